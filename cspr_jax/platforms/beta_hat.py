@@ -12,7 +12,7 @@ from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.wrench_balance import determinant_share, is_regular
 
-# Beyond this nothing was ever gained, docs/theory.md.
+# Larger values of beta-hat have never gained anything, docs/theory.md.
 LARGEST = 12.0
 OPTIONS = 11
 # Poses that are computed in one call.
@@ -29,12 +29,12 @@ def options(preferred: np.ndarray, lowest: np.ndarray, highest: np.ndarray, coun
 
     Args:
         preferred: (n,) beta-hat of (3.91).
-        lowest: (n,) of (3.92).
-        highest: (n,) of (3.92).
+        lowest: (n,) start of the interval (3.92).
+        highest: (n,) end of the interval (3.92).
         count: how many values in all.
 
     Returns:
-        (n, count) NaN in place of a value; all of a row if none keeps every cable taut.
+        (n, count) values; NaN for missing ones, a whole row where no value keeps every cable taut.
     """
     preferred, lowest, highest = (np.asarray(x, float) for x in (preferred, lowest, highest))
     low, high = np.maximum(lowest, -LARGEST)[:, None], np.minimum(highest, LARGEST)[:, None]
@@ -48,8 +48,8 @@ def options(preferred: np.ndarray, lowest: np.ndarray, highest: np.ndarray, coun
 
 @jax.jit
 def _ends(robot: PlatformRobot, poses) -> tuple[jax.Array, ...]:
-    # Return for each pose (3.91), the interval (3.92), the determinant over that at the same depth in the middle, and
-    # the depth.
+    # Return for each pose (3.91), the interval (3.92), the determinant over its value at the same depth in the middle,
+    # and the depth.
     def one(position, quaternion, z0):
         end, depth = endpoint(robot, position, quaternion, z0), plane_normal(robot) @ position
         share = determinant_share(robot, position, rotations.matrix(quaternion))
@@ -81,13 +81,16 @@ def end_options(
 
 
 def cheapest_path(costs: list[np.ndarray]) -> list[int]:
-    """The options along a sequence whose segments cost least in sum; among equals those tried first.
+    """Choose an option for each pose of a sequence, so that the segments cost least in sum.
+
+    Among equal sums the options that are tried first win; where no path is feasible, the path with the fewest
+    infeasible segments.
 
     Args:
         costs: of each segment, (n_options_at_start, n_options_at_end); inf where it is infeasible.
 
     Returns:
-        the option of each pose. Where no path is feasible, the one with the fewest infeasible segments.
+        the option of each pose.
     """
     # An infeasible segment costs more than everything else together.
     finite = [c[np.isfinite(c)] for c in costs]

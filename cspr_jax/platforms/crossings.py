@@ -1,4 +1,4 @@
-"""Cables between samples: followed in steps that are halved until they turn little."""
+"""Cables between samples: steps are halved until cables turn little within each."""
 
 from collections.abc import Callable
 
@@ -7,7 +7,7 @@ import numpy as np
 from cspr_jax.robots.interference import cables_cross, platform_hit
 
 HALVINGS = 12
-# Steps between which a gap or a cable turns by more than this angle are to be halved.
+# Steps in which the cosine of the angle by which a gap or a cable turns is below this are halved.
 LEAST_COSINE = 0.8
 
 CableVectors = tuple[np.ndarray, np.ndarray]  # between cables (k, n_pairs, 3), along cables (k, n_cables, 3)
@@ -20,17 +20,17 @@ def passed_over(
     ends: tuple[np.ndarray, np.ndarray],
     count: int,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Motions in whose steps cables cross, and those in which one passes over the platform.
+    """Motions in whose steps cables cross, and motions in whose steps a cable passes over the platform.
 
     Args:
-        cable_vectors: of motions (k,) at instants (k,).
-        platform: sides (n_cables, 2, 3) and normal (3,) of `interference.Contacts`; None: it is not looked at.
-        row: (k,) whose step it is.
-        ends: (k,) instants before and after each.
-        count: n, of motions.
+        cable_vectors: gives the vectors of motions (k,) at instants (k,).
+        platform: sides (n_cables, 2, 3) and normal (3,) of `interference.Contacts`; None: the platform is left out.
+        row: (k,) motion that each step belongs to.
+        ends: (k,) instants at the start and at the end of each step.
+        count: number n of motions.
 
     Returns:
-        (n,) each.
+        masks (n,).
     """
     met, hit = (np.zeros(count, bool) for _ in range(2))
     if not len(row):

@@ -30,18 +30,18 @@ from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.wrench_lanes import CABLES
 
-# Cables are nearest between their ends, and are not parallel, by so much.
+# Cables count as nearest between their ends, and as not parallel, only beyond these tolerances.
 INSIDE, PARALLEL = 1e-6, 1e-6
-# Parts of an arc that are looked at first; larger ones are hardly ever enough.
+# Number of blocks of an arc to begin with; larger blocks are hardly ever enough.
 PARTS = 32
-# Radius of discs in complex time by which changes of accelerations are bounded, over that in which a phase of the
-# oscillation turns by 1.
+# Radius of the discs in complex time on which changes of accelerations are bounded, over the time in which the phase of
+# the oscillation changes by 1 rad.
 RADIUS = 0.4
 
 
 class _Moving(NamedTuple):
-    # State in the middles of n blocks, fixed axes and normalised time, and bounds: on the blocks, and on discs about
-    # all of their instants.
+    # State in the middles of n blocks, in fixed axes and normalised time; bounds on the blocks (`near`), and on discs
+    # about all of their instants (`wide`).
     here: StateLanes
     squared: Array
     near: Reach
@@ -75,7 +75,7 @@ def _contacts(platform, points: Array, rays: Array, *, pairs: tuple) -> tuple[Ar
 
 
 class _Middle(NamedTuple):
-    # In the middles of k blocks, platform axes and time: rays, their rates (what turns with the platform stands still),
+    # Values in the middles of k blocks, in platform axes and time: rays, their rates as the platform sees them,
     # velocity and acceleration of the attachment points (k, 6, 3); force, moment (k, 3) and whirl (k, 3, 3) per mass.
     rays: np.ndarray
     pace: np.ndarray
@@ -87,9 +87,9 @@ class _Middle(NamedTuple):
 
 
 class _Within(NamedTuple):
-    # Ways that the tangents of the rays lead to the stops of k blocks (k, 6, 3), and bounds of changes within these
-    # blocks: of velocities and accelerations of the attachment points, of the deviations of rays from their tangents,
-    # of rays (k, 6), of force and whirl (k,).
+    # Changes of the rays along their tangents up to the stops of k blocks (k, 6, 3), and bounds of changes within these
+    # blocks: of velocities and accelerations of the attachment points, of rays from their tangents, of rays (k, 6), of
+    # force and whirl (k,).
     way: np.ndarray
     velocity: np.ndarray
     acceleration: np.ndarray
@@ -165,7 +165,7 @@ def _within(robot: PlatformRobot, middle: _Middle, moving: _Moving, half: np.nda
 
 
 class _Columns:
-    # Columns of `Distances`.
+    # Columns of `Distances`, which are added one by one.
 
     def __init__(self, count: int) -> None:
         self._count, self._columns = count, list[tuple]()
@@ -198,7 +198,7 @@ def _distances(problem: Problem, pairs: tuple, middle: _Middle, within: _Within,
 
 
 def _add_gap(columns: _Columns, gaps, places, middle: _Middle, within: _Within, tips: np.ndarray, pair) -> None:
-    # The distance of two cables, by the four pairs of their ends: seen from the platform the spools alone move.
+    # Add the distance of two cables, by the four pairs of their ends: seen from the platform only the spools move.
     i, j = pair
     e, gap = unit_vectors(gaps), np.linalg.norm(gaps, axis=1)
     tilt = _tilted(middle.rays[:, i], middle.rays[:, j], places)
@@ -213,8 +213,8 @@ def _add_gap(columns: _Columns, gaps, places, middle: _Middle, within: _Within, 
 
 
 def _tilted(first: np.ndarray, last: np.ndarray, places: np.ndarray) -> np.ndarray:
-    # Vectors that grow by 1 along each cable towards its spool, as displacements do, where the cables are nearest
-    # between their ends; both are normal to the shortest vector there.
+    # Return vectors that grow by 1 along each cable towards its spool, as displacements do, where the cables are
+    # nearest between their ends; there both cables are normal to the shortest vector.
     ways = np.stack([first, -last], axis=1)
     inner = (places > INSIDE) & (places < 1.0 - INSIDE)
     gram = np.einsum("kia,kja->kij", ways, ways) * inner[:, :, None] * inner[:, None] + np.eye(2) * ~inner[:, None]
@@ -231,13 +231,13 @@ class Robustness:
     Args:
         problem: robot, limits with an uncertainty, amplitude.
         batch: how many blocks are computed at a time.
-        count_instants: is told how many were looked at.
+        count_instants: called with the number of instants that were looked at.
     """
 
     def __init__(
         self, problem: Problem, kind: PlatformMotionKind, *, batch: int, count_instants: Callable[[int], None]
     ) -> None:
-        """Find what can meet."""
+        """Find which cables can meet each other or the platform."""
         self._problem, self._kind, self._batch = problem, kind, batch
         near = contacts(problem.robot)
         self._pairs = tuple((int(i), int(j)) for i, j in near.pairs)

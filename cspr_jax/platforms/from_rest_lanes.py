@@ -1,9 +1,9 @@
 """Transitions of a platform from rest, one lane a segment: the fewest operations that give a state.
 
-Such a motion is a straight swing and a rotation about one axis. What depends on the number of arcs and on the instant
-is a table: position and acceleration are one number each times a vector of the segment, and angle, angular speed and
-angular acceleration are linear in the two values of beta-hat. The mechanics are those
-of `platform_segment_lanes` (tests compare them).
+Such a motion is a straight swing and a rotation about one axis. All that depends on the number of arcs and on the
+instant is in a table: position and acceleration are one number each times a vector of the segment, and angle, angular
+speed and angular acceleration are linear in the two values of beta-hat. The mechanics are the same as in
+`platform_segment_lanes` (tests compare them).
 """
 
 import math
@@ -24,7 +24,7 @@ class Swings(NamedTuple):
 
     Fields:
         hub: the point p0, m.
-        reach: from p0 to the end, along the first arc; m.
+        reach: vector from p0 to the end, along the first arc; m.
         axis: unit vector of the rotation.
         angle: whole angle of the envelope, in half turns; (n,).
         start_beta_hat: beta-hat in p0, (n,).
@@ -81,15 +81,16 @@ def swings(segments: PlatformSegment) -> Swings:
 
 
 def rest_table(amplitude: Amplitude, arcs: Array, tau: Array, kind: PlatformMotionKind) -> Array:
-    """Table that segments from rest of one number of arcs share.
+    """Table that all segments from rest of one number of arcs share.
 
     Args:
         arcs: () number of arcs, a float.
         tau: (m,) instants.
 
     Returns:
-        (m, 11): position and acceleration; angle, speed and acceleration of the rotation, of each what is constant and
-        what multiplies beta-hat in p0 and at the end. In units of the phase pi p tau; angles in half turns.
+        (m, 11): position and acceleration; then of angle, speed and acceleration of the rotation each the constant
+        term and the factors of beta-hat in p0 and at the end. Derivatives are by the phase pi p tau; angles are in half
+        turns.
     """
     theta = math.pi * arcs
     a, a1, a2, a3 = (x / theta**k for k, x in enumerate(derivatives(amplitude, tau, order=3)))
@@ -108,13 +109,13 @@ def rest_table(amplitude: Amplitude, arcs: Array, tau: Array, kind: PlatformMoti
 
 
 def _plain(sine: Array, cosine: Array) -> list[tuple[Array, ...]]:
-    # beta_1 of (3.66) and its derivatives.
+    # Return beta_1 of (3.66) and its derivatives, and zeros for the factors of beta-hat.
     nothing = jnp.zeros_like(sine)
     return [(cosine, -sine, -cosine), (nothing,) * 3, (nothing,) * 3]
 
 
 def _with_beta_hats(sine: Array, cosine: Array, tau: Array, theta: Array) -> list[tuple[Array, ...]]:
-    # beta_ff of (3.93): (9 c - c3) / 8 + h (c - c3) / 8, where h goes from one beta-hat to the other.
+    # Return beta_ff of (3.93), (9 c - c3) / 8 + h (c - c3) / 8, where h goes from one beta-hat to the other.
     sine3, cosine3 = sine * (3.0 - 4.0 * sine * sine), cosine * (4.0 * cosine * cosine - 3.0)
     steady = ((9.0 * cosine - cosine3) / 8.0, (3.0 * sine3 - 9.0 * sine) / 8.0, 9.0 * (cosine3 - cosine) / 8.0)
     c, c1, c2 = (cosine - cosine3) / 8.0, (3.0 * sine3 - sine) / 8.0, (9.0 * cosine3 - cosine) / 8.0

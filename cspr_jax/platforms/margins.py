@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Parabolas follow one another, each through points so much nearer; a value that spreads less is not narrowed.
+# Number of parabolas that follow one another, how much nearer the points of each are, and the spread of values below
+# which they are not narrowed down.
 ROUNDS, NEARER, LEVEL = 5, 3.0, 1e-9
 
 
@@ -14,7 +15,7 @@ class Samples(NamedTuple):
 
     Fields:
         criteria: (n_values,) their numbers.
-        row: (k,) whose block it is.
+        row: (k,) motion of each block.
         tau: (m, k) instants, increasing.
         values: (m, n_values, k).
     """
@@ -28,10 +29,10 @@ class Samples(NamedTuple):
 def narrowed(
     values_at: Callable[[np.ndarray, np.ndarray], np.ndarray], least: np.ndarray, samples: Samples, selected: np.ndarray
 ) -> None:
-    """Put smallest values around samples into what is known.
+    """Narrow down the smallest values around samples.
 
     Args:
-        values_at: of motions (j,) at instants (j,), (n_criteria, j).
+        values_at: gives the values (n_criteria, j) of motions (j,) at instants (j,).
         least: (n_criteria, n) smallest values so far; written into.
         selected: (n,) mask of the motions that are looked at.
     """
@@ -57,7 +58,7 @@ def low_points(samples: Samples, selected: np.ndarray) -> tuple[np.ndarray, ...]
         selected: (n,) mask of the motions that are looked at.
 
     Returns:
-        which of the m, of the n_values and of the k, (j,) each.
+        indices of the samples along the axes of `Samples.values`, (j,) each.
     """
     values, row = samples.values, samples.row
     smallest = np.full((values.shape[1], len(selected)), np.inf)
@@ -79,7 +80,7 @@ def low_points(samples: Samples, selected: np.ndarray) -> tuple[np.ndarray, ...]
 
 
 def _values(values_at: Callable, least: np.ndarray, row: np.ndarray, points: np.ndarray, criterion: np.ndarray):
-    # Return values (j, m) of each candidate's own criterion; all criteria learn from the points.
+    # Return values (j, m) of each candidate's own criterion; the smallest values of all criteria are lowered.
     count = points.shape[1]
     rows = np.repeat(row, count)
     attained = values_at(rows, points.ravel())

@@ -1,4 +1,4 @@
-"""Many motions of a platform, and some of them."""
+"""Many motions of a platform, and rows chosen from them."""
 
 from typing import NamedTuple
 
@@ -16,9 +16,9 @@ def rows(segments: PlatformSegment, index: np.ndarray) -> PlatformSegment:
         index: indices, or (n,) a mask.
 
     Returns:
-        leaves (m, ...), NumPy's, whichever the given ones are.
+        leaves (m, ...), always NumPy arrays.
     """
-    # Four times as fast as by an index, where a leaf is no vector.
+    # `take` is four times as fast as an index where a leaf is no vector.
     index = np.flatnonzero(index) if np.asarray(index).dtype == bool else index
     return jax.tree.map(lambda x: np.asarray(x).take(index, axis=0), segments)
 
@@ -28,7 +28,7 @@ class Motions(NamedTuple):
 
     Fields:
         segments: leaves (n, ...), of the parity of `arcs`.
-        arcs: (n,) how many each has.
+        arcs: (n,) number of arcs of each.
     """
 
     segments: PlatformSegment

@@ -17,8 +17,8 @@ from jax import Array
 from cspr_jax.arithmetic import rotations
 from cspr_jax.arithmetic.elementary import length, polynomial, sincospi
 
-# Below these, series stand for quotients that would cancel: of 1 - s for arccos(s) / sqrt(1 - s^2), of the square of
-# an angle for sin(r) / r.
+# Series replace quotients whose numerators would cancel: arccos(s) / sqrt(1 - s^2) where 1 - s is below the first of
+# these numbers, sin(r) / r where r^2 is below the other.
 _NEAR, _NEAR_TERMS = 0.1, 16
 _LOG = [float(c) for c in np.cumprod([1.0, *((k + 1.0) / (2.0 * k + 3.0) for k in range(_NEAR_TERMS + 1))])]
 _SMALL, _SERIES = 0.5, 12
@@ -27,11 +27,12 @@ _STILL = 1e-12
 
 
 class Slerp(NamedTuple):
-    """Rotation from one pose to another, for one parity of the number of arcs.
+    """Oscillating SLERP from one pose to another, for one parity of the number of arcs.
 
     Fields:
         start: (4,) q_1.
-        across: (4,) unit quaternion at a right angle to q_1 toward the envelope's end; zero if it does not turn.
+        across: (4,) unit quaternion at a right angle to q_1 towards the end of the envelope; zero if the envelope does
+            not turn.
         angle: () Theta_env of (3.60), rad.
         start_beta_hat: () beta-hat of the first pose, (3.81).
         end_beta_hat: () of the last.
@@ -46,7 +47,7 @@ class Slerp(NamedTuple):
 
 @jax.jit
 def slerp_between(start: Array, end: Array, start_beta_hat: Array, end_beta_hat: Array, *, odd: Array) -> Slerp:
-    """Oscillating SLERP between two orientations.
+    """Parameters of the oscillating SLERP between two orientations.
 
     Args:
         start: (4,) unit quaternion.
@@ -56,7 +57,7 @@ def slerp_between(start: Array, end: Array, start_beta_hat: Array, end_beta_hat:
         odd: () whether the number of arcs is odd.
 
     Returns:
-        its parameters.
+        the parameters.
     """
     first, last = rotations.upper(start), rotations.upper(end)
     last = jnp.where(odd, rotations.conjugate(last), last)  # (3.58)
@@ -65,7 +66,7 @@ def slerp_between(start: Array, end: Array, start_beta_hat: Array, end_beta_hat:
     beside = beside - first * jnp.dot(first, beside)
     size = length(beside)
     angle = jnp.arctan2(size, along)
-    # Opposite ends, both half a turn from the reference orientation: the envelope goes through that one.
+    # Opposite ends are both half a turn from the reference orientation: the envelope goes through the latter.
     identity = jnp.zeros_like(first).at[0].set(1.0)
     is_opposite = (size < _STILL) & (along < 0.0)
     across = jnp.where(size < _STILL, 0.0, beside / jnp.where(size < _STILL, 1.0, size))
@@ -78,12 +79,12 @@ def beat(
 ) -> tuple[Array, Array, Array]:
     """beta_ff of (3.93) and its first two derivatives in tau.
 
-    It is linear in beta-hat, so that the mean of two beta_f is the beta_f of the mean beta-hat. That of -1 / share is
-    beta_1 of (3.66), and 0 is beta_0 of (3.67).
+    The function is linear in beta-hat, so that the mean of two beta_f is the beta_f of the mean beta-hat. With a
+    beta-hat of -1 / share it is beta_1 of (3.66), with 0 beta_0 of (3.67).
 
     Args:
         start_beta_hat: () beta-hat of the first pose.
-        end_beta_hat: () of the last.
+        end_beta_hat: () beta-hat of the last pose.
         share: () theta_h^2 (n_h - 1) / (pi p)^2.
         arcs: () number of arcs p, a float.
         tau: () normalised time.
@@ -127,7 +128,8 @@ def orientation(
 
 
 def _half_vector(slerp: Slerp, amplitude_values: tuple[Array, ...]) -> tuple[Array, Array, Array]:
-    # Half of the rotation vector of the envelope, and its derivatives: the envelope turns in a plane of quaternions.
+    # Return half of the rotation vector of the envelope and its derivatives; the quaternions of the envelope lie in a
+    # plane.
     a, a1, a2 = amplitude_values[:3]
     sine, cosine = sincospi(slerp.angle * a / math.pi)
     rate, bend = slerp.angle * a1, slerp.angle * a2
@@ -140,7 +142,7 @@ def _half_vector(slerp: Slerp, amplitude_values: tuple[Array, ...]) -> tuple[Arr
 
 
 def _angle_ratio(s: Array, v: Array) -> tuple[Array, Array, Array]:
-    # W = arccos(s) / sqrt(1 - s^2), with |v|^2 = 1 - s^2, and its first two derivatives in s.
+    # Return W = arccos(s) / sqrt(1 - s^2), where |v|^2 = 1 - s^2, and its first two derivatives in s.
     x = 1.0 - s
     is_near = x < _NEAR
     square = jnp.where(is_near, 1.0, jnp.dot(v, v))
@@ -158,7 +160,7 @@ def _angle_ratio(s: Array, v: Array) -> tuple[Array, Array, Array]:
 
 
 def _exponential(u: Array, u1: Array, u2: Array) -> tuple[Array, Array, Array]:
-    # (cos |u|, u sin |u| / |u|) and its derivatives, with y = |u|^2.
+    # Return the quaternion (cos |u|, u sin |u| / |u|) and its derivatives, with y = |u|^2.
     y, y1, y2 = jnp.dot(u, u), 2.0 * jnp.dot(u, u1), 2.0 * (jnp.dot(u1, u1) + jnp.dot(u, u2))
     cosine, s, s1, s2 = _sinc(y)
     q = jnp.concatenate([cosine[None], u * s])
@@ -168,7 +170,7 @@ def _exponential(u: Array, u1: Array, u2: Array) -> tuple[Array, Array, Array]:
 
 
 def _sinc(y: Array) -> tuple[Array, Array, Array, Array]:
-    # cos r, sin r / r and its first two derivatives in y = r^2.
+    # Return cos r, sin r / r, and the first two derivatives of the latter in y = r^2.
     is_small = y < _SMALL
     large = jnp.where(is_small, 1.0, y)
     r = jnp.sqrt(large)

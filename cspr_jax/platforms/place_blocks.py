@@ -1,9 +1,10 @@
-"""Bounds of what depends on a platform's pose alone on blocks of its motions: contacts, depth, limits on the pose.
+"""Bounds of contacts, depth and limits on the pose, which depend on the pose alone, on blocks of a platform's motions.
 
-Two cables are apart where some unit vector e has e . (x_j - x_i) > 0 for all points x of both: linear in the points, so
-that their ends are enough. A cable is off the platform where its vector v from its corner, in platform axes, has
-e . v > 0 for a unit vector e of the polar cone of the corner's sector. Any e is valid on a whole block; that of its
-middle is taken, the shortest vector between the cables, and the residual of the projection onto the sector (Moreau).
+Two cables are apart where some unit vector e has e . (x_j - x_i) > 0 for all points x of both: this is linear in the
+points, so that the ends of the cables are enough. A cable is off the platform where its vector v from its corner, in
+platform axes, has e . v > 0 for a unit vector e of the polar cone of the corner's sector. Any e is valid on a whole
+block. The e of the middle is taken: along the shortest vector between the cables, or along the residual of the
+projection of the cable onto the sector (Moreau).
 Between instants h apart a function f with |f''| <= C stays above its smaller end less C h^2 / 8.
 """
 
@@ -29,7 +30,7 @@ from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.wrench_lanes import CABLES, CableLanes, cable_lanes
 from cspr_jax.schema.limits import Limit
 
-# Steps of a block, and the instants between them.
+# Steps of a block, and the instants at their ends.
 STEPS = 4
 PLACES = np.linspace(-1.0, 1.0, STEPS + 1)
 # Lengths and heights may be wrong by this part of the size of coordinates.
@@ -41,14 +42,14 @@ class PlaceBounds(NamedTuple):
     """Bounds and attained values of n blocks.
 
     Fields:
-        clear: (n,) lower bound of the distance between cables that can meet, and of that of the cables from the sectors
-            of their corners, m.
+        clear: (n,) lower bound of the distances between cables that can meet, and of the distances of cables from the
+            sectors of their corners, m.
         slacks: (n_criteria, n) lower bounds of the depth below the spools and of the limits on the pose.
         nodes: (n_instants, n_criteria + 1, n) attained slacks at instants a step apart; the smallest distance between
-            cables, m. Where no margins are wanted, the least of each: (1, n_criteria + 1, n).
-        place: (n,) where the smallest of the least slacks is, from -1 to 1; 0 where margins are wanted.
-        bends: (3, n) what may be missed between two instants, C h^2 / 8: of the mass centre, m; of a point of the
-            platform beside it, over its distance; of vectors as the platform sees them, m.
+            cables, m. Without margins the least of each: (1, n_criteria + 1, n).
+        place: (n,) place of the smallest of the least slacks, from -1 to 1; 0 with margins.
+        bends: (3, n) C h^2 / 8, by which motions between two instants may depart from the chord: of the mass centre, m;
+            of a point of the platform beside it, over its distance; of vectors as the platform sees them, m.
     """
 
     clear: Array
@@ -59,21 +60,21 @@ class PlaceBounds(NamedTuple):
 
 
 class _Bends(NamedTuple):
-    # Amounts (n,) that second derivatives take off between two instants, m: of the centre, of a unit arm, of unit
-    # vectors seen from the platform.
+    # Departures (n,) from the chord between two instants, C h^2 / 8: of the centre, m; of an arm of unit length; of
+    # vectors seen from the platform, m.
     centre: Array
     arm: Array
     seen: Array
 
 
 def of_pose(problem: Problem) -> list[Limit]:
-    """Limits on the pose that are given.
+    """Rows of the limits on the pose that are set.
 
     Args:
         problem: robot, limits.
 
     Returns:
-        their rows.
+        the rows.
     """
     return [row for row in limits_set(problem.limits) if not row.of_motion]
 
@@ -90,7 +91,7 @@ def place_blocks(
         one: () the number 1; see `arithmetic.lanes.stored`.
         items: segments (leaves (n, ...)), arcs (n,), and where blocks start (n,) and stop (n,), with no knot inside.
         pairs: of cables that can meet.
-        margins: whether all instants and distances between cables are wanted; else these are infinite.
+        margins: whether to return the values at all instants, and distances between cables; else these are infinite.
 
     Returns:
         the bounds.
@@ -124,7 +125,7 @@ def place_blocks(
         if margins and pairs:
             squares = [dot(x, x) for x in interference_lanes.gaps(problem.robot.base_points, pairs, cables)]
             values.append(jnp.sqrt(smallest(squares)))
-        # Pack two real numbers into one complex number: two numbers a loop.
+        # Pack two real numbers into one complex number, so that one loop computes both.
         return lax.complex(clear, values[0]), *values[1:]
 
     first, *others = lax.map(on, PLACES)
@@ -147,8 +148,9 @@ def place_blocks(
 
 
 def _separators(robot: PlatformRobot, platform, pairs: tuple, middle, one: Array) -> tuple[list[Vector], list[Vector]]:
-    # Find unit vectors between cables, one a pair, and off sectors, one a cable, by position and turn in the middle.
-    # All pairs, or cables, go at a time: components (m, n), lanes last, which XLA writes with vectors, in little code.
+    # Find unit vectors between cables, one a pair, and away from sectors, one a cable, by the pose in the middle. All
+    # pairs, or cables, are computed at a time, components (m, n) with lanes last: XLA then uses vectors, in little
+    # code.
     position, rotation = ([x[None] for x in middle[0]], [[x[None] for x in row] for row in middle[1]])
     points, base = ([x[:, k, None] for k in range(3)] for x in (robot.platform_points, robot.base_points))
     rays = stored([position[k] + dot(rotation[k], points) - base[k] for k in range(3)], one)
@@ -164,7 +166,7 @@ def _separators(robot: PlatformRobot, platform, pairs: tuple, middle, one: Array
 
 
 def _units(vectors: Vector) -> list[Vector]:
-    # Unit vectors along vectors with components (m, n), one after the other.
+    # Return m unit vectors along vectors with components (m, n).
     scale = 1.0 / jnp.sqrt(jnp.maximum(dot(vectors, vectors), TINY))
     columns = [x * scale for x in vectors]
     return [tuple(x[k] for x in columns) for k in range(columns[0].shape[0])]
@@ -205,8 +207,8 @@ def _slacks(problem: Problem, segments: PlatformSegment, here: StateLanes, cable
 
 
 def _steps(problem: Problem, segments: PlatformSegment, bends: _Bends) -> list[Array]:
-    # Bound how far these slacks may fall below their values at two instants; a length is convex along the chord of its
-    # ray.
+    # Bound how far the slacks of `_slacks` may fall below their values at two instants; a length is convex along the
+    # chord of its ray.
     robot, z0 = problem.robot, problem.robot.gravity / segments.rate
     steps = [jnp.sqrt(jnp.sum(plane_normal(robot) ** 2)) * bends.centre / z0]
     factor, size = scales(CABLES, robot.mass * robot.gravity, z0)["depth"]

@@ -45,7 +45,7 @@ class PlatformSegment:
         rate: () lambda of (3.50), 1/s^2.
         slerp: of the orientation.
         regular: () determinant (`wrench_balance.normalised_determinant`) at rest in P0, whose sign must not change; 1
-            of a robot on more cables, which has none.
+            for a robot on more than six cables, which has no determinant.
     """
 
     plane: Array
@@ -79,7 +79,7 @@ def pose_segment(
         odd: () whether the number of arcs is odd.
 
     Returns:
-        the segment for arcs of that parity.
+        the segment for numbers of arcs of that parity.
     """
     hub = rest_point(z0)
     upright = jnp.zeros_like(hub).at[2].set(1.0)
@@ -106,7 +106,7 @@ def duration(segment: PlatformSegment, arcs: Array) -> Array:
 
 
 def _share(segment: PlatformSegment, arcs: Array) -> Array:
-    # theta_h^2 (n_h - 1) over (pi p)^2; 1 - ratio is what vanishes for p = 1 and psi -> 0.
+    # Return theta_h^2 (n_h - 1) over (pi p)^2. For p = 1 and psi -> 0 the factor 1 - ratio vanishes.
     ratio = segment.precession / arcs
     return (1.0 - ratio) * (1.0 + ratio)
 
@@ -124,7 +124,7 @@ def motion(
         tau: () normalised time in [0, 1].
 
     Returns:
-        the state, in time.
+        the state, derivatives by time.
     """
     values = derivatives(amplitude, tau, order=3)
     time = duration(segment, arcs)
@@ -169,7 +169,7 @@ def _quaternions(
 def _swing(
     segment: PlatformSegment, values: tuple[Array, ...], arcs: Array, tau: Array, *, variable: bool
 ) -> tuple[Array, Array, Array]:
-    # c, c' and c'' in the plane, derivatives in tau.
+    # Return c, c' and c'' in the plane of the segment, derivatives by tau.
     span = segment.end_radius - segment.start_radius
     r, r1, r2, r3 = segment.start_radius + span * values[0], span * values[1], span * values[2], span * values[3]
     omega, nu = segment.sense * math.pi * arcs, segment.precession / arcs

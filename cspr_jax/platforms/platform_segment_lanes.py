@@ -1,7 +1,7 @@
 """The state of many platforms on their way, one lane a segment: the fast form of `platform_segment.motion`.
 
-The same mechanics (tests compare them), written for numbers instead of small vectors. A transition from rest needs
-neither an ellipse nor a quaternion: it is a straight swing, and a rotation about one axis.
+The mechanics are the same (tests compare both forms), written for numbers instead of small vectors. A transition from
+rest needs neither an ellipse nor a quaternion: it is a straight swing and a rotation about one axis.
 """
 
 import math
@@ -19,17 +19,17 @@ from cspr_jax.motions.amplitudes import Amplitude, derivatives
 from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.platforms.platform_segment import PlatformSegment
 
-# Degree of Chebyshev fits on s in [0, 1] of W = arccos(s) / sqrt(1 - s^2) and of its derivatives, one each: accurate to
-# 2e-15. A derivative of the fit of W would be wrong by 3e-10.
+# Degree of the Chebyshev fits, on s in [0, 1], of W = arccos(s) / sqrt(1 - s^2) and of each of its derivatives; they
+# are accurate to 2e-15. The derivative of the fit of W would be wrong by 3e-10.
 _DEGREE = 22
 
 
 class InstantLanes(NamedTuple):
-    """Normalised time, and what depends on it and on the number of arcs alone: () or (n,) each.
+    """Normalised time, and quantities that depend on it and on the number of arcs alone: () or (n,) each.
 
     Fields:
         tau: normalised time.
-        a: A, then its derivatives.
+        a: value A of the amplitude function.
         a1: A'.
         a2: A''.
         a3: A'''.
@@ -105,8 +105,8 @@ def state(
     Args:
         segment: leaves (n, ...), of the parity of `arcs`.
         arcs: () or (n,) number of arcs, a float.
-        one: () the number 1 as an argument of what is compiled, where the sine and cosine of a turn about one axis are
-            to be stored; see `arithmetic.lanes.stored`.
+        one: () the number 1 as an argument of the compiled function, where the sine and cosine of a rotation about one
+            axis are to be stored; see `arithmetic.lanes.stored`.
 
     Returns:
         the state.
@@ -210,7 +210,7 @@ _RATIO = _angle_ratio_coefficients()
 def _half_vector(
     segment: PlatformSegment, instant: InstantLanes, beats: tuple[Array, ...]
 ) -> tuple[Vector, Vector, Vector]:
-    # Half of the rotation vector and its derivatives, as in `oscillating_slerp`.
+    # Return half of the rotation vector and its derivatives, as in `oscillating_slerp`.
     slerp, (beta, beta1, beta2) = segment.slerp, beats
     sine, cosine = sincospi(slerp.angle * instant.a / math.pi)
     rate, bend = slerp.angle * instant.a1, slerp.angle * instant.a2
@@ -229,7 +229,7 @@ def _half_vector(
 
 
 def _exponential(v: Vector, v1: Vector, v2: Vector) -> tuple[Matrix, Vector, Vector]:
-    # Rotation matrix, angular velocity and acceleration from half of the rotation vector.
+    # Return the rotation matrix, angular velocity and angular acceleration from half of the rotation vector.
     y, y1, y2 = dot(v, v), 2.0 * dot(v, v1), 2.0 * (dot(v1, v1) + dot(v, v2))
     root = jnp.sqrt(jnp.maximum(y, 1e-24))
     sine, cosine = sincospi(root / math.pi)
@@ -244,7 +244,7 @@ def _exponential(v: Vector, v1: Vector, v2: Vector) -> tuple[Matrix, Vector, Vec
     q, q1 = (cosine, *combined([(s, v)])), (-0.5 * s * y1, *combined([(s, v1), (s1 * y1, v)]))
     q2 = (-0.5 * (s1 * y1 * y1 + s * y2), *combined([(s, v2), (2.0 * s1 * y1, v1), (s2 * y1 * y1 + s1 * y2, v)]))
 
-    def vector_part(left):  # of left times the conjugate of q, twice
+    def vector_part(left):  # twice the vector part of left times the conjugate of q
         across = cross(left[1:], q[1:])
         return tuple(2.0 * (q[0] * left[i + 1] - left[0] * q[i + 1] - across[i]) for i in range(3))
 

@@ -1,4 +1,4 @@
-"""The slacks of `pose_slacks` for many platforms, one lane a case, and their part that the first look needs."""
+"""The slacks of `slacks.pose_slacks` for many platforms, one lane a case, and the part of them that the sieve needs."""
 
 import jax.numpy as jnp
 from jax import Array
@@ -24,8 +24,8 @@ from cspr_jax.robots.wrench_lanes import (
 )
 from cspr_jax.schema.limits import Limit
 
-# The volume of three of the cables over the product of their lengths below which no tension is told: they are nearly in
-# one plane, and the rounding of the fast balance grows with the third power of the inverse. It must refute nothing.
+# No tension is given below this volume of three of the cables over the product of their lengths: they lie nearly in one
+# plane, and the rounding of the fast balance grows with the third power of the inverse volume. It must refute nothing.
 FLAT = 1e-3
 
 
@@ -97,8 +97,8 @@ def moving_slacks(
         arcs: () or (n,) number of arcs, a float.
 
     Returns:
-        (n,) each: the taut cables', then those of limits on the motion; infinite where the fast balance has too few
-        digits.
+        (n,) each: the slack of taut cables, then the slacks of limits on the motion; infinite where the fast balance
+        has too few digits.
     """
     robot, limits = problem.robot, problem.limits
     here, squared = state(segment, arcs, instant, kind), squared_duration(segment, arcs)
@@ -130,7 +130,7 @@ def still_slacks(problem: Problem, segment: PlatformSegment, here: StateLanes, c
         segment: leaves (n, ...).
 
     Returns:
-        (n,) each: regular, below the spools, then those of limits on the pose.
+        (n,) each: regular, below the spools, then the slacks of limits on the pose.
     """
     robot, limits, z0 = problem.robot, problem.limits, problem.robot.gravity / segment.rate
     normal = plane_normal(robot)
@@ -146,7 +146,7 @@ def _limit_rows(limits: Limits, *, of_motion: bool) -> list[Limit]:
 
 
 def _least(row: Limit, limits: Limits, each: list[Array], scale) -> Array:
-    # Smallest slack of a limit, of a quantity of each cable or of one alone.
+    # Return the smallest slack of a limit on a quantity of each cable, or on a single quantity.
     limit = getattr(limits, row.name)
     bounds = [limit[k] for k in range(len(each))] if row.per_cable else [limit]
     return smallest([slack(row, x, value, scale) for x, value in zip(bounds, each, strict=True)])
