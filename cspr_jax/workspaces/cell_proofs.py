@@ -1,4 +1,4 @@
-"""Proofs of cells at one orientation: which keep their tensions, or lack them, at every position; without halving."""
+"""Proofs of cells at one orientation, without halving: that they lie wholly inside a workspace, or wholly outside."""
 
 import numpy as np
 
@@ -16,10 +16,10 @@ from cspr_jax.workspaces.questions import CLOSURE
 from cspr_jax.workspaces.search import WorkspaceSearch
 from cspr_jax.workspaces.worst_cocircuits import worst_cocircuits
 
-# Cells that are proved at a time, whose arrays fit a cache, and poses whose cocircuits are compared at a time.
+# Cells that are proved at a time, so that their arrays fit a cache; poses whose cocircuits are compared at a time.
 PART, BATCH = 256, 1024
-# Tensions at the centre keep this part of the margin there from their limits. At the whole margin nothing but one
-# point is left, which rounding can miss.
+# Tensions at the centre keep this part of the margin from their limits. At the whole margin only one point is left,
+# which rounding can miss.
 KEPT = 0.98
 
 
@@ -27,7 +27,7 @@ class CellProofs:
     """Proofs of cells at one orientation, without halving."""
 
     def __init__(self, robot: AnyRobot, search: WorkspaceSearch, quaternion: np.ndarray) -> None:
-        """Prepare the proofs of what the search of a robot without pulleys asks."""
+        """Prepare the proofs of the requirement of a search, for its robot, which has no pulleys."""
         self._requirement, self._is_closure = search.requirement, search.requirement.condition == CLOSURE
         self._unbounded = tuple(np.isinf(search.requirement.high).tolist())
         self._exits, self._forces = _geometry(robot, quaternion, search.unit)
@@ -58,14 +58,15 @@ class CellProofs:
             margin: (n,) at the centres, positive.
 
         Returns:
-            (n,) N: tensions keep so far from their limits at every position, or -inf; of wrench closure a number that
-            is positive where the closure of the whole cell is proved. Of ellipsoids of wrenches nothing is.
+            (n,) distance that tensions keep from their limits at every position, N, or -inf; for wrench closure a
+            number that is positive where closure is proved in the whole cell. For ellipsoids of wrenches nothing is
+            proved.
         """
         if not (self._is_finite or self._is_closure):
             return np.full(len(positions), -np.inf)
         units, count = self.matrices(positions), self._exits.shape[0]
         low, high, loads = self._requirement.low, self._requirement.high, self._wrenches
-        if self._is_closure:  # by any tensions that pull on nothing
+        if self._is_closure:  # tensions without a wrench
             low, high, loads = np.zeros(count), np.full(count, np.inf), np.zeros((1, units.shape[1]))
             room = np.ones((1, 1))
         else:
@@ -88,7 +89,7 @@ class CellProofs:
             half: (n, 3) half sizes, m.
 
         Returns:
-            (n,) whether it is proved.
+            (n,) whether this is proved.
         """
         low, high = self._requirement.low, self._requirement.high
         finite = np.where(self._unbounded, 0.0, high)

@@ -15,17 +15,17 @@ from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.workspaces import geometry
 
 BATCH = 4096
-# Numbers of `schema.meanings.NEAREST_BODIES`; a pose that has nothing to meet takes the last one.
+# Numbers of `schema.meanings.NEAREST_BODIES`; a pose with no body that could be met takes 0.
 KINDS = dict(zip(get_args(Kind), range(1, 5), strict=True))
 
 
 def surroundings(robot: AnyRobot, frame: Frame, obstacles: Sequence[Obstacle] = (), body: Body | None = None) -> Scene:
-    """A robot at rest among what its cables can meet.
+    """A robot at rest among the bodies that its cables can meet.
 
     Args:
         robot: centred, z down.
         frame: axes of the robot file.
-        obstacles: fixed in space, in the axes of the file.
+        obstacles: bodies fixed in space, in the axes of the file.
         body: shape of the platform, in platform axes as in the file, from the mass centre, or from the joint.
 
     Returns:
@@ -56,7 +56,7 @@ def at_rest(robot: AnyRobot, around: Scene, positions: np.ndarray, quaternions: 
 
 
 def flags(distances: Clearances) -> np.ndarray:
-    """Reasons why poses are not free of interference.
+    """Flags of the reasons why poses are not free of interference.
 
     Args:
         distances: of `at_rest`.
@@ -70,7 +70,7 @@ def flags(distances: Clearances) -> np.ndarray:
         (distances.obstacles, Verdict.OBSTACLE),
         (distances.platform, Verdict.CABLE_PLATFORM),
     ):
-        # NaN is open.
+        # NaN compares as false: such poses stay open.
         verdict |= np.where(values <= 0.0, flag, 0).astype(FLAGS)
     return np.where(distances.is_open, Verdict.UNDECIDED, verdict).astype(FLAGS)
 

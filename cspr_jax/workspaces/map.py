@@ -29,11 +29,11 @@ from cspr_jax.workspaces.search import WorkspaceSearch
 from cspr_jax.workspaces.speeds import CableSpeeds, cable_speeds
 
 INTERFERENCE = "interference-free"
-# Limits of poses at rest: others belong to motions.
+# Limits that apply to poses at rest; all others belong to motions.
 TENSIONS = ("tension_min", "tension_max")
 SPEED = "cable_speed_max"
 HELD = (*TENSIONS, "floor", "cable_length_max", SPEED)
-# Sets of orientations divide pi into this many parts where the file does not say.
+# Sets of orientations divide pi into this many parts unless the file says otherwise.
 DIVISIONS = 12
 
 
@@ -41,7 +41,7 @@ class WorkspaceMap(GridMap):
     """The workspace of a robot: of poses, or of places with sets of orientations; see `GridMap`."""
 
     def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
-        """Refuse what the robot cannot be asked."""
+        """Refuse conditions that do not apply to the robot."""
         self._keys, self._file = keys, file
         self._frame, self._z_axis = frame_of(robot_file.base_points, robot_file.z_axis), robot_file.z_axis
         self._workspace = keys.workspace or WorkspaceTable()
@@ -88,7 +88,7 @@ class WorkspaceMap(GridMap):
         for name in ("platform_box", "platform_hull"):
             if getattr(workspace, name) is not None and not row.is_body:
                 raise ConfigError(self._file, f"workspace.{name}: must be absent: {robot_file.kind} has no shape")
-        # Shapes are from where the arms of the kernels are: the mass centre, or a joint.
+        # Shapes have the same origin as the arms of the kernels: the mass centre, or a joint.
         centre = None if row.is_jointed else robot_file.centre_of_mass
         try:
             body = workspace.body(centre or (0.0, 0.0, 0.0), robot_file.platform_points or ())
@@ -115,14 +115,14 @@ class WorkspaceMap(GridMap):
         return cable_speeds(self._robot, np.asarray(most), speed=speed, angular_speed=angular_speed)
 
     def _unit_quaternions(self, quaternions: Sequence[list[float] | None], key: str) -> np.ndarray:
-        # (k, 4) in the kernels' axes.
+        # Return quaternions (k, 4) in the kernels' axes.
         units = np.stack([given_quaternion(one, key, self._file) for one in quaternions])
         if self._row.is_planar and units[:, [1, 3]].any():
             raise ConfigError(self._file, f"{key}: must turn about y: that of a planar robot")
         return self._frame.turned_quaternions(units)
 
     def _orientation_set(self) -> tuple[np.ndarray | None, np.ndarray]:
-        # (k, 4) orientations and the part of the set that each stands for; None: there is no set.
+        # Return orientations (k, 4), None where there is no set, and the part of the set that each stands for.
         workspace = self._workspace
         if workspace.orientations is None:
             return None, np.ones(1)
@@ -176,7 +176,7 @@ class WorkspaceMap(GridMap):
         return answers | {"orientation_fraction": (answers["verdict"] == 0).astype(float), "cell_side": sides}
 
     def _half_sizes(self, cells: dict[str, np.ndarray]) -> np.ndarray:
-        # (n, 3) of the cells: half of the way to the farther neighbour along each axis.
+        # Return half sizes (n, 3) of the cells: half of the distance to the farther neighbour along each axis.
         half_sizes = []
         for name in "xyz":
             points = np.sort(axis_points(getattr(self._keys.axes, name)))
