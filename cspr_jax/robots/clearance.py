@@ -1,7 +1,7 @@
 """Clearance of many poses: how far cables are from each other, from obstacles and from their own platform, signed.
 
-Coordinates are those of the robot that is given; shapes have the same axes, its platform's own shape those of the
-platform, from the mass centre. Every meeting of a scene has a kernel of `clearance_lanes`, compiled once a robot.
+Coordinates are those of the given robot, and shapes have the same axes; the shape of the platform has platform axes,
+from the mass centre. Every kind of meeting in a scene has a kernel of `clearance_kernels`, compiled once a robot.
 """
 
 import dataclasses
@@ -20,12 +20,13 @@ from cspr_jax.robots.platform import PlatformRobot, pairs_apart
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.robots.shapes import Body, Box, Cylinder, Hull, Obstacle, Sphere, hull, is_flat
 
-# Poses of a batch on a CPU: of 16384 to 131072 about the same.
+# Poses of a batch on a CPU; rates are about the same from 16384 to 131072.
 BATCH = 65_536
-# The part of a cable next to its attachment point that is not held against it is so many diameters long, or has this
-# part of the size of the platform's shape.
+# The part of a cable next to its attachment point for which contacts with the platform do not count is so many
+# diameters long, or this part of the size of the platform's shape.
 LEAVE_DIAMETERS, LEAVE_SIZE = 10.0, 0.01
-# Rounding of a clearance, over machine epsilon and the largest coordinate of pose, robot and obstacles; 2.2 was met.
+# Rounding of a clearance, over machine epsilon and the largest coordinate of pose, robot and obstacles; the largest
+# value that was met is 2.2.
 ROUNDING = 16.0
 
 Kind = Literal["cables", "obstacle", "platform", "platform-obstacle"]
@@ -37,8 +38,8 @@ class Meeting(NamedTuple):
     Fields:
         kind: "cables": two cables; "obstacle": a cable and an obstacle; "platform": a cable and its own platform;
             "platform-obstacle": the platform and an obstacle.
-        cable: number of the cable, the first of two, from 0 on; -1 of the platform.
-        other: number of the other cable or of the obstacle, from 0 on; -1 of the platform.
+        cable: number of the cable, the first of two, from 0 on; -1 for the platform.
+        other: number of the other cable or of the obstacle, from 0 on; -1 for the platform.
     """
 
     kind: Kind
@@ -48,16 +49,16 @@ class Meeting(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Scene:
-    """A robot among what its cables can meet.
+    """A robot among the bodies that its cables can meet.
 
     Fields:
         base_points: (n_cables, 3) m.
-        platform_points: (n_cables, 3) platform axes, from the mass centre, m; zero of a point mass.
+        platform_points: (n_cables, 3) platform axes, from the mass centre, m; zero for a point mass.
         diameters: (n_cables,) m.
         pairs: cables that share neither spool nor platform point.
         obstacles: shapes fixed in space.
-        body: shape of the platform in its axes, from the mass centre; None: it is not looked at.
-        leave: length of each cable next to its attachment point that is not held against its own platform, m.
+        body: shape of the platform in its axes, from the mass centre; None: the platform does not count.
+        leave: length of each cable next to its attachment point for which contacts with the platform do not count, m.
     """
 
     base_points: np.ndarray
@@ -84,12 +85,12 @@ class Clearances(NamedTuple):
     """Clearances of poses.
 
     Fields:
-        clearance: (n,) the least of all, m; negative where two bodies meet; inf where nothing can meet.
-        nearest: (n,) place among `Scene.meetings` of what is the nearest; -1 where nothing can meet.
-        cables: (n,) the least of two cables, m; inf where none can meet.
-        obstacles: (n,) the least of obstacles with cables and platform, m.
-        platform: (n,) the least of cables with their own platform, m; of whole cables never above `Scene.leave`.
-        is_open: (n,) whether the least is nearer to the threshold than rounding lets it be told.
+        clearance: (n,) the least of all clearances, m; negative where two bodies meet; inf where nothing can meet.
+        nearest: (n,) index in `Scene.meetings` of the nearest two bodies; -1 where nothing can meet.
+        cables: (n,) the least clearance of two cables, m; inf where none can meet.
+        obstacles: (n,) the least clearance of obstacles from cables and platform, m.
+        platform: (n,) the least clearance of cables from their own platform, m; of whole cables at most `Scene.leave`.
+        is_open: (n,) whether the least clearance is within rounding of the threshold.
     """
 
     clearance: np.ndarray
@@ -108,16 +109,16 @@ def scene(
     body: Body | None = None,
     leave: float | None = None,
 ) -> Scene:
-    """A robot among what its cables can meet.
+    """A robot among the bodies that its cables can meet.
 
     Args:
         robot: a platform, or a point mass, whose cables never meet each other.
         diameter: of the cables, one number or (n_cables,), m.
         obstacles: shapes fixed in space, in the robot's axes.
-        body: shape of the platform in its axes, from the mass centre; see `attachment_hull`. None: cables are not
-            held against their platform, nor it against obstacles.
-        leave: length of each cable next to its attachment point that is not held against its own platform, m; None:
-            ten diameters, or a hundredth of the shape if that is more.
+        body: shape of the platform in its axes, from the mass centre; see `attachment_hull`. None: contacts of the
+            platform, with cables or obstacles, do not count.
+        leave: length of each cable next to its attachment point for which contacts with the platform do not count, m;
+            None: ten diameters, or a hundredth of the size of the shape if that is more.
 
     Returns:
         the scene.
@@ -164,16 +165,15 @@ def clearances(
     """Clearances of poses.
 
     Args:
-        scene: the robot and what its cables can meet.
+        scene: the robot and the bodies that its cables can meet.
         positions: (n, 3) of the mass centre, m.
         quaternions: (n, 4) unit quaternions, scalar first; None: no rotation.
-        ends: (n, n_cables, 3) where the cables leave their spools, if that moves, m; None: the base points.
-        threshold: the clearance about which verdicts are wanted, m.
-        dtype: of the numbers; of "float32" poses that are open are done again in float64.
+        ends: (n, n_cables, 3) points at which the cables leave their spools, if these move, m; None: the base points.
+        threshold: clearance with which verdicts compare, m.
+        dtype: of the numbers; with "float32" open poses are computed again in float64.
 
     Returns:
-        the clearances, float64; of "float32" good to some 1e-6 of the scene's size where they are not near the
-        threshold.
+        the clearances, float64; with "float32" accurate to some 1e-6 of the scene's size away from the threshold.
 
     Raises:
         InputError: arrays of other shapes.
@@ -223,7 +223,7 @@ def _checked(scene: Scene, positions, quaternions, ends) -> _CheckedPoses:
 
 
 def _all(scene: Scene, all_poses: _CheckedPoses, threshold: float, dtype: np.dtype) -> Clearances:
-    # From the centroid of the spools, so that float32 has the digits where they are needed.
+    # Take coordinates from the centroid of the spools, so that float32 has its digits where they are needed.
     origin = scene.base_points.mean(0)
     terms = list(_terms(scene, origin, dtype))
     extent = max(float(np.abs(x).max()) for x in (scene.base_points - origin, scene.platform_points))
@@ -236,7 +236,7 @@ def _all(scene: Scene, all_poses: _CheckedPoses, threshold: float, dtype: np.dty
         answer = _least([(kind, first, x) for (kind, first, _), x in zip(terms, answers, strict=True)])
         far = [np.abs(x) for x in poses.position]
         size = np.maximum(np.maximum(np.maximum(far[0], far[1]), far[2]), reach)
-        # NaN is open.
+        # NaN compares as false: such poses stay open.
         return answer._replace(is_open=~(np.abs(answer.clearance - threshold) > bound * size))
 
     if not terms:
@@ -255,7 +255,7 @@ def _least(terms: Sequence[tuple[Kind, int, np.ndarray]]) -> Clearances:
     _, first, distances = terms[0]
     clearance, nearest = distances.real.copy(), distances.imag.astype(np.int32) + np.int32(first)
     for _, first, distances in terms[1:]:
-        # A pose that gives NaN has it from the first kernel on, and keeps it.
+        # A pose with NaN has it from the first kernel on, and keeps it.
         is_less = distances.real < clearance
         np.copyto(clearance, distances.real, where=is_less)
         np.copyto(nearest, distances.imag.astype(np.int32) + np.int32(first), where=is_less)
@@ -316,7 +316,7 @@ def _corners(shape: Body) -> np.ndarray:
 
 
 def _reach(shape: Obstacle, origin: np.ndarray) -> float:
-    # Largest coordinate.
+    # Return the largest coordinate.
     if isinstance(shape, Box):
         return float(np.abs(_corners(shape) - origin).max())
     ends = [shape.centre] if isinstance(shape, Sphere) else [shape.start, shape.end]

@@ -1,6 +1,7 @@
-"""Compiled functions of `clearance`: the nearest of each kind of meeting, one lane a pose.
+"""Compiled functions of `clearance`: the nearest bodies of each kind of meeting, one lane a pose.
 
-Each gives one complex number a pose, of `clearance_lanes.nearest`: the clearance, m, and which of its meetings it is.
+Each gives one complex number a pose, as `clearance_lanes.nearest` does: the clearance, m, and the number of the
+meeting.
 """
 
 from collections.abc import Sequence
@@ -58,7 +59,7 @@ class PoseLanes(NamedTuple):
     Fields:
         position: three arrays, m.
         quaternion: four arrays of a unit quaternion, scalar first; None: no rotation.
-        ends: where each cable leaves its spool, three arrays each, m; None: the base points.
+        ends: point at which each cable leaves its spool, three arrays each, m; None: the base points.
     """
 
     position: Vector
@@ -83,7 +84,7 @@ class Rod(NamedTuple):
 
     Fields:
         start: (3,) m.
-        ray: (3,) from there to the end, m.
+        ray: (3,) from the start to the end, m.
         radius: () m.
     """
 
@@ -98,7 +99,7 @@ class Brick(NamedTuple):
     Fields:
         centre: (3,) m.
         half: (3,) halves of the lengths of its edges, m.
-        rotation: (3, 3) its axes, one a column.
+        rotation: (3, 3) axes of the box, one a column.
     """
 
     centre: Array
@@ -147,8 +148,8 @@ def of_cables(points: Points, poses: PoseLanes, pairs: np.ndarray) -> Array:
 
 @jax.jit
 def _lines(points: Points, poses: PoseLanes) -> tuple[list[Array] | None, list[Array]]:
-    # Components of where cables leave their spools, if that moves, and from there to the platform, (n_cables, n) each:
-    # a loop over what its own call has stored would be slow.
+    # Return the points at which cables leave their spools, None if these are fixed, and the rays from there to the
+    # platform, components (n_cables, n): a loop over values that its own compiled call has stored would be slow.
     if poses.ends is not None:
         ends, rays = _cables(points, poses)
         return [jnp.stack([end[i] for end in ends]) for i in range(3)], [
@@ -174,7 +175,7 @@ def _nearest_pair(points: Points, starts: list[Array] | None, rays: list[Array],
         (i, j), place = pair
         thick = 0.5 * (points.diameters[i] + points.diameters[j])
         distance = segments(*line(i), *line(j)) - thick
-        # As `clearance_lanes.nearest` does: the first of equal ones, and NaN stays.
+        # Keep the first of equal distances, and NaN, as `clearance_lanes.nearest` does.
         is_kept = jnp.isnan(jnp.real(best)) | (distance >= jnp.real(best))
         return jnp.where(is_kept, best, lax.complex(distance, jnp.full_like(distance, place))), None
 
@@ -207,7 +208,7 @@ def of_obstacle(points: Points, poses: PoseLanes, solid: Solid) -> Array:
 
 
 def _in_brick(brick: Brick, start: Vector, ray: Vector) -> tuple[Vector, Vector]:
-    # A segment in the axes of a box, from its centre.
+    # Return a segment in the axes of a box, from the centre of the box.
     axes = [_three(row) for row in brick.rotation]
     return lanes.turned_back(axes, _less(start, _three(brick.centre))), lanes.turned_back(axes, ray)
 
@@ -229,7 +230,7 @@ def of_platform(points: Points, poses: PoseLanes, body: BodyShape, leave: Array)
     for k, ray in enumerate(rays):
         away = tuple(-x for x in _inward(rotation, ray))
         length = jnp.sqrt(lanes.dot(away, away))
-        # A cable that is shorter than that keeps only its end.
+        # A cable that is shorter than this length keeps only its end.
         part = jnp.where(length > leave, leave / jnp.where(length > leave, length, 1.0), 1.0)
         start = tuple(x + part * y for x, y in zip(_three(points.platform[k]), away, strict=True))
         rest = tuple((1.0 - part) * x for x in away)

@@ -33,9 +33,9 @@ def gap(apart: Vector, u: Vector, v: Vector) -> Vector:
     """The shortest vector between two segments; `interference.between` in lanes.
 
     Args:
-        apart: from where the first one starts to where the second one does, m.
-        u: along the first one.
-        v: along the second one.
+        apart: from the start of the first to the start of the second, m.
+        u: from start to end of the first, m.
+        v: from start to end of the second, m.
 
     Returns:
         from the first to the second, m.
@@ -52,15 +52,15 @@ def gap(apart: Vector, u: Vector, v: Vector) -> Vector:
 
 
 def residual(sides: tuple[Vector, Vector], normal: Vector, seen: Vector) -> Vector:
-    """Rest of a cable after its projection onto the sector of its corner.
+    """Residual of the projection of a cable onto the sector of its corner.
 
     Args:
-        sides: of the sector, as in `interference.Contacts`.
+        sides: sides of the sector, as in `interference.Contacts`.
         normal: unit normal of the platform's plane.
         seen: the cable from the platform, platform axes, m.
 
     Returns:
-        normal to the projection, and as long as the distance of the cable's end from the sector, m.
+        a vector normal to the projection, as long as the distance of the cable's end from the sector, m.
     """
     height = dot(normal, seen)
     up = tuple(height * n for n in normal)
@@ -96,8 +96,8 @@ def as_arrays(between: Sequence[Vector], directions: Sequence[Vector]) -> tuple[
     """Vectors as the arrays that `interference` takes.
 
     Args:
-        between: of `gaps`, (n,) each.
-        directions: of `cable_directions`.
+        between: vectors of `gaps`, (n,) each.
+        directions: vectors of `cable_directions`.
 
     Returns:
         (n, n_pairs, 3) and (n, n_cables, 3).

@@ -1,6 +1,6 @@
 """The wrench balance of many platforms, one lane a case: the fast form of `wrench_balance`, one division at the end.
 
-(3.11) is solved by adjugates, the cables in two groups of three; the determinant falls out of the same products.
+(3.11) is solved by adjugates, with the cables in two groups of three; the same products give the determinant.
 """
 
 import itertools
@@ -14,7 +14,7 @@ from jax import Array
 from cspr_jax.arithmetic.lanes import Matrix, Vector, combined, cross, dot, turned, turned_back
 from cspr_jax.robots.platform import PlatformRobot
 
-CABLES = 6  # what the adjugates and Laplace's expansion here are written for
+CABLES = 6  # the number for which the adjugates and Laplace's expansion here are written
 
 
 class CableLanes(NamedTuple):
@@ -33,10 +33,10 @@ class Balance(NamedTuple):
     """The tensions per mass and length as fractions.
 
     Fields:
-        numerators: six, of mu.
-        denominator: their common one.
+        numerators: six numerators of mu.
+        denominator: common denominator.
         signed: a number with the sign of det J.
-        volume: of the first, third and fifth ray, m^3.
+        volume: volume of the first, third and fifth ray, m^3.
     """
 
     numerators: Sequence[Array]
@@ -46,7 +46,7 @@ class Balance(NamedTuple):
 
 
 def cable_lanes(robot: PlatformRobot, position: Vector, rotation: Matrix) -> CableLanes:
-    """The cables, (3.1).
+    """Arms and rays of the cables, (3.1).
 
     Args:
         position: of the mass centre, m.
@@ -115,12 +115,12 @@ def balance(cables: CableLanes, force: Vector, moment: Vector) -> Balance:
     odd = [dot(row, rest) for row in inner]
     even = [top[j] * determinant - sum(g[j][n] * odd[n] for n in range(3)) for j in range(3)]
     numerators = [x for pair in zip(even, [d * x for x in odd], strict=True) for x in pair]
-    # Taking the cables in two groups is an odd permutation.
+    # The order of the cables in two groups is an odd permutation.
     return Balance(numerators, d * determinant, -determinant, d)
 
 
 def determinant(cables: CableLanes) -> Array:
-    """Determinant of J, (3.5), in three pairs of cables: the volumes of their forces times those of their moments.
+    """Determinant of J, (3.5), as a sum of volumes of three rays times volumes of the moments of the other three.
 
     Returns:
         (...) m^9.
@@ -131,7 +131,7 @@ def determinant(cables: CableLanes) -> Array:
         others = [k for k in range(CABLES) if k not in three]
         a, b, c = (cables.rays[k] for k in three)
         d, e, f = (moments[k] for k in others)
-        # Laplace's expansion by the first three columns.
+        # Sign of the term in Laplace's expansion by the first three columns.
         sign = -1.0 if (sum(three) - 3) % 2 else 1.0
         total = total + sign * dot(a, cross(b, c)) * dot(d, cross(e, f))
     return total
