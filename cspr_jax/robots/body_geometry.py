@@ -9,9 +9,9 @@ from cspr_jax.robots.spool_plane import is_on_line
 
 # Points nearer to each other than this part of the largest distance are one point.
 SAME = 1e-9
-# Rounding that is allowed to an inertia tensor: of its symmetry, and of a flat body's I1 + I2 = I3.
+# Tolerance for rounding of an inertia tensor: of its symmetry, and of I1 + I2 = I3 for a flat body.
 INERTIA_TOLERANCE = 1e-9
-# Part of the length of a rod that its mass centre may lie beside the line of its attachment points.
+# The mass centre of a rod may lie beside the line of its attachment points by this part of its length.
 BESIDE = 1e-6
 
 
@@ -20,10 +20,10 @@ def is_same(points: np.ndarray, first: int, second: int) -> bool:
 
     Args:
         points: (n, 3) m.
-        first: number of one, from 0 on.
+        first: index of one of them.
 
     Returns:
-        whether they are nearer to each other than rounding.
+        whether their distance is within rounding.
     """
     span = np.ptp(points, axis=0).max()
     return bool(np.linalg.norm(points[first] - points[second]) <= SAME * span)
@@ -76,8 +76,8 @@ def checked_centre(centre_of_mass, platform: np.ndarray, pattern: Pattern) -> np
         (3,) m.
 
     Raises:
-        InputError: wrong shape, not finite, out of a planar platform's plane, or beside a rod's line, where its weight
-            would turn it about that.
+        InputError: wrong shape, not finite, out of a planar platform's plane, or beside the line of a rod, about which
+            its weight would turn it.
     """
     centre = np.asarray(centre_of_mass, float)
     if centre.shape != (3,) or not (np.abs(centre) <= LARGEST_LENGTH).all():
@@ -98,7 +98,7 @@ def checked_inertia(inertia, pattern: Pattern) -> np.ndarray:
 
     Args:
         inertia: (3, 3) about the mass centre, platform axes, kg m^2.
-        pattern: of the body. Of a planar platform only the moment about y counts, and a rod may have none about its
+        pattern: of the body. For a planar platform only the moment about y counts, and a rod may have none about its
             line.
 
     Returns:

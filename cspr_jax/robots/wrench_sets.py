@@ -71,9 +71,9 @@ class Faces:
             values: (..., n_components) wrenches, or accelerations.
 
         Returns:
-            (...) inside the set the distance from its boundary, inf where it has none; outside of it negative, and no
-            smaller than the distance from the set. Where the cables span less than a plane (of d = 2, a line), the
-            distance from what the smallest tensions give, negative.
+            (...) inside the set the distance from its boundary, inf where it has none; outside negative, in size at
+            most the distance from the set. Where the cables span no plane (with d = 2, no line), minus the distance
+            from the wrench, or acceleration, of the smallest tensions.
         """
         slacks = self.slacks(values)
         least, spanned = jnp.min(slacks, axis=-1), jnp.isfinite(self.offsets).any(-1)
