@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 ROUNDS = 64
-# A bound and an attained value agree within this, over the scale of the values.
+# A bound and an attained value agree if they differ by no more than this part of the scale of the values.
 AGREED = 1e-12
 # Halving ends after this many blocks: the bounds that are proved by then are the answer.
 MOST = 2_000_000
@@ -18,7 +18,7 @@ class Proved(NamedTuple):
 
     Fields:
         attained: (n, n_groups) a value that is attained.
-        bound: (n, n_groups) none is smaller.
+        bound: (n, n_groups) proved lower bound.
     """
 
     attained: np.ndarray
@@ -30,8 +30,8 @@ class MinimumBlocks(NamedTuple):
 
     Fields:
         case: (n_blocks,) number of the case.
-        piece: (n_blocks,) of a function that is made of pieces.
-        start: (n_blocks,) where they begin.
+        piece: (n_blocks,) number of the piece of a piecewise function.
+        start: (n_blocks,) start of each block.
         width: (n_blocks,).
     """
 
@@ -68,13 +68,13 @@ def smallest(
 
     Args:
         count: number of cases n.
-        values: gives of blocks a lower bound, and a value that is attained, (n_blocks, n_groups) each.
-        scales: (n_groups,) of the values.
+        values: takes blocks, and gives a lower bound and an attained value of each, (n_blocks, n_groups).
+        scales: (n_groups,) scales of the values.
         size: number of blocks that are given to `values` at a time.
         enough: bounds above this many scales need not be sharp.
 
     Returns:
-        the values; inf of a case without blocks.
+        the values; inf for a case without blocks.
     """
     best = np.full((count, len(scales)), np.inf)
     done, seen = best.copy(), 0

@@ -1,7 +1,7 @@
 """Point-mass robots: geometry, mass, gravity, limits, wrenches.
 
-A robot that is loaded or made has the axes of its file. Kernels take it from the centroid of its spools and with z
-down, as `robots.kernel_axes.centred` gives it.
+A robot that is loaded or built has the axes of its file. Kernels take it with the origin at the centroid of its spools
+and with z down, as `robots.kernel_axes.centred` gives it.
 """
 
 import dataclasses
@@ -37,15 +37,15 @@ class PointMassRobot:
     """A point mass on three cables or more, on two or more in the plane y = 0, or on a vertical guide.
 
     Fields:
-        base_points: (n_cables, 3) where the cables leave their spools, one a row, in cable order, of pulleys where they
-            enter; m.
-        mass: () of the effector, kg.
+        base_points: (n_cables, 3) points at which the cables leave their spools, or enter their pulleys, in cable
+            order; m.
+        mass: () mass of the effector, kg.
         gravity: () downwards, m/s^2.
         limits: limits beyond taut cables.
         name: for people.
-        z_axis: where z points, "down" or "up"; known when a function is compiled.
+        z_axis: direction of z, "down" or "up"; known when a function is compiled.
         dof: degrees of freedom, 3, 2 in the plane y = 0, or 1 on a guide; known when a function is compiled.
-        pulleys: between base points and cables; None: the cables leave from the base points.
+        pulleys: pulleys between base points and cables; None: the cables leave from the base points.
         cable_diameter: () m; None: 0.
     """
 
@@ -61,7 +61,7 @@ class PointMassRobot:
 
     @property
     def pattern(self) -> str:
-        """Name of its row of `robots.patterns`."""
+        """Name of a row of `robots.patterns`."""
         return f"{self.dof}T"
 
     @property
@@ -79,11 +79,11 @@ class PointMassRobot:
 
     @property
     def _directions(self) -> np.ndarray:
-        # In which the effector moves: x and z in the plane y = 0.
+        # Return the axes along which the effector moves: x and z in the plane y = 0.
         return np.array(PATTERNS[self.pattern].forces)
 
 
-# The name stays outside: compiled functions do not see it, and are not compiled again for another one.
+# Compiled functions do not see the name, so that they are not compiled again for another one.
 jax.tree_util.register_dataclass(
     PointMassRobot,
     ["base_points", "mass", "gravity", "limits", "pulleys", "cable_diameter"],
@@ -104,12 +104,12 @@ def point_mass_robot(
     """A point-mass robot, its geometry checked.
 
     Args:
-        base_points: (n_cables, 3) spool points, one a row, three or more, m. Anywhere, as long as their plane (of more
-            than three: that of least squares) is not vertical.
+        base_points: (n_cables, 3) spool points, one a row, three or more, m. Their plane, of more than three points the
+            plane of least squares, must not be vertical.
         mass: kg, positive.
         gravity: m/s^2, positive.
-        z_axis: where z points, "down" or "up".
-        limits: limits beyond taut cables; None: none.
+        z_axis: direction of z, "down" or "up".
+        limits: limits beyond taut cables; None: there are none.
 
     Returns:
         the robot, float64 NumPy leaves.
@@ -139,8 +139,8 @@ def planar_robot(
         base_points: (n_cables, 3) spool points, two or more, y = 0, two of them on a level line; m.
         mass: kg, positive.
         gravity: m/s^2, positive.
-        z_axis: where z points, "down" or "up".
-        limits: limits beyond taut cables; None: none.
+        z_axis: direction of z, "down" or "up".
+        limits: limits beyond taut cables; None: there are none.
 
     Returns:
         the robot, float64 NumPy leaves.
@@ -175,8 +175,8 @@ def guided_robot(
         base_points: (n_cables, 3) spool points, one or more, m.
         mass: kg, positive.
         gravity: m/s^2, positive.
-        z_axis: where z points, "down" or "up".
-        limits: limits beyond taut cables; None: none.
+        z_axis: direction of z, "down" or "up".
+        limits: limits beyond taut cables; None: there are none.
 
     Returns:
         the robot, float64 NumPy leaves.
@@ -242,7 +242,7 @@ def pulls(robot: Robot, targets: Array) -> Array:
     """Unit vectors of the cables, from the effector on; with pulleys those of the free cables.
 
     Args:
-        targets: (n_cables, 3) or (1, 3) where the cables are attached, in the axes of the spools, m.
+        targets: (n_cables, 3) or (1, 3) points at which the cables are attached, in the axes of the spools, m.
 
     Returns:
         (n_cables, 3).
@@ -256,7 +256,7 @@ def pulls(robot: Robot, targets: Array) -> Array:
 
 
 def relative_acceleration(robot: PointMassRobot, acceleration: Array) -> Array:
-    """Acceleration beyond that of free fall, p'' - g.
+    """Acceleration relative to free fall, p'' - g.
 
     Args:
         acceleration: (3,) z down, m/s^2.
@@ -268,7 +268,7 @@ def relative_acceleration(robot: PointMassRobot, acceleration: Array) -> Array:
 
 
 def check_numbers(mass: float, gravity: float) -> None:
-    """Refuse a mass or a gravity that is none.
+    """Refuse an invalid mass or gravity.
 
     Args:
         mass: kg.
@@ -283,7 +283,7 @@ def check_numbers(mass: float, gravity: float) -> None:
 
 
 def check_axis(z_axis: str) -> None:
-    """Refuse a z axis that points nowhere.
+    """Refuse an unknown direction of z.
 
     Raises:
         InputError: neither "down" nor "up".
@@ -296,7 +296,7 @@ def is_planar(robot: PointMassRobot) -> bool:
     """Tell whether the robot moves in the plane y = 0.
 
     Returns:
-        the claim; known when a function is compiled.
+        whether it does; known when a function is compiled.
     """
     return robot.dof == PLANAR
 
@@ -308,7 +308,7 @@ def rest_point(z0):
         z0: (...) depth, m.
 
     Returns:
-        (..., 3) from the centroid, z down, m; NumPy of NumPy.
+        (..., 3) from the centroid, z down, m; a NumPy array for NumPy numbers.
     """
     xp = jnp if isinstance(z0, jax.Array) else np
     z0 = xp.asarray(z0)
@@ -332,7 +332,7 @@ def spool_radius(robot: Robot) -> Array:
 def plane_normal(robot: Robot) -> Array:
     """Normal of the spool plane, scaled so that its vertical component is 1.
 
-    Of more than three spools it is the plane of least squares. The depth below the plane, measured along the
+    For more than three spools it is the plane of least squares. The depth of p below the plane, measured along the
     vertical, is normal . p.
 
     Args:

@@ -1,11 +1,11 @@
 """Tensions of a robot with more cables than it needs, at one instant: the least ones, or the farthest from limits.
 
 All tensions that give a wrench are t = t0 + N^T x: t0 is the least of all, N an orthonormal basis of tensions without a
-wrench, so that the least tensions within limits belong to the shortest feasible x. With one or two components of x (d +
-1 or d + 2 cables) this is the nearest feasible point among 0, the point of the line of each limit nearest to 0, and the
-points where the lines of two limits meet. With more components, the limit that is broken most is fixed, again and
-again, as in the improved closed form of Pott (2013); a limit that then holds a tension back is let go again (Goldfarb
-and Idnani 1983), which makes the answer exact, and proves that there is none where there is none.
+wrench, so that the least tensions within limits belong to the shortest feasible x. With one or two components of x
+(d + 1 or d + 2 cables) this is the nearest feasible point among 0, the point of the line of each limit nearest to 0,
+and the points where the lines of two limits meet. With more components, the limit that is broken most is fixed, again
+and again, as in the improved closed form of Pott (2013); a limit that then holds a tension back is let go again
+(Goldfarb and Idnani 1983), which makes the answer exact, and proves that there is none where there is none.
 
 The largest distance from the limits is the distance of the wrench from the nearest face of `wrench_sets`.
 """

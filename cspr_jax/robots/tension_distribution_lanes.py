@@ -149,7 +149,7 @@ def _shortest(least: Lanes, low: Lanes, high: Lanes, size: Array, points: Sequen
     for point in points[1:]:
         square = point.real * point.real + point.imag * point.imag
         best, shortest = jnp.where(square < shortest, point, best), lesser(square, shortest)
-    # Where no point is within limits the result is not finite.
+    # The result is not finite where no point is within limits.
     return jnp.where(within, jnp.zeros_like(best), best)
 
 

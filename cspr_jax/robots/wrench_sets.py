@@ -209,7 +209,7 @@ def acceleration_faces(robot: PointMassRobot, position: Array, tension_min: Arra
         tension_max: (n_cables,) N, inf for none.
 
     Returns:
-        the faces, with normals (n_faces, 3); for a planar robot y is zero.
+        the faces, whose normals are vectors in space; y is zero for a planar robot.
     """
     still = jnp.zeros_like(position)
     matrix = robot.wrench_matrix(State(position, still, still))

@@ -10,9 +10,9 @@ relative to the platform by at most (1 - s) (D + h), and relative to the point a
     two cables               max(2 D, D + h)
     cable and platform       D + h
 
-The last bound also holds if a length next to A is left out of the cable: a point of the cable at the distance r from A
-moves, to the point at the same distance afterwards or to the end of the cable if that is nearer, by no more than E
-moves relative to the platform.
+The last bound also holds if a length next to A is left out of the cable: for each point of the cable at a distance r
+from A, the point that is at the same distance afterwards, or the end of the cable if that is nearer to A, is no farther
+away than E moves relative to the platform.
 
 If a cable is attached in or on the shape of its platform, which is convex, the signed distance from the shape grows
 along the cable from where it is positive. So if it is positive at the distance r from A, where the part that is not
