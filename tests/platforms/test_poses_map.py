@@ -31,7 +31,7 @@ from cspr_jax.motions.platform_kind import USUAL, PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.plans import choices, planning
 from cspr_jax.platforms.checker import slacks_at
-from cspr_jax.platforms.place_proof import wires_beside
+from cspr_jax.platforms.place_proof import cables_beside
 from cspr_jax.platforms.platform_segment import motion
 from cspr_jax.platforms.platform_segment_lanes import instant_lanes, state
 from cspr_jax.platforms.slack_lanes import moving_slacks, order, still_slacks
@@ -162,7 +162,7 @@ def test_cables_beside_the_middles_of_blocks():
     off = np.where((middle + off < 0.1) | (middle + off > 0.9), 0.0, off)
     some = [made(package, random_pose(rng), random_pose(rng), Z0, tuple(rng.uniform(-5, 1, 2)), p) for _ in middle]
     items = stacked(some), np.full(INSTANTS, float(p)), middle, off
-    rays, seen = wires_beside(Problem(package, NO_LIMITS, EFFECTIVE), items, kind=USUAL)
+    rays, seen = cables_beside(Problem(package, NO_LIMITS, EFFECTIVE), items, kind=USUAL)
     own = np.asarray(seen) / np.linalg.norm(seen, axis=2, keepdims=True)
     for segment, t, found, along in zip(some, middle + off, np.asarray(rays), own, strict=True):
         pose = states(segment, EFFECTIVE, p, [t])
