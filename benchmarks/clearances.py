@@ -32,7 +32,9 @@ def main() -> None:
     bodies = {"platform's box": shapes.box([0.0, 0.0, 0.0], [0.8, 0.6, 0.4]), "hull": clearance.attachment_hull(robot)}
     dtype = np.dtype(options.dtype)
     some = min(count, BATCH)
-    poses = clearance.kernels.Poses(tuple(positions[:some].T.astype(dtype)), tuple(turns[:some].T.astype(dtype)), None)
+    poses = clearance.kernels.PoseLanes(
+        tuple(positions[:some].T.astype(dtype)), tuple(turns[:some].T.astype(dtype)), None
+    )
 
     def cpu(function, rounds: int) -> float:
         function()

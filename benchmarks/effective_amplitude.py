@@ -15,10 +15,9 @@ from cspr_jax.arithmetic.rotations import from_tilt_torsion
 from cspr_jax.motions import amplitudes
 from cspr_jax.motions.problem import Problem
 from cspr_jax.platforms.arcs import Candidates, smallest_arcs
-from cspr_jax.platforms.beta_hat import OPTIONS
+from cspr_jax.platforms.beta_hat import OPTIONS, end_options
 from cspr_jax.platforms.checker import PlatformChecker
 from cspr_jax.platforms.motion_checker import MANY
-from cspr_jax.platforms.pose_ends import end_options
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.reference_pose import aligned
 

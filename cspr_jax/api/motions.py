@@ -154,7 +154,7 @@ def platform_motion(
     beta_hats = (jnp.asarray(beta_hat[0], float), jnp.asarray(beta_hat[1], float))
     first, last = zip(places, quaternions, strict=True)
     geometry = pose_segment(prepared_robot, first, last, jnp.asarray(z0, float), beta_hats, odd=jnp.mod(p, 2.0) == 1.0)
-    return Placed(PlatformMotion(geometry, function, p, PlatformMotionKind(variable)), frame)
+    return Placed(PlatformMotion(geometry, function, p, PlatformMotionKind(variable=variable)), frame)
 
 
 @checked

@@ -79,7 +79,7 @@ def minimum_pose_arcs(  # noqa: PLR0913
         problem, frame = kernel_problem(robot, amplitude, limits, families=("hypocycloid",))
         for each in np.unique(depth):
             reference_pose(problem.robot, float(each))
-        checker = PlatformChecker(problem, PlatformMotionKind(variable, from_rest=start is None), batch=MANY)
+        checker = PlatformChecker(problem, PlatformMotionKind(variable=variable, from_rest=start is None), batch=MANY)
         ends = (frame.inward(places), frame.turned_quaternions(turns))
         if start is None:
             first, beta_hats = rest_poses(depth), np.full(len(depth), AT_REST)
@@ -91,7 +91,7 @@ def minimum_pose_arcs(  # noqa: PLR0913
         trial = Candidates(first, ends, depth, np.arange(len(depth)), (beta_hats, beta_hats))
         value = float(beta_hat) if isinstance(beta_hat, int) else beta_hat
         answers = pose_arcs(checker, trial, beta_hat=value, max_arcs=max_arcs)
-    make = partial(_motions, problem, frame, trial, PlatformMotionKind(variable))
+    make = partial(_motions, problem, frame, trial, PlatformMotionKind(variable=variable))
     return PlatformAnswers(**vars(answers), make=make, problem=problem)
 
 

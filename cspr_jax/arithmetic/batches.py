@@ -16,23 +16,23 @@ from jax import lax
 from cspr_jax.arithmetic.cores import cores
 from cspr_jax.arithmetic.elementary import double_precision
 
-# How many times as large a batch is elsewhere than on a CPU, whose caches it has to fit.
+# How many times as large a batch is as on a CPU, whose caches it has to fit.
 LARGER = {"gpu": 16, "tpu": 16}
-# No batch is larger. Tests, which ask for few cases at a time, set it lower.
+# Largest length of a batch. Tests, which compute few cases at a time, set it lower.
 LARGEST = 1 << 20
-# Cases are divided for so many threads, whatever the number of cores: results keep their bits.
+# Cases are divided among so many threads, whatever the number of cores, so that results keep their bits.
 THREADS = 2
 Found = TypeVar("Found")
 
 
 def in_threads(function: Callable, items: Sequence) -> list:
-    """Results of a function, in order, by two threads: what XLA does on one core goes beside another's.
+    """Results of a function, in order, by two threads: work that XLA does on one core runs beside that of the other.
 
-    One thread does it all in a process that computes on one core.
+    In a process that computes on one core, one thread does it all.
 
     Args:
         function: called from several threads.
-        items: its arguments, one each.
+        items: arguments of the function, one for each call.
 
     Returns:
         one result an item.
@@ -41,7 +41,7 @@ def in_threads(function: Callable, items: Sequence) -> list:
     device = jax.config.jax_default_device  # type: ignore[attr-defined]
 
     def one(item):
-        # The settings may be the caller's thread's own.
+        # Settings of jax may belong to the caller's thread alone.
         with double_precision(), jax.default_device(device):
             return function(item)
 
@@ -52,19 +52,19 @@ def in_threads(function: Callable, items: Sequence) -> list:
 
 
 def in_parts(function: Callable[[slice], Found], count: int, size: int) -> list[Found]:
-    """Results of many cases, so many at a time.
+    """Results of many cases, range by range.
 
-    Two threads work: what one does outside of XLA, and what XLA does on one core, goes beside the other's.
+    Two threads work: what one does outside of XLA, and what XLA does on one core, runs beside the work of the other.
 
     Args:
-        function: gives that of a range of cases; it is called from several threads.
-        count: of cases, at least one.
-        size: of the largest range.
+        function: gives the result of a range of cases; it is called from several threads.
+        count: number of cases, at least one.
+        size: length of the largest range.
 
     Returns:
         one result a range, in order.
     """
-    # Parts of one length, as many for each thread.
+    # All parts have one length, and each thread gets as many.
     rounds = -(-count // (THREADS * size))
     bounds = np.linspace(0, count, min(rounds * THREADS, count) + 1).round().astype(int).tolist()
     return in_threads(function, [slice(*pair) for pair in pairwise(bounds)])
@@ -74,7 +74,7 @@ def room(size: int) -> int:
     """Length of a batch on the device in use.
 
     Args:
-        size: its length on a CPU.
+        size: length on a CPU.
 
     Returns:
         the length.
@@ -85,9 +85,9 @@ def room(size: int) -> int:
 def row_by_row(function: Callable, rows):
     """Apply a function of many lanes to each row of a table, inside of a compiled function.
 
-    On a CPU one row after the other, so that the lanes stay in its caches. Elsewhere in two halves: a GPU waits for the
-    start of every kernel, and XLA stores what a loop gives, while it would compute a formula outside of loops again for
-    each of its consumers.
+    On a CPU one row follows the other, so that the lanes stay in its caches. Elsewhere rows are taken in two halves: a
+    GPU waits for the start of every kernel, and XLA stores the results of a loop, while it would compute a formula
+    outside of loops again for each of its consumers.
 
     Args:
         function: takes one row, a pytree without the leading dimension.
@@ -109,10 +109,10 @@ def in_batches(function: Callable, arguments, *, size: int, axis: int = 0):
         function: takes one pytree whose leaves have leading dimension `size`, returns a pytree likewise.
         arguments: pytree of NumPy arrays (n, ...), n >= 0.
         size: length of a batch on a CPU; see `room`.
-        axis: along which the results of a batch lie.
+        axis: axis along which the results of a batch are joined.
 
     Returns:
-        pytree of NumPy arrays, n long along that axis; None if n is 0.
+        pytree of NumPy arrays, of length n along the axis; None if n is 0.
     """
     size = room(size)
     leaves = jax.tree.leaves(arguments)
@@ -132,7 +132,7 @@ def in_batches(function: Callable, arguments, *, size: int, axis: int = 0):
 
 
 def padded(arguments, size: int):
-    """Arrays made as long as a batch.
+    """Arrays padded to the length of a batch.
 
     Args:
         arguments: pytree of NumPy arrays (n, ...), 0 < n <= size.

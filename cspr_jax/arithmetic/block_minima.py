@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 ROUNDS = 64
-# A bound and an attained value agree within this, over the scale of the values.
+# A bound and an attained value agree if they differ by no more than this part of the scale of the values.
 AGREED = 1e-12
 # Halving ends after this many blocks: the bounds that are proved by then are the answer.
 MOST = 2_000_000
@@ -18,7 +18,7 @@ class Proved(NamedTuple):
 
     Fields:
         attained: (n, n_groups) a value that is attained.
-        bound: (n, n_groups) none is smaller.
+        bound: (n, n_groups) proved lower bound.
     """
 
     attained: np.ndarray
@@ -30,8 +30,8 @@ class MinimumBlocks(NamedTuple):
 
     Fields:
         case: (n_blocks,) number of the case.
-        piece: (n_blocks,) of a function that is made of pieces.
-        start: (n_blocks,) where they begin.
+        piece: (n_blocks,) number of the piece of a piecewise function.
+        start: (n_blocks,) start of each block.
         width: (n_blocks,).
     """
 
@@ -40,16 +40,9 @@ class MinimumBlocks(NamedTuple):
     start: np.ndarray
     width: np.ndarray
 
-    def some(self, which) -> "MinimumBlocks":
-        """Some of the blocks.
-
-        Args:
-            which: an index of them.
-
-        Returns:
-            these.
-        """
-        return MinimumBlocks(*(x[which] for x in self))
+    def rows(self, index) -> "MinimumBlocks":
+        """Blocks chosen by an index, or by a mask (n_blocks,)."""
+        return MinimumBlocks(*(x[index] for x in self))
 
     def halved(self) -> "MinimumBlocks":
         """Both halves of each block.
@@ -75,13 +68,13 @@ def smallest(
 
     Args:
         count: number of cases n.
-        values: gives of blocks a lower bound, and a value that is attained, (n_blocks, n_groups) each.
-        scales: (n_groups,) of the values.
+        values: takes blocks, and gives a lower bound and an attained value of each, (n_blocks, n_groups).
+        scales: (n_groups,) scales of the values.
         size: number of blocks that are given to `values` at a time.
         enough: bounds above this many scales need not be sharp.
 
     Returns:
-        the values; inf of a case without blocks.
+        the values; inf for a case without blocks.
     """
     best = np.full((count, len(scales)), np.inf)
     done, seen = best.copy(), 0
@@ -94,11 +87,11 @@ def smallest(
         np.minimum.at(done, blocks.case[~is_open], low[~is_open])
         if not is_open.any():
             break
-        blocks = blocks.some(is_open).halved()
+        blocks = blocks.rows(is_open).halved()
     return Proved(best, done)
 
 
 def _of(values, blocks: MinimumBlocks, size: int) -> tuple[np.ndarray, np.ndarray]:
-    parts = [values(blocks.some(slice(i, i + size))) for i in range(0, len(blocks.case), size)]
+    parts = [values(blocks.rows(slice(i, i + size))) for i in range(0, len(blocks.case), size)]
     low, attained = (np.concatenate(x) for x in zip(*parts, strict=True))
     return low, attained

@@ -1,8 +1,7 @@
 """Bounds on a function and its first two derivatives over an interval, and their arithmetic.
 
-A certificate that holds between samples needs a bound on a second derivative. Instead of writing
-out the derivative of each constraint by hand, its factors are bounded once and combined by
-Leibniz' rule.
+A proof that holds between samples needs a bound of a second derivative. Instead of deriving each constraint by hand,
+its factors are bounded once, and the bounds combined by Leibniz' rule.
 """
 
 from typing import NamedTuple

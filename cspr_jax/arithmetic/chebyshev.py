@@ -1,4 +1,4 @@
-"""Polynomials through values at Chebyshev's nodes: how far from an analytic function, and where they lie.
+"""Polynomials through values at Chebyshev's nodes: bounds of their distance from an analytic function, and their range.
 
 A function that is bounded by M on the ellipse with the semi-axes (rho + 1 / rho) / 2 and (rho - 1 / rho) / 2 around
 [-1, 1] differs there from the polynomial of degree n through its values at the n + 1 nodes by at most
@@ -16,9 +16,9 @@ from fractions import Fraction
 import numpy as np
 
 DEGREE = 18
-# More than Lebesgue's constant of the nodes: by so much can an error of the values grow between them.
+# Bound of Lebesgue's constant of the nodes, by which an error of the values can grow between them.
 LEBESGUE = 3.0
-# Sizes of the ellipse; the one with the smallest remainder counts.
+# Sizes rho of the ellipse; the ellipse with the smaller remainder counts.
 RADII = (2.5, 6.0)
 
 
@@ -57,7 +57,7 @@ def bernstein() -> np.ndarray:
 
 
 def remainders(radii: np.ndarray) -> np.ndarray:
-    """Factors by which bounds on ellipses are multiplied for a bound of the remainder.
+    """Factors from bounds on ellipses to bounds of the remainder.
 
     Args:
         radii: (m,) rho, above 1.

@@ -1,4 +1,4 @@
-"""Least value of a smooth objective under smallest margins: many places looked at, the best improved, and proved."""
+"""Least value of a smooth objective under smallest margins: the best of many places are improved, and proved."""
 
 from collections.abc import Callable
 from functools import partial
@@ -11,10 +11,10 @@ from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches
 
-# Gives of arguments and unknowns (n,) the objective () and the margins (n_margins,).
+# A function of arguments and unknowns (n,) that gives the objective () and the margins (n_margins,).
 Parts = Callable[[Any, Array], tuple[Array, Array]]
 LOOKED_AT, IMPROVED, BATCH = 4096, 8, 512
-# Smallest margins asked for, one after the other until the answer is proved.
+# Smallest margins that are required, one after the other, until the answer is proved.
 MARGINS = (1e-9, 1e-7, 1e-5, 1e-3)
 STEPS, AGREED = 200, 1e-12
 
@@ -51,24 +51,24 @@ def _slopes(parts: Parts, arguments: Any, x: Array) -> tuple[Array, Array]:
 
 
 def least(
-    parts: Parts, given: Any, low: np.ndarray, high: np.ndarray, judged: Callable[[np.ndarray], Judged]
+    parts: Parts, arguments: Any, low: np.ndarray, high: np.ndarray, judged: Callable[[np.ndarray], Judged]
 ) -> np.ndarray:
     """Unknowns with the least objective among feasible ones: a local minimum, or the best of several.
 
     Args:
-        parts: a function of a module, as it is compiled once.
+        parts: a function at the top of a module, so that it is compiled once.
         low: (n,) smallest unknowns.
-        high: (n,) largest ones.
+        high: (n,) largest unknowns.
         judged: proves or refutes a place.
 
     Returns:
-        (n,) feasible if any place that was improved is; else the one with the largest margin.
+        (n,) a feasible place if any improved place is feasible; else the place with the largest margin.
     """
     from scipy.stats import qmc  # it takes a second to import
 
     share = qmc.Halton(len(low), seed=0).random(LOOKED_AT)
     places = low + (high - low) * share
-    value, margin = in_batches(partial(_screened, parts, given), places, size=BATCH)
+    value, margin = in_batches(partial(_screened, parts, arguments), places, size=BATCH)
     usable = np.isfinite(value) & np.isfinite(margin)
     margin = np.where(usable, margin, -np.inf)
     # Feasible places come first, the smallest objective ahead; then the places that are nearest to being feasible.
@@ -76,8 +76,8 @@ def least(
     best, verdict = places[order[0]], judged(places[order[0]])
     size = float(value[order[0]])
     for start in places[order[:IMPROVED]]:
-        candidate = _improved(parts, given, start, list(zip(low, high, strict=True)), judged)
-        other, length = judged(candidate), float(_both(parts, given, jnp.asarray(candidate))[0])
+        candidate = _improved(parts, arguments, start, list(zip(low, high, strict=True)), judged)
+        other, length = judged(candidate), float(_both(parts, arguments, jnp.asarray(candidate))[0])
         if (other.feasible, -length if other.feasible else other.margin) > (
             verdict.feasible,
             -size if verdict.feasible else verdict.margin,

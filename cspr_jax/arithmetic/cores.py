@@ -1,10 +1,10 @@
-"""Cores of this machine that a process computes on: all that it may use, or a share where several work beside it."""
+"""Cores that a process computes on: all that it may use, or a share where several processes work at once."""
 
 import math
 import os
 from pathlib import Path, PurePosixPath
 
-# How many; XLA starts as many threads.
+# Environment variable with the number of cores; XLA starts as many threads.
 SHARE = "NPROC"
 _GROUPS, _MOUNTED = Path("/proc/self/cgroup"), Path("/sys/fs/cgroup")
 
@@ -13,8 +13,8 @@ def cores() -> int:
     """Number of cores that this process computes on.
 
     Returns:
-        the number, at least 1: what the environment variable `SHARE` says, else all that it may use, within the quota
-        of its container or job.
+        the number, at least 1: the value of the environment variable `SHARE`, else all cores that the process may use,
+        within the quota of its container or job.
     """
     share = os.environ.get(SHARE, "")
     if share.isascii() and share.isdigit() and int(share) > 0:
@@ -25,13 +25,13 @@ def cores() -> int:
 
 
 def quota(groups: Path = _GROUPS, mounted: Path = _MOUNTED) -> float:
-    """Cores' worth of time that the control groups of this process grant it, of versions 1 and 2 of Linux's.
+    """Quota of time, in cores, that Linux's control groups (versions 1 and 2) grant this process.
 
     Args:
-        mounted: folder in which they lie.
+        mounted: folder of the control groups.
 
     Returns:
-        the least of all levels; infinite where there is none.
+        the least quota of all levels; infinite where there is none.
     """
     try:
         lines = groups.read_text("utf-8", "replace").splitlines()
@@ -43,8 +43,8 @@ def quota(groups: Path = _GROUPS, mounted: Path = _MOUNTED) -> float:
         controllers, _, place = rest.partition(":")
         if controllers and "cpu" not in controllers.split(","):
             continue
-        # In a container the path may be the machine's, of which only the end, or nothing, lies in the folder. Version 1
-        # has a folder for its controllers, and where both are in use version 2 has one, too.
+        # In a container the path may be that of the machine, of which only the end, or nothing, exists in the folder.
+        # Version 1 has a folder for its controllers; where both versions are in use, version 2 has one, too.
         for root in [mounted / controllers, mounted / "cpu"] if controllers else [mounted, mounted / "unified"]:
             path = PurePosixPath(place.lstrip("/"))
             for level in (path, *path.parents):

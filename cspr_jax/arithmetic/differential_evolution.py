@@ -1,10 +1,10 @@
 """Least value of an objective under smallest margins, for many questions at once: differential evolution.
 
-A fixed set of places is looked at in groups, and the best of each group are a population. Each generation moves every
-member towards one of the best and along the difference of two others, and keeps what is no worse: so the steps shrink
-with the population and lie along the valleys it lies in. Smallest margins have kinks, which a search by gradients would
-get stuck on. Every question sees the same places and moves: answers are repeatable, and do not depend on what is asked
-beside them.
+A fixed set of places is evaluated in groups, and the best of each group form a population. Each generation moves every
+member towards one of the best and along the difference of two others, and keeps the move if it is no worse: so steps
+shrink with the population, and follow the valleys in which it lies. Smallest margins have kinks, at which a search by
+gradients would get stuck. All questions use the same places and moves, so that answers are repeatable and do not depend
+on other questions.
 """
 
 from collections.abc import Callable
@@ -18,13 +18,14 @@ from jax import Array, lax
 
 from cspr_jax.arithmetic.batches import in_batches, in_parts
 
-# Gives of arguments, a question and unknowns (d,) in [0, 1] the objective () >= 0 and the smallest margin ().
+# A function of arguments, a question and unknowns (d,) in [0, 1] that gives the objective () >= 0 and the smallest
+# margin ().
 Parts = Callable[[Any, Any, Array], tuple[Array, Array]]
 # Places in a group, generations for each member, and members for each of the best ones; measured.
 GROUP, GENERATIONS, LED = 64, 2, 10
-# Range of the lengths of steps, and chance of an unknown to take part in one.
+# Range of the lengths of steps, and probability that an unknown takes part in a step.
 STEPS, CHANCE = (0.4, 0.9), 0.9
-# Questions at a time, and at most in a thread.
+# Questions of a batch, and the largest number of questions of a thread at a time.
 BATCH, PART = 16, 256
 
 
@@ -32,11 +33,11 @@ class Moves(NamedTuple):
     """Moves of all generations.
 
     Fields:
-        leader: (n_generations, n) which of the best ones it is moved towards.
-        first: (n_generations, n) number of the member that another one's difference starts at.
-        second: (n_generations, n) of the one that it ends at.
-        step: (n_generations, n, 1) length.
-        taken: (n_generations, n, d) which unknowns take part.
+        leader: (n_generations, n) number, among the best, of the member towards which each is moved.
+        first: (n_generations, n) number of the first member of the difference.
+        second: (n_generations, n) number of the second member of the difference.
+        step: (n_generations, n, 1) length of the step.
+        taken: (n_generations, n, d) mask of the unknowns that take part.
     """
 
     leader: Any
@@ -50,14 +51,14 @@ def moves_of(unknowns: int, population: int) -> Moves:
     """Moves, the same ones for all questions.
 
     Args:
-        population: n, at least 2.
+        population: number of members n, at least 2.
 
     Returns:
         the moves.
     """
     random = np.random.default_rng(0)
     shape = (GENERATIONS * population, population)
-    # A permutation and the same one rolled pair no member with itself.
+    # A permutation and the same permutation rolled pair no member with itself.
     first = random.permuted(np.tile(np.arange(population), (shape[0], 1)), axis=1)
     taken = random.random((*shape, unknowns)) < CHANCE
     np.put_along_axis(taken, random.integers(unknowns, size=(*shape, 1)), True, axis=2)
@@ -99,7 +100,7 @@ def _generation(
     members, rank = state
     good = members[lax.top_k(-rank, _leaders(len(members)))[1]][move.leader]
     moved = members + move.step * (good - members + members[move.first] - members[move.second])
-    # Half of the way to the bound where a step goes beyond it.
+    # Go half of the way to a bound that a step would cross.
     moved = jnp.where(moved < 0.0, 0.5 * members, jnp.where(moved > 1.0, 0.5 * (members + 1.0), moved))
     moved = jnp.where(move.taken, moved, members)
     new = _rank(*judged(moved), threshold)
@@ -113,26 +114,26 @@ def _rank(value: Array, margin: Array, threshold: Array) -> Array:
 
 
 def evolved(
-    parts: Parts, given: Any, questions: Any, *, unknowns: int, asked: tuple[float, ...], population: int
+    parts: Parts, arguments: Any, questions: Any, *, unknowns: int, margins: tuple[float, ...], population: int
 ) -> np.ndarray:
     """Best places of many questions.
 
     Args:
-        parts: a function of a module, as it is compiled once.
+        parts: a function at the top of a module, so that it is compiled once.
         questions: pytree of NumPy arrays (n, ...).
-        asked: margins, below 1, at which the objective is to be least; inf: the margin is to be largest.
-        population: members of it; one twice as large takes four times as long.
+        margins: below 1, at each of which the objective is to be least; inf: the margin is to be largest.
+        population: number of members; twice as many take four times as long.
 
     Returns:
-        (n, n_asked, d) in [0, 1]; where no place found has the margin, the one with the largest.
+        (n, n_margins, d) in [0, 1]; where no place has the margin, the place with the largest margin.
     """
     from scipy.stats import qmc  # it takes a second to import
 
     places = qmc.Halton(unknowns, seed=0).random(GROUP * population)
     base_moves = moves_of(unknowns, population)
     # Each search gets its own moves: one may find the place that another one misses.
-    moves = jax.tree.map(lambda x: np.stack([np.roll(x, i, axis=0) for i in range(len(asked))]), base_moves)
-    kernel = partial(_evolved, parts, given, np.asarray(asked), places, moves)
+    moves = jax.tree.map(lambda x: np.stack([np.roll(x, i, axis=0) for i in range(len(margins))]), base_moves)
+    kernel = partial(_evolved, parts, arguments, np.asarray(margins), places, moves)
 
     def part(rows: slice) -> np.ndarray:
         return in_batches(kernel, jax.tree.map(lambda x: x[rows], questions), size=BATCH)

@@ -11,10 +11,10 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
-# Terms that keep the truncation below half a unit in the last place on |x| <= pi / 2.
+# Numbers of terms that keep the truncation error below half a unit in the last place on |x| <= pi / 2.
 _SINE_TERMS = {"float64": 11, "float32": 7}
 _COSINE_TERMS = {"float64": 12, "float32": 7}
-# Promotion of dtypes and of ranks, as jax names it, holds whatever the caller's is. Tests set the strictest.
+# Promotion of dtypes and of ranks, as jax names it, whatever the caller has set. Tests set the strictest.
 PROMOTION = ("standard", "allow")
 
 
@@ -80,7 +80,7 @@ def length(vector: Array) -> Array:
         ().
     """
     square = jnp.sum(vector * vector)
-    # NaN stays NaN.
+    # The length is NaN where the square is.
     return jnp.where(square > 0.0, jnp.sqrt(jnp.where(square > 0.0, square, 1.0)), square)
 
 
@@ -101,12 +101,12 @@ def _refuse_fork() -> None:
 
 @contextlib.contextmanager
 def double_precision() -> Iterator[None]:
-    """Settings of jax under which this package computes, whatever the caller's are; these come back afterwards.
+    """Set jax as this package needs it, whatever the caller has set, and restore the caller's settings afterwards.
 
-    64 bits above all: verdicts are float64's. NaN is an answer in places, so that it is no error.
+    Above all 64 bits, since verdicts are in float64. NaN is a valid answer in places, so that it is no error.
 
     Raises:
-        RuntimeError: this process was forked from one that had used jax, whose threads a fork does not take along.
+        RuntimeError: this process was forked from a process that had used jax, whose threads do not survive a fork.
     """
     _refuse_fork()
     with contextlib.ExitStack() as stack:
@@ -126,10 +126,10 @@ def double_precision() -> Iterator[None]:
 def leaf(value) -> Array:
     """A float64 NumPy array, as a leaf of a pytree that compiled functions take.
 
-    NumPy and not jax: jax would round it to float32 where 64 bits are off.
+    It is NumPy's, since jax would round it to float32 where 64 bits are off.
 
     Args:
-        value: number or nested sequence; what jax is tracing stays as it is.
+        value: number or nested sequence; values that jax is tracing stay as they are.
 
     Returns:
         the array.
@@ -146,7 +146,7 @@ def vertex(left: Array, middle: Array, right: Array) -> tuple[Array, Array]:
         right: () value one step after.
 
     Returns:
-        steps from the middle one, () in [-1, 1]; the value, (). An end where there is no minimum inside.
+        steps from the middle value, () in [-1, 1]; the value, (). Without a minimum inside, those of an end.
     """
     bend = left - 2.0 * middle + right
     move = 0.5 * (left - right) / jnp.where(bend > 0.0, bend, 1.0)
@@ -158,8 +158,8 @@ def vertex(left: Array, middle: Array, right: Array) -> tuple[Array, Array]:
 def solved(matrix: Array, right: Array) -> tuple[Array, Array]:
     """Solution of a small linear system, and the determinant, by elimination with pivots.
 
-    In place of `jnp.linalg`: XLA calls LAPACK for that, and in jaxlib 0.10 batches of such calls can wait for ever for
-    the threads that they occupy themselves.
+    It replaces `jnp.linalg`, for which XLA calls LAPACK: in jaxlib 0.10 batches of such calls can wait for ever for
+    threads that they occupy themselves.
 
     Args:
         matrix: (n, n).
@@ -178,7 +178,7 @@ def solved(matrix: Array, right: Array) -> tuple[Array, Array]:
         is_pivot, is_next = index == place, index == k
         pivot_row = jnp.sum(jnp.where(is_pivot[:, None], rows, 0.0), axis=0)
         pivot = jnp.sum(jnp.where(is_pivot, column, 0.0))
-        # The two rows change places.
+        # Swap the two rows.
         rows, column = jnp.where(is_pivot[:, None], row, rows), jnp.where(is_pivot, column[k], column)
         determinant = determinant * pivot * jnp.where(place == k, 1.0, -1.0)
         pivot_row = pivot_row / pivot

@@ -11,8 +11,8 @@ import numpy as np
 
 # Unit quaternion of no rotation, scalar first.
 IDENTITY = (1.0, 0.0, 0.0, 0.0)
-# A z-up file is turned by half a turn about x: a rotation, so that nothing is mirrored.
-_TURN = {"down": (1.0, 1.0, 1.0), "up": (1.0, -1.0, -1.0)}
+# A z-up file is rotated by half a turn about x, so that nothing is mirrored.
+_SIGNS = {"down": (1.0, 1.0, 1.0), "up": (1.0, -1.0, -1.0)}
 
 
 def _numbers(values):
@@ -27,12 +27,12 @@ def _beside(vector, array):
 
 @dataclasses.dataclass(frozen=True)
 class Frame:
-    """Axes and origin of a robot file, as the kernels' see them.
+    """Axes and origin of a robot file, relative to those of the kernels.
 
     Fields:
-        signs: (3,) of +1 and -1 between the axes of the file and the kernels'; the same both ways.
+        signs: (3,) +1 and -1 between the axes of the file and the kernels'; the same in both directions.
         origin: (3,) centroid of the spools in the file's axes, to the nearest float64, m.
-        rest: (3,) of the centroid, what its rounding leaves, m.
+        rest: (3,) rounding error of the origin, m.
     """
 
     signs: np.ndarray
@@ -66,7 +66,7 @@ class Frame:
         return origin + (array * signs + rest)
 
     def depth(self, height) -> np.ndarray:
-        """Depth below the centroid of the spools of a z of the file.
+        """Depth below the centroid of the spools of a z coordinate of the file.
 
         Args:
             height: (...) z in the file's axes, m.
@@ -77,7 +77,7 @@ class Frame:
         return ((_numbers(height) - self.origin[2]) - self.rest[2]) * self.signs[2]
 
     def height(self, depth) -> np.ndarray:
-        """A depth below the centroid of the spools as z of the file.
+        """Height in the file of a depth below the centroid of the spools.
 
         Args:
             depth: (...) m.
@@ -130,7 +130,7 @@ class Frame:
         Returns:
             (..., 4).
         """
-        # The first sign is always +1, as that of the scalar part is.
+        # The scalar part keeps its sign, like the component along x.
         array = _numbers(quaternions)
         return array * _beside(self.signs[np.array([0, 0, 1, 2])], array)
 
@@ -145,7 +145,7 @@ def frame_of(base_points, z_axis: str) -> Frame:
     Returns:
         the frame.
     """
-    points, signs = _numbers(base_points), np.array(_TURN[z_axis])
+    points, signs = _numbers(base_points), np.array(_SIGNS[z_axis])
     if not isinstance(points, np.ndarray):
         origin = points.mean(0)
         return Frame(signs, origin, (points - origin[None]).mean(0))

@@ -1,8 +1,8 @@
 """Interval jets: bounds of a function and of its first two derivatives over many blocks at once.
 
-Formulas of +, -, *, ** that are written for arrays take jets as well. Derivatives follow from the rules of products
-and chains, in interval arithmetic. Bounds of the second derivative are what they are for: over a block of width w no
-value lies further below the chord of its ends than w^2 / 8 times the largest second derivative.
+Formulas of +, -, *, ** that are written for arrays take jets as well. Derivatives follow from the product rule and the
+chain rule, in interval arithmetic. The aim is a bound of the second derivative: over a block of width w no value lies
+further below the chord of its ends than w^2 / 8 times the largest second derivative.
 """
 
 from collections.abc import Callable
@@ -37,15 +37,15 @@ class Jet:
 
     Args:
         value: lower and upper bounds of the values, arrays of the blocks' shape.
-        slope: likewise of the first derivative.
-        bend: likewise of the second one.
+        slope: bounds of the first derivative, likewise.
+        bend: bounds of the second derivative, likewise.
     """
 
-    # Arrays leave products with jets to the jets.
+    # NumPy arrays leave arithmetic with jets to the jets.
     __array_ufunc__ = None
 
     def __init__(self, value: Interval, slope: Interval, bend: Interval) -> None:
-        """Keep them."""
+        """Keep the bounds."""
         self.value, self.slope, self.bend = value, slope, bend
 
     def _each(self, change: Callable[..., np.ndarray], *others: "Jet") -> "Jet":
@@ -57,7 +57,7 @@ class Jet:
         """The same bounds with one more dimension.
 
         Args:
-            axis: where, of length 1.
+            axis: place of the new dimension, which has length 1.
 
         Returns:
             the bounds.
@@ -98,15 +98,15 @@ class Jet:
     __radd__, __rmul__ = __add__, __mul__
 
     def __neg__(self) -> "Jet":
-        """Opposite."""
+        """Negative."""
         return self * -1.0
 
     def __sub__(self, other: Any) -> "Jet":
-        """Difference from a jet or from constants."""
+        """This jet minus a jet or constants."""
         return self + -other
 
     def __rsub__(self, other: Any) -> "Jet":
-        """Difference of constants from this one."""
+        """Constants minus this jet."""
         return -self + other
 
     def __pow__(self, power: float) -> "Jet":
@@ -136,7 +136,7 @@ def lowest(ends: np.ndarray, jet: Jet) -> np.ndarray:
     """Lower bounds of a function over blocks.
 
     Args:
-        ends: (2, ...) its values at both ends of each block, of width 1.
+        ends: (2, ...) values at both ends of each block, whose width is 1.
 
     Returns:
         (...); -inf where nothing is known.
@@ -144,6 +144,6 @@ def lowest(ends: np.ndarray, jet: Jet) -> np.ndarray:
     least = ends.min(0)
     with np.errstate(invalid="ignore"):
         low = least - np.maximum(jet.bend[1], 0.0) / 8.0
-        # A function whose slope has one sign has no value below the lower end.
+        # A function whose slope has one sign is nowhere below its lower end.
         steady = (jet.slope[0] >= 0.0) | (jet.slope[1] <= 0.0)
     return np.where(steady, least, np.where(np.isnan(low), -np.inf, low))

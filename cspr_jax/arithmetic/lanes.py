@@ -41,7 +41,7 @@ def combined(terms: Sequence[tuple[Array, Vector]]) -> Vector:
     """Sum of weighted vectors.
 
     Args:
-        terms: weight (...) and vector of each.
+        terms: weight (...) and vector of each term.
 
     Returns:
         three arrays.
@@ -75,7 +75,7 @@ def turned_back(matrix: Matrix, vector: Vector) -> Vector:
     return combined([(vector[i], matrix[i]) for i in range(3)])
 
 
-def rotation(quaternion: Sequence[Array]) -> Matrix:
+def rotation_matrix(quaternion: Sequence[Array]) -> Matrix:
     """The rotation matrix of a unit quaternion; see `arithmetic.rotations.matrix`.
 
     Args:
@@ -144,14 +144,14 @@ def largest(values: Sequence[Array]) -> Array:
 
 
 def stored(values: Any, one: Array | None) -> Any:
-    """The same values, which XLA then computes once.
+    """The same values, which XLA then computes only once.
 
-    On a CPU it computes a cheap value again in every loop that uses it, with all that leads to it. A division is
-    dear to it: its result is stored instead.
+    On a CPU XLA computes a cheap value again, with all that leads to it, in every loop that uses it. It counts a
+    division as expensive, and stores its result instead.
 
     Args:
         values: pytree of arrays.
-        one: () the number 1, as an argument of the compiled function; None: not stored.
+        one: () the number 1, as an argument of the compiled function; None: values are not stored.
 
     Returns:
         the pytree.

@@ -9,7 +9,7 @@ import numpy as np
 
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
-# Places looked at for each function, points at each, and how often: each round is eight times as fine as the last.
+# Places that are refined for each function, points at each place, and rounds, each eight times as fine as the last.
 PLACES, POINTS, ROUNDS = 3, 17, 4
 
 
@@ -17,12 +17,12 @@ class Bracket(NamedTuple):
     """An interval in which a function falls and then rises, with two points that divide it by the golden section.
 
     Fields:
-        low: (...).
-        high: (...).
-        left: (...) the point nearer to `low`.
-        right: (...) the other.
-        at_left: (...) value there.
-        at_right: (...).
+        low: (...) lower end.
+        high: (...) upper end.
+        left: (...) inner point nearer to `low`.
+        right: (...) inner point nearer to `high`.
+        at_left: (...) value at `left`.
+        at_right: (...) value at `right`.
     """
 
     low: Any
@@ -37,11 +37,11 @@ def inner_points(low, high) -> tuple[Any, Any]:
     """Two points that divide an interval by the golden section.
 
     Args:
-        low: (...) numbers, NumPy or jax.
-        high: (...).
+        low: (...) lower ends, NumPy or jax.
+        high: (...) upper ends.
 
     Returns:
-        (...) each, the left and the right one.
+        (...) the left point; (...) the right point.
     """
     step = GOLDEN * (high - low)
     return high - step, low + step
@@ -52,7 +52,7 @@ def golden_step(function: Callable, bracket: Bracket, *, left_if_equal: bool = T
 
     Args:
         function: (...) to (...), of jax.
-        left_if_equal: which side is kept where both points have one value.
+        left_if_equal: whether to keep the left side where both points have the same value.
 
     Returns:
         the bracket, and the new value, (...).
@@ -72,12 +72,12 @@ def narrowed(function: Callable[[np.ndarray], np.ndarray], tau: np.ndarray, valu
     """Smallest value of each function along each of several motions.
 
     Args:
-        function: of instants (n_motions, m), to (n_motions, m, n_functions).
+        function: takes instants (n_motions, m), and gives values (n_motions, m, n_functions).
         tau: (n,) equidistant instants from 0 to 1, at least three.
-        values: (n_motions, n, n_functions) of the functions there.
+        values: (n_motions, n, n_functions) values at these instants.
 
     Returns:
-        (n_motions, n_functions) values that they attain.
+        (n_motions, n_functions) attained values.
     """
     return narrowed_places(function, tau, values)[0]
 
@@ -85,15 +85,15 @@ def narrowed(function: Callable[[np.ndarray], np.ndarray], tau: np.ndarray, valu
 def narrowed_places(
     function: Callable[[np.ndarray], np.ndarray], tau: np.ndarray, values: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Smallest value of each function along each of several motions, and when it is attained.
+    """Smallest value of each function along each of several motions, and the instant at which it is attained.
 
     Args:
         function: as for `narrowed`.
-        tau: likewise.
-        values: likewise.
+        tau: (n,) as for `narrowed`.
+        values: (n_motions, n, n_functions) as for `narrowed`.
 
     Returns:
-        (n_motions, n_functions) values, and the instants at which the functions have them.
+        (n_motions, n_functions) values, and (n_motions, n_functions) instants.
     """
     padded = np.pad(values, ((0, 0), (1, 1), (0, 0)), constant_values=np.inf)
     lows = np.where((values <= padded[:, :-2]) & (values <= padded[:, 2:]), values, np.inf)
@@ -104,7 +104,7 @@ def narrowed_places(
     for _ in range(ROUNDS):
         points = np.clip(place[..., None] + width * np.linspace(-1.0, 1.0, POINTS), 0.0, 1.0)
         samples = function(points.reshape(len(points), -1)).reshape(*points.shape, -1)
-        # Each place of a function takes its own values alone: (n_motions, PLACES, n_functions, POINTS).
+        # At each place of a function keep only the values of this function: (n_motions, PLACES, n_functions, POINTS).
         own_samples = np.moveaxis(samples[:, :, column, :, column], 0, 2)
         lowest = own_samples.min((1, 3))
         place = np.take_along_axis(points, own_samples.argmin(3)[..., None], axis=3)[..., 0]

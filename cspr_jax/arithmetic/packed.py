@@ -1,6 +1,6 @@
-"""Several numbers of one loop: XLA's CPU backend computes all that numbers share again for each array that it writes.
+"""Several numbers in one array: for each array that it writes, XLA's CPU backend repeats all that several arrays share.
 
-An array of complex numbers holds two in float64, or four in float32.
+An array of complex numbers holds two real numbers in float64, or four in float32.
 """
 
 from collections.abc import Sequence
@@ -47,7 +47,7 @@ def packed(values: Sequence[Array]) -> tuple[Array, ...]:
         values: float64 arrays of one shape.
 
     Returns:
-        a fourth as many, or one more.
+        a fourth as many, rounded up.
     """
     filled = [*values, *([jnp.zeros_like(values[0])] * (-len(values) % WIDTH))]
     return paired([_joined(a, b) for a, b in zip(filled[::2], filled[1::2], strict=True)])

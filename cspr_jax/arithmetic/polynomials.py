@@ -46,7 +46,7 @@ def derivatives(table: np.ndarray, order: int) -> list[np.ndarray]:
         table: (..., n) coefficients.
 
     Returns:
-        order + 1 tables: (..., n), (..., n - 1), ...; of constants (..., 1).
+        order + 1 tables: (..., n), (..., n - 1), ...; for constants (..., 1).
     """
     tables = [table]
     for _ in range(order):
@@ -61,8 +61,8 @@ def over(table: np.ndarray, start: np.ndarray, width: np.ndarray) -> np.ndarray:
 
     Args:
         table: (..., n) coefficients.
-        start: (...) where the blocks begin.
-        width: (...) of the blocks.
+        start: (...) starts of the blocks.
+        width: (...) widths of the blocks.
 
     Returns:
         (..., n).

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-# Largest deviation of a given quaternion's length from 1 that is mended.
+# A given quaternion is normalised if its length differs from 1 by no more than this.
 UNIT_TOLERANCE = 1e-6
 
 
@@ -33,10 +33,10 @@ def from_tilt_torsion(angles: np.ndarray) -> np.ndarray:
 
 
 def cylindrical_frames(places: np.ndarray) -> np.ndarray:
-    """Azimuths (3.98) of the cylindrical frames of places, to be added to tilt-and-torsion angles in them.
+    """Azimuths (3.98) of the cylindrical frames of places, to be added to tilt-and-torsion angles in these frames.
 
     Args:
-        places: (..., 3) from a point of the vertical axis.
+        places: (..., 3) from a point on the vertical axis.
 
     Returns:
         (..., 3) the azimuth, 0, 0, rad.
@@ -78,7 +78,7 @@ def matrix(quaternion: Array) -> Array:
 
 
 def product(left: Array, right: Array) -> Array:
-    """The product of two quaternions, (3.18): the right rotation first.
+    """The product of two quaternions, (3.18): the right one is the first rotation.
 
     Args:
         left: (4,).
@@ -93,11 +93,11 @@ def product(left: Array, right: Array) -> Array:
 
 
 def products(left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Products of quaternions, each with each: the right rotation first; see `product`.
+    """Products of quaternions, one by one; see `product`.
 
     Args:
         left: (n, 4), or (1, 4) one for all.
-        right: likewise.
+        right: (n, 4), or (1, 4) one for all.
 
     Returns:
         (n, 4).
@@ -120,7 +120,7 @@ def conjugate(quaternion: Array) -> Array:
 
 
 def upper(quaternion: Array) -> Array:
-    """The one of q and -q whose angle lies in [-pi, pi]: scalar part not negative, thesis section 3.7.
+    """Whichever of q and -q has an angle in [-pi, pi]: its scalar part is not negative, thesis section 3.7.
 
     Args:
         quaternion: (..., 4).

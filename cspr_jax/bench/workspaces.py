@@ -140,7 +140,9 @@ def tension_rate(robot: PointMassRobot | PlatformRobot) -> float:
     places, quaternions = np.stack(poses.place, 1), np.stack(poses.quaternion or (), 1)
     matrices = np.asarray(geometry.wrench_matrices(centred_robot, places, quaternions)) / search.unit[:, None]
     wrenches = np.repeat(search.required(places[0], quaternions[0]).corners, count, axis=0)
-    limits = [np.broadcast_to(x, (count, centred_robot.n_cables)) for x in (search.asked.low, search.asked.high)]
+    limits = [
+        np.broadcast_to(x, (count, centred_robot.n_cables)) for x in (search.requirement.low, search.requirement.high)
+    ]
     return count / best(lambda: least_norms(matrices, wrenches, *limits))
 
 
@@ -179,7 +181,8 @@ def _others(robot: PointMassRobot | PlatformRobot) -> dict[str, float]:
     wrench = search.required(places[0], quaternions[0]).corners[0]
 
     def rate(way) -> float:
-        return SAMPLE / best(lambda: [way(matrix, wrench, search.asked.low, search.asked.high) for matrix in matrices])
+        low, high = search.requirement.low, search.requirement.high
+        return SAMPLE / best(lambda: [way(matrix, wrench, low, high) for matrix in matrices])
 
     return {"HiGHS": rate(by_program), "NNLS": rate(by_squares)}
 

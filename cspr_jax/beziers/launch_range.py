@@ -153,7 +153,7 @@ def launch_range(
     """
     question = LaunchRequirement(starts, targets, depths_of(problem.robot, starts))
     margins = (np.inf, *(SAMPLED if limits_set(problem.limits) else EXACT))
-    places = evolved(_energy, (problem, bounds), question, unknowns=UNKNOWNS, asked=margins, population=population)
+    places = evolved(_energy, (problem, bounds), question, unknowns=UNKNOWNS, margins=margins, population=population)
     parts = [slice(i, i + TOGETHER) for i in range(0, len(starts), TOGETHER)]
     answers = [
         _answers((problem, bounds), jax.tree.map(lambda x, s=chunk: x[s], (question, places))) for chunk in parts

@@ -100,4 +100,4 @@ def motion_kind(keys: TrajectoryKeys, *, from_rest: bool = False) -> PlatformMot
     Returns:
         the kind.
     """
-    return PlatformMotionKind(keys.family == "hypocycloid", keys.beat == "beta_1", from_rest)
+    return PlatformMotionKind(variable=keys.family == "hypocycloid", plain=keys.beat == "beta_1", from_rest=from_rest)

@@ -15,19 +15,16 @@ Files, each importing only from those above it:
     platform_segment_lanes  the same, one lane a segment
     from_rest_lanes         the same from rest, with the fewest operations
     end_acceleration        angular acceleration at the end of a segment, section 3.8
-    beta_hat                values of beta-hat to try
-    pose_ends               the same at many poses
+    beta_hat                values of beta-hat to try, and whether motions can end at poses
     slacks                  criteria of one instant
     slack_lanes             the same, one lane a case
     motions                 many motions in one record, and selections from it
     motion_checker          what searches ask of a checker, whatever the number of cables
     sieve                   a first look, in single precision
-    kernels                 criteria of many motions at instants
     orientation_steps       cables at still poses, and between neighbouring ones
     crossings               cables that cross between samples
     meetings                proofs that cables meet
-    work_list               blocks that are closed, or halved
-    least_nodes             node values of a block -> the few numbers that a verdict needs
+    work_list               blocks that are closed, or halved; the few numbers that this needs of their nodes
     platform_reach          bounds of a motion on an ellipse of complex time
     limit_blocks            limits on blocks
     tension_blocks          tensions and determinant on blocks

@@ -1,8 +1,8 @@
 """Accessible orientations of a platform at a place, thesis section 3.10.2, by three definitions.
 
-"grid": those multiples of the step of tilt and torsion that neighbours join to the reference orientation. "scan":
-Bonev's scan as the thesis describes it, rays from a moving centre. "equal-volume": like "grid", on cells of equal
-volume of SO(3), the only one whose count is a fraction of something.
+"grid": the multiples of the step of tilt and torsion that chains of neighbours join to the reference orientation.
+"scan": Bonev's scan as the thesis describes it, rays from a moving centre. "equal-volume": like "grid", on cells of
+equal volume of SO(3); only here is the number of orientations proportional to a volume.
 """
 
 import functools
@@ -22,8 +22,8 @@ from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.runtime.stages import stage
 
 DEFINITIONS = ("grid", "scan", "equal-volume")
-# Steps along rays that are tried at a time: few rays go farther, and with the usual step they fill three batches of
-# `OrientationSteps`.
+# Steps along rays that are tried at a time: few rays go farther, and with the usual number of rays these steps fill
+# three batches of `OrientationSteps`.
 LEG = 23
 WHOLE = 8.0 * math.pi**2  # volume of SO(3), in the measure sin(theta) d phi d theta d sigma
 
@@ -33,7 +33,7 @@ class Accessible(NamedTuple):
 
     Fields:
         angles: (n, 3) tilt and torsion in the cylindrical frame of the place, rad.
-        volume: (n,) part of SO(3) that each stands for.
+        volume: (n,) part of SO(3) that each orientation stands for.
         of_points: part of all grid points; NaN for a scan, which has no grid.
     """
 
@@ -54,10 +54,10 @@ def accessible(robot: PlatformRobot, place: np.ndarray, definition: str, divisio
         robot: centred, in its reference axes.
         place: (3,) from the centroid of the spools, z down, m.
         definition: one of `DEFINITIONS`.
-        divisions: of pi; the step is pi over it.
+        divisions: of pi: the step is pi / divisions.
 
     Returns:
-        the orientations; none where the reference orientation itself is singular, or the place above the spools.
+        the orientations; none where the reference orientation itself is singular, or the place lies above the spools.
     """
     stage("accessible orientations")
     steps = OrientationSteps(robot, place)
@@ -76,22 +76,22 @@ def accessible(robot: PlatformRobot, place: np.ndarray, definition: str, divisio
     return Accessible(grid.angles[inside], grid.volume[inside], float(inside.mean()))
 
 
-def accessible_sets(robot: PlatformRobot, asked: Sequence[tuple[np.ndarray, int]], definition: str) -> list[Accessible]:
+def accessible_sets(robot: PlatformRobot, grids: Sequence[tuple[np.ndarray, int]], definition: str) -> list[Accessible]:
     """The accessible orientations of many places, by two threads.
 
     Args:
         robot: centred, in its reference axes.
-        asked: of each its place (3,), m, and its divisions of pi.
+        grids: the place (3,), m, and the divisions of pi of each.
         definition: one of `DEFINITIONS`.
 
     Returns:
-        the orientations of each; see `accessible`.
+        the orientations of each place; see `accessible`.
     """
-    return in_threads(lambda one: accessible(robot, one[0], definition, one[1]), asked)
+    return in_threads(lambda grid: accessible(robot, grid[0], definition, grid[1]), grids)
 
 
 def _scan(steps: OrientationSteps, towards: np.ndarray, divisions: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    # Sections of constant torsion, from 0 up and from 0 down; each starts at the centre of the one before.
+    # Scan sections of constant torsion, from 0 up and from 0 down; each starts at the centre of the section before.
     step = math.pi / divisions
     part, first = _section(steps, towards, np.zeros(2), 0.0, divisions)
     yield part
@@ -110,7 +110,7 @@ def _scan(steps: OrientationSteps, towards: np.ndarray, divisions: int) -> Itera
 def _section(
     steps: OrientationSteps, towards: np.ndarray, centre: np.ndarray, torsion: float, divisions: int
 ) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
-    # Go along rays in the polar plane (theta cos phi, theta sin phi), up to the first step that cannot be made.
+    # Go along rays in the polar plane (theta cos phi, theta sin phi), up to the first step that is impossible.
     step, count = math.pi / divisions, 2 * divisions
     azimuth = np.arange(count) * step
     rays = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1)
@@ -132,7 +132,8 @@ def _section(
 
 
 def _free(steps: OrientationSteps, towards: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    # Take orientations along rays, (n, m + 1, 3); return (n, m) which steps can be made, and all before them.
+    # Take orientations along rays, (n, m + 1, 3); return the mask (n, m) of steps that are possible with all steps
+    # before them.
     samples = steps.at(from_tilt_torsion(angles.reshape(-1, 3) + towards))
     index = np.arange(angles[..., 0].size).reshape(len(angles), -1)
     free = steps.passable(samples, index[:, :-1].ravel(), index[:, 1:].ravel()).reshape(len(angles), -1)
@@ -141,6 +142,6 @@ def _free(steps: OrientationSteps, towards: np.ndarray, angles: np.ndarray) -> n
 
 
 def _angles(points: np.ndarray, torsion: np.ndarray) -> np.ndarray:
-    # Turn points of the polar plane, and the torsion, into angles of tilt and torsion.
+    # Convert points of the polar plane, and the torsion, to angles of tilt and torsion.
     tilt = np.hypot(points[..., 0], points[..., 1])
     return np.stack([np.arctan2(points[..., 1], points[..., 0]), tilt, np.broadcast_to(torsion, tilt.shape)], axis=-1)

@@ -29,12 +29,12 @@ NEVER = np.iinfo(int).max
 
 @dataclasses.dataclass(frozen=True)
 class PlatformMotionAnswers(Answers):
-    """One answer a segment between poses.
+    """Answers about segments between poses, one a segment.
 
     Fields:
         beta_hat: (n, 2) at both ends.
         det_margin: (n,) smallest determinant over its value at rest in P0; NaN on more than six cables, where there is
-            none, and cables are not held against the platform.
+            no determinant, and contacts with the platform are not looked for.
         cable_distance: (n,) smallest distance between cables that can meet, m.
         refuted_at: (n,) time at which the motion of `tried_arcs` is refuted, s: by its tensions, else by limits or
             contacts; NaN where it is not, and of contacts where they were only sampled.
@@ -58,9 +58,9 @@ class PlatformMotionAnswers(Answers):
             "beta_hat": [float(value) for value in self.beta_hat[i]],
         }
 
-    def rows(self, which: np.ndarray) -> "PlatformMotionAnswers":
+    def rows(self, index: np.ndarray) -> "PlatformMotionAnswers":
         """Answers chosen by indices, or by a mask (n,)."""
-        return PlatformMotionAnswers(**{name: values[which] for name, values in vars(self).items()})
+        return PlatformMotionAnswers(**{name: values[index] for name, values in vars(self).items()})
 
 
 def settled(
@@ -73,18 +73,18 @@ def settled(
     fixed: np.ndarray | None = None,
     margins: bool = True,
 ) -> tuple[PlatformMotionAnswers, PlatformSegment]:
-    """Answers of motions, whether a number of arcs was found or not.
+    """Answers about motions, with and without a feasible number of arcs.
 
     Args:
-        candidates: one of each of n motions.
-        smallest: of these; its checks are completed.
-        refused: those of them that only limits refuse.
+        candidates: one candidate of each of n motions.
+        smallest: numbers of arcs of the candidates; its checks are completed here.
+        refused: numbers of arcs at which only limits refuse the candidates.
         max_arcs: largest number tried.
         fixed: (n,) a fixed number of arcs, 0 where free; None: all free.
-        margins: whether those of motions without a number of arcs are wanted, and not only why they fail.
+        margins: whether motions without a number of arcs get margins, and not only reasons.
 
     Returns:
-        the answers; (2.55) does not apply: NaN. The segments that they belong to.
+        the answers, NaN for (2.55), which does not apply; the segments that they belong to.
     """
     tried = np.where(smallest.arcs > 0, smallest.arcs, refused.arcs)
     if fixed is not None:
@@ -100,7 +100,7 @@ def settled(
     checks.not_tolerated[known] = np.minimum(checks.not_tolerated[known], tolerances.refuted)
     duration = checker.durations(segments, tried)
     beta_hats = np.stack(candidates.beta_hats, axis=1)
-    if checker.kind.plain:  # (3.66) has the one that its cosine has
+    if checker.kind.plain:  # beta-hat of the cosine, (3.66)
         beta_hats = np.tile(-((math.pi * tried / duration) ** 2 / segments.rate)[:, None], 2)
     doubtful = (smallest.undecided > 0) & ((smallest.arcs == 0) | (smallest.undecided < smallest.arcs))
     parts = checker, candidates, smallest, refused, checks
@@ -152,7 +152,7 @@ def _reasons(
     named = np.zeros(len(basic), int)
     for flag, column in zip(checker.flags, broken.T, strict=True):
         named |= np.where(column, flag.value, 0)
-    # These motions are proved but for limits, or but for the robots within the uncertainty, at a closer look.
+    # At a closer look some motions are proved except for limits, or for robots within the uncertainty.
     alone = named | (checks.verdict & (Verdict.UNCERTAINTY | Verdict.UNDECIDED).value)
     return np.where(by_limits, alone, basic | named)
 
@@ -161,12 +161,12 @@ def trials(motions: Candidates, values: np.ndarray, *, same: bool = False) -> tu
     """Motions with each of several values of beta-hat at their ends.
 
     Args:
-        motions: n of them, one candidate each, with the values at their starts.
+        motions: n motions, one candidate each, with the values of beta-hat at their starts.
         values: (n, n_values) in the order in which they are tried; NaN for none.
         same: whether the value at the end holds at the start too.
 
     Returns:
-        which motion each candidate is of, (k,); the candidates.
+        motion of each candidate, (k,); the candidates.
     """
     cell, option = np.nonzero(~np.isnan(values))
     return cell, _with_ends(motions.rows(cell), values[cell, option], same=same)
@@ -184,19 +184,19 @@ def reached(
     """Smallest numbers of arcs of motions, each with several values of beta-hat at its end.
 
     Args:
-        motions: n of them, one candidate each, with the values at their starts.
+        motions: n motions, one candidate each, with the values of beta-hat at their starts.
         values: (n, n_values) in the order in which they are tried; NaN for none.
         max_arcs: largest number tried.
         same: whether the value at the end holds at the start too.
 
     Returns:
-        the answers; where there is none, those of the first value, or of that at rest.
+        the answers; where no value is feasible, the answer with the first value, or with the value at rest.
     """
     cell, trial = trials(motions, values, same=same)
     of_trials = smallest_arcs(checker, trial, max_arcs=max_arcs, margins=margins)
     arcs, undecided, checks = np.zeros(len(values), int), np.full(len(values), NEVER), checker.nothing(len(values))
     beta_hats = np.where(np.isnan(values[:, 0]), AT_REST, values[:, 0])
-    # Several values of one motion may have passed: the one tried first is last here.
+    # Several values of one motion may have passed: in reverse order, the one tried first is written last.
     best = np.flatnonzero(of_trials.arcs > 0)[::-1]
     arcs[cell[best]], beta_hats[cell[best]] = of_trials.arcs[best], trial.beta_hats[1][best]
     checks.put(cell[best], of_trials.checks.rows(best))
@@ -207,7 +207,7 @@ def reached(
     of_limits = refused_by_limits(checker, trial.rows(open_ones), max_arcs=max_arcs)
     refused = Refused(np.zeros(len(values), int), np.zeros((len(values), len(checker.flags)), bool))
     ranks = rank(checker.flags, of_limits.broken)
-    best = np.lexsort((of_limits.arcs, ranks))[::-1]  # written last: the fewest limits, then the fewest arcs
+    best = np.lexsort((of_limits.arcs, ranks))[::-1]  # the fewest limits, then the fewest arcs, are written last
     best = best[of_limits.arcs[best] > 0]
     cells = cell[open_ones[best]]
     refused.arcs[cells], refused.broken[cells] = of_limits.arcs[best], of_limits.broken[best]

@@ -18,11 +18,12 @@ from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.verdicts import Verdict
 
 BATCH = 2048
-# So many candidates are held at a time.
+# Number of candidates that are held at a time.
 CANDIDATES = 262_144
-# Instants of the first look, in arcs before the end: those at which most motions fail, the most telling ones first;
-# then those at which most of the rest fail, with one beside the start, where the amplitude function may bend most.
-# Chosen one by one among motions of the MSSM with three amplitude functions; any others are as right, and slower.
+# Instants of the first look, in arcs before the end: first the instants at which most motions fail, the most telling
+# ones first; then the instants at which most of the others fail, with one beside the start, where the amplitude
+# function may bend most. They were chosen one by one among motions of the MSSM with three amplitude functions; other
+# instants would be as right, and slower.
 TELLING = np.array([1, 2, 25, 11, 16, 5, 13, 17, 8, 4, 10, 48, 27, 6, 24, 49]) / 16.0
 OTHERS = np.array([338, 192, 260, 3, 74, 63, 32, 330, 1, 49, 134, 56, 436, 168, 8]) / 96.0
 BESIDE_START = 6.0 / 96.0
@@ -31,14 +32,14 @@ COARSEST = 4
 
 
 class Candidates(NamedTuple):
-    """Motions whose smallest number of arcs is asked for, with values of beta-hat to be tried.
+    """Motions whose smallest number of arcs is sought, with values of beta-hat to be tried.
 
     Fields:
         start: position (m, 3) m and quaternion (m, 4) of each motion.
         end: likewise.
-        z0: (m,) m.
-        motion: (n,) which motion each candidate is of, in any order; those of one motion that are tried first come
-            first.
+        z0: (m,) depth of P0, m.
+        motion: (n,) motion of each candidate, in any order; among candidates of one motion, those that are tried first
+            come first.
         beta_hats: beta-hat at the start (n,) and at the end (n,).
     """
 
@@ -48,23 +49,24 @@ class Candidates(NamedTuple):
     motion: np.ndarray
     beta_hats: tuple[np.ndarray, np.ndarray]
 
-    def rows(self, which: np.ndarray) -> "Candidates":
+    def rows(self, index: np.ndarray) -> "Candidates":
         """Candidates chosen by indices, or by a mask (n,)."""
-        return self._replace(motion=self.motion[which], beta_hats=(self.beta_hats[0][which], self.beta_hats[1][which]))
+        return self._replace(motion=self.motion[index], beta_hats=(self.beta_hats[0][index], self.beta_hats[1][index]))
 
-    def motions(self, which: np.ndarray) -> "Candidates":
+    def motions(self, index: np.ndarray) -> "Candidates":
         """Motions of one candidate each, chosen by indices."""
-        start, end, beta_hats = ((a[which], b[which]) for a, b in (self.start, self.end, self.beta_hats))
-        return Candidates(start, end, self.z0[which], np.arange(len(which)), beta_hats)
+        start, end, beta_hats = ((a[index], b[index]) for a, b in (self.start, self.end, self.beta_hats))
+        return Candidates(start, end, self.z0[index], np.arange(len(index)), beta_hats)
 
 
 class FewestArcs(NamedTuple):
     """Smallest numbers of arcs.
 
     Fields:
-        arcs: (n,) 0 where none passes all tests, or none was asked for any more; several of a motion may have one.
+        arcs: (n,) 0 where no number passes all tests, or where another candidate had one already; several candidates of
+            a motion may have a number.
         undecided: (n,) the smallest number that stayed undecided; 0: none did.
-        checks: of the motions with `arcs`; all else is to be ignored.
+        checks: valid of candidates with a number of arcs only.
     """
 
     arcs: np.ndarray
@@ -95,7 +97,7 @@ class _Segments:
         motion, (first, last) = self._candidates.motion[indices], self._candidates.beta_hats
         segments = rows(self._of_motions[arcs % 2], motion)
         return dataclasses.replace(
-            segments, turn=segments.turn._replace(start_beta_hat=first[indices], end_beta_hat=last[indices])
+            segments, slerp=segments.slerp._replace(start_beta_hat=first[indices], end_beta_hat=last[indices])
         )
 
 
@@ -108,19 +110,19 @@ def smallest_arcs(
     beyond: int = -1,
     margins: bool = True,
 ) -> FewestArcs:
-    """The smallest number of arcs that passes all tests.
+    """Smallest number of arcs that passes all tests, of each candidate.
 
     A few instants refute most motions before they are checked in full.
 
     Args:
         max_arcs: largest number tried.
         fixed: (m,) a fixed number of arcs of each motion, 0 where free; None: all free.
-        beyond: how many arcs beyond the smallest one of a motion are tried for its other candidates; -1: the first
-            one that passes is enough.
-        margins: whether the checks are to have more than verdicts.
+        beyond: how many arcs beyond the smallest number of a motion are tried for its other candidates; -1: the first
+            candidate that passes is enough.
+        margins: whether the checks have more than verdicts.
 
     Returns:
-        what was found.
+        the numbers, and the checks.
     """
     motion, count = candidates.motion, len(candidates.motion)
     smallest, undecided, checks = np.zeros(count, int), np.zeros(count, int), checker.nothing(count)
@@ -138,14 +140,14 @@ def smallest_arcs(
         alive = _sieved(checker, segments, arcs, alive, _instants(arcs, TELLING))
         first = np.unique(motion[alive], return_index=True)[1] if beyond < 0 else slice(None)
         # The first candidate of each motion, then all others of motions where it fails: few and large batches.
-        for turn in (alive[first], np.delete(alive, first)):
-            turn = turn[last[motion[turn]] >= arcs]
-            turn = _sieved(checker, segments, arcs, turn, np.append(BESIDE_START / arcs, _instants(arcs, OTHERS)))
-            if not len(turn):
+        for group in (alive[first], np.delete(alive, first)):
+            group = group[last[motion[group]] >= arcs]
+            group = _sieved(checker, segments, arcs, group, np.append(BESIDE_START / arcs, _instants(arcs, OTHERS)))
+            if not len(group):
                 continue
-            got = checker.check(segments(arcs, turn), np.full(len(turn), arcs), whole=False, margins=margins)
-            checks.put(turn, got)
-            passed, unsure = (turn[got.verdict == verdict] for verdict in (0, Verdict.UNDECIDED))
+            got = checker.check(segments(arcs, group), np.full(len(group), arcs), whole=False, margins=margins)
+            checks.put(group, got)
+            passed, unsure = (group[got.verdict == verdict] for verdict in (0, Verdict.UNDECIDED))
             smallest[passed] = arcs
             undecided[unsure] = np.where(undecided[unsure] > 0, undecided[unsure], arcs)
             last[motion[passed]] = np.minimum(last[motion[passed]], arcs + beyond)
@@ -153,7 +155,7 @@ def smallest_arcs(
 
 
 def _instants(arcs: int, before: np.ndarray) -> np.ndarray:
-    # Go so many arcs back from the end, or to the start of a shorter motion, where nothing fails.
+    # Return instants so many arcs before the end; of a shorter motion the start, where nothing fails.
     return np.maximum(1.0 - before / arcs, 0.0)
 
 
@@ -175,14 +177,14 @@ def _sieved(
 def refused_by_limits(
     checker: MotionChecker, candidates: Candidates, *, max_arcs: int, fixed: np.ndarray | None = None
 ) -> Refused:
-    """Candidates of motions, none of which is feasible, that only limits refuse.
+    """Smallest numbers of arcs at which only limits refuse candidates, of motions without a feasible candidate.
 
     Args:
         max_arcs: largest number tried.
         fixed: (m,) a fixed number of arcs of each motion, 0 where free; None: all free.
 
     Returns:
-        one for each candidate.
+        the number and the broken limits of each candidate.
     """
     motion, count = candidates.motion, len(candidates.motion)
     fewest, is_limit = FewestLimits(count, checker.flags), checker.is_limit
@@ -202,7 +204,7 @@ def refused_by_limits(
 
 
 def _but_for_limits(checker: MotionChecker, segments: PlatformSegment, arcs: int) -> tuple[np.ndarray, np.ndarray]:
-    # Tell which motions are proved but for the limits that they break, (n,), and return these limits, (n, n_criteria).
+    # Tell which motions are proved except for limits that they break, (n,), and return these limits, (n, n_criteria).
     each, is_limit = np.full(len(segments.rate), arcs), checker.is_limit
     first = checker.check(segments, each, whole=False, margins=False, ignored=is_limit)
     is_proved, broken = first.verdict == 0, checker.breaks(first.slack) & is_limit
@@ -219,7 +221,7 @@ def _but_for_limits(checker: MotionChecker, segments: PlatformSegment, arcs: int
             broken[alike] |= more
             left.append(alike[more.any(1)])
         unclear = np.concatenate(left)
-        is_proved[unclear] = True  # but for more limits
+        is_proved[unclear] = True  # except for more limits
     is_proved[unclear] &= (broken[unclear] == is_limit).all(1)
     return is_proved, broken
 
@@ -230,13 +232,13 @@ def unavoidable(
     """Criteria that every number of arcs breaks.
 
     Args:
-        candidates: n of them, one of each motion.
-        suspects: (n, n_criteria) criteria that are asked about, which some number of arcs breaks.
+        candidates: n candidates, one of each motion.
+        suspects: (n, n_criteria) mask of criteria that some number of arcs breaks.
         max_arcs: largest number tried.
         fixed: (n,) a fixed number of arcs, 0 where free; None: all free.
 
     Returns:
-        (n, n_criteria): no instant that was looked at says otherwise of these, and some instant says it of each.
+        (n, n_criteria): mask of criteria that, as far as the samples show, are broken with every number of arcs.
     """
     if not suspects.any():
         return suspects
@@ -254,7 +256,7 @@ def unavoidable(
 
 
 def best_candidates(checker: MotionChecker, candidates: Candidates, *, max_arcs: int) -> np.ndarray:
-    """The number of arcs with the largest smallest tension over some samples, where none is feasible.
+    """Number of arcs whose smallest sampled tension is the largest, for motions without a feasible number.
 
     Args:
         max_arcs: largest number tried.

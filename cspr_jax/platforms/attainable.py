@@ -8,18 +8,18 @@ from cspr_jax.arithmetic.rotations import cylindrical_frames, from_tilt_torsion
 from cspr_jax.motions.answers import joined
 from cspr_jax.platforms.answers import PlatformMotionAnswers, reached, trials
 from cspr_jax.platforms.arcs import CANDIDATES, Candidates, smallest_arcs
+from cspr_jax.platforms.beta_hat import end_options
 from cspr_jax.platforms.checker import PlatformChecker
 from cspr_jax.platforms.end_acceleration import AT_REST
-from cspr_jax.platforms.pose_ends import end_options
 from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.robots.symmetries import NONE, Symmetries, alike
 
 # Values of beta-hat tried at the target.
 VALUES = 20
-# The preferred value comes first; one in so many of the others is then tried before the rest.
+# The preferred value is tried first, then every fifth of the others, then the rest.
 FEWER = 5
-# Large parts fill their batches: candidates of a search for the smallest numbers of arcs, motions of one that only asks
-# whether.
+# Sizes of parts, large enough to fill batches: candidates of a search for the smallest numbers of arcs; motions of a
+# search that only tells whether there is one; and the stride by which the latter are mixed.
 LARGE, PART, MIXED = 4 * CANDIDATES, CANDIDATES // 4, 16
 
 
@@ -41,9 +41,9 @@ def attainable(
         angles: (n, 3) tilt and torsion in the cylindrical frame of each place, rad; n >= 1.
         z0: (n,) m.
         max_arcs: largest number tried.
-        values: of beta-hat, the preferred one first.
+        values: number of values of beta-hat, the preferred one first.
         symmetry: symmetries of the robot; orientations that they join are computed once.
-        margins: whether they are wanted, and not only why orientations are not attained.
+        margins: whether orientations that are not attained get margins, and not only reasons.
 
     Returns:
         the answers.
@@ -71,29 +71,29 @@ def attained(
 ) -> np.ndarray:
     """Orientations of places that some number of arcs and some value of beta-hat attains.
 
-    `attainable` says this too, and tells how, and why not; this function takes half of the work.
+    `attainable` also tells how, or why not; this function does half of the work.
 
     Args:
         places: (n, 3) from the centroid of the spools, z down, m.
         angles: (n, 3) tilt and torsion in the cylindrical frame of each place, rad; n >= 1.
         z0: (n,) m.
         max_arcs: largest number tried.
-        values: of beta-hat, the preferred one first.
-        tried: which of these, (k,) numbers from 0 on; None: all, in `turns`.
+        values: number of values of beta-hat, the preferred one first.
+        tried: (k,) numbers of the values to try, from 0 on; None: all, in `rounds`.
         symmetry: symmetries of the robot; orientations that they join are computed once.
 
     Returns:
         (n,).
     """
     representatives, inverse = _once(checker, places, angles, z0, symmetry)
-    each = turns(values) if tried is None else (tried,)
+    each = rounds(values) if tried is None else (tried,)
 
     def part(rows):
         rows = representatives[rows]
         motions, beta_hats = _motions(checker, places[rows], angles[rows], z0[rows], values)
         is_attained = np.zeros(len(rows), bool)
-        for turn in each:
-            left, options = np.flatnonzero(~is_attained), beta_hats[:, turn]
+        for numbers in each:
+            left, options = np.flatnonzero(~is_attained), beta_hats[:, numbers]
             size = max(CANDIDATES // max(options.shape[1], 1), 1)
             for piece in (left[k : k + size] for k in range(0, len(left), size)):
                 cell, trial = trials(motions.motions(piece), options[piece])
@@ -101,7 +101,7 @@ def attained(
                 is_attained[piece[cell[arcs > 0]]] = True
         return is_attained
 
-    # Places differ in what they take: each part gets some of all.
+    # Places differ in how long they take: each part gets some of all.
     mixed = np.argsort(np.arange(len(representatives)) % MIXED, kind="stable")
     flags = np.empty(len(representatives), bool)
     representatives[:] = representatives[mixed]
@@ -109,21 +109,21 @@ def attained(
     return flags[inverse]
 
 
-def turns(values: int = VALUES) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Turns in which values of beta-hat are tried, each with every number of arcs, where the one before fails.
+def rounds(values: int = VALUES) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rounds in which values of beta-hat are tried, each with every number of arcs, where the one before fails.
 
     Args:
-        values: how many there are, the preferred one first.
+        values: how many values there are, the preferred one first.
 
     Returns:
-        numbers of values from 0 on: the preferred one; some of the others; the rest.
+        numbers of values, from 0 on: the preferred one; some of the others; the rest.
     """
     numbers = np.arange(1, values)
     return np.array([0]), numbers[numbers % FEWER == 0], numbers[numbers % FEWER != 0]
 
 
 def _once(checker: PlatformChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, symmetry: Symmetries):
-    # Find the orientations that stand for others too, and the place of each orientation among these.
+    # Find the orientations that represent all, and the place of each orientation's representative among them.
     representatives, inverse = np.unique(alike(symmetry, np.c_[places, z0], angles), return_inverse=True)
     return representatives, inverse.ravel()
 
@@ -131,7 +131,7 @@ def _once(checker: PlatformChecker, places: np.ndarray, angles: np.ndarray, z0: 
 def _motions(
     checker: PlatformChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, values: int
 ) -> tuple[Candidates, np.ndarray]:
-    # Return transitions from rest, and (n, values) of beta-hat at their ends.
+    # Return transitions from rest, and values (n, n_values) of beta-hat at their ends.
     robot, count = checker.problem.robot, len(angles)
     ends = (places, from_tilt_torsion(angles + cylindrical_frames(places)))
     beta_hats, can_end = end_options(robot, *ends, z0, values)

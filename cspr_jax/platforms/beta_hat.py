@@ -1,10 +1,22 @@
-"""Values of beta-hat to try at the ends of segments, and the choice among them along a sequence of poses."""
+"""Values of beta-hat to try at the ends of segments, poses where none can end, and the choice along a sequence."""
 
+from functools import partial
+
+import jax
 import numpy as np
 
-# Beyond this nothing was ever gained, docs/theory.md.
+from cspr_jax.arithmetic import rotations
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.platforms.end_acceleration import endpoint
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.point_mass import plane_normal
+from cspr_jax.robots.wrench_balance import determinant_share, is_regular
+
+# Larger values of beta-hat have never gained anything, docs/theory.md.
 LARGEST = 12.0
 OPTIONS = 11
+# Poses that are computed in one call.
+BATCH = 1024
 # Arcs tried beyond the first number that some values allow: more are rarely better.
 BEYOND = 4
 
@@ -17,12 +29,12 @@ def options(preferred: np.ndarray, lowest: np.ndarray, highest: np.ndarray, coun
 
     Args:
         preferred: (n,) beta-hat of (3.91).
-        lowest: (n,) of (3.92).
-        highest: (n,) of (3.92).
+        lowest: (n,) start of the interval (3.92).
+        highest: (n,) end of the interval (3.92).
         count: how many values in all.
 
     Returns:
-        (n, count) NaN in place of a value; all of a row if none keeps every cable taut.
+        (n, count) values; NaN for missing ones, a whole row where no value keeps every cable taut.
     """
     preferred, lowest, highest = (np.asarray(x, float) for x in (preferred, lowest, highest))
     low, high = np.maximum(lowest, -LARGEST)[:, None], np.minimum(highest, LARGEST)[:, None]
@@ -34,14 +46,51 @@ def options(preferred: np.ndarray, lowest: np.ndarray, highest: np.ndarray, coun
     return np.concatenate([first, others], axis=1)
 
 
+@jax.jit
+def _ends(robot: PlatformRobot, poses) -> tuple[jax.Array, ...]:
+    # Return for each pose (3.91), the interval (3.92), the determinant over its value at the same depth in the middle,
+    # and the depth.
+    def one(position, quaternion, z0):
+        end, depth = endpoint(robot, position, quaternion, z0), plane_normal(robot) @ position
+        share = determinant_share(robot, position, rotations.matrix(quaternion))
+        return end.preferred, end.lowest, end.highest, share, depth
+
+    return jax.vmap(one)(*poses)
+
+
+def end_options(
+    robot: PlatformRobot, positions: np.ndarray, quaternions: np.ndarray, z0: np.ndarray, count: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Values of beta-hat to try at poses.
+
+    Args:
+        robot: in its reference axes.
+        positions: (n, 3) m.
+        quaternions: (n, 4).
+        z0: (n,) m.
+        count: how many values for each.
+
+    Returns:
+        (n, count) of `options`; (n,) whether a motion can end there: below the spools, and not beyond a
+        singularity.
+    """
+    preferred, lowest, highest, share, depth = in_batches(
+        partial(_ends, robot), (positions, quaternions, z0), size=BATCH
+    )
+    return options(preferred, lowest, highest, count), (depth > 0.0) & is_regular(share)
+
+
 def cheapest_path(costs: list[np.ndarray]) -> list[int]:
-    """The options along a sequence whose segments cost least in sum; among equals those tried first.
+    """Choose an option for each pose of a sequence, so that the segments cost least in sum.
+
+    Among equal sums the options that are tried first win; where no path is feasible, the path with the fewest
+    infeasible segments.
 
     Args:
         costs: of each segment, (n_options_at_start, n_options_at_end); inf where it is infeasible.
 
     Returns:
-        the option of each pose. Where no path is feasible, the one with the fewest infeasible segments.
+        the option of each pose.
     """
     # An infeasible segment costs more than everything else together.
     finite = [c[np.isfinite(c)] for c in costs]

@@ -1,9 +1,8 @@
-"""Feasibility of a platform's motions: proved on blocks of time, or refuted by an instant; and their margins.
+"""Feasibility of a platform's motions: proved on blocks of time, or refuted by an instant; and margins.
 
-A first look at a few instants refutes most of what is infeasible. Tensions, the determinant and the limits on the
-motion are then proved by `proof`, contacts and the limits on the pose by `place_proof`. Margins are
-smallest values that are attained, narrowed down around the smallest samples of every criterion; beside them stands what
-is proved.
+A first look at a few instants refutes most infeasible motions. Tensions, the determinant and the limits on the motion
+are then proved by `proof`, contacts and the limits on the pose by `place_proof`. Margins are the smallest values that
+are attained, narrowed down around the smallest samples of every criterion; beside them stand the proved bounds.
 """
 
 import threading
@@ -12,38 +11,69 @@ from functools import partial
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches, in_threads
+from cspr_jax.arithmetic.lanes import dot, smallest
 from cspr_jax.motions.platform_kind import USUAL, PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.tolerances import Tolerated
 from cspr_jax.platforms.enclosures import Robustness
 from cspr_jax.platforms.end_acceleration import endpoint
-from cspr_jax.platforms.kernels import slacks_at
 from cspr_jax.platforms.margins import Samples, narrowed
 from cspr_jax.platforms.motion_checker import BESIDE_KNOT, FEW, MANY, MotionChecker, PlatformChecks
 from cspr_jax.platforms.motions import Motions
 from cspr_jax.platforms.place_proof import PlaceCertifier, PlaceProof
 from cspr_jax.platforms.platform_segment import PlatformSegment
+from cspr_jax.platforms.platform_segment_lanes import instant_lanes, state
 from cspr_jax.platforms.proof import Certifier, TensionProof
 from cspr_jax.platforms.sieve import FIRST, TensionSieve
-from cspr_jax.platforms.slack_lanes import order
+from cspr_jax.platforms.slack_lanes import moving_slacks, order, still_slacks
 from cspr_jax.platforms.slacks import flags
 from cspr_jax.platforms.tension_blocks import of_motion
 from cspr_jax.platforms.work_list import TOLERANCE, allowance
+from cspr_jax.robots import interference_lanes
 from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.wrench_lanes import cable_lanes
 from cspr_jax.schema.verdicts import Verdict
 
-# Blocks of a call at most; so many arcs are held at a time.
+# Largest number of blocks in a call, and of arcs that are held at a time.
 BLOCKS, ARCS = 1024, 32 * MANY
 # Instants that are looked at together.
 SAMPLES = 1 << 18
-# No bound may stay below this part of the attained value, if margins are asked for.
+# With margins, the bound must reach this part of the attained value.
 NEAR = 0.5
 
 
-# One function for XLA instead of some hundred small ones.
+# XLA compiles one function here instead of some hundred small ones.
 _end = jax.jit(endpoint)
+
+
+@partial(jax.jit, static_argnames=("pairs", "kind"))
+def slacks_at(problem: Problem, items, *, pairs: tuple, kind: PlatformMotionKind) -> tuple[Array, ...]:
+    """Slacks and distances between cables at instants.
+
+    Args:
+        problem: robot, limits, amplitude.
+        items: segments (leaves (n, ...)), arcs (n,), instants (n,).
+        pairs: cables that can meet.
+
+    Returns:
+        n_criteria + 1 arrays (n,): slacks in the order of `slacks.flags`, infinite where the fast balance has too few
+        digits; the smallest distance between cables, m.
+    """
+    segments, arcs, tau = items
+    instant = instant_lanes(problem.amplitude, segments.sense, arcs, tau)
+    here = state(segments, arcs, instant, kind)
+    cables = cable_lanes(problem.robot, here.position, here.rotation)
+    slacks = [
+        *moving_slacks(problem, segments, arcs, instant, kind),
+        *still_slacks(problem, segments, here, cables),
+    ]
+    squares = [dot(gap, gap) for gap in interference_lanes.gaps(problem.robot.base_points, pairs, cables)]
+    nearest = jnp.sqrt(smallest(squares)) if squares else jnp.full_like(segments.rate, jnp.inf)
+    # Return a tuple: XLA would compute a whole stack for each of its elements.
+    return *(slacks[k] for k in order(problem.limits)), nearest
 
 
 class PlatformChecker(MotionChecker):
@@ -51,16 +81,16 @@ class PlatformChecker(MotionChecker):
 
     Args:
         problem: robot, limits, amplitude.
-        batch: how many are computed at a time.
+        batch: how many motions are computed at a time.
 
     Fields:
         sieve: the first look, which comes before checks.
-        done: how many instants of motions were looked at so far, in the first look and in checks, and how many motions
-            were checked.
+        done: numbers of instants that were looked at so far in the first look ("sieve") and in checks ("checks"), and
+            of motions that were checked ("motions").
     """
 
     def __init__(self, problem: Problem, kind: PlatformMotionKind = USUAL, *, batch: int = FEW) -> None:
-        """Find what can meet."""
+        """Prepare the sieve and both proofs."""
         super().__init__(problem, kind, batch=batch)
         self._lock, self.done = threading.Lock(), {"sieve": 0, "motions": 0, "checks": 0}
         self._compiling, self._compiled = threading.Lock(), set[bool]()
@@ -75,7 +105,7 @@ class PlatformChecker(MotionChecker):
             self._robustness = Robustness(problem, kind, batch=min(batch, BLOCKS), count_instants=count_checks)
         self._knots = np.concatenate([knots - BESIDE_KNOT, knots + BESIDE_KNOT])
         self._allowed = allowance(np.arange(len(self.flags)) >= len(flags(Limits())))
-        # Each criterion has a place in a list: criteria that depend on the motion, then those of the pose alone.
+        # Place of each criterion in a list that has the criteria of the motion first, then those of the pose alone.
         self._order = np.array(order(problem.limits))
         self._n_moving = 1 + len(of_motion(problem))
 
@@ -158,7 +188,8 @@ class PlatformChecker(MotionChecker):
         return checks
 
     def _compile(self, motions: Motions, *, margins: bool) -> None:
-        # Compile both proofs at once, before the first: XLA takes seconds for each, on one core. Other threads wait.
+        # Compile both proofs at once, before the first check: XLA takes seconds for each, on one core. Other threads
+        # wait.
         with self._compiling:
             if margins not in self._compiled:
                 one = motions.rows(np.arange(1))
@@ -172,7 +203,7 @@ class PlatformChecker(MotionChecker):
         return self._robustness.tolerated(segments, arcs)
 
     def _weigh(self, checks: PlatformChecks, rows: np.ndarray, motions: Motions, verdict: np.ndarray) -> None:
-        # Judge motions that are feasible as they are planned by all robots within the uncertainty.
+        # Judge motions that are feasible as planned by how much of the uncertainty they stand.
         feasible = np.flatnonzero(verdict == Verdict.FEASIBLE)
         if self._robustness is None or not len(feasible):
             return
@@ -205,7 +236,7 @@ class PlatformChecker(MotionChecker):
         return moving, np.append(places[self._n_moving + 1 :], len(self.flags))
 
     def _narrow(self, least: np.ndarray, motions: Motions, samples: tuple[Samples, ...], selected: np.ndarray) -> None:
-        # Put margins of the selected motions into the attained values, (n_criteria + 1, n).
+        # Lower the attained values, (n_criteria + 1, n), of the selected motions to their margins.
         def values_at(row: np.ndarray, tau: np.ndarray) -> np.ndarray:
             kernel = partial(slacks_at, self.problem, pairs=self._places.pairs, kind=self.kind)
             return np.stack(in_batches(kernel, (*motions.items(row), tau), size=self.batch))
@@ -213,11 +244,11 @@ class PlatformChecker(MotionChecker):
         rows = np.flatnonzero(selected)
         if not len(rows):
             return
-        # Limits on speeds and accelerations are proved as other functions of the same sign, and beyond a singularity
-        # nothing is: only true slacks count.
+        # Limits on speeds and accelerations are proved by other functions of the same sign, and beyond a singularity
+        # nothing is proved: start again from true slacks.
         least[np.argsort(self._order)[1 : self._n_moving]] = np.inf
         least[np.isneginf(least)] = np.inf
-        # The ends of motions, and what may jump at a knot.
+        # Add the ends of motions, and both sides of knots, where slacks may jump.
         for tau in (0.0, 1.0, *self._knots):
             least[:, rows] = np.fmin(least[:, rows], values_at(rows, np.full(len(rows), tau)))
         for one in samples:
@@ -225,10 +256,10 @@ class PlatformChecker(MotionChecker):
 
 
 def _samples(criteria: np.ndarray, proof: TensionProof | PlaceProof, rows: np.ndarray) -> Samples:
-    # Take samples at the instants of blocks of some of the motions, and number the motions among these.
+    # Take samples of the motions in `rows` at the instants of their first blocks; motions are numbered within `rows`.
     numbers = np.full(len(proof.is_proved), -1)
     numbers[rows] = np.arange(len(rows))
     row = numbers[proof.row]
-    # Not by a mask as an index, which would leave blocks as the slowest axis in memory.
+    # A mask as an index would leave blocks as the slowest axis in memory.
     row, tau, nodes = (np.compress(row >= 0, x, axis=-1) for x in (row, proof.first.tau, proof.first.nodes))
     return Samples(criteria, row, tau, nodes)

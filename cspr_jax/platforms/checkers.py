@@ -12,10 +12,10 @@ def pose_checker(problem: Problem, kind: PlatformMotionKind = USUAL, *, batch: i
 
     Args:
         problem: robot, limits, amplitude.
-        batch: how many are computed at a time.
+        batch: how many motions are computed at a time.
 
     Returns:
-        on six cables that of their only tensions, on more that of the margin of all tensions.
+        on six cables the checker of their unique tensions, on more the checker of the margin of all tensions.
     """
     is_determined = problem.robot.n_cables == problem.robot.dof
     return (PlatformChecker if is_determined else RedundantChecker)(problem, kind, batch=batch)

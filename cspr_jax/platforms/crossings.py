@@ -1,4 +1,4 @@
-"""Cables between samples: followed in steps that are halved until they turn little."""
+"""Cables between samples: steps are halved until cables turn little within each."""
 
 from collections.abc import Callable
 
@@ -7,7 +7,7 @@ import numpy as np
 from cspr_jax.robots.interference import cables_cross, platform_hit
 
 HALVINGS = 12
-# Steps between which a gap or a cable turns by more than this angle are to be halved.
+# Steps in which the cosine of the angle by which a gap or a cable turns is below this are halved.
 LEAST_COSINE = 0.8
 
 CableVectors = tuple[np.ndarray, np.ndarray]  # between cables (k, n_pairs, 3), along cables (k, n_cables, 3)
@@ -20,17 +20,17 @@ def passed_over(
     ends: tuple[np.ndarray, np.ndarray],
     count: int,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Motions in whose steps cables cross, and those in which one passes over the platform.
+    """Motions in whose steps cables cross, and motions in whose steps a cable passes over the platform.
 
     Args:
-        cable_vectors: of motions (k,) at instants (k,).
-        platform: sides (n_cables, 2, 3) and normal (3,) of `interference.Contacts`; None: it is not looked at.
-        row: (k,) whose step it is.
-        ends: (k,) instants before and after each.
-        count: n, of motions.
+        cable_vectors: gives the vectors of motions (k,) at instants (k,).
+        platform: sides (n_cables, 2, 3) and normal (3,) of `interference.Contacts`; None: the platform is left out.
+        row: (k,) motion that each step belongs to.
+        ends: (k,) instants at the start and at the end of each step.
+        count: number n of motions.
 
     Returns:
-        (n,) each.
+        masks (n,).
     """
     met, hit = (np.zeros(count, bool) for _ in range(2))
     if not len(row):
@@ -38,17 +38,17 @@ def passed_over(
     vectors = tuple(cable_vectors(row, tau) for tau in ends)
     for level in range(HALVINGS + 1):
         (gap, direction), (next_gap, next_direction) = vectors
-        turns = _turns_much(gap, next_gap) | _turns_much(direction, next_direction)
-        closed = ~turns if level < HALVINGS else np.ones(len(row), bool)
-        met[row[closed & cables_cross(gap, next_gap).any(1)]] = True
+        is_open = _turns_much(gap, next_gap) | _turns_much(direction, next_direction)
+        is_closed = ~is_open if level < HALVINGS else np.ones(len(row), bool)
+        met[row[is_closed & cables_cross(gap, next_gap).any(1)]] = True
         if platform is not None:
-            hit[row[closed & platform_hit(*platform, direction, next_direction).any(1)]] = True
-        row, before, after = row[~closed], ends[0][~closed], ends[1][~closed]
+            hit[row[is_closed & platform_hit(*platform, direction, next_direction).any(1)]] = True
+        row, before, after = row[~is_closed], ends[0][~is_closed], ends[1][~is_closed]
         if not len(row):
             break
         middle = 0.5 * (before + after)
         between = cable_vectors(row, middle)
-        first, last = ((gap[~closed], direction[~closed]) for gap, direction in vectors)
+        first, last = ((gap[~is_closed], direction[~is_closed]) for gap, direction in vectors)
         vectors = _joined(first, between), _joined(between, last)
         ends = np.concatenate([before, middle]), np.concatenate([middle, after])
         row = np.concatenate([row, row])

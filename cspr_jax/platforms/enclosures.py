@@ -30,18 +30,18 @@ from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.wrench_lanes import CABLES
 
-# Cables are nearest between their ends, and are not parallel, by so much.
+# Cables count as nearest between their ends, and as not parallel, only beyond these tolerances.
 INSIDE, PARALLEL = 1e-6, 1e-6
-# Parts of an arc that are looked at first; larger ones are hardly ever enough.
+# Number of blocks of an arc to begin with; larger blocks are hardly ever enough.
 PARTS = 32
-# Radius of discs in complex time by which changes of accelerations are bounded, over that in which a phase of the
-# oscillation turns by 1.
+# Radius of the discs in complex time on which changes of accelerations are bounded, over the time in which the phase of
+# the oscillation changes by 1 rad.
 RADIUS = 0.4
 
 
 class _Moving(NamedTuple):
-    # State in the middles of n blocks, fixed axes and normalised time, and bounds: on the blocks, and on discs about
-    # all of their instants.
+    # State in the middles of n blocks, in fixed axes and normalised time; bounds on the blocks (`near`), and on discs
+    # about all of their instants (`wide`).
     here: StateLanes
     squared: Array
     near: Reach
@@ -75,7 +75,7 @@ def _contacts(platform, points: Array, rays: Array, *, pairs: tuple) -> tuple[Ar
 
 
 class _Middle(NamedTuple):
-    # In the middles of k blocks, platform axes and time: rays, their rates (what turns with the platform stands still),
+    # Values in the middles of k blocks, in platform axes and time: rays, their rates as the platform sees them,
     # velocity and acceleration of the attachment points (k, 6, 3); force, moment (k, 3) and whirl (k, 3, 3) per mass.
     rays: np.ndarray
     pace: np.ndarray
@@ -87,9 +87,9 @@ class _Middle(NamedTuple):
 
 
 class _Within(NamedTuple):
-    # Ways that the tangents of the rays lead to the stops of k blocks (k, 6, 3), and bounds of changes within these
-    # blocks: of velocities and accelerations of the attachment points, of the deviations of rays from their tangents,
-    # of rays (k, 6), of force and whirl (k,).
+    # Changes of the rays along their tangents up to the stops of k blocks (k, 6, 3), and bounds of changes within these
+    # blocks: of velocities and accelerations of the attachment points, of rays from their tangents, of rays (k, 6), of
+    # force and whirl (k,).
     way: np.ndarray
     velocity: np.ndarray
     acceleration: np.ndarray
@@ -100,14 +100,13 @@ class _Within(NamedTuple):
 
 
 def _middle(robot: PlatformRobot, here: StateLanes, squared: np.ndarray) -> _Middle:
-    position, velocity, acceleration, omega, spin = (
-        np.stack(x, axis=1) for x in (here.position, here.velocity, here.acceleration, here.omega, here.spin)
-    )
-    turn = np.stack([np.stack(row, axis=1) for row in here.turn], axis=1)
+    vectors = here.position, here.velocity, here.acceleration, here.omega, here.angular_acceleration
+    position, velocity, acceleration, omega, angular_acceleration = (np.stack(x, axis=1) for x in vectors)
+    rotation = np.stack([np.stack(row, axis=1) for row in here.rotation], axis=1)
     base, arms = np.asarray(robot.base_points), np.asarray(robot.platform_points)
 
     def in_platform(vectors: np.ndarray) -> np.ndarray:
-        return np.einsum("kji,k...j->k...i", turn, vectors)
+        return np.einsum("kji,k...j->k...i", rotation, vectors)
 
     time = np.sqrt(squared)
     away, velocity, acceleration = (
@@ -115,17 +114,18 @@ def _middle(robot: PlatformRobot, here: StateLanes, squared: np.ndarray) -> _Mid
         in_platform(velocity),
         in_platform(acceleration),
     )
-    omega, spin = in_platform(omega) / time[:, None], in_platform(spin) / squared[:, None]
+    omega = in_platform(omega) / time[:, None]
+    angular_acceleration = in_platform(angular_acceleration) / squared[:, None]
     velocity, acceleration = velocity / time[:, None], acceleration / squared[:, None]
-    whirl = _skew(spin) + _skew(omega) @ _skew(omega)
+    whirl = _skew(angular_acceleration) + _skew(omega) @ _skew(omega)
     inertia = np.asarray(robot.inertia) / float(robot.mass)
-    moment = spin @ inertia.T + np.cross(omega, omega @ inertia.T)
+    moment = angular_acceleration @ inertia.T + np.cross(omega, omega @ inertia.T)
     return _Middle(
         away + arms,
         velocity[:, None] - np.cross(omega[:, None], away),
         velocity[:, None] + np.cross(omega[:, None], arms),
         acceleration[:, None] + np.einsum("kij,nj->kni", whirl, arms),
-        acceleration - float(robot.gravity) * turn[:, 2],
+        acceleration - float(robot.gravity) * rotation[:, 2],
         moment,
         whirl,
     )
@@ -147,11 +147,12 @@ def _within(robot: PlatformRobot, middle: _Middle, moving: _Moving, half: np.nda
     away = np.linalg.norm(middle.rays - np.asarray(robot.platform_points), axis=2) + half * near.speed
     jerk = wide.bend / radius
     force = jerk / squared + near.omega * (near.bend / squared + float(robot.gravity))
-    whirl = (wide.spin / radius + 3.0 * near.omega * near.spin) / squared
+    whirl = (wide.angular_acceleration / radius + 3.0 * near.omega * near.angular_acceleration) / squared
     pace = near.speed + arms * near.omega
-    pull = near.bend + arms * (near.spin + near.omega**2)
-    steep = jerk + arms * wide.growth * (wide.spin + wide.omega**2) / radius
-    bent = 0.5 * half**2 * (near.bend + 2.0 * near.omega * near.speed + (near.spin + near.omega**2) * away)
+    turning = near.angular_acceleration + near.omega**2
+    pull = near.bend + arms * turning
+    steep = jerk + arms * wide.growth * (wide.angular_acceleration + wide.omega**2) / radius
+    bent = 0.5 * half**2 * (near.bend + 2.0 * near.omega * near.speed + turning * away)
     way = middle.pace * (half * time)[..., None]
     return _Within(
         way,
@@ -164,7 +165,7 @@ def _within(robot: PlatformRobot, middle: _Middle, moving: _Moving, half: np.nda
 
 
 class _Columns:
-    # Columns of `Distances`.
+    # Columns of `Distances`, which are added one by one.
 
     def __init__(self, count: int) -> None:
         self._count, self._columns = count, list[tuple]()
@@ -197,7 +198,7 @@ def _distances(problem: Problem, pairs: tuple, middle: _Middle, within: _Within,
 
 
 def _add_gap(columns: _Columns, gaps, places, middle: _Middle, within: _Within, tips: np.ndarray, pair) -> None:
-    # The distance of two cables, by the four pairs of their ends: seen from the platform the spools alone move.
+    # Add the distance of two cables, by the four pairs of their ends: seen from the platform only the spools move.
     i, j = pair
     e, gap = unit_vectors(gaps), np.linalg.norm(gaps, axis=1)
     tilt = _tilted(middle.rays[:, i], middle.rays[:, j], places)
@@ -212,8 +213,8 @@ def _add_gap(columns: _Columns, gaps, places, middle: _Middle, within: _Within, 
 
 
 def _tilted(first: np.ndarray, last: np.ndarray, places: np.ndarray) -> np.ndarray:
-    # Vectors that grow by 1 along each cable towards its spool, as displacements do, where the cables are nearest
-    # between their ends; both are normal to the shortest vector there.
+    # Return vectors that grow by 1 along each cable towards its spool, as displacements do, where the cables are
+    # nearest between their ends; there both cables are normal to the shortest vector.
     ways = np.stack([first, -last], axis=1)
     inner = (places > INSIDE) & (places < 1.0 - INSIDE)
     gram = np.einsum("kia,kja->kij", ways, ways) * inner[:, :, None] * inner[:, None] + np.eye(2) * ~inner[:, None]
@@ -230,13 +231,13 @@ class Robustness:
     Args:
         problem: robot, limits with an uncertainty, amplitude.
         batch: how many blocks are computed at a time.
-        count_instants: is told how many were looked at.
+        count_instants: called with the number of instants that were looked at.
     """
 
     def __init__(
         self, problem: Problem, kind: PlatformMotionKind, *, batch: int, count_instants: Callable[[int], None]
     ) -> None:
-        """Find what can meet."""
+        """Find which cables can meet each other or the platform."""
         self._problem, self._kind, self._batch = problem, kind, batch
         near = contacts(problem.robot)
         self._pairs = tuple((int(i), int(j)) for i, j in near.pairs)

@@ -1,7 +1,7 @@
 """The angular acceleration of a platform at the end of a segment, beta-hat, thesis section 3.8.
 
-There the platform stands still, p'' = -(g / z0) (p - p0), and omega' = beta-hat (g / z0) gamma e: (3.71) without its
-factor 2, since the angle of the rotation is gamma beta. The tensions are linear in beta-hat.
+At the end the platform stands still, p'' = -(g / z0) (p - p0), and omega' = beta-hat (g / z0) gamma e: this is (3.71)
+without its factor 2, since the angle of the rotation is gamma beta. The tensions are linear in beta-hat.
 """
 
 from typing import NamedTuple
@@ -23,14 +23,14 @@ FLAT = 1e-12
 
 
 class Endpoint(NamedTuple):
-    """Tensions per mass and length at an end, offset + beta-hat slope, and what follows.
+    """Tensions per mass and length at an end, offset + beta-hat slope, and the values of beta-hat that they allow.
 
     Fields:
         offset: (n_cables,) 1/s^2.
         slope: (n_cables,) 1/s^2.
-        preferred: () beta-hat of (3.91), which makes the tensions as equal as it can.
-        lowest: () of the interval (3.92) in which every cable is taut; above `highest` if it is empty.
-        highest: ().
+        preferred: () beta-hat of (3.91), which makes the tensions as equal as possible.
+        lowest: () start of the interval (3.92) in which every cable is taut; above `highest` if the interval is empty.
+        highest: () end of the interval.
     """
 
     offset: Array
@@ -88,7 +88,7 @@ def end_state(robot: PlatformRobot, position: Array, quaternion: Array, z0: Arra
         beta_hat: () of (3.81).
 
     Returns:
-        the state: at rest, accelerated towards p0, and about the axis of the orientation.
+        the state: standing still, accelerated towards p0 and about the axis of the orientation.
     """
     eta, still = robot.gravity / z0, jnp.zeros(3)
     away = position - rest_point(z0)
@@ -97,7 +97,7 @@ def end_state(robot: PlatformRobot, position: Array, quaternion: Array, z0: Arra
 
 
 def _angle_vector(quaternion: Array) -> Array:
-    # gamma e, gamma in [-pi, pi]; near 0 twice the vector part.
+    # Return gamma e with gamma in [-pi, pi]; near 0 it is twice the vector part.
     q = rotations.upper(quaternion)
     sine = length(q[1:])
     ratio = 2.0 * jnp.arctan2(sine, q[0]) / jnp.where(sine > 0.0, sine, 1.0)

@@ -1,9 +1,9 @@
 """Transitions of a platform from rest, one lane a segment: the fewest operations that give a state.
 
-Such a motion is a straight swing and a rotation about one axis. What depends on the number of arcs and on the instant
-is a table: position and acceleration are one number each times a vector of the segment, and angle, angular speed and
-angular acceleration are linear in the two values of beta-hat. The mechanics are those
-of `platform_segment_lanes` (tests compare them).
+Such a motion is a straight swing and a rotation about one axis. All that depends on the number of arcs and on the
+instant is in a table: position and acceleration are one number each times a vector of the segment, and angle, angular
+speed and angular acceleration are linear in the two values of beta-hat. The mechanics are the same as in
+`platform_segment_lanes` (tests compare them).
 """
 
 import math
@@ -24,7 +24,7 @@ class Swings(NamedTuple):
 
     Fields:
         hub: the point p0, m.
-        reach: from p0 to the end, along the first arc; m.
+        reach: vector from p0 to the end, along the first arc; m.
         axis: unit vector of the rotation.
         angle: whole angle of the envelope, in half turns; (n,).
         start_beta_hat: beta-hat in p0, (n,).
@@ -47,14 +47,14 @@ class Swing(NamedTuple):
     Fields:
         position: m.
         acceleration: m/s^2.
-        turn: rows of the rotation matrix.
+        rotation: rows of the rotation matrix.
         squared_speed: of the rotation, (n,) rad^2/s^2.
         angular_acceleration: about the axis, (n,) rad/s^2.
     """
 
     position: Vector
     acceleration: Vector
-    turn: Matrix
+    rotation: Matrix
     squared_speed: Array
     angular_acceleration: Array
 
@@ -68,28 +68,29 @@ def swings(segments: PlatformSegment) -> Swings:
     Returns:
         the same motions.
     """
-    how = segments.turn
+    slerp = segments.slerp
     return Swings(
         tuple(segments.hub[:, i] for i in range(3)),
         tuple(segments.plane[:, i, 0] * segments.end_radius for i in range(3)),
-        tuple(how.across[:, i] for i in range(1, 4)),
-        how.angle * (2.0 / math.pi),
-        how.start_beta_hat,
-        how.end_beta_hat,
+        tuple(slerp.across[:, i] for i in range(1, 4)),
+        slerp.angle * (2.0 / math.pi),
+        slerp.start_beta_hat,
+        slerp.end_beta_hat,
         segments.rate,
     )
 
 
 def rest_table(amplitude: Amplitude, arcs: Array, tau: Array, kind: PlatformMotionKind) -> Array:
-    """Table that segments from rest of one number of arcs share.
+    """Table that all segments from rest of one number of arcs share.
 
     Args:
         arcs: () number of arcs, a float.
         tau: (m,) instants.
 
     Returns:
-        (m, 11): position and acceleration; angle, speed and acceleration of the rotation, of each what is constant and
-        what multiplies beta-hat in p0 and at the end. In units of the phase pi p tau; angles in half turns.
+        (m, 11): position and acceleration; then of angle, speed and acceleration of the rotation each the constant
+        term and the factors of beta-hat in p0 and at the end. Derivatives are by the phase pi p tau; angles are in half
+        turns.
     """
     theta = math.pi * arcs
     a, a1, a2, a3 = (x / theta**k for k, x in enumerate(derivatives(amplitude, tau, order=3)))
@@ -101,20 +102,20 @@ def rest_table(amplitude: Amplitude, arcs: Array, tau: Array, kind: PlatformMoti
         place = a * cosine
         bend = (a2 - a) * cosine - 2.0 * a1 * sine
     beat = _plain(sine, cosine) if kind.plain else _with_beta_hats(sine, cosine, tau, theta)
-    turns = []
+    angles = []
     for b, b1, b2 in beat:
-        turns.append((a * b, math.pi * (a1 * b + a * b1), math.pi * (a2 * b + 2.0 * a1 * b1 + a * b2)))
-    return jnp.stack([place, bend, *(turn[k] for k in range(3) for turn in turns)], axis=1)
+        angles.append((a * b, math.pi * (a1 * b + a * b1), math.pi * (a2 * b + 2.0 * a1 * b1 + a * b2)))
+    return jnp.stack([place, bend, *(angle[k] for k in range(3) for angle in angles)], axis=1)
 
 
 def _plain(sine: Array, cosine: Array) -> list[tuple[Array, ...]]:
-    # beta_1 of (3.66) and its derivatives.
+    # Return beta_1 of (3.66) and its derivatives, and zeros for the factors of beta-hat.
     nothing = jnp.zeros_like(sine)
     return [(cosine, -sine, -cosine), (nothing,) * 3, (nothing,) * 3]
 
 
 def _with_beta_hats(sine: Array, cosine: Array, tau: Array, theta: Array) -> list[tuple[Array, ...]]:
-    # beta_ff of (3.93): (9 c - c3) / 8 + h (c - c3) / 8, where h goes from one beta-hat to the other.
+    # Return beta_ff of (3.93), (9 c - c3) / 8 + h (c - c3) / 8, where h goes from one beta-hat to the other.
     sine3, cosine3 = sine * (3.0 - 4.0 * sine * sine), cosine * (4.0 * cosine * cosine - 3.0)
     steady = ((9.0 * cosine - cosine3) / 8.0, (3.0 * sine3 - 9.0 * sine) / 8.0, 9.0 * (cosine3 - cosine) / 8.0)
     c, c1, c2 = (cosine - cosine3) / 8.0, (3.0 * sine3 - sine) / 8.0, (9.0 * cosine3 - cosine) / 8.0
@@ -125,7 +126,7 @@ def _with_beta_hats(sine: Array, cosine: Array, tau: Array, theta: Array) -> lis
     return [steady, *parts]
 
 
-def swing(which: Swings, row: Array) -> Swing:
+def swing(motions: Swings, row: Array) -> Swing:
     """The state at one instant.
 
     Args:
@@ -136,15 +137,15 @@ def swing(which: Swings, row: Array) -> Swing:
     """
 
     def blended(k):
-        return row[k] + which.start_beta_hat * row[k + 1] + which.end_beta_hat * row[k + 2]
+        return row[k] + motions.start_beta_hat * row[k + 1] + motions.end_beta_hat * row[k + 2]
 
-    speed, spin = which.angle * blended(5), which.angle * blended(8)
-    sine, cosine = sincospi(which.angle * blended(2))
-    pull = which.rate * row[1]
+    speed, angular_acceleration = motions.angle * blended(5), motions.angle * blended(8)
+    sine, cosine = sincospi(motions.angle * blended(2))
+    pull = motions.rate * row[1]
     return Swing(
-        tuple(h + row[0] * r for h, r in zip(which.hub, which.reach, strict=True)),
-        tuple(pull * r for r in which.reach),
-        about_axis(which.axis, sine, cosine),
-        which.rate * speed * speed,
-        which.rate * spin,
+        tuple(h + row[0] * r for h, r in zip(motions.hub, motions.reach, strict=True)),
+        tuple(pull * r for r in motions.reach),
+        about_axis(motions.axis, sine, cosine),
+        motions.rate * speed * speed,
+        motions.rate * angular_acceleration,
     )

@@ -1,4 +1,4 @@
-"""Leg of poses of a platform: orientations, values of beta-hat, and the search along the leg: chapter 3."""
+"""Leg of poses of a platform, chapter 3: orientations, values of beta-hat, and the search along the leg."""
 
 import itertools
 from pathlib import Path
@@ -37,22 +37,23 @@ from cspr_jax.robots.reference_pose import reference_pose
 from cspr_jax.robots.wrench_balance import determinant_share, is_regular
 from cspr_jax.schema.families import WITHOUT_BETA_HAT
 
-# A third derivative that changes more than this, relative to its largest value, just beside a knot makes tensions jump.
+# Tensions jump where the third derivative of the amplitude function changes across a knot by more than this part of its
+# largest value; and the distance from a knot at which it is compared.
 JUMP, NEAR_KNOT = 1e-6, 1e-12
 _JUMPS = 'amplitude {}: accelerations and tensions jump where its third derivative does; "effective-c3" has no jump'
-# A motion that limits alone refuse counts as so many arcs beside its own: more than a sequence of feasible ones has.
+# A motion that only limits refuse counts as having so many more arcs: more than any sequence of feasible motions has.
 REFUSED = 100_000
-# Up to so many segments compiling for large batches takes longer than it saves.
-SOME = 1000
+# Up to so many segments, compiling for large batches takes longer than it saves.
+FEW_SEGMENTS = 1000
 
 
 class _Poses(Leg):
-    # Poses of a platform, joined by the motions of chapter 3; `variable` says by which ones.
+    # Poses of a platform, joined by hypocycloids of variable amplitude or by standard ones, as `variable` says.
 
     variable: ClassVar[bool]
 
     def __init__(self, stops: Waypoints) -> None:
-        """Refuse keys of other families and orientations that are none."""
+        """Refuse keys of other families and quaternions that are no orientations."""
         keys, path = stops.keys, stops.path
         if keys.inclination is not None:
             raise ConfigError(path, 'inclination: must be absent unless family = "transition"')
@@ -61,11 +62,12 @@ class _Poses(Leg):
                 if pose.beta_hat is not None:
                     raise ConfigError(path, f'{stops.name(i)}.beta_hat: must be absent with beat = "{keys.beat}"')
         super().__init__(stops)
-        self._kind = PlatformMotionKind(self.variable, keys.beat == "beta_1")
+        self._kind = PlatformMotionKind(variable=self.variable, plain=keys.beat == "beta_1")
         self._given = np.array([_orientation(stops.name(i), pose, path) for i, pose in enumerate(stops.poses)])
 
     def _quaternions(self, points: np.ndarray) -> np.ndarray:
-        # Orientations (n_poses, 4) in the kernels' axes; tilt is seen from the vertical through the centroid.
+        # Return orientations (n_poses, 4) in the kernels' axes; azimuths of tilts are relative to the vertical plane
+        # through the centroid and the point.
         poses, frame = self.stops.poses, self.stops.frame
         angles = np.array([[0.0] * 3 if p.rest else p.tilt_torsion or [0.0] * 3 for p in poses])
         is_given = np.array([pose.rest or pose.tilt_torsion is None for pose in poses])
@@ -77,7 +79,7 @@ class _Poses(Leg):
         points = stops.points(1.0)
         hint = "".join(f" ({line})" for line in plan_hints(stops.keys, stops.robot_file))
         for i, (position, quaternion) in enumerate(zip(points, self._quaternions(points), strict=True)):
-            # On more cables poses are judged by the margin of their tensions alone.
+            # On more than six cables poses are judged by the margin of their tensions alone.
             if not stops.poses[i].rest and _is_determined(problem):
                 _check_pose(problem.robot, stops.name(i), position, quaternion, stops.path, hint)
 
@@ -105,7 +107,7 @@ class _Poses(Leg):
         count, z0 = len(self), np.repeat(depths, len(self))
         points = self.stops.points(depths)
         quaternions = self._quaternions(points[0])
-        checker = pose_checker(problem, self._kind, batch=FEW if len(z0) <= SOME else MANY)
+        checker = pose_checker(problem, self._kind, batch=FEW if len(z0) <= FEW_SEGMENTS else MANY)
         beta_hats = [
             self._beta_hats(checker, places, quaternions, float(depth))
             for places, depth in zip(points, depths, strict=True)
@@ -136,7 +138,7 @@ class _Poses(Leg):
         return refused
 
     def _pairs(self, i: int, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        # Values at both ends of segment i, (n_first, n_last) each.
+        # Return the values at both ends of segment i, (n_first, n_last) each.
         starts, ends = np.meshgrid(first, last, indexing="ij")
         if self.stops.keys.beat == "beta_f":
             return (starts, starts) if self.stops.poses[i + 1].rest else (ends, ends)
@@ -153,7 +155,7 @@ class _Poses(Leg):
     def _beta_hats(
         self, checker: MotionChecker, points: np.ndarray, quaternions: np.ndarray, z0: float
     ) -> list[np.ndarray]:
-        # Values of beta-hat to try at each pose; NaN where none keeps every cable taut.
+        # Return the values of beta-hat to try at each pose; NaN where none keeps every cable taut.
         tries: list[np.ndarray] = []
         stops, changes = self.stops, self._changes()
         for i, (pose, position, quaternion) in enumerate(zip(stops.poses, points, quaternions, strict=True)):
@@ -173,7 +175,8 @@ class _Poses(Leg):
         return tries
 
     def _changes(self) -> set[int]:
-        # Poses where another family goes on: both take the value that is tried first, so that accelerations meet.
+        # Return the poses where the family changes: both families take the value that is tried first there, so that
+        # accelerations are continuous.
         ends = {0: self.stops.first > 0, len(self): self.stops.last < len(self.stops.keys.pose) - 1}
         return {i for i, changes in ends.items() if changes}
 
@@ -199,8 +202,8 @@ class VariablePoses(_Poses):
 
 
 def _best_paths(arcs: np.ndarray, refused: np.ndarray, pairs: list) -> np.ndarray:
-    # Choose a candidate of each segment of each depth, (n_depths * n_segments,); rather one that limits alone refuse
-    # than another one that fails.
+    # Choose a candidate of each segment of each depth, (n_depths * n_segments,). Among candidates that fail, those that
+    # only limits refuse come first.
     arcs = np.where(arcs > 0, arcs, np.where(refused > 0, refused + REFUSED, 0))
     places, last = [], 0
     for of_depth in pairs:
@@ -236,8 +239,8 @@ def _is_determined(problem: Problem) -> bool:
 
 @jax.jit
 def _standing(robot: PlatformRobot, position: Array, quaternion: Array, pairs: Array):
-    # Depth below the spool plane, determinant over that of the reference orientation in the middle at the same depth,
-    # distances between cables.
+    # Return the depth below the spool plane, the determinant over that of the reference orientation in the middle at
+    # the same depth, and the distances between cables.
     where = (position, rotations.matrix(quaternion))
     depth = plane_normal(robot) @ position
     apart = jnp.linalg.norm(gaps(robot, pairs, *where), axis=1)

@@ -1,10 +1,11 @@
 """Limits on a platform's motion as analytic functions on blocks, one row a quantity.
 
-    tension         |x_k| kappa_k / z0 over D, against the limit over the weight a cable
+    tension         |x_k| kappa_k / z0 over D, compared with the limit over the weight that a cable carries
     speed           (|x_k|^2 - (x_k . x_k')^2 / limit^2) / z0^2
     acceleration    (|x_k|^3 -+ ((x_k'^2 + x_k . x_k'') |x_k|^2 - (x_k . x_k')^2) / limit) / z0^3
 
-with x_k cable k as a vector, primes derivatives in time. They are positive exactly while the limit is met.
+with x_k cable k as a vector and primes for derivatives in time. The last two are positive exactly while the limit is
+met.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,24 +18,24 @@ from cspr_jax.arithmetic.lanes import dot
 from cspr_jax.platforms.platform_segment_lanes import StateLanes
 from cspr_jax.robots.wrench_lanes import CABLES, CableLanes, cable_rates
 
-# A length is analytic where its ray changes by less than this part of it: sqrt(2) - 1.
+# The length of a ray is analytic where the ray changes by less than this part of it: sqrt(2) - 1.
 STRAIGHT = 0.414
 Pair = tuple[Array, Array]
 
 
 class Here(NamedTuple):
-    """Instant of n blocks.
+    """One instant of each of n blocks.
 
     Fields:
         state: of the platform.
-        wires: the cables.
-        kappa: of the taut cables, one (n,) each.
+        cables: arms and rays.
+        kappa: numerators of the slacks of taut cables, (n,) each; see `tension_blocks`.
         squared: T^2, s^2.
-        z0: m.
+        z0: depth of P0, m.
     """
 
     state: StateLanes
-    wires: CableLanes
+    cables: CableLanes
     kappa: Sequence[Array]
     squared: Array
     z0: Array
@@ -44,13 +45,13 @@ class Sizes(NamedTuple):
     """Bounds on an ellipse of complex time, one (n,) a cable.
 
     Fields:
-        kappa: of the taut cables.
-        rays: of lengths, m.
-        paces: of the derivative of rays in normalised time, m.
-        pulls: of their second derivative, m.
+        kappa: bounds of the numerators of the slacks of taut cables.
+        rays: bounds of lengths, m.
+        paces: bounds of the derivative of rays in normalised time, m.
+        pulls: bounds of the second derivative of rays, m.
         is_straight: whether lengths are analytic.
         squared: (n,) T^2, s^2.
-        z0: (n,) m.
+        z0: (n,) depth of P0, m.
     """
 
     kappa: Sequence[Array]
@@ -63,13 +64,13 @@ class Sizes(NamedTuple):
 
 
 class Enclosed(NamedTuple):
-    """A quantity on n blocks, and at their nodes, (m, n_cables, n) each; of D (m, 1, n).
+    """Lower and upper bounds of a quantity on n blocks and at their nodes, (m, n_cables, n); of D (m, 1, n).
 
     Fields:
-        coefficients: Bernstein's, less and more what the polynomials leave out.
-        nodes: values there, less and more what may be rounding.
-        regular: coefficients of D.
-        share: D at the nodes.
+        coefficients: bounds of Bernstein coefficients, which allow for what the polynomials leave out.
+        nodes: bounds of the values at the nodes, which allow for rounding.
+        regular: as `coefficients`, of D.
+        share: as `nodes`, of D.
     """
 
     coefficients: Pair
@@ -82,11 +83,11 @@ class LimitOnBlocks(NamedTuple):
     """A quantity of the motion that limits bound.
 
     Fields:
-        width: how many values it has.
-        values: from an instant and the limit, (n_cables,), values in pairs of (n,).
-        sizes: from sizes and the limit, as many bounds of them as values.
-        slacks: of limits at least and at most so large, from what is enclosed and the limit over the scale of slacks:
-            upper bounds of the smallest ones at the nodes (m, n), and a lower bound of all (n,).
+        width: number of values that stand for the quantity.
+        values: takes an instant and the limit (n_cables,); gives the values in pairs of (n,).
+        sizes: takes `Sizes` and the limit; gives a bound of the size of each value.
+        slacks: takes the enclosed values, the limit over the scale of slacks, and whether the limit is a least value;
+            gives upper bounds of the smallest slacks at the nodes (m, n), and a lower bound of all slacks (n,).
     """
 
     width: int
@@ -100,7 +101,7 @@ def ratio(top: Array, regular: Pair) -> Array:
 
     Args:
         top: (...) coefficients of the numerator.
-        regular: lower and upper bounds of those of the denominator, (...) each.
+        regular: lower and upper bounds of the coefficients of the denominator, (...) each.
 
     Returns:
         (...); -inf where the denominator may vanish.
@@ -114,7 +115,7 @@ def at_most(top: Array, regular: Pair) -> Array:
     """Upper bounds of quotients where the denominator is positive.
 
     Args:
-        top: (...) those of the numerator.
+        top: (...) upper bounds of the numerator.
         regular: lower and upper bounds of the denominator, (...) each.
 
     Returns:
@@ -128,7 +129,7 @@ def _paired(values: Sequence[Array]) -> list[Pair]:
 
 
 def _tensions(here: Here, _: Array) -> list[Pair]:
-    lengths = [jnp.sqrt(dot(ray, ray)) / here.z0 for ray in here.wires.rays]
+    lengths = [jnp.sqrt(dot(ray, ray)) / here.z0 for ray in here.cables.rays]
     return _paired([x * length for x, length in zip(here.kappa, lengths, strict=True)])
 
 
@@ -148,7 +149,7 @@ def _tension_slacks(enclosed: Enclosed, limit: Array, is_least: bool) -> Pair:
 
 def _rates(here: Here) -> list[tuple[Array, Array, Array]]:
     state = here.state
-    rows = cable_rates(here.wires, state.velocity, state.acceleration, state.omega, state.spin)
+    rows = cable_rates(here.cables, state.velocity, state.acceleration, state.omega, state.angular_acceleration)
     return list(zip(*rows, strict=True))
 
 
@@ -195,7 +196,7 @@ def _acceleration_slacks(enclosed: Enclosed, _: Array, __: bool) -> Pair:
     return jnp.min(over[:, ::2] - bends, axis=1), jnp.min(low[:, ::2] - worst, axis=(0, 1))
 
 
-# The keys are the names that rows of `schema.limits` call the quantities.
+# The keys are the names of the quantities in the rows of `schema.limits`.
 QUANTITIES = {
     "tension": LimitOnBlocks(CABLES, _tensions, _tension_sizes, _tension_slacks),
     "speed": LimitOnBlocks(CABLES, _speeds, _speed_sizes, _speed_slacks),

@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Parabolas follow one another, each through points so much nearer; a value that spreads less is not narrowed.
+# Number of parabolas that follow one another, how much nearer the points of each are, and the spread of values below
+# which they are not narrowed down.
 ROUNDS, NEARER, LEVEL = 5, 3.0, 1e-9
 
 
@@ -13,32 +14,32 @@ class Samples(NamedTuple):
     """Samples of criteria along motions.
 
     Fields:
-        which: (n_values,) criteria.
-        row: (k,) whose block it is.
+        criteria: (n_values,) their numbers.
+        row: (k,) motion of each block.
         tau: (m, k) instants, increasing.
         values: (m, n_values, k).
     """
 
-    which: np.ndarray
+    criteria: np.ndarray
     row: np.ndarray
     tau: np.ndarray
     values: np.ndarray
 
 
 def narrowed(
-    values_at: Callable[[np.ndarray, np.ndarray], np.ndarray], least: np.ndarray, samples: Samples, wanted: np.ndarray
+    values_at: Callable[[np.ndarray, np.ndarray], np.ndarray], least: np.ndarray, samples: Samples, selected: np.ndarray
 ) -> None:
-    """Put smallest values around samples into what is known.
+    """Narrow down the smallest values around samples.
 
     Args:
-        values_at: of motions (j,) at instants (j,), (n_criteria, j).
+        values_at: gives the values (n_criteria, j) of motions (j,) at instants (j,).
         least: (n_criteria, n) smallest values so far; written into.
-        wanted: (n,) motions that are asked about.
+        selected: (n,) mask of the motions that are looked at.
     """
-    place, value, item = low_points(samples, wanted)
+    place, value, item = low_points(samples, selected)
     if not len(place):
         return
-    row, criterion, tau = samples.row[item], samples.which[value], samples.tau[place, item]
+    row, criterion, tau = samples.row[item], samples.criteria[value], samples.tau[place, item]
     last = len(samples.tau) - 1
     beside = [np.abs(samples.tau[np.clip(place + k, 0, last), item] - tau) for k in (-1, 1)]
     width = np.maximum(*beside)
@@ -50,17 +51,17 @@ def narrowed(
     _values(values_at, least, row, tau[:, None], criterion)
 
 
-def low_points(samples: Samples, wanted: np.ndarray) -> tuple[np.ndarray, ...]:
+def low_points(samples: Samples, selected: np.ndarray) -> tuple[np.ndarray, ...]:
     """Samples no larger than their neighbours, where a parabola of twice the bend could reach the smallest value.
 
     Args:
-        wanted: (n,) motions that are asked about.
+        selected: (n,) mask of the motions that are looked at.
 
     Returns:
-        which of the m, of the n_values and of the k, (j,) each.
+        indices of the samples along the axes of `Samples.values`, (j,) each.
     """
     values, row = samples.values, samples.row
-    smallest = np.full((values.shape[1], len(wanted)), np.inf)
+    smallest = np.full((values.shape[1], len(selected)), np.inf)
     lowest = values.min(0)
     for least, block_values in zip(smallest, lowest, strict=True):
         np.minimum.at(least, row, block_values)
@@ -68,7 +69,7 @@ def low_points(samples: Samples, wanted: np.ndarray) -> tuple[np.ndarray, ...]:
     side = np.ones_like(falls[:1])
     is_low = np.concatenate([side, falls]) & np.concatenate([~falls, side])
     with np.errstate(invalid="ignore"):  # infinities beside infinities
-        is_low &= (np.ptp(values, axis=0) > LEVEL) & wanted[row]
+        is_low &= (np.ptp(values, axis=0) > LEVEL) & selected[row]
     place, value, item = np.nonzero(is_low)
     here, last = values[place, value, item], len(values) - 1
     before, after = (values[np.clip(place + k, 0, last), value, item] for k in (-1, 1))
@@ -79,7 +80,7 @@ def low_points(samples: Samples, wanted: np.ndarray) -> tuple[np.ndarray, ...]:
 
 
 def _values(values_at: Callable, least: np.ndarray, row: np.ndarray, points: np.ndarray, criterion: np.ndarray):
-    # Return values (j, m) of each candidate's own criterion; all criteria learn from the points.
+    # Return values (j, m) of each candidate's own criterion; the smallest values of all criteria are lowered.
     count = points.shape[1]
     rows = np.repeat(row, count)
     attained = values_at(rows, points.ravel())

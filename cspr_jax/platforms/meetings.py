@@ -5,14 +5,15 @@ step, and the lines' nearest points stay inside both cables all the while, the c
 platform where its height over the platform's plane vanishes while it points into its corner's sector.
 
 A vector r with |r''| <= C stays within |r1 - r0| / 2 + C h^2 / 8 of the mean of its values at both ends of a step of
-length h: from that follows what stays so. Steps in which no sign changes are not looked at.
+length h; so what holds for all vectors within that distance holds during the step. Steps in which no sign changes are
+not looked at.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-# Part of the sizes of the factors by which rounding may move F or a height.
+# Rounding may move F, or a height, by this part of the product of the sizes of its factors.
 ROUNDING = 1e-13
 
 
@@ -23,7 +24,7 @@ class CablesOfStep(NamedTuple):
         rays: (m, n, n_cables, 3) from spool to platform, m.
         seen: (m, n, n_cables, 3) from platform to spool in platform axes, m.
         bent: (n, n_cables) C h^2 / 8 of the rays, m.
-        seen_bent: (n,) of the cables as the platform sees them, m.
+        seen_bent: (n,) C h^2 / 8 of the cables as the platform sees them, m.
     """
 
     rays: np.ndarray
@@ -33,7 +34,7 @@ class CablesOfStep(NamedTuple):
 
 
 class _Around(NamedTuple):
-    # Vectors (k, 3), and how far from them others may be, (k,).
+    # Balls: centres (k, 3) and radii (k,) of the vectors within them.
     mean: np.ndarray
     off: np.ndarray
 
@@ -41,7 +42,7 @@ class _Around(NamedTuple):
         return _Around(np.cross(self.mean, other.mean), self._product_off(other))
 
     def dot(self, other: "_Around") -> tuple[np.ndarray, np.ndarray]:
-        # The least and the largest product.
+        # Return the least and the largest product.
         product, off = (self.mean * other.mean).sum(-1), self._product_off(other)
         return product - off, product + off
 
@@ -49,49 +50,50 @@ class _Around(NamedTuple):
         return _size(self.mean) * other.off + _size(other.mean) * self.off + self.off * other.off
 
 
-def cables_meet(base: np.ndarray, pairs: np.ndarray, found: CablesOfStep) -> np.ndarray:
+def cables_meet(base: np.ndarray, pairs: np.ndarray, cables: CablesOfStep) -> np.ndarray:
     """Steps in which two cables meet for certain.
 
     Args:
         base: (n_cables, 3) spools, m.
-        pairs: (n_pairs, 2) of cables that can meet.
+        pairs: (n_pairs, 2) cables that can meet.
 
     Returns:
-        (n,) one of each block, from 0 on; -1: none.
+        (n,) number of one such step of each block, from 0 on; -1: none.
     """
-    meets = np.full(found.rays.shape[1], -1)
+    meets = np.full(cables.rays.shape[1], -1)
     i, j = pairs.T
     apart = base[j] - base[i]
-    u, v = found.rays[:, :, i], found.rays[:, :, j]
+    u, v = cables.rays[:, :, i], cables.rays[:, :, j]
     volume = (np.cross(apart, u) * v).sum(-1)
     step, block, pair = _sign_changes(volume, _size(apart) * (_size(u) * _size(v)).max(0))
-    first = _within(found.rays, (step, block, i[pair]), found.bent)
-    second = _within(found.rays, (step, block, j[pair]), found.bent)
+    first = _within(cables.rays, (step, block, i[pair]), cables.bent)
+    second = _within(cables.rays, (step, block, j[pair]), cables.bent)
     between = _Around(apart[pair], np.zeros(len(pair)))
     normal = first.cross(second)
     least = normal.dot(normal)[0]
     inside = least > 0.0
     for other in (second, first):
-        # The share of a cable at which the lines are nearest, times the square of the normal.
+        # Bound the share of a cable at which the lines are nearest, times the square of the normal.
         low, high = between.cross(other).dot(normal)
         inside &= (low > 0.0) & (high < least)
     meets[block[inside]] = step[inside]
     return meets
 
 
-def cables_hit(sides: np.ndarray, normal: np.ndarray, found: CablesOfStep) -> np.ndarray:
+def cables_hit(sides: np.ndarray, normal: np.ndarray, cables: CablesOfStep) -> np.ndarray:
     """Steps in which a cable lies on the platform for certain.
 
     Args:
         sides: (n_cables, 2, 3) of `interference.contacts`.
-        normal: (3,) of it.
+        normal: (3,) of `interference.contacts`.
 
     Returns:
-        (n,) one of each block, from 0 on; -1: none.
+        (n,) number of one such step of each block, from 0 on; -1: none.
     """
-    hits = np.full(found.seen.shape[1], -1)
-    step, block, cable = _sign_changes(found.seen @ normal, _size(found.seen).max(0))
-    seen = _within(found.seen, (step, block, cable), np.broadcast_to(found.seen_bent[:, None], found.seen.shape[1:3]))
+    hits = np.full(cables.seen.shape[1], -1)
+    step, block, cable = _sign_changes(cables.seen @ normal, _size(cables.seen).max(0))
+    bent = np.broadcast_to(cables.seen_bent[:, None], cables.seen.shape[1:3])
+    seen = _within(cables.seen, (step, block, cable), bent)
     one, two = sides[cable, 0], sides[cable, 1]
     # The area that a vector spans with a side changes by no more than the side's length times how far the vector moves.
     inside = np.cross(two, seen.mean) @ normal > _size(two) * seen.off
@@ -102,13 +104,13 @@ def cables_hit(sides: np.ndarray, normal: np.ndarray, found: CablesOfStep) -> np
 
 
 def _sign_changes(values: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, ...]:
-    # Steps, blocks and pairs, or cables, in which values (m, n, ...) change their sign, beyond rounding.
+    # Return the steps, blocks and pairs (or cables) in which values (m, n, ...) change their sign, beyond rounding.
     is_high, is_low = values > ROUNDING * sizes, values < -ROUNDING * sizes
     return np.nonzero((is_high[:-1] & is_low[1:]) | (is_low[:-1] & is_high[1:]))
 
 
 def _within(vectors: np.ndarray, indices: tuple[np.ndarray, ...], bent: np.ndarray) -> _Around:
-    # Enclose vectors at instants during the steps after these.
+    # Enclose vectors during the steps that begin at the given instants.
     step, block, cable = indices
     before, after = vectors[step, block, cable], vectors[step + 1, block, cable]
     return _Around(0.5 * (before + after), 0.5 * _size(after - before) + bent[block, cable])

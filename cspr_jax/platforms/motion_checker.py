@@ -17,7 +17,7 @@ from cspr_jax.schema.verdicts import Verdict
 # Sizes of batches for few and for many cases: a batch is always full, and every size is compiled for.
 FEW, MANY = 256, 2048
 TOLERANCE = 1e-7
-TOUCH = 1e-6  # of the platform's size: poses nearer to a contact cannot be asked for
+TOUCH = 1e-6  # part of the platform's size: poses of a plan must not be nearer to a contact
 BESIDE_KNOT = 1e-12
 BASIC = 3  # criteria that are no limits
 
@@ -33,10 +33,10 @@ class PlatformChecks:
         bound: (n,) proved lower bound of the slack of taut cables and of the depth below the spools; NaN where nothing
             is proved.
         instant: (n,) tau at which the motion is refuted: by its tensions, else by limits and contacts (within a small
-            step of it); NaN where it is not, and of contacts where they were only sampled.
-        tolerated: (n,) multiple of the uncertainty that it is proved to stand, 1 or 0 as far as verdicts need it; NaN
-            where none is given, or the motion is not feasible as planned.
-        not_tolerated: (n,) one that it does not, likewise; infinite where none was found.
+            step of it); NaN where it is not refuted, or by contacts that were only sampled.
+        tolerated: (n,) multiple of the uncertainty that the motion is proved to stand, 1 or 0 as far as verdicts need
+            it; NaN where no uncertainty is given, or the motion is not feasible as planned.
+        not_tolerated: (n,) multiple that the motion does not stand, likewise; infinite where none was found.
     """
 
     verdict: np.ndarray
@@ -47,29 +47,29 @@ class PlatformChecks:
     tolerated: np.ndarray
     not_tolerated: np.ndarray
 
-    def put(self, which: np.ndarray, others: "PlatformChecks") -> None:
+    def put(self, index: np.ndarray, others: "PlatformChecks") -> None:
         """Write other checks into these.
 
         Args:
-            which: (m,) their places.
+            index: (m,) their places.
         """
         for column, new_column in zip(vars(self).values(), vars(others).values(), strict=True):
-            column[which] = new_column
+            column[index] = new_column
 
-    def rows(self, which: np.ndarray) -> "PlatformChecks":
+    def rows(self, index: np.ndarray) -> "PlatformChecks":
         """Checks of some of the motions.
 
         Args:
-            which: (m,) indices.
+            index: (m,) indices.
 
         Returns:
-            those of m motions.
+            the checks of m motions.
         """
-        return PlatformChecks(**{name: values[which] for name, values in vars(self).items()})
+        return PlatformChecks(**{name: values[index] for name, values in vars(self).items()})
 
 
 class Sieve(Protocol):
-    """First look at motions: a few instants that refute most of what is infeasible."""
+    """First look at motions: a few instants that refute most infeasible motions."""
 
     def lowest(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
         """Smallest slack of the tensions over some instants.
@@ -85,13 +85,13 @@ class Sieve(Protocol):
         ...
 
     def refuted(self, segments: PlatformSegment, arcs: int, tau: np.ndarray, *, limits: bool = True) -> np.ndarray:
-        """Motions that some instants refute.
+        """Mask of the motions that some instants refute.
 
         Args:
             segments: leaves (n, ...), all of this number of arcs.
             arcs: the number.
             tau: (m,) instants, the most telling ones first.
-            limits: whether limits may refute them, too.
+            limits: whether limits may refute motions, too.
 
         Returns:
             (n,).
@@ -109,11 +109,11 @@ class MotionChecker(abc.ABC):
 
     Args:
         problem: robot, limits, amplitude.
-        batch: how many are computed at a time.
+        batch: how many motions are computed at a time.
 
     Fields:
-        flags: of each criterion, the verdict where it is broken: of the tensions, of singular poses, of poses above the
-            spools, then of the other limits. Where one does not apply, its slack is NaN or infinite.
+        flags: verdict of each criterion where it is broken: slack cables, singular poses, poses above the spools, then
+            limits. Where a criterion does not apply, its slack is NaN or infinite.
         sieve: the first look, which comes before checks.
     """
 
@@ -137,16 +137,16 @@ class MotionChecker(abc.ABC):
         return in_batches(_durations, (segments, arcs.astype(float)), size=self.batch)
 
     def nothing(self, count: int) -> PlatformChecks:
-        """Checks to be filled.
+        """Checks to be filled in.
 
         Returns:
-            verdicts 0, the rest NaN.
+            verdicts 0, all else NaN.
         """
         numbers = [np.full(count, np.nan) for _ in range(5)]
         return PlatformChecks(np.zeros(count, int), np.full((count, len(self.flags)), np.nan), *numbers)
 
     def tolerated(self, segments: PlatformSegment, arcs: np.ndarray) -> Tolerated:
-        """Multiples of the uncertainty that motions stand, as closely as they can be found.
+        """Multiples of the uncertainty that motions stand, as closely as possible.
 
         Args:
             segments: leaves (n, ...), of the parity of `arcs`; feasible as they are planned.
@@ -159,7 +159,7 @@ class MotionChecker(abc.ABC):
 
     @property
     def is_limit(self) -> np.ndarray:
-        """Mask of the criteria of `flags` that are those of limits, (n_criteria,)."""
+        """Mask of the criteria of `flags` that are limits, (n_criteria,)."""
         return np.arange(len(self.flags)) >= BASIC
 
     @abc.abstractmethod
@@ -201,10 +201,10 @@ class MotionChecker(abc.ABC):
         Args:
             segments: leaves (n, ...), of the parity of `arcs`.
             arcs: (n,).
-            whole: whether to go on where the motion itself is infeasible; else the rest is NaN there.
-            margins: whether more than the verdict is wanted; else slacks and gaps are ignored.
-            ignored: (n_criteria,) whether each criterion has no part in the verdict, nor has the uncertainty; None:
-                all have.
+            whole: whether to go on where tensions refute the motion; else all that follows is NaN there.
+            margins: whether slacks and gaps are narrowed down to margins; else only the verdict counts.
+            ignored: (n_criteria,) mask of criteria that have no part in the verdict, as then the uncertainty has none;
+                None: all have.
 
         Returns:
             the checks.
@@ -220,5 +220,5 @@ class MotionChecker(abc.ABC):
             z0: m.
 
         Returns:
-            the preferred value; the lowest and the highest feasible one, the other way round if there are none.
+            the preferred value; the lowest and the highest feasible value, in reverse order if there is none.
         """

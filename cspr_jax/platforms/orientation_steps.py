@@ -10,17 +10,17 @@ from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.frames import IDENTITY
-from cspr_jax.arithmetic.lanes import rotation, stored
+from cspr_jax.arithmetic.lanes import rotation_matrix, stored
 from cspr_jax.robots import interference_lanes, wrench_lanes
 from cspr_jax.robots.interference import Contacts, cables_cross, contacts, platform_hit
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.wrench_balance import determinant_share, is_regular, normalised_determinant
-from cspr_jax.robots.wrench_lanes import cables
+from cspr_jax.robots.wrench_lanes import cable_lanes
 
 BATCH = 512
-# Gaps between cables below this part of the platform's size are none. A cable that makes a smaller angle with the
-# platform lies in it, and counts as being where it is in the reference orientation: it has not yet passed over.
+# Gaps between cables below this part of the platform's size count as zero. A cable that makes a smaller angle with the
+# platform lies in it, and counts as on the side where it is in the reference orientation: it has not yet passed over.
 TOUCHING = 1e-9
 # Steps between neighbours that are held at a time.
 STEPS = 65536
@@ -30,8 +30,8 @@ class OrientationSamples(NamedTuple):
     """Determinants and vectors of cables of n poses.
 
     Fields:
-        share: (n,) determinant over that of the reference orientation at the same place; NaN where that is singular
-            itself, or the place is not below the spools.
+        share: (n,) determinant over the determinant of the reference orientation at the same place; NaN where the
+            reference orientation is singular itself, or the place is not below the spools.
         gaps: (n, n_pairs, 3) shortest vectors between cables, m.
         cable_directions: (n, n_cables, 3) cables seen from the platform, m.
     """
@@ -45,25 +45,26 @@ class OrientationSamples(NamedTuple):
 def _sampled(robot: PlatformRobot, poses: tuple[Array, Array], *, pairs: tuple) -> tuple[Array, Array, Array]:
     places, quaternions = poses
     one = jnp.where(robot.mass > 0.0, 1.0, 2.0)
-    turn = stored(rotation([quaternions[:, i] for i in range(4)]), one)
-    wires = cables(robot, [places[:, i] for i in range(3)], turn)
-    wires = wires._replace(rays=stored(wires.rays, one))
+    rotation = stored(rotation_matrix([quaternions[:, i] for i in range(4)]), one)
+    cables = cable_lanes(robot, [places[:, i] for i in range(3)], rotation)
+    cables = cables._replace(rays=stored(cables.rays, one))
     apart, directions = (
-        interference_lanes.gaps(robot.base_points, pairs, wires),
-        interference_lanes.cable_directions(wires, turn),
+        interference_lanes.gaps(robot.base_points, pairs, cables),
+        interference_lanes.cable_directions(cables, rotation),
     )
-    return wrench_lanes.normalised_determinant(robot, wires), *interference_lanes.as_arrays(apart, directions)
+    return wrench_lanes.normalised_determinant(robot, cables), *interference_lanes.as_arrays(apart, directions)
 
 
 def reference_share(robot: PlatformRobot, place: np.ndarray) -> float:
-    """Determinant of the reference orientation at a place, if it has the sign that it has in the middle.
+    """Determinant of the reference orientation at a place, if its sign is the same as in the middle.
 
     Args:
         robot: in its reference axes.
         place: (3,) m.
 
     Returns:
-        of `robots.wrench_balance.normalised_determinant`; NaN if it has not, or the place is not below the spools.
+        the value of `robots.wrench_balance.normalised_determinant`; NaN if its sign is another one, or the place is not
+        below the spools.
     """
     here, depth, share = _upright(robot, np.asarray(place, float))
     return float(here) if float(depth) > 0.0 and bool(is_regular(share)) else np.nan
@@ -85,7 +86,7 @@ class OrientationSteps:
     """
 
     def __init__(self, robot: PlatformRobot, place: np.ndarray) -> None:
-        """Find what can meet."""
+        """Find which cables can meet each other or the platform."""
         self._robot, self._place = robot, np.asarray(place, float)
         self._contacts: Contacts = contacts(robot)
         self._pairs = tuple((int(i), int(j)) for i, j in self._contacts.pairs)
@@ -110,7 +111,7 @@ class OrientationSteps:
         share, gaps, directions = sampled
         # Cables that touch have a gap of rounding errors, whose direction means nothing.
         gaps[_squares(gaps) < (TOUCHING * self._size) ** 2] = 0.0
-        # So has the height of cables that lie in the platform: they are put on one side of it.
+        # Neither does the sign of the height of cables that lie in the platform: they are put on one side of it.
         height, least = directions @ self._contacts.normal, TOUCHING * np.sqrt(_squares(directions))
         height = np.where(np.abs(height) < least, 2.0 * least * self._side - height, 0.0)
         return OrientationSamples(share / self._reference, gaps, directions + height[..., None] * self._contacts.normal)

@@ -38,14 +38,14 @@ class OrientationsMap(AttainabilityMap):
         return results
 
     def _accessible(self, places: np.ndarray, angles: np.ndarray) -> np.ndarray:
-        # Tell which orientations are accessible, (n,), on the grid of which the angles are points.
+        # Tell which orientations are accessible, (n,); their angles are points of the grid of orientations.
         divisions = self._orientations.divisions
         distinct, inverse = np.unique(np.round(places, DIGITS), axis=0, return_inverse=True)
         index, inside = _index(angles, divisions), np.zeros(len(places), bool)
         for k, place in enumerate(distinct):
             free = np.zeros((2 * divisions, divisions, 2 * divisions), bool)
             free[_index(accessible(self._problem.robot, place, "grid", divisions).angles, divisions)] = True
-            free[:, 0] = free[0, 0]  # without a tilt its azimuth says nothing
+            free[:, 0] = free[0, 0]  # without a tilt, its azimuth means nothing
             is_here = inverse.ravel() == k
             inside[is_here] = free[tuple(i[is_here] for i in index)]
         return inside

@@ -17,8 +17,8 @@ from jax import Array
 from cspr_jax.arithmetic import rotations
 from cspr_jax.arithmetic.elementary import length, polynomial, sincospi
 
-# Below these, series stand for quotients that would cancel: of 1 - s for arccos(s) / sqrt(1 - s^2), of the square of
-# an angle for sin(r) / r.
+# Series replace quotients whose numerators would cancel: arccos(s) / sqrt(1 - s^2) where 1 - s is below the first of
+# these numbers, sin(r) / r where r^2 is below the other.
 _NEAR, _NEAR_TERMS = 0.1, 16
 _LOG = [float(c) for c in np.cumprod([1.0, *((k + 1.0) / (2.0 * k + 3.0) for k in range(_NEAR_TERMS + 1))])]
 _SMALL, _SERIES = 0.5, 12
@@ -26,12 +26,13 @@ _SMALL, _SERIES = 0.5, 12
 _STILL = 1e-12
 
 
-class Turn(NamedTuple):
-    """Rotation from one pose to another, for one parity of the number of arcs.
+class Slerp(NamedTuple):
+    """Oscillating SLERP from one pose to another, for one parity of the number of arcs.
 
     Fields:
         start: (4,) q_1.
-        across: (4,) unit quaternion at a right angle to q_1 toward the envelope's end; zero if it does not turn.
+        across: (4,) unit quaternion at a right angle to q_1 towards the end of the envelope; zero if the envelope does
+            not turn.
         angle: () Theta_env of (3.60), rad.
         start_beta_hat: () beta-hat of the first pose, (3.81).
         end_beta_hat: () of the last.
@@ -45,8 +46,8 @@ class Turn(NamedTuple):
 
 
 @jax.jit
-def turn(start: Array, end: Array, start_beta_hat: Array, end_beta_hat: Array, *, odd: Array) -> Turn:
-    """The turn between two orientations.
+def slerp_between(start: Array, end: Array, start_beta_hat: Array, end_beta_hat: Array, *, odd: Array) -> Slerp:
+    """Parameters of the oscillating SLERP between two orientations.
 
     Args:
         start: (4,) unit quaternion.
@@ -56,7 +57,7 @@ def turn(start: Array, end: Array, start_beta_hat: Array, end_beta_hat: Array, *
         odd: () whether the number of arcs is odd.
 
     Returns:
-        the turn.
+        the parameters.
     """
     first, last = rotations.upper(start), rotations.upper(end)
     last = jnp.where(odd, rotations.conjugate(last), last)  # (3.58)
@@ -65,12 +66,12 @@ def turn(start: Array, end: Array, start_beta_hat: Array, end_beta_hat: Array, *
     beside = beside - first * jnp.dot(first, beside)
     size = length(beside)
     angle = jnp.arctan2(size, along)
-    # Opposite ends, both half a turn from the reference orientation: the envelope goes through that one.
+    # Opposite ends are both half a turn from the reference orientation: the envelope goes through the latter.
     identity = jnp.zeros_like(first).at[0].set(1.0)
     is_opposite = (size < _STILL) & (along < 0.0)
     across = jnp.where(size < _STILL, 0.0, beside / jnp.where(size < _STILL, 1.0, size))
     across = jnp.where(is_opposite, identity, across)
-    return Turn(first, across, jnp.where((size < _STILL) & ~is_opposite, 0.0, angle), start_beta_hat, end_beta_hat)
+    return Slerp(first, across, jnp.where((size < _STILL) & ~is_opposite, 0.0, angle), start_beta_hat, end_beta_hat)
 
 
 def beat(
@@ -78,12 +79,12 @@ def beat(
 ) -> tuple[Array, Array, Array]:
     """beta_ff of (3.93) and its first two derivatives in tau.
 
-    It is linear in beta-hat, so that the mean of two beta_f is the beta_f of the mean beta-hat. That of -1 / share is
-    beta_1 of (3.66), and 0 is beta_0 of (3.67).
+    The function is linear in beta-hat, so that the mean of two beta_f is the beta_f of the mean beta-hat. With a
+    beta-hat of -1 / share it is beta_1 of (3.66), with 0 beta_0 of (3.67).
 
     Args:
         start_beta_hat: () beta-hat of the first pose.
-        end_beta_hat: () of the last.
+        end_beta_hat: () beta-hat of the last pose.
         share: () theta_h^2 (n_h - 1) / (pi p)^2.
         arcs: () number of arcs p, a float.
         tau: () normalised time.
@@ -105,7 +106,9 @@ def beat(
 
 
 @jax.jit
-def orientation(how: Turn, amplitude_values: tuple[Array, ...], beats: tuple[Array, ...]) -> tuple[Array, Array, Array]:
+def orientation(
+    slerp: Slerp, amplitude_values: tuple[Array, ...], beats: tuple[Array, ...]
+) -> tuple[Array, Array, Array]:
     """The orientation and its first two derivatives in tau, (3.59) to (3.65).
 
     Args:
@@ -115,7 +118,7 @@ def orientation(how: Turn, amplitude_values: tuple[Array, ...], beats: tuple[Arr
     Returns:
         q, q', q'', (4,) each.
     """
-    half = _half_vector(how, amplitude_values)
+    half = _half_vector(slerp, amplitude_values)
     beta, beta1, beta2 = beats
     return _exponential(
         beta * half[0],
@@ -124,13 +127,14 @@ def orientation(how: Turn, amplitude_values: tuple[Array, ...], beats: tuple[Arr
     )
 
 
-def _half_vector(how: Turn, amplitude_values: tuple[Array, ...]) -> tuple[Array, Array, Array]:
-    # Half of the rotation vector of the envelope, and its derivatives: the envelope turns in a plane of quaternions.
+def _half_vector(slerp: Slerp, amplitude_values: tuple[Array, ...]) -> tuple[Array, Array, Array]:
+    # Return half of the rotation vector of the envelope and its derivatives; the quaternions of the envelope lie in a
+    # plane.
     a, a1, a2 = amplitude_values[:3]
-    sine, cosine = sincospi(how.angle * a / math.pi)
-    rate, bend = how.angle * a1, how.angle * a2
-    q = how.start * cosine + how.across * sine
-    along = how.across * cosine - how.start * sine
+    sine, cosine = sincospi(slerp.angle * a / math.pi)
+    rate, bend = slerp.angle * a1, slerp.angle * a2
+    q = slerp.start * cosine + slerp.across * sine
+    along = slerp.across * cosine - slerp.start * sine
     q1, q2 = along * rate, along * bend - q * rate**2
     s, s1, s2, v, v1, v2 = q[0], q1[0], q2[0], q[1:], q1[1:], q2[1:]
     w, w1, w2 = _angle_ratio(s, v)
@@ -138,7 +142,7 @@ def _half_vector(how: Turn, amplitude_values: tuple[Array, ...]) -> tuple[Array,
 
 
 def _angle_ratio(s: Array, v: Array) -> tuple[Array, Array, Array]:
-    # W = arccos(s) / sqrt(1 - s^2), with |v|^2 = 1 - s^2, and its first two derivatives in s.
+    # Return W = arccos(s) / sqrt(1 - s^2), where |v|^2 = 1 - s^2, and its first two derivatives in s.
     x = 1.0 - s
     is_near = x < _NEAR
     square = jnp.where(is_near, 1.0, jnp.dot(v, v))
@@ -156,7 +160,7 @@ def _angle_ratio(s: Array, v: Array) -> tuple[Array, Array, Array]:
 
 
 def _exponential(u: Array, u1: Array, u2: Array) -> tuple[Array, Array, Array]:
-    # (cos |u|, u sin |u| / |u|) and its derivatives, with y = |u|^2.
+    # Return the quaternion (cos |u|, u sin |u| / |u|) and its derivatives, with y = |u|^2.
     y, y1, y2 = jnp.dot(u, u), 2.0 * jnp.dot(u, u1), 2.0 * (jnp.dot(u1, u1) + jnp.dot(u, u2))
     cosine, s, s1, s2 = _sinc(y)
     q = jnp.concatenate([cosine[None], u * s])
@@ -166,7 +170,7 @@ def _exponential(u: Array, u1: Array, u2: Array) -> tuple[Array, Array, Array]:
 
 
 def _sinc(y: Array) -> tuple[Array, Array, Array, Array]:
-    # cos r, sin r / r and its first two derivatives in y = r^2.
+    # Return cos r, sin r / r, and the first two derivatives of the latter in y = r^2.
     is_small = y < _SMALL
     large = jnp.where(is_small, 1.0, y)
     r = jnp.sqrt(large)

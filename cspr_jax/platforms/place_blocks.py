@@ -1,9 +1,10 @@
-"""Bounds of what depends on a platform's pose alone on blocks of its motions: contacts, depth, limits on the pose.
+"""Bounds of contacts, depth and limits on the pose, which depend on the pose alone, on blocks of a platform's motions.
 
-Two cables are apart where some unit vector e has e . (x_j - x_i) > 0 for all points x of both: linear in the points, so
-that their ends are enough. A cable is off the platform where its vector v from its corner, in platform axes, has
-e . v > 0 for a unit vector e of the polar cone of the corner's sector. Any e is valid on a whole block; that of its
-middle is taken, the shortest vector between the cables, and the residual of the projection onto the sector (Moreau).
+Two cables are apart where some unit vector e has e . (x_j - x_i) > 0 for all points x of both: this is linear in the
+points, so that the ends of the cables are enough. A cable is off the platform where its vector v from its corner, in
+platform axes, has e . v > 0 for a unit vector e of the polar cone of the corner's sector. Any e is valid on a whole
+block. The e of the middle is taken: along the shortest vector between the cables, or along the residual of the
+projection of the cable onto the sector (Moreau).
 Between instants h apart a function f with |f''| <= C stays above its smaller end less C h^2 / 8.
 """
 
@@ -19,18 +20,17 @@ from cspr_jax.arithmetic.lanes import Vector, dot, largest, smallest, stored, tu
 from cspr_jax.motions.limits import limits_set, scales
 from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.motions.problem import Problem
-from cspr_jax.platforms.least_nodes import least_nodes
 from cspr_jax.platforms.platform_reach import instant_beside, middle_of, reach
 from cspr_jax.platforms.platform_segment import PlatformSegment
 from cspr_jax.platforms.platform_segment_lanes import StateLanes, state
-from cspr_jax.platforms.work_list import allowance
+from cspr_jax.platforms.work_list import allowance, least_nodes
 from cspr_jax.robots import interference_lanes
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal
-from cspr_jax.robots.wrench_lanes import CABLES, CableLanes, cables
+from cspr_jax.robots.wrench_lanes import CABLES, CableLanes, cable_lanes
 from cspr_jax.schema.limits import Limit
 
-# Steps of a block, and the instants between them.
+# Steps of a block, and the instants at their ends.
 STEPS = 4
 PLACES = np.linspace(-1.0, 1.0, STEPS + 1)
 # Lengths and heights may be wrong by this part of the size of coordinates.
@@ -42,14 +42,14 @@ class PlaceBounds(NamedTuple):
     """Bounds and attained values of n blocks.
 
     Fields:
-        clear: (n,) lower bound of the distance between cables that can meet, and of that of the cables from the sectors
-            of their corners, m.
+        clear: (n,) lower bound of the distances between cables that can meet, and of the distances of cables from the
+            sectors of their corners, m.
         slacks: (n_criteria, n) lower bounds of the depth below the spools and of the limits on the pose.
         nodes: (n_instants, n_criteria + 1, n) attained slacks at instants a step apart; the smallest distance between
-            cables, m. Where no margins are wanted, the least of each: (1, n_criteria + 1, n).
-        place: (n,) where the smallest of the least slacks is, from -1 to 1; 0 where margins are wanted.
-        bends: (3, n) what may be missed between two instants, C h^2 / 8: of the mass centre, m; of a point of the
-            platform beside it, over its distance; of vectors as the platform sees them, m.
+            cables, m. Without margins the least of each: (1, n_criteria + 1, n).
+        place: (n,) place of the smallest of the least slacks, from -1 to 1; 0 with margins.
+        bends: (3, n) C h^2 / 8, by which motions between two instants may depart from the chord: of the mass centre, m;
+            of a point of the platform beside it, over its distance; of vectors as the platform sees them, m.
     """
 
     clear: Array
@@ -60,21 +60,21 @@ class PlaceBounds(NamedTuple):
 
 
 class _Bends(NamedTuple):
-    # Amounts (n,) that second derivatives take off between two instants, m: of the centre, of a unit arm, of unit
-    # vectors seen from the platform.
+    # Departures (n,) from the chord between two instants, C h^2 / 8: of the centre, m; of an arm of unit length; of
+    # vectors seen from the platform, m.
     centre: Array
     arm: Array
     seen: Array
 
 
 def of_pose(problem: Problem) -> list[Limit]:
-    """Limits on the pose that are given.
+    """Rows of the limits on the pose that are set.
 
     Args:
         problem: robot, limits.
 
     Returns:
-        their rows.
+        the rows.
     """
     return [row for row in limits_set(problem.limits) if not row.of_motion]
 
@@ -91,7 +91,7 @@ def place_blocks(
         one: () the number 1; see `arithmetic.lanes.stored`.
         items: segments (leaves (n, ...)), arcs (n,), and where blocks start (n,) and stop (n,), with no knot inside.
         pairs: of cables that can meet.
-        margins: whether all instants and distances between cables are wanted; else these are infinite.
+        margins: whether to return the values at all instants, and distances between cables; else these are infinite.
 
     Returns:
         the bounds.
@@ -104,28 +104,28 @@ def place_blocks(
 
     bounds = reach(segments, arcs, middle, (half, jnp.zeros_like(half)), kind)
     share = (2.0 * half / STEPS) ** 2 / 8.0
-    turning = bounds.spin + bounds.omega**2
+    turning = bounds.angular_acceleration + bounds.omega**2
     instant = stored(instant_beside(middle, segments.sense, arcs, jnp.zeros_like(half)), one)
     here = state(segments, arcs, instant, kind, one)
-    position, turn = stored((here.position, here.turn), one)
+    position, rotation = stored((here.position, here.rotation), one)
     away = [
         dot(x, x) for x in ([position[i] - problem.robot.base_points[k, i] for i in range(3)] for k in range(CABLES))
     ]
     seen = turning * (jnp.sqrt(largest(away)) + half * bounds.speed) + bounds.bend + 2.0 * bounds.omega * bounds.speed
     bends = stored(_Bends(bounds.bend * share, turning * share, seen * share), one)
-    gaps, left = _separators(problem.robot, platform, pairs, (position, turn), one)
+    gaps, left = _separators(problem.robot, platform, pairs, (position, rotation), one)
 
     def on(place):
         pose = at(place)
-        lines = cables(problem.robot, pose.position, pose.turn)
-        apart = _apart(problem.robot, pairs, gaps, lines, bends)
-        away = zip(left, interference_lanes.cable_directions(lines, pose.turn), strict=True)
+        cables = cable_lanes(problem.robot, pose.position, pose.rotation)
+        apart = _apart(problem.robot, pairs, gaps, cables, bends)
+        away = zip(left, interference_lanes.cable_directions(cables, pose.rotation), strict=True)
         clear = jnp.minimum(apart, smallest([dot(e, v) for e, v in away]) - bends.seen)
-        values = _slacks(problem, segments, pose, lines)
+        values = _slacks(problem, segments, pose, cables)
         if margins and pairs:
-            squares = [dot(x, x) for x in interference_lanes.gaps(problem.robot.base_points, pairs, lines)]
+            squares = [dot(x, x) for x in interference_lanes.gaps(problem.robot.base_points, pairs, cables)]
             values.append(jnp.sqrt(smallest(squares)))
-        # Pack two real numbers into one complex number: two numbers a loop.
+        # Pack two real numbers into one complex number, so that one loop computes both.
         return lax.complex(clear, values[0]), *values[1:]
 
     first, *others = lax.map(on, PLACES)
@@ -148,12 +148,13 @@ def place_blocks(
 
 
 def _separators(robot: PlatformRobot, platform, pairs: tuple, middle, one: Array) -> tuple[list[Vector], list[Vector]]:
-    # Find unit vectors between cables, one a pair, and off sectors, one a cable, by position and turn in the middle.
-    # All pairs, or cables, go at a time: components (m, n), lanes last, which XLA writes with vectors, in little code.
-    position, turn = ([x[None] for x in middle[0]], [[x[None] for x in row] for row in middle[1]])
+    # Find unit vectors between cables, one a pair, and away from sectors, one a cable, by the pose in the middle. All
+    # pairs, or cables, are computed at a time, components (m, n) with lanes last: XLA then uses vectors, in little
+    # code.
+    position, rotation = ([x[None] for x in middle[0]], [[x[None] for x in row] for row in middle[1]])
     points, base = ([x[:, k, None] for k in range(3)] for x in (robot.platform_points, robot.base_points))
-    rays = stored([position[k] + dot(turn[k], points) - base[k] for k in range(3)], one)
-    seen = turned_back(turn, [-x for x in rays])
+    rays = stored([position[k] + dot(rotation[k], points) - base[k] for k in range(3)], one)
+    seen = turned_back(rotation, [-x for x in rays])
     sides, normal = platform
     first, last = ([sides[:, side, k, None] for k in range(3)] for side in range(2))
     left = _units(interference_lanes.residual((first, last), [normal[k] for k in range(3)], seen))
@@ -165,20 +166,20 @@ def _separators(robot: PlatformRobot, platform, pairs: tuple, middle, one: Array
 
 
 def _units(vectors: Vector) -> list[Vector]:
-    # Unit vectors along vectors with components (m, n), one after the other.
+    # Return m unit vectors along vectors with components (m, n).
     scale = 1.0 / jnp.sqrt(jnp.maximum(dot(vectors, vectors), TINY))
     columns = [x * scale for x in vectors]
     return [tuple(x[k] for x in columns) for k in range(columns[0].shape[0])]
 
 
-def _apart(robot: PlatformRobot, pairs: tuple, gaps: list[Vector], wires: CableLanes, bends: _Bends) -> Array:
+def _apart(robot: PlatformRobot, pairs: tuple, gaps: list[Vector], cables: CableLanes, bends: _Bends) -> Array:
     # Return the least over pairs of e . (x_j - x_i) at the ends of both cables, less what may be missed in between.
     if not pairs:
         return jnp.full_like(bends.centre, jnp.inf)
     sizes = jnp.sqrt(jnp.sum(robot.platform_points**2, axis=1))
     values = []
     for (i, j), e in zip(pairs, gaps, strict=True):
-        first, last = dot(e, wires.rays[i]), dot(e, wires.rays[j])
+        first, last = dot(e, cables.rays[i]), dot(e, cables.rays[j])
         spools = dot(e, [robot.base_points[j, k] - robot.base_points[i, k] for k in range(3)])
         between = jnp.sqrt(jnp.sum((robot.platform_points[i] - robot.platform_points[j]) ** 2))
         values += [
@@ -190,7 +191,7 @@ def _apart(robot: PlatformRobot, pairs: tuple, gaps: list[Vector], wires: CableL
     return smallest(values)
 
 
-def _slacks(problem: Problem, segments: PlatformSegment, here: StateLanes, wires: CableLanes) -> list[Array]:
+def _slacks(problem: Problem, segments: PlatformSegment, here: StateLanes, cables: CableLanes) -> list[Array]:
     # Return the slacks of the depth below the spools, and of limits on the pose.
     robot, z0 = problem.robot, problem.robot.gravity / segments.rate
     normal = plane_normal(robot)
@@ -201,13 +202,13 @@ def _slacks(problem: Problem, segments: PlatformSegment, here: StateLanes, wires
         if row.quantity == "depth":
             values.append((limit - here.position[2]) * factor / size)
         else:
-            values.append(smallest([1.0 - jnp.sqrt(dot(ray, ray)) / limit[k] for k, ray in enumerate(wires.rays)]))
+            values.append(smallest([1.0 - jnp.sqrt(dot(ray, ray)) / limit[k] for k, ray in enumerate(cables.rays)]))
     return values
 
 
 def _steps(problem: Problem, segments: PlatformSegment, bends: _Bends) -> list[Array]:
-    # Bound how far these slacks may fall below their values at two instants; a length is convex along the chord of its
-    # ray.
+    # Bound how far the slacks of `_slacks` may fall below their values at two instants; a length is convex along the
+    # chord of its ray.
     robot, z0 = problem.robot, problem.robot.gravity / segments.rate
     steps = [jnp.sqrt(jnp.sum(plane_normal(robot) ** 2)) * bends.centre / z0]
     factor, size = scales(CABLES, robot.mass * robot.gravity, z0)["depth"]

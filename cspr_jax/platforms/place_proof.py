@@ -1,7 +1,7 @@
-"""Proofs about what depends on a platform's pose alone: contacts, depth, limits on the pose.
+"""Proofs about contacts, depth and limits on the pose, which depend on a platform's pose alone.
 
-A motion is clear if all of its blocks are (`place_blocks`); it meets if two cables, or a cable and the platform, are
-proved to meet between two instants (`meetings`); else, after many halvings, it is undecided.
+A motion is clear if all of its blocks are clear (`place_blocks`). It has a contact if two cables, or a cable and the
+platform, are proved to meet between two instants (`meetings`). Else, after many halvings, it is undecided.
 """
 
 import dataclasses
@@ -25,33 +25,33 @@ from cspr_jax.platforms.platform_segment_lanes import state
 from cspr_jax.platforms.work_list import BlockBounds, WorkList
 from cspr_jax.robots import interference_lanes
 from cspr_jax.robots.interference import contacts
-from cspr_jax.robots.wrench_lanes import cables
+from cspr_jax.robots.wrench_lanes import cable_lanes
 
-# Parts of an arc that are looked at first: where margins are wanted; else, as in `proof`, at cusps and halfway
-# between two, where a platform moves fastest.
+# Numbers of blocks of an arc to begin with: with margins; else, as in `proof`, at cusps and halfway between two cusps,
+# where a platform moves fastest.
 PARTS = 8
 FROM_REST, BETWEEN = ((0.7, 3.7), (0.7, 15.7)), ((4.0, 4.0), (11.0, 11.0))
 TOUCH = 1e-9  # nearer than this part of the platform's size is undecided
-# From so many halvings on meetings are looked for. Instants halfway between those of a block.
+# After so many halvings a meeting is looked for; and places of the instants halfway between those of a block.
 NEAR_CONTACT = 5
 MIDDLES = 0.5 * (PLACES[1:] + PLACES[:-1])
 
 
 @dataclasses.dataclass(frozen=True)
 class PlaceProof:
-    """Proofs about n motions; criteria are the depth below the spools and the limits on the pose that are given.
+    """Proofs about n motions; criteria are the depth below the spools and the limits on the pose that are set.
 
     Fields:
-        is_proved: (n,) nothing meets, and every criterion is met, at every instant.
-        is_refuted: (n,) something meets, or a criterion is broken at an instant.
-        met: (n,) two cables meet.
-        hit: (n,) a cable lies on the platform.
+        is_proved: (n,) whether there is no contact, and every criterion is met, at every instant.
+        is_refuted: (n,) whether there is a contact, or a criterion is broken at an instant.
+        met: (n,) whether two cables meet.
+        hit: (n,) whether a cable lies on the platform.
         attained: (n, n_criteria + 1) smallest slacks at the instants that were looked at, and distance between cables.
         bound: (n, n_criteria) proved lower bounds; NaN of motions that are not proved.
-        instant: (n,) tau at which a criterion is broken by most, or in the middle of a step in which something meets;
-            NaN where there is none.
-        row: (k,) whose blocks were looked at first.
-        first: what was found of these.
+        instant: (n,) tau at which a criterion is broken by most, or in the middle of a step with a contact; NaN where
+            there is neither.
+        row: (k,) motion of each of the first blocks.
+        first: bounds of the first blocks.
     """
 
     is_proved: np.ndarray
@@ -66,12 +66,12 @@ class PlaceProof:
 
 
 @partial(jax.jit, static_argnames="kind")
-def wires_beside(problem: Problem, items, *, kind: PlatformMotionKind) -> tuple[Array, Array]:
+def cables_beside(problem: Problem, items, *, kind: PlatformMotionKind) -> tuple[Array, Array]:
     """Cables at one instant beside the middle of each of many blocks.
 
     Args:
         problem: robot, limits, amplitude.
-        items: segments (leaves (n, ...)), arcs (n,), middles (n,) and how far beside them (n,), of tau.
+        items: segments (leaves (n, ...)), arcs (n,), middles (n,) and distances of the instants from them (n,), in tau.
 
     Returns:
         (n, n_cables, 3) from spool to platform, and from platform to spool in platform axes, m.
@@ -79,8 +79,8 @@ def wires_beside(problem: Problem, items, *, kind: PlatformMotionKind) -> tuple[
     segments, arcs, middles, off = items
     instant = instant_beside(middle_of(problem.amplitude, middles), segments.sense, arcs, off)
     here = state(segments, arcs, instant, kind)
-    wires = cables(problem.robot, here.position, here.turn)
-    return interference_lanes.as_arrays(wires.rays, interference_lanes.cable_directions(wires, here.turn))
+    cables = cable_lanes(problem.robot, here.position, here.rotation)
+    return interference_lanes.as_arrays(cables.rays, interference_lanes.cable_directions(cables, here.rotation))
 
 
 class PlaceCertifier:
@@ -89,16 +89,16 @@ class PlaceCertifier:
     Args:
         problem: robot, limits, amplitude.
         batch: how many blocks are computed at a time.
-        count_instants: is told how many were looked at.
+        count_instants: called with the number of instants that were looked at.
 
     Fields:
-        pairs: of cables that can meet.
+        pairs: cables that can meet.
     """
 
     def __init__(
         self, problem: Problem, kind: PlatformMotionKind, *, batch: int, count_instants: Callable[[int], None]
     ) -> None:
-        """Find what can meet."""
+        """Find which cables can meet each other or the platform."""
         self._problem, self._kind, self._batch, self._count = problem, kind, batch, count_instants
         near, points = contacts(problem.robot), np.asarray(problem.robot.platform_points)
         self.pairs = tuple((int(i), int(j)) for i, j in near.pairs)
@@ -110,13 +110,13 @@ class PlaceCertifier:
     def prove(
         self, segments: PlatformSegment, arcs: np.ndarray, *, margins: bool = False, ignored: np.ndarray | None = None
     ) -> PlaceProof:
-        """Prove motions clear, or that something meets or is broken.
+        """Prove motions, or refute them.
 
         Args:
             segments: leaves (n, ...), of the parity of `arcs`.
             arcs: (n,).
-            margins: whether distances between cables are wanted.
-            ignored: (n_criteria,) whether each criterion does not count; None: all do.
+            margins: whether to compute distances between cables.
+            ignored: (n_criteria,) mask of criteria that do not count; None: all count.
 
         Returns:
             the proofs.
@@ -168,7 +168,7 @@ class PlaceCertifier:
         block = np.tile(np.arange(len(blocks.row)), len(PLACES))
         row, middle = blocks.row[block], 0.5 * (blocks.start + blocks.stop)[block]
         items = rows(segments, row), arcs[row].astype(float), middle, blocks.instants(PLACES[:, None]).ravel() - middle
-        vectors = in_batches(partial(wires_beside, self._problem, kind=self._kind), items, size=self._batch)
+        vectors = in_batches(partial(cables_beside, self._problem, kind=self._kind), items, size=self._batch)
         rays, seen = (x.reshape(len(PLACES), len(blocks.row), *x.shape[1:]) for x in vectors)
         centre, arm, platform = bends
         return CablesOfStep(rays, seen, centre[:, None] + arm[:, None] * self._arms, platform)

@@ -62,7 +62,7 @@ class OrientationWorkspaceMap(PlatformMap):
 
 
 class AttainabilityMap(OrientationWorkspaceMap):
-    """The accessible orientations of each place, and those of them that are attained; see `GridMap`."""
+    """The accessible orientations of each place, and which of them are attained; see `GridMap`."""
 
     def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
         """Build the checker of motions from rest."""
@@ -73,14 +73,14 @@ class AttainabilityMap(OrientationWorkspaceMap):
     def _attainable(
         self, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, *, margins: bool
     ) -> PlatformMotionAnswers:
-        # Ask about (n, 3) angles at (n, 3) places, both in the kernels' axes.
+        # Search for motions to orientations of (n, 3) angles at (n, 3) places, both in the kernels' axes.
         values, most = self._orientations.values or VALUES, self._keys.trajectory.max_arcs
         arguments = self._checker, places, angles, z0
         return attainable(*arguments, max_arcs=most, values=values, symmetry=self._alike, margins=margins)
 
     def _places(self, places: np.ndarray, z0: np.ndarray) -> dict[str, np.ndarray]:
         fine, coarse = (self._sets(places, k) for k in (1, 2))
-        # All places together, with both steps: full batches.
+        # Compute all places with both steps together, so that batches are full.
         sets = [*fine, *coarse]
         counts = [len(inside.angles) for inside in sets]
         place_index = np.repeat(np.tile(np.arange(len(places)), 2), counts)

@@ -2,12 +2,12 @@
 
 A motion is analytic between the knots of its amplitude function. Around the middle m of a block, on the ellipse with
 the semi-axes a (along time) and b, every quantity of the motion is bounded in the Hermitian norm: polynomials by their
-terms, sines and cosines by those of the middle, and turns by the imaginary part of half their rotation vector, v =
-beta u: for a complex v
+terms, sines and cosines by their values in the middle, and rotations by the imaginary part of half their rotation
+vector, v = beta u: for a complex v
 
     |exp(2 [v])| <= exp(2 |Im v|) = G,    omega = 2 beta' u + 2 beta (integral over s from 0 to 1 of exp(2 s [v]) u')
 
-since a turn leaves its own axis alone. With b = 0 these are bounds on an interval of real time: docs/theory.md.
+since a rotation leaves its own axis alone. With b = 0 these are bounds on an interval of real time: docs/theory.md.
 """
 
 import math
@@ -23,7 +23,7 @@ from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.platforms.platform_segment import PlatformSegment
 from cspr_jax.platforms.platform_segment_lanes import InstantLanes
 
-# 1 - s up to which arccos(s) / sqrt(1 - s^2) is bounded: it is singular at 2. Less than the least counts as that.
+# arccos(s) / sqrt(1 - s^2) is bounded up to this 1 - s, since it is singular at 2; and 1 - s counts as this at least.
 FARTHEST, NEAREST = 1.9, 0.1
 
 
@@ -43,27 +43,27 @@ class Reach(NamedTuple):
     """Bounds on an ellipse, (n,) each; derivatives in normalised time.
 
     Fields:
-        speed: of |p'|, m.
-        bend: of |p''|, m.
-        growth: of the norm of the rotation matrix.
-        turn: of the norm of its derivative.
-        omega: of |omega|, rad.
-        spin: of |omega'|, rad.
+        speed: bound of |p'|, m.
+        bend: bound of |p''|, m.
+        growth: bound of the norm of the rotation matrix.
+        rotation_rate: bound of the norm of the derivative of the rotation matrix.
+        omega: bound of |omega|, rad.
+        angular_acceleration: bound of |omega'|, rad.
     """
 
     speed: Array
     bend: Array
     growth: Array
-    turn: Array
+    rotation_rate: Array
     omega: Array
-    spin: Array
+    angular_acceleration: Array
 
 
 def middle_of(amplitude: Amplitude, tau: Array) -> Middle:
     """The middle of a block.
 
     Args:
-        tau: (n,) no knot.
+        tau: (n,) middles, none of them a knot.
 
     Returns:
         the middle.
@@ -78,7 +78,7 @@ def instant_beside(middle: Middle, sense: Array, arcs: Array, off: Array) -> Ins
     Args:
         sense: (n,) +1 (odd) or -1 (even).
         arcs: (n,) number of arcs, a float.
-        off: (n,) of tau.
+        off: (n,) distance from the middle, in tau.
 
     Returns:
         the instant, (n,) each.
@@ -96,10 +96,10 @@ def reach(
     Args:
         segment: leaves (n, ...), of the parity of `arcs`.
         arcs: (n,) number of arcs, a float.
-        axes: a and b of the ellipses, (n,) of tau each.
+        axes: semi-axes a and b of the ellipses, (n,) each, in tau.
 
     Returns:
-        the bounds; infinite where there is none.
+        the bounds; infinite where nothing is bounded.
     """
     along, aside = axes
     sizes = _polynomial_sizes(middle.terms, along)
@@ -114,7 +114,7 @@ def reach(
         sine3, cosine3 = sine * (3.0 - 4.0 * sine * sine), cosine * (4.0 * cosine * cosine - 3.0)
         third = _trigonometric((jnp.abs(sine3), jnp.abs(cosine3)), 3.0 * phase[0], phase[1] * phase[1] * phase[1])
         beats = _beat(segment, arcs, middle, (along, aside), first, third)
-    angle = jnp.abs(segment.turn.angle)
+    angle = jnp.abs(segment.slerp.angle)
     if kind.from_rest:
         u, u1, u2 = (angle * size for size in sizes[:3])
     else:
@@ -122,12 +122,12 @@ def reach(
     beta, beta1, beta2, beta_aside = beats
     v1 = beta1 * u + beta * u1
     grown = jnp.exp(2.0 * jnp.minimum(beta_aside * u + beta * aside * u1, beta * u))
-    beside = 1.0 if kind.from_rest else grown  # then all is about one axis
+    beside = 1.0 if kind.from_rest else grown  # from rest, all rotation is about one axis
     omega = beta1 * u + beside * beta * u1
-    spin = beta2 * u + beta1 * u1 + beside * (beta1 * u1 + beta * u2)
+    angular_acceleration = beta2 * u + beta1 * u1 + beside * (beta1 * u1 + beta * u2)
     if not kind.from_rest:
-        spin = spin + grown * beta * u1 * v1
-    return Reach(speed, bend, grown, 2.0 * grown * v1, 2.0 * omega, 2.0 * spin)
+        angular_acceleration = angular_acceleration + grown * beta * u1 * v1
+    return Reach(speed, bend, grown, 2.0 * grown * v1, 2.0 * omega, 2.0 * angular_acceleration)
 
 
 def _polynomial_sizes(terms: Sequence[Array], along: Array) -> tuple[Array, ...]:
@@ -201,11 +201,11 @@ def _hypotenuse(a: Array, b: Array) -> Array:
 
 
 def _beat(segment: PlatformSegment, arcs: Array, middle: Middle, axes, first, third) -> _Beats:
-    # Bound (3.93) by its terms.
-    how, omega, nu = segment.turn, math.pi * arcs, segment.precession / arcs
+    # Bound beta_ff of (3.93) by its terms.
+    slerp, omega, nu = segment.slerp, math.pi * arcs, segment.precession / arcs
     share = (1.0 - nu) * (1.0 + nu)
-    slope = (how.end_beta_hat - how.start_beta_hat) * share
-    h, steep = how.start_beta_hat * share + slope * middle.tau, jnp.abs(slope)
+    slope = (slerp.end_beta_hat - slerp.start_beta_hat) * share
+    h, steep = slerp.start_beta_hat * share + slope * middle.tau, jnp.abs(slope)
     nine, one = jnp.abs(9.0 + h) + steep * axes[0], jnp.abs(1.0 + h) + steep * axes[0]
     value = nine * first.cosine + one * third.cosine
     rate = steep * (first.cosine + third.cosine) + omega * (3.0 * one * third.sine + nine * first.sine)
@@ -217,15 +217,15 @@ def _beat(segment: PlatformSegment, arcs: Array, middle: Middle, axes, first, th
 
 def _half_vector(segment: PlatformSegment, middle: Middle, axes, sizes, angle: Array) -> tuple[Array, ...]:
     # Bound |u|, |u'| and |u''|: u = W(s) times the vector part of the envelope, which is at the angle phi = Theta A.
-    how = segment.turn
+    slerp = segment.slerp
     rate, bend = angle * sizes[1], angle * sizes[2]
     grown = jnp.exp(axes[1] * rate)
     shrunk = 1.0 / grown
     cosh = 0.5 * (grown + shrunk)
     size = jnp.sqrt(0.5 * (grown * grown + shrunk * shrunk))
-    sine, cosine = sincospi(how.angle * middle.terms[0] / math.pi)
-    largest = _hypotenuse(how.start[:, 0], how.across[:, 0]) * cosh
-    off = jnp.abs(1.0 - how.start[:, 0] * cosine - how.across[:, 0] * sine) + axes[0] * rate * largest
+    sine, cosine = sincospi(slerp.angle * middle.terms[0] / math.pi)
+    largest = _hypotenuse(slerp.start[:, 0], slerp.across[:, 0]) * cosh
+    off = jnp.abs(1.0 - slerp.start[:, 0] * cosine - slerp.across[:, 0] * sine) + axes[0] * rate * largest
     w, w1, w2 = _angle_ratio(jnp.maximum(off, NEAREST))
     s, s1 = jnp.minimum(1.0 + off, largest), largest
     by_angle = size * (w + w1 * s1)
@@ -234,8 +234,8 @@ def _half_vector(segment: PlatformSegment, middle: Middle, axes, sizes, angle: A
 
 
 def _angle_ratio(off: Array) -> tuple[Array, ...]:
-    # Bound W = arccos(s) / sqrt(1 - s^2) and the sizes of its derivatives where |1 - s| is at most so large: their
-    # series in 1 - s have positive terms alone, so that they are largest on the axis.
+    # Bound W = arccos(s) / sqrt(1 - s^2) and the sizes of its derivatives where |1 - s| <= off: their series in 1 - s
+    # have positive terms alone, so that they are largest on the real axis.
     is_inside = off < FARTHEST
     s = 1.0 - jnp.where(is_inside, off, 1.0)
     square = 1.0 - s * s

@@ -23,7 +23,7 @@ from cspr_jax.arithmetic.elementary import sincospi
 from cspr_jax.motions.amplitudes import Amplitude, derivatives
 from cspr_jax.motions.platform_kind import USUAL, PlatformMotionKind
 from cspr_jax.motions.swing_plane import swing_plane
-from cspr_jax.platforms.oscillating_slerp import Turn, beat, orientation, rates, turn
+from cspr_jax.platforms.oscillating_slerp import Slerp, beat, orientation, rates, slerp_between
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import rest_point, spool_radius
 from cspr_jax.robots.state import State
@@ -43,9 +43,9 @@ class PlatformSegment:
         precession: () of the ellipse, in half turns, in [0, 1].
         sense: () +1 (p odd) or -1 (p even).
         rate: () lambda of (3.50), 1/s^2.
-        turn: of the orientation.
+        slerp: of the orientation.
         regular: () determinant (`wrench_balance.normalised_determinant`) at rest in P0, whose sign must not change; 1
-            of a robot on more cables, which has none.
+            for a robot on more than six cables, which has no determinant.
     """
 
     plane: Array
@@ -55,7 +55,7 @@ class PlatformSegment:
     precession: Array
     sense: Array
     rate: Array
-    turn: Turn
+    slerp: Slerp
     regular: Array
 
 
@@ -79,17 +79,17 @@ def pose_segment(
         odd: () whether the number of arcs is odd.
 
     Returns:
-        the segment for arcs of that parity.
+        the segment for numbers of arcs of that parity.
     """
     hub = rest_point(z0)
     upright = jnp.zeros_like(hub).at[2].set(1.0)
     plane, r1, r2, precession = swing_plane(start[0] - hub, end[0] - hub, spool_radius(robot), upright, odd)
     sense = jnp.where(odd, 1.0, -1.0).astype(r1.dtype)
-    how = turn(start[1], end[1], *beta_hats, odd=odd)
+    slerp = slerp_between(start[1], end[1], *beta_hats, odd=odd)
     is_determined = robot.n_cables == robot.dof
     one = jnp.eye(3, dtype=hub.dtype)
     regular = normalised_determinant(robot, hub, one) if is_determined else one[0, 0]
-    return PlatformSegment(plane, hub, r1, r2, precession, sense, robot.gravity / z0, how, regular)
+    return PlatformSegment(plane, hub, r1, r2, precession, sense, robot.gravity / z0, slerp, regular)
 
 
 def duration(segment: PlatformSegment, arcs: Array) -> Array:
@@ -106,7 +106,7 @@ def duration(segment: PlatformSegment, arcs: Array) -> Array:
 
 
 def _share(segment: PlatformSegment, arcs: Array) -> Array:
-    # theta_h^2 (n_h - 1) over (pi p)^2; 1 - ratio is what vanishes for p = 1 and psi -> 0.
+    # Return theta_h^2 (n_h - 1) over (pi p)^2. For p = 1 and psi -> 0 the factor 1 - ratio vanishes.
     ratio = segment.precession / arcs
     return (1.0 - ratio) * (1.0 + ratio)
 
@@ -124,7 +124,7 @@ def motion(
         tau: () normalised time in [0, 1].
 
     Returns:
-        the state, in time.
+        the state, derivatives by time.
     """
     values = derivatives(amplitude, tau, order=3)
     time = duration(segment, arcs)
@@ -161,15 +161,15 @@ def _quaternions(
     segment: PlatformSegment, values: tuple[Array, ...], arcs: Array, tau: Array, kind: PlatformMotionKind
 ) -> tuple[Array, Array, Array]:
     share = _share(segment, arcs)
-    beta_hats = (-1.0 / share, -1.0 / share) if kind.plain else (segment.turn.start_beta_hat, segment.turn.end_beta_hat)
-    beats = beat(*beta_hats, share, arcs, tau)
-    return orientation(segment.turn, values, beats)
+    slerp = segment.slerp
+    beta_hats = (-1.0 / share, -1.0 / share) if kind.plain else (slerp.start_beta_hat, slerp.end_beta_hat)
+    return orientation(slerp, values, beat(*beta_hats, share, arcs, tau))
 
 
 def _swing(
     segment: PlatformSegment, values: tuple[Array, ...], arcs: Array, tau: Array, *, variable: bool
 ) -> tuple[Array, Array, Array]:
-    # c, c' and c'' in the plane, derivatives in tau.
+    # Return c, c' and c'' in the plane of the segment, derivatives by tau.
     span = segment.end_radius - segment.start_radius
     r, r1, r2, r3 = segment.start_radius + span * values[0], span * values[1], span * values[2], span * values[3]
     omega, nu = segment.sense * math.pi * arcs, segment.precession / arcs

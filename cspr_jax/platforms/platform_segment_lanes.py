@@ -1,7 +1,7 @@
 """The state of many platforms on their way, one lane a segment: the fast form of `platform_segment.motion`.
 
-The same mechanics (tests compare them), written for numbers instead of small vectors. A transition from rest needs
-neither an ellipse nor a quaternion: it is a straight swing, and a rotation about one axis.
+The mechanics are the same (tests compare both forms), written for numbers instead of small vectors. A transition from
+rest needs neither an ellipse nor a quaternion: it is a straight swing and a rotation about one axis.
 """
 
 import math
@@ -14,22 +14,22 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.elementary import polynomial, sincospi
-from cspr_jax.arithmetic.lanes import Matrix, Vector, about_axis, combined, cross, dot, rotation, stored
+from cspr_jax.arithmetic.lanes import Matrix, Vector, about_axis, combined, cross, dot, rotation_matrix, stored
 from cspr_jax.motions.amplitudes import Amplitude, derivatives
 from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.platforms.platform_segment import PlatformSegment
 
-# Degree of Chebyshev fits on s in [0, 1] of W = arccos(s) / sqrt(1 - s^2) and of its derivatives, one each: accurate to
-# 2e-15. A derivative of the fit of W would be wrong by 3e-10.
+# Degree of the Chebyshev fits, on s in [0, 1], of W = arccos(s) / sqrt(1 - s^2) and of each of its derivatives; they
+# are accurate to 2e-15. The derivative of the fit of W would be wrong by 3e-10.
 _DEGREE = 22
 
 
 class InstantLanes(NamedTuple):
-    """Normalised time, and what depends on it and on the number of arcs alone: () or (n,) each.
+    """Normalised time, and quantities that depend on it and on the number of arcs alone: () or (n,) each.
 
     Fields:
         tau: normalised time.
-        a: A, then its derivatives.
+        a: value A of the amplitude function.
         a1: A'.
         a2: A''.
         a3: A'''.
@@ -53,21 +53,21 @@ class StateLanes(NamedTuple):
         position: m.
         velocity: p', m.
         acceleration: p'', m.
-        turn: rows of the rotation matrix.
+        rotation: rows of the rotation matrix.
         omega: angular velocity, rad.
-        spin: angular acceleration, rad.
+        angular_acceleration: rad.
     """
 
     position: Vector
     velocity: Vector
     acceleration: Vector
-    turn: Matrix
+    rotation: Matrix
     omega: Vector
-    spin: Vector
+    angular_acceleration: Vector
 
 
 @jax.jit
-def instant(amplitude: Amplitude, sense: Array, arcs: Array, tau: Array) -> InstantLanes:
+def instant_lanes(amplitude: Amplitude, sense: Array, arcs: Array, tau: Array) -> InstantLanes:
     """Instant common to segments of the same number of arcs.
 
     Args:
@@ -98,52 +98,52 @@ def squared_duration(segment: PlatformSegment, arcs: Array) -> Array:
 
 @partial(jax.jit, static_argnames="kind")
 def state(
-    segment: PlatformSegment, arcs: Array, now: InstantLanes, kind: PlatformMotionKind, one: Array | None = None
+    segment: PlatformSegment, arcs: Array, instant: InstantLanes, kind: PlatformMotionKind, one: Array | None = None
 ) -> StateLanes:
     """The state of the platform.
 
     Args:
         segment: leaves (n, ...), of the parity of `arcs`.
         arcs: () or (n,) number of arcs, a float.
-        one: () the number 1 as an argument of what is compiled, where the sine and cosine of a turn about one axis are
-            to be stored; see `arithmetic.lanes.stored`.
+        one: () the number 1 as an argument of the compiled function, where the sine and cosine of a rotation about one
+            axis are to be stored; see `arithmetic.lanes.stored`.
 
     Returns:
         the state.
     """
     if kind.from_rest:
-        place = _straight(segment, arcs, now, variable=kind.variable)
-        rotation = _about_one_axis(segment, now, _beat(segment, arcs, now, kind), one)
+        place = _straight(segment, arcs, instant, variable=kind.variable)
+        rotation = _about_one_axis(segment, instant, _beat(segment, arcs, instant, kind), one)
     else:
-        place = _ellipse(segment, arcs, now, variable=kind.variable)
-        rotation = _exponential(*_half_vector(segment, now, _beat(segment, arcs, now, kind)))
+        place = _ellipse(segment, arcs, instant, variable=kind.variable)
+        rotation = _exponential(*_half_vector(segment, instant, _beat(segment, arcs, instant, kind)))
     hub = tuple(segment.hub[:, i] for i in range(3))
     position = tuple(h + c for h, c in zip(hub, place[0], strict=True))
     return StateLanes(position, place[1], place[2], *rotation)
 
 
-def _straight(segment: PlatformSegment, arcs: Array, now: InstantLanes, *, variable: bool) -> tuple[Vector, ...]:
+def _straight(segment: PlatformSegment, arcs: Array, instant: InstantLanes, *, variable: bool) -> tuple[Vector, ...]:
     omega, size = segment.sense * math.pi * arcs, segment.end_radius
     if variable:
-        inner = now.a * omega * omega + now.a2
-        place = now.a * now.cosine - now.a1 * now.sine / omega
-        pace = -inner * now.sine / omega
-        bend = -(inner * now.cosine + (now.a1 * omega + now.a3 / omega) * now.sine)
+        inner = instant.a * omega * omega + instant.a2
+        place = instant.a * instant.cosine - instant.a1 * instant.sine / omega
+        pace = -inner * instant.sine / omega
+        bend = -(inner * instant.cosine + (instant.a1 * omega + instant.a3 / omega) * instant.sine)
     else:
-        place = now.a * now.cosine
-        pace = now.a1 * now.cosine - now.a * omega * now.sine
-        bend = (now.a2 - now.a * omega * omega) * now.cosine - 2.0 * now.a1 * omega * now.sine
+        place = instant.a * instant.cosine
+        pace = instant.a1 * instant.cosine - instant.a * omega * instant.sine
+        bend = (instant.a2 - instant.a * omega * omega) * instant.cosine - 2.0 * instant.a1 * omega * instant.sine
     return tuple(tuple(segment.plane[:, i, 0] * (size * x) for i in range(3)) for x in (place, pace, bend))
 
 
-def _ellipse(segment: PlatformSegment, arcs: Array, now: InstantLanes, *, variable: bool) -> tuple[Vector, ...]:
+def _ellipse(segment: PlatformSegment, arcs: Array, instant: InstantLanes, *, variable: bool) -> tuple[Vector, ...]:
     # Compute the same as `platform_segment._swing`.
     omega, nu = segment.sense * math.pi * arcs, segment.precession / arcs
     span = segment.end_radius - segment.start_radius
-    r, r1, r2, r3 = segment.start_radius + span * now.a, span * now.a1, span * now.a2, span * now.a3
+    r, r1, r2, r3 = segment.start_radius + span * instant.a, span * instant.a1, span * instant.a2, span * instant.a3
     steady = omega * omega * (1.0 - nu) * (1.0 + nu)
-    lateral, axial = sincospi(segment.sense * segment.precession * now.tau)
-    sine, cosine = now.sine, now.cosine
+    lateral, axial = sincospi(segment.sense * segment.precession * instant.tau)
+    sine, cosine = instant.sine, instant.cosine
     if variable:
         w = (-(r * steady + r2) / omega, 2.0 * nu * r1)
         w1 = (2.0 * nu * nu * r1 * omega - (r1 * steady + r3) / omega, nu * (r * steady + 3.0 * r2))
@@ -162,17 +162,17 @@ def _ellipse(segment: PlatformSegment, arcs: Array, now: InstantLanes, *, variab
 
 
 def _beat(
-    segment: PlatformSegment, arcs: Array, now: InstantLanes, kind: PlatformMotionKind
+    segment: PlatformSegment, arcs: Array, instant: InstantLanes, kind: PlatformMotionKind
 ) -> tuple[Array, Array, Array]:
     # Compute the same as `oscillating_slerp.beat`, at the phase that the instant knows.
-    how, omega, nu = segment.turn, math.pi * arcs, segment.precession / arcs
+    slerp, omega, nu = segment.slerp, math.pi * arcs, segment.precession / arcs
     share = (1.0 - nu) * (1.0 + nu)
-    sine, cosine = segment.sense * now.sine, now.cosine
+    sine, cosine = segment.sense * instant.sine, instant.cosine
     if kind.plain:  # beta_1
         return cosine, -omega * sine, -omega * omega * cosine
     sine3, cosine3 = sine * (3.0 - 4.0 * sine * sine), cosine * (4.0 * cosine * cosine - 3.0)
-    slope = (how.end_beta_hat - how.start_beta_hat) * share
-    h = how.start_beta_hat * share + slope * now.tau
+    slope = (slerp.end_beta_hat - slerp.start_beta_hat) * share
+    h = slerp.start_beta_hat * share + slope * instant.tau
     value = ((9.0 + h) * cosine - (1.0 + h) * cosine3) * 0.125
     rate = (slope * (cosine - cosine3) + omega * (3.0 * (1.0 + h) * sine3 - (9.0 + h) * sine)) * 0.125
     bend = 2.0 * slope * omega * (3.0 * sine3 - sine) + omega * omega * (9.0 * (1.0 + h) * cosine3 - (9.0 + h) * cosine)
@@ -180,15 +180,15 @@ def _beat(
 
 
 def _about_one_axis(
-    segment: PlatformSegment, now: InstantLanes, beats: tuple[Array, ...], one: Array | None
+    segment: PlatformSegment, instant: InstantLanes, beats: tuple[Array, ...], one: Array | None
 ) -> tuple[Matrix, Vector, Vector]:
     # The envelope leaves the reference orientation along one axis: the angle is 2 beta Theta_env A.
-    axis = tuple(segment.turn.across[:, i] for i in range(1, 4))
+    axis = tuple(segment.slerp.across[:, i] for i in range(1, 4))
     beta, beta1, beta2 = beats
-    whole = 2.0 * segment.turn.angle
-    sine, cosine = stored(sincospi(whole * beta * now.a / math.pi), one)
-    rate = whole * (beta1 * now.a + beta * now.a1)
-    bend = whole * (beta2 * now.a + 2.0 * beta1 * now.a1 + beta * now.a2)
+    whole = 2.0 * segment.slerp.angle
+    sine, cosine = stored(sincospi(whole * beta * instant.a / math.pi), one)
+    rate = whole * (beta1 * instant.a + beta * instant.a1)
+    bend = whole * (beta2 * instant.a + 2.0 * beta1 * instant.a1 + beta * instant.a2)
     return about_axis(axis, sine, cosine), tuple(rate * e for e in axis), tuple(bend * e for e in axis)
 
 
@@ -208,14 +208,14 @@ _RATIO = _angle_ratio_coefficients()
 
 
 def _half_vector(
-    segment: PlatformSegment, now: InstantLanes, beats: tuple[Array, ...]
+    segment: PlatformSegment, instant: InstantLanes, beats: tuple[Array, ...]
 ) -> tuple[Vector, Vector, Vector]:
-    # Half of the rotation vector and its derivatives, as in `oscillating_slerp`.
-    how, (beta, beta1, beta2) = segment.turn, beats
-    sine, cosine = sincospi(how.angle * now.a / math.pi)
-    rate, bend = how.angle * now.a1, how.angle * now.a2
-    q = [how.start[:, i] * cosine + how.across[:, i] * sine for i in range(4)]
-    along = [how.across[:, i] * cosine - how.start[:, i] * sine for i in range(4)]
+    # Return half of the rotation vector and its derivatives, as in `oscillating_slerp`.
+    slerp, (beta, beta1, beta2) = segment.slerp, beats
+    sine, cosine = sincospi(slerp.angle * instant.a / math.pi)
+    rate, bend = slerp.angle * instant.a1, slerp.angle * instant.a2
+    q = [slerp.start[:, i] * cosine + slerp.across[:, i] * sine for i in range(4)]
+    along = [slerp.across[:, i] * cosine - slerp.start[:, i] * sine for i in range(4)]
     q1 = [x * rate for x in along]
     q2 = [x * bend - y * rate * rate for x, y in zip(along, q, strict=True)]
     x = 1.0 - q[0]
@@ -229,7 +229,7 @@ def _half_vector(
 
 
 def _exponential(v: Vector, v1: Vector, v2: Vector) -> tuple[Matrix, Vector, Vector]:
-    # Rotation matrix, angular velocity and acceleration from half of the rotation vector.
+    # Return the rotation matrix, angular velocity and angular acceleration from half of the rotation vector.
     y, y1, y2 = dot(v, v), 2.0 * dot(v, v1), 2.0 * (dot(v1, v1) + dot(v, v2))
     root = jnp.sqrt(jnp.maximum(y, 1e-24))
     sine, cosine = sincospi(root / math.pi)
@@ -244,8 +244,8 @@ def _exponential(v: Vector, v1: Vector, v2: Vector) -> tuple[Matrix, Vector, Vec
     q, q1 = (cosine, *combined([(s, v)])), (-0.5 * s * y1, *combined([(s, v1), (s1 * y1, v)]))
     q2 = (-0.5 * (s1 * y1 * y1 + s * y2), *combined([(s, v2), (2.0 * s1 * y1, v1), (s2 * y1 * y1 + s1 * y2, v)]))
 
-    def vector_part(left):  # of left times the conjugate of q, twice
+    def vector_part(left):  # twice the vector part of left times the conjugate of q
         across = cross(left[1:], q[1:])
         return tuple(2.0 * (q[0] * left[i + 1] - left[0] * q[i + 1] - across[i]) for i in range(3))
 
-    return rotation(q), vector_part(q1), vector_part(q2)
+    return rotation_matrix(q), vector_part(q1), vector_part(q2)

@@ -9,15 +9,14 @@ from cspr_jax.arithmetic.frames import IDENTITY
 from cspr_jax.motions.answers import joined
 from cspr_jax.platforms.answers import PlatformMotionAnswers, reached
 from cspr_jax.platforms.arcs import CANDIDATES, Candidates
-from cspr_jax.platforms.beta_hat import OPTIONS
+from cspr_jax.platforms.beta_hat import OPTIONS, end_options
 from cspr_jax.platforms.checker import PlatformChecker
 from cspr_jax.platforms.end_acceleration import AT_REST
-from cspr_jax.platforms.pose_ends import end_options
 from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.schema.families import WITHOUT_BETA_HAT
 
-# Time functions of the rotation with a beta-hat of its own at each end; None is the default.
-_OWN = (None, "beta_ff")
+# Time functions of the rotation that take a separate beta-hat at each end; None stands for the default.
+_SEPARATE = (None, "beta_ff")
 Poses = tuple[np.ndarray, np.ndarray]
 
 
@@ -60,8 +59,8 @@ def pose_arcs(
     """Smallest number of arcs of each motion.
 
     Args:
-        motions: n of them, one candidate each, with the values of beta-hat at their starts.
-        beta_hat: at the ends: a number, "preferred" (3.91), or None: several are tried, the preferred one first.
+        motions: n motions, one candidate each, with the values of beta-hat at their starts.
+        beta_hat: at the ends: a number; "preferred" (3.91); or None: several values are tried, the preferred one first.
         beat: time function of the rotation; None: "beta_ff".
         max_arcs: largest number tried.
 
@@ -79,6 +78,6 @@ def pose_arcs(
         elif isinstance(beta_hat, float):
             values = np.full((len(targets.z0), 1), beta_hat)
         values = np.where(can_end[:, None], values, np.nan)
-        return reached(checker, targets, values, max_arcs=max_arcs, same=beat not in _OWN)
+        return reached(checker, targets, values, max_arcs=max_arcs, same=beat not in _SEPARATE)
 
     return joined(in_parts(part, len(motions.z0), CANDIDATES // (OPTIONS if beta_hat is None else 1)))

@@ -24,7 +24,7 @@ class PosesMap(PlatformMap):
     proves = True
 
     def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
-        """Refuse a start that is no pose."""
+        """Refuse a start whose quaternion is no orientation."""
         super().__init__(robot_file, keys, file)
         start = keys.trajectory.start
         self._quaternion = given_quaternion(

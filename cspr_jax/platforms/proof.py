@@ -1,8 +1,8 @@
 """Proofs about the tensions and the determinant of a platform's motions, between the instants too.
 
-Every block of a motion (`tension_blocks`) is proved, or refuted by an instant, or halved. So is the motion:
+Every block of a motion (`tension_blocks`) is proved, or refuted by an instant, or halved. The motion is then
 
-    proved       if every block is: no cable slack, no singularity, limits on the motion met
+    proved       if every block is proved: no cable slack, no singularity, limits on the motion met
     refuted      if some instant breaks a criterion by more than the tolerance
     undecided    if a block still holds zero where its slack is known to half the tolerance, or after many halvings
 
@@ -37,13 +37,13 @@ from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.wrench_lanes import CABLES
 from cspr_jax.schema.limits import LIMITS
 
-# Parts of an arc that are looked at first, from rest and between poses, where orientations turn faster. Where verdicts
-# alone are wanted, and no instants to narrow margins down from, they go from the first to the second number with the
-# amplitude; see `blocks.growing`.
+# Numbers of blocks of an arc to begin with, from rest and between poses, where orientations turn faster. Where margins
+# are narrowed down from the instants of blocks, the number is fixed; for verdicts alone it grows from the first to the
+# second number with the amplitude, see `blocks.growing`.
 WITH_MARGINS, FROM_REST, BETWEEN = (3, 6), (1.0, 5.0), (6.0, 6.0)
 # Orders of the cables that are tried, one after the other, where rounding keeps a block open.
 ORDERS = 6
-MATTERS = 0.1  # part of all that is allowed for
+MATTERS = 0.1  # part of the whole allowance from which rounding matters
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,13 +51,13 @@ class TensionProof:
     """Proofs about n motions; criteria are those of `tension_blocks.TensionBounds`.
 
     Fields:
-        is_proved: (n,) every criterion is met at every instant.
-        is_refuted: (n,) some criterion is broken at an instant.
+        is_proved: (n,) whether every criterion is met at every instant.
+        is_refuted: (n,) whether some criterion is broken at an instant.
         attained: (n, n_criteria) smallest slacks at the instants that were looked at.
         bound: (n, n_criteria) proved lower bounds; NaN of motions that are not proved.
         instant: (n,) tau at which a criterion is broken by most; NaN where none is.
-        row: (k,) whose blocks were looked at first.
-        first: what was found of these.
+        row: (k,) motion of each of the first blocks.
+        first: bounds of the first blocks.
     """
 
     is_proved: np.ndarray
@@ -70,7 +70,7 @@ class TensionProof:
 
 
 class _Order(NamedTuple):
-    # The same robot, its cables in another order, and the sign that this gives to determinants.
+    # The same robot with its cables in another order, and the sign that the order gives to determinants.
     problem: Problem
     sign: float
     cables: list[int]
@@ -82,7 +82,7 @@ class Certifier:
     Args:
         problem: robot, limits, amplitude.
         batch: how many blocks are computed at a time.
-        count_instants: is told how many were looked at.
+        count_instants: called with the number of instants that were looked at.
     """
 
     def __init__(
@@ -109,9 +109,9 @@ class Certifier:
         Args:
             segments: leaves (n, ...), of the parity of `arcs`.
             arcs: (n,).
-            near: part of the smallest slack that is attained of taut cables below which no bound of it may stay.
-            margins: whether the nodes of the normalised determinant are wanted.
-            ignored: (n_criteria,) whether each criterion does not count; None: all do.
+            near: part of the smallest attained slack of taut cables that its bound must reach.
+            margins: whether to compute the normalised determinant at the nodes.
+            ignored: (n_criteria,) mask of criteria that do not count; None: all count.
 
         Returns:
             the proofs.
@@ -133,12 +133,13 @@ class Certifier:
     def _looked_at(self, blocks: Blocks, motions, *, margins: bool) -> TensionBounds:
         bounds = self.bounds(0, blocks, motions, margins=margins, least=not margins)
         for k in range(1, len(self._orders)):
-            # These blocks are not proved because the first three cables lie nearly in one plane.
+            # These blocks stay open because the first three cables lie nearly in one plane.
             open_ones = np.flatnonzero(_rounding_matters(bounds) & ~(bounds.bound > TOLERANCE).all(0))
             if not len(open_ones):
                 break
             better = self.bounds(k, blocks.part(open_ones), motions, margins=margins, least=not margins)
-            # Replace values of nodes too: where such cables are in one plane they are rounding, and could refute.
+            # Replace the values at nodes too: where these cables lie in one plane the values are rounding, and could
+            # refute.
             surer = better.rounding < bounds.rounding[open_ones]
             bounds.nodes[:, :, open_ones[surer]] = better.nodes[:, :, surer]
             bounds.place[open_ones[surer]] = better.place[surer]
@@ -151,10 +152,10 @@ class Certifier:
         """Bounds on blocks.
 
         Args:
-            order: of the cables, from 0 on, below `ORDERS`.
+            order: number of the order of the cables, from 0 on, below `ORDERS`.
             motions: segments (leaves (n, ...)), arcs (n,), and det J(P0) (n,) by the first order.
-            margins: whether the nodes of the normalised determinant are wanted.
-            least: whether of the nodes only the smallest values are.
+            margins: whether to compute the normalised determinant at the nodes.
+            least: whether to return only the smallest value of each criterion at the nodes.
 
         Returns:
             the bounds, NumPy arrays.
@@ -179,7 +180,8 @@ class Certifier:
             arcs: (n,).
 
         Returns:
-            (k, n_cables) proved lower and upper bounds, per mass and length, over those of equal ones at rest in P0.
+            (k, n_cables) proved lower and upper bounds, per mass and length, over the value at rest in P0 if all
+            tensions were equal.
         """
         motions = segments, arcs, determinant_at_rest(self._orders[0].problem, segments)
         count = len(blocks.row)
@@ -199,7 +201,7 @@ class Certifier:
 
 
 def _rounding_matters(bounds: TensionBounds | TensionRange) -> np.ndarray:
-    # Elsewhere no other order of the cables gives better bounds: only shorter blocks do.
+    # Tell where rounding matters: elsewhere another order of the cables gives no better bounds, only shorter blocks do.
     rounding, allowed = np.asarray(bounds.rounding), np.asarray(bounds.allowed)
     return (rounding > 0.25 * TOLERANCE) & (rounding >= MATTERS * allowed)
 
@@ -226,7 +228,7 @@ def _sign(order: list[int]) -> float:
 
 
 def _reordered(problem: Problem, order: list[int]) -> Problem:
-    # No point is shared, so that one compiled function serves every order.
+    # Share no joints between cables, so that one compiled function serves every order.
     robot, limits = problem.robot, problem.limits
     points = {name: np.asarray(getattr(robot, name))[order] for name in ("base_points", "platform_points")}
     changed = dataclasses.replace(robot, **points, joints=tuple(range(CABLES)), limits=Limits())

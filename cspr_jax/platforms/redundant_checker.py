@@ -1,10 +1,10 @@
-"""Feasibility of motions of a platform on more cables than six, with margins: samples, finer where it matters.
+"""Feasibility of motions of a platform on more than six cables, with margins: by samples, finer where it matters.
 
-Motion and limits leave a choice of tensions. The margin of an instant is that of a workspace at its pose, for the
-wrench that the motion asks for: the largest s such that tensions between f_min + s and f_max - s supply it,
-`workspaces`. No determinant is asked about, nor which side of the spools the platform is on: where the
-cables cannot supply the wrench there is no s. Nothing here is a proof that a motion is feasible. Cables are held
-against each other, thick ones too, but not against the platform, whose attachment points need not lie in a plane.
+Motion and limits leave a choice of tensions. The margin of an instant is the margin of a workspace (`workspaces`) at
+its pose, for the wrench that the motion needs: the largest s such that tensions between f_min + s and f_max - s supply
+the wrench. Neither the determinant nor the side of the spools on which the platform is matters: where the cables cannot
+supply the wrench there is no s. Nothing here is a proof that a motion is feasible. Contacts between cables, thick ones
+too, are looked for, but not contacts with the platform, whose attachment points need not lie in a plane.
 """
 
 from functools import partial
@@ -28,10 +28,10 @@ from cspr_jax.workspaces import exact
 from cspr_jax.workspaces.questions import FEASIBLE, requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
 
-# So many samples are held at a time, instants of the first look computed at a time.
+# Number of samples that are held at a time, and of instants of the first look that are computed at a time.
 ROOM, CHUNK = 200_000, 8
 SAMPLES = 64  # an arc
-# Halvings of an interval of beta-hat: to rounding. Slopes below this, over the margins, are none.
+# Halvings of an interval of beta-hat, down to rounding. Slopes below this part of the margins count as zero.
 HALVINGS, FLAT = 60, 1e-12
 # An interval of no values.
 NONE = (LARGEST, -LARGEST)
@@ -70,14 +70,14 @@ class RedundantChecker(MotionChecker):
     """Checker of motions of one robot on more cables than six; see `MotionChecker`."""
 
     def __init__(self, problem: Problem, kind: PlatformMotionKind = USUAL, *, batch: int = FEW) -> None:
-        """Find what can meet."""
+        """Find which cables can meet."""
         super().__init__(problem, kind, batch=batch)
         robot, limits = problem.robot, problem.limits
         self._rows = other_limits(limits)
         basic = (Verdict.WRENCH_INFEASIBLE, Verdict.SINGULAR, Verdict.ABOVE_SPOOLS)
         self.flags, self.sieve = (*basic, *(row.flag for row in self._rows)), MarginSieve(self)
-        self._asked = requirement(robot, FEASIBLE, limits)
-        self._workspace = WorkspaceSearch(robot, self._asked)
+        self._requirement = requirement(robot, FEASIBLE, limits)
+        self._workspace = WorkspaceSearch(robot, self._requirement)
         self._weight = float(robot.mass * robot.gravity) / robot.n_cables
         self._pairs = np.array(pairs_apart(robot), int).reshape(-1, 2)
         size = float(np.linalg.norm(np.asarray(robot.platform_points), axis=1).max())
@@ -90,12 +90,11 @@ class RedundantChecker(MotionChecker):
         """Margins, other slacks and distances along motions.
 
         Args:
-            tau: (n, m) when.
+            tau: (n, m) instants.
 
         Returns:
-            (n, m, n_values) the margin of the tensions over the weight that a cable would carry if all carried the
-            same, -inf where the cables do not span the wrench; the slacks of other limits; the smallest distance
-            between cables, m.
+            (n, m, n_values) the margin of the tensions over the weight a cable if all carried the same, -inf where the
+            cables do not span the wrench; the slacks of other limits; the smallest distance between cables, m.
         """
         row = np.repeat(np.arange(len(tau)), tau.shape[1])
         kernel = partial(instants, self.problem, self._pairs, kind=self.kind)
@@ -112,11 +111,12 @@ class RedundantChecker(MotionChecker):
         return values.reshape(*tau.shape, -1)
 
     def end_interval(self, position: np.ndarray, quaternion: np.ndarray, z0: float) -> tuple[float, float, float]:
-        """The value of the largest margin, and those of positive ones; see `MotionChecker.end_interval`."""
-        # The wrench is linear in beta-hat, and so is the distance from each plane: the margin, the least, is concave.
+        """Value with the largest margin, and interval of positive margins; see `MotionChecker.end_interval`."""
+        # The wrench is linear in beta-hat, and so is its distance from each plane; the margin, the least distance, is
+        # concave.
         matrix, wrenches = (np.asarray(x) for x in end_wrenches(self.problem.robot, position, quaternion, z0))
         unit = self._workspace.unit
-        planes = exact.margin_planes(matrix / unit[:, None], self._asked.low, self._asked.high)
+        planes = exact.margin_planes(matrix / unit[:, None], self._requirement.low, self._requirement.high)
         if exact.is_outside(wrenches / unit, planes.basis):
             return AT_REST, *NONE
         first, second = planes.offsets - (wrenches / unit) @ planes.normals.T
@@ -156,7 +156,7 @@ class RedundantChecker(MotionChecker):
         """Check motions in full, by samples: nothing is proved; see `MotionChecker.check`."""
         checks, motions = self.nothing(len(arcs)), Motions(segments, arcs)
         for count in np.unique(arcs).tolist():
-            # Motions with one number of samples are checked together.
+            # Check motions with the same number of samples together.
             alike = np.flatnonzero(arcs == count)
             size = max(ROOM // (SAMPLES * count), 1)
             for start in range(0, len(alike), size):
@@ -176,7 +176,7 @@ class RedundantChecker(MotionChecker):
             return checks
         motions, samples = motions.rows(is_open), samples[is_open]
         least, when = narrowed_places(partial(self.values, motions), tau, samples)
-        if len(self._knots):  # the motion may jump there
+        if len(self._knots):  # slacks may jump at knots
             beside = self.values(motions, np.tile(self._knots, (len(least), 1)))
             when = np.where(beside.min(1) < least, self._knots[beside.argmin(1)], when)
             least = np.minimum(least, beside.min(1))
@@ -222,15 +222,15 @@ class RedundantChecker(MotionChecker):
 
 
 def _refuted_at(least: np.ndarray, when: np.ndarray) -> np.ndarray:
-    # Take smallest values (n, n_values), the margin first, and when they are attained; return when the margin is below
-    # zero, else when the worst of the others is.
+    # Take smallest values (n, n_values), the margin first, and the instants at which they are attained. Return the
+    # instant of the margin if it is negative, else of the worst other value if that is negative, else NaN.
     worst = np.where(least[:, 0] <= -TOLERANCE, 0, least.argmin(1))
     row = np.arange(len(least))
     return np.where(least[row, worst] <= -TOLERANCE, when[row, worst], np.nan)
 
 
 def _in_order(values: np.ndarray) -> np.ndarray:
-    # Take margin, other limits and distance; keep those that have a flag (n, n_criteria): there is no determinant, and
-    # no side of the spools to be on.
+    # Take the margin, slacks of other limits and the distance; return slacks in the order of the flags (n, n_criteria):
+    # NaN for the determinant, which does not exist, and infinity for the depth below the spools, which does not matter.
     nothing, always = np.full((len(values), 1), np.nan), np.full((len(values), 1), np.inf)
     return np.concatenate([values[:, :1], nothing, always, values[:, 1:-1]], axis=1)

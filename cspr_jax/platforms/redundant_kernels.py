@@ -1,4 +1,4 @@
-"""Compiled states of motions of a platform on more cables than six: what they ask of the cables at many instants."""
+"""Compiled states of motions on more than six cables, and the wrenches that they need, at many instants."""
 
 from functools import partial
 from typing import NamedTuple
@@ -26,7 +26,7 @@ class PoseInstants(NamedTuple):
         position: (n, 3) m.
         quaternion: (n, 4).
         wrench: (n, 6) what the cables must supply, N and N m.
-        slacks: (n, n_rows) of limits other than those of the tensions, and the smallest distance between cables, m.
+        slacks: (n, n_rows) slacks of limits other than tension limits, and the smallest distance between cables, m.
     """
 
     position: Array
@@ -36,7 +36,7 @@ class PoseInstants(NamedTuple):
 
 
 def other_limits(limits: Limits) -> list[Limit]:
-    """Rows of the limits that are given, but for those of the tensions, which are within the margin.
+    """Rows of the limits that are set, except those of tensions, which the margin contains.
 
     Returns:
         the rows.
@@ -52,11 +52,11 @@ def instants(
 
     Args:
         problem: robot, limits, amplitude.
-        pairs: (n_pairs, 2) of cables that can meet.
+        pairs: (n_pairs, 2) cables that can meet.
         items: segments (leaves (n, ...)), arcs (n,), instants (n,).
 
     Returns:
-        the same, n of them.
+        the poses, wrenches and slacks.
     """
     robot, limits = problem.robot, problem.limits
 
@@ -82,11 +82,11 @@ def instants(
 def cable_vectors(
     problem: Problem, pairs: Array, items: tuple[PlatformSegment, Array, Array], *, kind: PlatformMotionKind
 ) -> tuple[Array, Array]:
-    """The vectors between cables, and the directions of cables, of motions, each at an instant.
+    """Vectors between cables, and directions of cables, of motions, each at an instant.
 
     Args:
         problem: robot, limits, amplitude.
-        pairs: (n_pairs, 2) of cables that can meet.
+        pairs: (n_pairs, 2) cables that can meet.
         items: segments (leaves (n, ...)), arcs (n,), instants (n,).
 
     Returns:
@@ -108,7 +108,7 @@ def end_wrenches(robot: PlatformRobot, position: Array, quaternion: Array, z0: A
     Args:
         position: (3,) from the centroid of the spools, z down, m.
         quaternion: (4,) unit.
-        z0: () m.
+        z0: () depth of P0, m.
 
     Returns:
         the wrench matrix (6, n_cables); (2, 6) what the cables must supply with beta-hat 0 and 1, N and N m.

@@ -1,7 +1,8 @@
 """The first look at many motions of a platform: instants that refute most of them.
 
-In float32, where a sample costs half; the instant with the smallest tension is then looked at in float64. So the first
-look refutes nothing that float64 would not refute, and a motion that float32 passes is checked in full anyway.
+Samples are computed in float32, which costs half; the instant with the smallest tension is then computed in float64.
+So the first look refutes nothing that float64 would not refute, and a motion that float32 passes is checked in full
+anyway.
 """
 
 import dataclasses
@@ -21,12 +22,13 @@ from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.platforms.from_rest_lanes import rest_table, swing, swings
 from cspr_jax.platforms.motions import rows
 from cspr_jax.platforms.platform_segment import PlatformSegment
-from cspr_jax.platforms.platform_segment_lanes import instant
+from cspr_jax.platforms.platform_segment_lanes import instant_lanes
 from cspr_jax.platforms.slack_lanes import certain_tension, lowest_tension
 from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.robots.wrench_lanes import balance, cables
+from cspr_jax.robots.wrench_lanes import balance, cable_lanes
 
-# Instants of one call; how many more motions are looked at than checked at a time, and what part of them is few.
+# Instants of one call; how many times more motions are looked at than checked at a time; and the part of a batch up to
+# which motions count as few.
 CHUNK, FIRST, FEWER = 8, 2, 8
 
 
@@ -48,10 +50,10 @@ def smallest_tensions(
         arcs: () number of arcs, the same for all, a float.
         tau: (m,) instants.
         segments: leaves (n, ...), of the parity of `arcs`.
-        single_precision: whether in float32.
+        single_precision: whether to compute in float32.
 
     Returns:
-        (n,) of `slack_lanes.certain_tension`; and which instant it belongs to, (n,) from 0 on.
+        (n,) of `slack_lanes.certain_tension`; (n,) index of the instant at which it is attained.
     """
     if single_precision:
         robot, segments = _of_one_size(robot, segments)
@@ -60,12 +62,12 @@ def smallest_tensions(
     if kind.from_rest:
         at, table = _from_rest(robot, segments), cast(rest_table(amplitude, arcs, tau, kind))
     else:
-        table = cast(jax.vmap(lambda t: instant(amplitude, segments.sense[0].astype(tau.dtype), arcs, t))(tau))
+        table = cast(jax.vmap(lambda t: instant_lanes(amplitude, segments.sense[0].astype(tau.dtype), arcs, t))(tau))
 
         def at(instant_lanes):
             return lowest_tension(robot, segments, number, instant_lanes, kind)
 
-    # One number a loop: XLA would compute the tension once for each of several.
+    # The loop returns one number: with several, XLA would compute the tension once for each of them.
     values = row_by_row(at, table)
     lowest = values.min(0)
     return lowest, jnp.where(values == lowest[None], jnp.arange(len(tau))[:, None], len(tau)).min(0)
@@ -73,7 +75,7 @@ def smallest_tensions(
 
 def _of_one_size(robot: PlatformRobot, segments: PlatformSegment) -> tuple[PlatformRobot, PlatformSegment]:
     # Take the spread of the spools as unit of length: determinants are of ninth order in lengths, their products of
-    # eighteenth, which float32 has no room for. Tensions over their value at rest do not depend on the unit.
+    # eighteenth order, for which float32 has no room. Tensions over their value at rest do not depend on the unit.
     unit = jnp.sqrt(jnp.mean(robot.base_points**2))
     smaller = dataclasses.replace(
         robot,
@@ -93,19 +95,19 @@ def _of_one_size(robot: PlatformRobot, segments: PlatformSegment) -> tuple[Platf
 
 def _from_rest(robot: PlatformRobot, segments: PlatformSegment):
     motions, inertia = swings(segments), robot.inertia / robot.mass
-    # I e has the same direction in platform axes as about the fixed ones before the turn, which leaves the axis alone.
+    # The rotation leaves its axis e alone, so that e, and with it I e, has the same components in platform axes always.
     axis_inertia = tuple(dot([inertia[i, j] for j in range(3)], motions.axis) for i in range(3))
 
     def at(row):
         here = swing(motions, row)
-        wires = cables(robot, here.position, here.turn)
-        weight = tuple(dot(line, axis_inertia) for line in here.turn)
+        cables = cable_lanes(robot, here.position, here.rotation)
+        weight = tuple(dot(line, axis_inertia) for line in here.rotation)
         whirl = cross(motions.axis, weight)
         moment = tuple(
             here.angular_acceleration * a + here.squared_speed * b for a, b in zip(weight, whirl, strict=True)
         )
         force = (here.acceleration[0], here.acceleration[1], here.acceleration[2] - robot.gravity)
-        return certain_tension(motions.rate, segments.regular, wires, balance(wires, force, moment))
+        return certain_tension(motions.rate, segments.regular, cables, balance(cables, force, moment))
 
     return at
 
@@ -122,10 +124,11 @@ def _rough_and_certain(
 ) -> tuple[Array, Array]:
     # Compute `smallest_tensions` in float32, and the tension at its instant in float64, (n,) each.
     lowest, when = smallest_tensions(robot, amplitude, arcs, tau, segments, kind=kind, single_precision=True)
-    when = jnp.minimum(when, len(tau) - 1)  # there is none where all are NaN
+    when = jnp.minimum(when, len(tau) - 1)  # where all tensions are NaN there is no such instant
     if kind.from_rest:
         return lowest, _from_rest(robot, segments)(rest_table(amplitude, arcs, tau, kind).T[:, when])
-    return lowest, lowest_tension(robot, segments, arcs, instant(amplitude, segments.sense, arcs, tau[when]), kind)
+    instant = instant_lanes(amplitude, segments.sense, arcs, tau[when])
+    return lowest, lowest_tension(robot, segments, arcs, instant, kind)
 
 
 class TensionSieve(NamedTuple):
@@ -135,9 +138,9 @@ class TensionSieve(NamedTuple):
         robot: the robot.
         amplitude: A.
         kind: of the motions.
-        least: a tension no larger than that refutes.
-        size: how many are looked at in one call.
-        count_instants: is told how many.
+        least: tension that refutes, as any smaller one does.
+        size: how many motions are looked at in one call.
+        count_instants: called with the number of instants that were looked at.
     """
 
     robot: PlatformRobot
@@ -156,7 +159,7 @@ class TensionSieve(NamedTuple):
             tau: (m,) instants.
 
         Returns:
-            (n,) of `smallest_tensions`; -inf where not finite.
+            (n,) of `smallest_tensions`; -inf where that is not finite.
         """
         lowest = np.full(len(segments.rate), np.inf)
         for chunk in _chunks(tau):
@@ -170,10 +173,11 @@ class TensionSieve(NamedTuple):
             segments: leaves (n, ...), all of this number of arcs.
             arcs: the number.
             tau: (m,) instants, the most telling ones first.
-            limits: whether limits may refute them, which are not looked at here.
+            limits: without effect here, since limits are not looked at.
 
         Returns:
-            (n,) where a tension is, or is none, or the determinant has changed its sign.
+            (n,) mask of motions with a tension that refutes, or that is no number, or with a determinant that has
+            changed its sign.
         """
         del limits
         is_refuted = np.zeros(len(segments.rate), bool)
@@ -199,6 +203,6 @@ class TensionSieve(NamedTuple):
 
 
 def _chunks(tau: np.ndarray) -> np.ndarray:
-    # One shape for all: the last instant is repeated.
+    # Repeat the last instant, so that all chunks have one shape.
     length = -(-len(tau) // CHUNK) * CHUNK
     return np.pad(tau, (0, length - len(tau)), mode="edge").reshape(-1, CHUNK)

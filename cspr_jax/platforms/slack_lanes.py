@@ -1,4 +1,4 @@
-"""The slacks of `pose_slacks` for many platforms, one lane a case, and their part that the first look needs."""
+"""The slacks of `slacks.pose_slacks` for many platforms, one lane a case, and the part of them that the sieve needs."""
 
 import jax.numpy as jnp
 from jax import Array
@@ -17,30 +17,32 @@ from cspr_jax.robots.wrench_lanes import (
     Balance,
     CableLanes,
     balance,
+    cable_lanes,
     cable_rates,
-    cables,
     inertial_wrench,
     normalised_determinant,
 )
 from cspr_jax.schema.limits import Limit
 
-# The volume of three of the cables over the product of their lengths below which no tension is told: they are nearly in
-# one plane, and the rounding of the fast balance grows with the third power of the inverse. It must refute nothing.
+# No tension is given below this volume of three of the cables over the product of their lengths: they lie nearly in one
+# plane, and the rounding of the fast balance grows with the third power of the inverse volume. It must refute nothing.
 FLAT = 1e-3
 
 
-def _balanced(robot: PlatformRobot, here: StateLanes, wires: CableLanes, squared: Array) -> Balance:
+def _balanced(robot: PlatformRobot, here: StateLanes, cables: CableLanes, squared: Array) -> Balance:
     def slowed(vector):
         return tuple(x / squared for x in vector)
 
     # The moment is of second order in time like the force: omega enters squared.
-    force, moment = inertial_wrench(robot, slowed(here.acceleration), here.turn, here.omega, here.spin)
-    return balance(wires, force, slowed(moment))
+    force, moment = inertial_wrench(
+        robot, slowed(here.acceleration), here.rotation, here.omega, here.angular_acceleration
+    )
+    return balance(cables, force, slowed(moment))
 
 
-def _is_flat(wires: CableLanes, balance: Balance) -> Array:
+def _is_flat(cables: CableLanes, balance: Balance) -> Array:
     # Tell where three of the cables are nearly in one plane.
-    a, b, c = (dot(wires.rays[k], wires.rays[k]) for k in range(0, CABLES, 2))
+    a, b, c = (dot(cables.rays[k], cables.rays[k]) for k in range(0, CABLES, 2))
     return balance.volume * balance.volume < FLAT**2 * a * b * c
 
 
@@ -50,7 +52,7 @@ def _smallest_tension(rate: Array, balance: Balance) -> Array:
     return smallest([x * share for x in balance.numerators])
 
 
-def certain_tension(rate: Array, regular: Array, wires: CableLanes, balance: Balance) -> Array:
+def certain_tension(rate: Array, regular: Array, cables: CableLanes, balance: Balance) -> Array:
     """The smallest tension, where the fast balance gives one.
 
     Args:
@@ -62,11 +64,11 @@ def certain_tension(rate: Array, regular: Array, wires: CableLanes, balance: Bal
         where the fast balance has too few digits.
     """
     lowest = jnp.where(balance.signed * regular > 0.0, _smallest_tension(rate, balance), -jnp.inf)
-    return jnp.where(_is_flat(wires, balance), jnp.inf, lowest)
+    return jnp.where(_is_flat(cables, balance), jnp.inf, lowest)
 
 
 def lowest_tension(
-    robot: PlatformRobot, segment: PlatformSegment, arcs: Array, now: InstantLanes, kind: PlatformMotionKind
+    robot: PlatformRobot, segment: PlatformSegment, arcs: Array, instant: InstantLanes, kind: PlatformMotionKind
 ) -> Array:
     """The smallest tension at one instant of many segments.
 
@@ -78,14 +80,14 @@ def lowest_tension(
     Returns:
         (n,) of `certain_tension`.
     """
-    here = state(segment, arcs, now, kind)
-    wires = cables(robot, here.position, here.turn)
-    balance = _balanced(robot, here, wires, squared_duration(segment, arcs))
-    return certain_tension(segment.rate, segment.regular, wires, balance)
+    here = state(segment, arcs, instant, kind)
+    cables = cable_lanes(robot, here.position, here.rotation)
+    balance = _balanced(robot, here, cables, squared_duration(segment, arcs))
+    return certain_tension(segment.rate, segment.regular, cables, balance)
 
 
 def moving_slacks(
-    problem: Problem, segment: PlatformSegment, arcs: Array, now: InstantLanes, kind: PlatformMotionKind
+    problem: Problem, segment: PlatformSegment, arcs: Array, instant: InstantLanes, kind: PlatformMotionKind
 ) -> list[Array]:
     """Smallest slacks of the criteria that depend on the motion, at one instant of many segments.
 
@@ -95,19 +97,19 @@ def moving_slacks(
         arcs: () or (n,) number of arcs, a float.
 
     Returns:
-        (n,) each: the taut cables', then those of limits on the motion; infinite where the fast balance has too few
-        digits.
+        (n,) each: the slack of taut cables, then the slacks of limits on the motion; infinite where the fast balance
+        has too few digits.
     """
     robot, limits = problem.robot, problem.limits
-    here, squared = state(segment, arcs, now, kind), squared_duration(segment, arcs)
-    wires = cables(robot, here.position, here.turn)
-    balance = _balanced(robot, here, wires, squared)
-    is_flat = _is_flat(wires, balance)
+    here, squared = state(segment, arcs, instant, kind), squared_duration(segment, arcs)
+    cables = cable_lanes(robot, here.position, here.rotation)
+    balance = _balanced(robot, here, cables, squared)
+    is_flat = _is_flat(cables, balance)
     values = [jnp.where(is_flat, jnp.inf, _smallest_tension(segment.rate, balance))]
     rows = _limit_rows(limits, of_motion=True)
     if not rows:
         return values
-    lengths, rates, bends = cable_rates(wires, here.velocity, here.acceleration, here.omega, here.spin)
+    lengths, rates, bends = cable_rates(cables, here.velocity, here.acceleration, here.omega, here.angular_acceleration)
     pace, scale = jnp.sqrt(squared), scales(CABLES, robot.mass * robot.gravity, robot.gravity / segment.rate)
     each = {
         "tension": [robot.mass * x / balance.denominator * y for x, y in zip(balance.numerators, lengths, strict=True)],
@@ -120,7 +122,7 @@ def moving_slacks(
     return values
 
 
-def still_slacks(problem: Problem, segment: PlatformSegment, here: StateLanes, wires: CableLanes) -> list[Array]:
+def still_slacks(problem: Problem, segment: PlatformSegment, here: StateLanes, cables: CableLanes) -> list[Array]:
     """Smallest slacks of the criteria that depend on the pose alone, at one instant of many segments.
 
     Args:
@@ -128,14 +130,14 @@ def still_slacks(problem: Problem, segment: PlatformSegment, here: StateLanes, w
         segment: leaves (n, ...).
 
     Returns:
-        (n,) each: regular, below the spools, then those of limits on the pose.
+        (n,) each: regular, below the spools, then the slacks of limits on the pose.
     """
     robot, limits, z0 = problem.robot, problem.limits, problem.robot.gravity / segment.rate
     normal = plane_normal(robot)
     below = dot([normal[i] for i in range(3)], here.position) / z0
-    values = [normalised_determinant(robot, wires) / segment.regular, below]
+    values = [normalised_determinant(robot, cables) / segment.regular, below]
     scale = scales(CABLES, robot.mass * robot.gravity, z0)
-    each = {"depth": [here.position[2]], "length": [jnp.sqrt(dot(ray, ray)) for ray in wires.rays]}
+    each = {"depth": [here.position[2]], "length": [jnp.sqrt(dot(ray, ray)) for ray in cables.rays]}
     return values + [_least(row, limits, each[row.quantity], scale) for row in _limit_rows(limits, of_motion=False)]
 
 
@@ -144,7 +146,7 @@ def _limit_rows(limits: Limits, *, of_motion: bool) -> list[Limit]:
 
 
 def _least(row: Limit, limits: Limits, each: list[Array], scale) -> Array:
-    # Smallest slack of a limit, of a quantity of each cable or of one alone.
+    # Return the smallest slack of a limit on a quantity of each cable, or on a single quantity.
     limit = getattr(limits, row.name)
     bounds = [limit[k] for k in range(len(each))] if row.per_cable else [limit]
     return smallest([slack(row, x, value, scale) for x, value in zip(bounds, each, strict=True)])

@@ -23,7 +23,7 @@ from cspr_jax.schema.verdicts import Verdict
 
 
 def flags(limits: Limits) -> tuple[Verdict, ...]:
-    """The flag that says that a criterion is broken, for each criterion.
+    """Flags that say which criterion is broken, one a criterion.
 
     Returns:
         n_criteria flags.
@@ -36,7 +36,7 @@ def pose_slacks(problem: Problem, state: State, z0: Array, regular: Array) -> Ar
 
     Args:
         problem: robot, limits.
-        z0: () m.
+        z0: () depth of P0, m.
         regular: () determinant at rest in P0.
 
     Returns:

@@ -4,10 +4,10 @@ With N_k and det J the determinants of Cramer's rule for the tension of cable k,
 
     kappa_k = 6 z0 N_k / (g det J(P0)),    D = det J / det J(P0),    slack of a taut cable = kappa_k / D
 
-are analytic on a block. They are taken at Chebyshev's nodes; what the polynomials through these leave out is bounded
-on ellipses of complex time, by Hadamard's inequality. With Bernstein coefficients k_i of kappa and d_i of D, and
-remainders r and q, no slack is below the smallest (k_i - r) / (d_i + q). Likewise for limits on tensions, speeds and
-accelerations of cables, `limit_blocks`: docs/theory.md.
+are analytic on a block. They are computed at Chebyshev's nodes; what the polynomials through these values leave out is
+bounded on ellipses of complex time, by Hadamard's inequality. With Bernstein coefficients k_i of kappa and d_i of D,
+and remainders r and q, no slack is below the smallest (k_i - r) / (d_i + q). Likewise for limits on tensions, speeds
+and accelerations of cables, `limit_blocks`: docs/theory.md.
 """
 
 import math
@@ -24,18 +24,17 @@ from cspr_jax.arithmetic.lanes import dot, stored
 from cspr_jax.motions.limits import limits_set, scales
 from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.motions.problem import Problem
-from cspr_jax.platforms.least_nodes import least_nodes
 from cspr_jax.platforms.limit_blocks import QUANTITIES, STRAIGHT, Enclosed, Here, Pair, Sizes, at_most, ratio
 from cspr_jax.platforms.platform_reach import Reach, instant_beside, middle_of, reach
 from cspr_jax.platforms.platform_segment import PlatformSegment
 from cspr_jax.platforms.platform_segment_lanes import StateLanes, squared_duration, state
-from cspr_jax.platforms.work_list import allowance
+from cspr_jax.platforms.work_list import allowance, least_nodes
 from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.robots.wrench_lanes import CABLES, balance, cables, inertial_wrench
+from cspr_jax.robots.wrench_lanes import CABLES, balance, cable_lanes, inertial_wrench
 from cspr_jax.schema.limits import Limit
 
-# Part of a bound on real time by which a value at a node may be wrong (tests: by a tenth of that), and by which the
-# polynomial through such values may be. What computing its Bernstein coefficients adds is a part of the values.
+# A value at a node may be wrong by this part of its bound on real time (tests find a tenth of that), times Lebesgue's
+# constant for the polynomial through such values. Computing the Bernstein coefficients adds a part of the values.
 ROUNDING = 1e-13 * chebyshev.LEBESGUE
 COEFFICIENTS = 2.0 * np.finfo(float).eps * (chebyshev.DEGREE + 1) * float(np.abs(chebyshev.bernstein()).sum(1).max())
 REGULAR = CABLES  # the place of D among the values
@@ -43,17 +42,17 @@ BASIC = 2  # criteria that are no limits
 
 
 class TensionBounds(NamedTuple):
-    """Slacks on n blocks: of taut cables, of the determinant (D), of the limits on the motion that are given.
+    """Slacks on n blocks: of taut cables, of the determinant (D), of the limits on the motion that are set.
 
     Fields:
-        nodes: (n_nodes, n_criteria, n) smallest ones at the nodes, and what may be rounding: no lower than they truly
-            are. Infinite where D is not positive for certain. Of the determinant that of
-            `wrench_lanes.normalised_determinant` over its value at rest in P0, where margins are asked for. Where only
-            the least are: (1, n_criteria, n).
-        place: (n,) where the smallest of the least is, from -1 to 1; 0 where all are asked for.
+        nodes: (n_nodes, n_criteria, n) smallest slacks at the nodes, rounded up: no lower than they truly are; infinite
+            where D is not certainly positive. With margins the slack of the determinant is that of
+            `wrench_lanes.normalised_determinant` over its value at rest in P0. Where only the least values are
+            computed: (1, n_criteria, n).
+        place: (n,) place of the smallest of the least values, from -1 to 1; 0 where the values at all nodes are kept.
         bound: (n_criteria, n) proved lower bounds.
-        rounding: (n,) largest allowance for rounding in those of taut cables, before these are divided by D.
-        allowed: (n,) largest allowance in all: also for what the polynomials leave out.
+        rounding: (n,) largest allowance for rounding in the slacks of taut cables, before they are divided by D.
+        allowed: (n,) largest allowance in all, which includes what the polynomials leave out.
     """
 
     nodes: Array
@@ -72,13 +71,13 @@ class _Block(NamedTuple):
 
 
 def of_motion(problem: Problem) -> list[Limit]:
-    """Limits on the motion that are given.
+    """Rows of the limits on the motion that are set.
 
     Args:
         problem: robot, limits.
 
     Returns:
-        their rows.
+        the rows.
     """
     return [row for row in limits_set(problem.limits) if row.of_motion]
 
@@ -94,14 +93,14 @@ def tension_blocks(
         one: () the number 1; see `arithmetic.lanes.stored`.
         items: segments (leaves (n, ...)), arcs (n,), det J(P0) (n,), and where blocks start (n,) and stop (n,), with
             no knot inside.
-        margins: whether the normalised determinant is wanted.
-        least: whether of the nodes only the smallest values are.
+        margins: whether to compute the normalised determinant at the nodes.
+        least: whether to return only the smallest value of each criterion at the nodes.
 
     Returns:
         the bounds.
     """
     taken = _taken(problem, one, items, kind=kind, margins=margins, single_precision=least)
-    # Values that margins alone need come last, and are not bounded.
+    # Values that only margins need come last, and are not bounded.
     nodes, bound = _bounds(problem, taken)
     if margins:
         nodes[1] = nodes[1] * taken.values[:, len(taken.rests)]
@@ -149,7 +148,7 @@ def tension_ranges(problem: Problem, one: Array, items, *, kind: PlatformMotionK
 
 
 def _coefficients(values: Array) -> Array:
-    # Bernstein coefficients of polynomials through values (m, n_values, n) at the nodes.
+    # Return the Bernstein coefficients of polynomials through values (m, n_values, n) at the nodes.
     matrix = jnp.asarray(chebyshev.bernstein())
     return (matrix @ values.reshape(len(matrix), -1)).reshape(values.shape)
 
@@ -159,8 +158,8 @@ def _allowances(taken: "_Taken") -> tuple[Array, Array]:
 
 
 class _Taken(NamedTuple):
-    # Values of blocks at the nodes (m, n_values, n), what polynomials through the first of them leave out (n_rests, n),
-    # and the part of it that is rounding.
+    # Values of blocks at the nodes (m, n_values, n), what the polynomials through the first n_rests of these values
+    # leave out (n_rests, n), and the part of this that is rounding.
     block: _Block
     values: Array
     rests: Array
@@ -200,7 +199,7 @@ def _taken(
     sizes = jnp.stack(packed.parts(lax.map(sizes_on, (axes[:, 0], lax.map(reach_on, axes), factors))))
     amplified = jnp.max(values[:, REGULAR + 1], axis=0) ** 1.5
     largest = jnp.max(jnp.abs(values[:, : len(sizes)]), axis=0)
-    largest = jnp.where(jnp.isnan(largest), jnp.inf, largest)  # of three cables in one plane
+    largest = jnp.where(jnp.isnan(largest), jnp.inf, largest)  # three cables in one plane
     rounding = sizes[:, -1] * amplified[None] + COEFFICIENTS * largest
     rests = jnp.min(sizes[:, :-1], axis=1) + rounding
     if single_precision:
@@ -209,28 +208,30 @@ def _taken(
 
 
 def _values(problem: Problem, block: _Block, here: StateLanes, *, margins: bool) -> list[Pair]:
-    # Return the values at one node, two at a time, which XLA then computes in one loop: kappa and D, the factor of
-    # rounding, the values that the limits need, and the factor that makes of D the normalised determinant.
+    # Return the values at one node in pairs, each of which XLA computes in one loop: kappa and D, the factor of
+    # rounding, the values that the limits need, and the factor that turns D into the normalised determinant.
     robot = problem.robot
-    wires = cables(robot, here.position, here.turn)
+    cables = cable_lanes(robot, here.position, here.rotation)
 
     def slowed(vector):
         return tuple(x / block.squared for x in vector)
 
-    force, moment = inertial_wrench(robot, slowed(here.acceleration), here.turn, here.omega, here.spin)
-    balanced = balance(wires, force, slowed(moment))
+    force, moment = inertial_wrench(
+        robot, slowed(here.acceleration), here.rotation, here.omega, here.angular_acceleration
+    )
+    balanced = balance(cables, force, slowed(moment))
     inverse = 1.0 / balanced.volume
-    squares = [dot(ray, ray) for ray in wires.rays]
+    squares = [dot(ray, ray) for ray in cables.rays]
     amplified = math.prod(squares[2::2], start=squares[0]) * inverse * inverse
     share = inverse * inverse * inverse / block.regular
     kappa = [x * (share * (CABLES * block.z0 / robot.gravity)) for x in balanced.numerators]
     regular = balanced.denominator * share
     pairs = [*zip(kappa[::2], kappa[1::2], strict=True), (regular, amplified)]
-    instant = Here(here, wires, kappa, block.squared, block.z0)
+    instant = Here(here, cables, kappa, block.squared, block.z0)
     for quantity, row in _quantities(problem).items():
         pairs += QUANTITIES[quantity].values(instant, getattr(problem.limits, row[0].name))
     if margins:
-        standing = cables(robot, tuple(block.segments.hub[:, i] for i in range(3)), _level(regular))
+        standing = cable_lanes(robot, tuple(block.segments.hub[:, i] for i in range(3)), _level(regular))
         rest = [dot(ray, ray) for ray in standing.rays]
         lengths = [jnp.sqrt(a / b) for a, b in zip(rest, squares, strict=True)]
         shortened = math.prod(lengths[1:], start=lengths[0])
@@ -244,7 +245,7 @@ def _level(template: Array):
 
 
 def _quantities(problem: Problem) -> dict[str, list[Limit]]:
-    # Quantities that limits bound, each with its limits.
+    # Return the quantities that limits bound, each with its limits.
     rows: dict[str, list[Limit]] = {}
     for row in of_motion(problem):
         rows.setdefault(row.quantity, []).append(row)
@@ -253,20 +254,20 @@ def _quantities(problem: Problem) -> dict[str, list[Limit]]:
 
 def _lengths(robot: PlatformRobot, here: StateLanes) -> tuple[list[Array], list[Array]]:
     # Return the lengths of the cables, and the distances from the spools to the mass centre.
-    wires = cables(robot, here.position, here.turn)
+    cables = cable_lanes(robot, here.position, here.rotation)
     offs = [tuple(here.position[i] - robot.base_points[k, i] for i in range(3)) for k in range(CABLES)]
-    rays, away = ([jnp.sqrt(dot(x, x)) for x in vectors] for vectors in (wires.rays, offs))
+    rays, away = ([jnp.sqrt(dot(x, x)) for x in vectors] for vectors in (cables.rays, offs))
     return rays, away
 
 
 def _sizes(problem: Problem, block: _Block, bounds: Reach, along: Array, lengths) -> list[Array]:
-    # Bound the sizes on an ellipse of the values that `_values` gives, in its order, by Hadamard's inequality: moments
+    # Bound the sizes, on an ellipse, of the values of `_values`, in the same order, by Hadamard's inequality: moments
     # are in platform axes, over the mean arm times the growth.
     robot, squared, z0 = problem.robot, block.squared, block.z0
     sizes = jnp.sqrt(jnp.sum(robot.platform_points**2, axis=1))
     arm, arms = jnp.sqrt(jnp.mean(sizes**2)), [sizes[k] for k in range(CABLES)]
-    shift, turn = along * bounds.speed, jnp.minimum(along * bounds.turn, bounds.growth + 1.0)
-    moved = [shift + lever * turn for lever in arms]
+    shift, rotated = along * bounds.speed, jnp.minimum(along * bounds.rotation_rate, bounds.growth + 1.0)
+    moved = [shift + lever * rotated for lever in arms]
     rays = [ray + move for ray, move in zip(lengths[0], moved, strict=True)]
     columns = [
         jnp.sqrt(ray**2 + (lever / arm * (away + shift)) ** 2)
@@ -274,13 +275,13 @@ def _sizes(problem: Problem, block: _Block, bounds: Reach, along: Array, lengths
     ]
     inertia = robot.inertia / robot.mass
     apart = inertia - jnp.trace(inertia) / 3.0 * jnp.eye(3)
-    whirl = jnp.sqrt(jnp.sum(inertia**2)) * bounds.spin + jnp.sqrt(jnp.sum(apart**2)) * bounds.omega**2
+    whirl = jnp.sqrt(jnp.sum(inertia**2)) * bounds.angular_acceleration + jnp.sqrt(jnp.sum(apart**2)) * bounds.omega**2
     force = bounds.bend / squared + robot.gravity
     wrench = jnp.sqrt(force**2 + (whirl / squared / (arm * bounds.growth)) ** 2)
     whole = (arm * bounds.growth) ** 3 / jnp.abs(block.regular) * math.prod(columns[1:], start=columns[0])
     kappa = [CABLES * z0 / robot.gravity * whole * wrench / column for column in columns]
-    paces = [bounds.speed + lever * bounds.turn for lever in arms]
-    pulls = [bounds.bend + lever * bounds.growth * (bounds.spin + bounds.omega**2) for lever in arms]
+    paces = [bounds.speed + lever * bounds.rotation_rate for lever in arms]
+    pulls = [bounds.bend + lever * bounds.growth * (bounds.angular_acceleration + bounds.omega**2) for lever in arms]
     is_straight = [move < STRAIGHT * ray for ray, move in zip(lengths[0], moved, strict=True)]
     cable_sizes = Sizes(kappa, rays, paces, pulls, is_straight, squared, z0)
     largest = [*kappa, whole, jnp.zeros_like(whole)]

@@ -1,18 +1,21 @@
 """Work list of a proof: blocks of motions are closed, or halved until they are, or until their motion is refuted."""
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+import jax.numpy as jnp
 import numpy as np
+from jax import Array
 
+from cspr_jax.arithmetic.lanes import smallest
 from cspr_jax.motions.blocks import Blocks
 
 TOLERANCE = 1e-6
-# So many times a block is halved at most, and so many of an arc may be open.
+# A block is halved so many times at most, and so many blocks of an arc may be open.
 HALVINGS, OPEN = 21, 64
-# Blocks are halved so many times at once, the first time, the second time, and then: few blocks are open by then, and
-# a batch of them costs as much as a full one.
+# How many times blocks are halved at once: in the first round, in the second, and in all later ones, where few blocks
+# are open and a batch of them costs as much as a full one.
 AT_ONCE = (1, 2, 3)
 
 
@@ -23,8 +26,8 @@ class BlockBounds(NamedTuple):
         nodes: (m, n_criteria or more, k) values at instants: slacks first.
         bound: (n_criteria, k) proved lower bounds of the slacks.
         tau: (m, k) the instants.
-        is_enough: of smallest values so far, (n, n_criteria or more): which blocks need not be halved if their slacks
-            are proved, (k,).
+        is_enough: takes the smallest values so far, (n, n_criteria or more), and gives which blocks need not be halved
+            once their slacks are proved, (k,).
     """
 
     nodes: np.ndarray
@@ -38,16 +41,16 @@ class WorkList:
 
     Args:
         arcs: (n,) numbers of arcs.
-        limits: (n_criteria,) whether each slack is one of a limit, which may be touched.
-        ignored: (n_criteria,) whether each neither refutes nor need be proved; None: none is.
+        limits: (n_criteria,) mask of slacks of limits, which may be touched.
+        ignored: (n_criteria,) mask of criteria that neither refute nor need be proved; None: all count.
 
     Fields:
-        is_refuted: (n,) an instant breaks a criterion, or `refute` was called.
-        is_stuck: (n,) undecided.
+        is_refuted: (n,) motions of which an instant breaks a criterion, or for which `refute` was called.
+        is_stuck: (n,) motions that stay undecided.
         attained: (n, n_criteria or more) smallest values at the instants that were looked at.
-        bound: (n, n_criteria) proved lower bounds of motions that are neither.
-        instant: (n,) tau of what broke a criterion by most, else of what else refutes the motion; NaN where nothing
-            does.
+        bound: (n, n_criteria) proved lower bounds; NaN of motions that are refuted or stuck.
+        instant: (n,) tau at which a criterion is broken by most, else tau at which something else refutes the motion;
+            NaN where nothing does.
     """
 
     def __init__(self, arcs: np.ndarray, limits: np.ndarray, ignored: np.ndarray | None = None) -> None:
@@ -59,13 +62,13 @@ class WorkList:
         self.attained, self._worst = np.zeros((len(arcs), 0)), np.full(len(arcs), -TOLERANCE)
 
     def work_off(self, blocks: Blocks, look: Callable[[Blocks, int], BlockBounds]) -> BlockBounds:
-        """Look at blocks, and at halves of what stays open.
+        """Bound blocks, and the halves of blocks that stay open.
 
         Args:
-            look: of blocks that were halved so many times.
+            look: takes blocks and how many times they were halved, and bounds them.
 
         Returns:
-            what was found of the blocks that were given.
+            the bounds of the blocks as they were given.
         """
         first = bounds = look(blocks, 0)
         self.attained = np.full((len(self._arcs), bounds.nodes.shape[1]), np.inf)
@@ -85,18 +88,18 @@ class WorkList:
         return first
 
     def refute(self, row: np.ndarray, tau: np.ndarray) -> None:
-        """Note that motions are refuted by other things than criteria.
+        """Note motions that are refuted by something else than criteria.
 
         Args:
             row: (k,) motions.
-            tau: (k,) when.
+            tau: (k,) instants at which they are refuted.
         """
         self.is_refuted[row] = True
         is_new = np.isnan(self.instant[row])
         self.instant[row[is_new]] = tau[is_new]
 
     def _take_in(self, blocks: Blocks, bounds: BlockBounds, *, last: bool) -> np.ndarray:
-        # Take in the bounds of blocks; return which of the blocks are to be halved.
+        # Take in the bounds of blocks; return the mask of blocks to be halved.
         least, low = bounds.nodes.min(0).T, bounds.bound.T
         _lower(self.attained, blocks.row, least)
         slack = least[:, : low.shape[1]]
@@ -105,7 +108,7 @@ class WorkList:
         self.is_refuted[blocks.row[(slack + self._allowed < -TOLERANCE).any(1)]] = True
         is_above = (low > TOLERANCE - self._allowed) | self._ignored
         is_proved = is_above.all(1) & bounds.is_enough(self.attained)
-        with np.errstate(invalid="ignore"):  # of infinities: singular poses, blocks without a bound
+        with np.errstate(invalid="ignore"):  # infinities: singular poses, blocks without a bound
             is_known = ((slack - low <= 0.5 * TOLERANCE) & ~is_above).any(1)
         is_done = is_proved | is_known | last | np.isnan(least).any(1)
         self.is_stuck[blocks.row[is_done & ~is_proved]] = True
@@ -122,19 +125,37 @@ class WorkList:
 
 
 def _lower(values: np.ndarray, row: np.ndarray, others: np.ndarray) -> None:
-    # Take values of rows, which stand side by side, into the smallest ones.
+    # Lower the smallest values to those of others, of which equal rows stand side by side.
     if len(row):
         first = np.flatnonzero(np.diff(row, prepend=-1))
         values[row[first]] = np.minimum(values[row[first]], np.minimum.reduceat(others, first))
 
 
 def allowance(limits: np.ndarray) -> np.ndarray:
-    """Allowance of slacks below zero: limits may be touched; cables may not be slack, and the rest may not be reached.
+    """How far below zero slacks may be: limits may be touched, all other criteria must be met strictly.
 
     Args:
-        limits: (n_criteria,) whether each is the slack of a limit.
+        limits: (n_criteria,) mask of slacks of limits.
 
     Returns:
         (n_criteria,).
     """
     return 2.0 * TOLERANCE * limits
+
+
+def least_nodes(nodes: Sequence[Array], allowed: np.ndarray, places: np.ndarray) -> tuple[Array, Array]:
+    """Reduce the node values of n blocks to the few numbers that a verdict needs.
+
+    Args:
+        nodes: of each criterion, (m, n).
+        allowed: (n_slacks,) how far below zero the first of these criteria, the slacks, may be; see `allowance`.
+        places: (m,) of the nodes, from -1 at the start of a block to 1 at its stop, increasing.
+
+    Returns:
+        (1, n_criteria, n) the smallest value of each criterion; (n,) the first place of the smallest of all slacks, NaN
+        where that is NaN.
+    """
+    worst = smallest([x + extra for x, extra in zip(nodes, allowed, strict=False)])
+    is_there = worst == jnp.min(worst, axis=0)[None]
+    first = jnp.min(jnp.where(is_there, places[:, None], jnp.inf), axis=0)
+    return jnp.stack([jnp.min(x, axis=0) for x in nodes])[None], jnp.where(first <= 1.0, first, jnp.nan)

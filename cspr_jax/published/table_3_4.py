@@ -46,7 +46,7 @@ def smallest_proportions(
     Returns:
         one proportion for each annulus.
     """
-    preferred, likely, rest = attainable.turns(values)
+    preferred, likely, rest = attainable.rounds(values)
     sets = [one for annulus in annuli for one in annulus]
     owner = np.repeat(np.arange(len(annuli)), [len(annulus) for annulus in annuli])
     good = attained(sets, preferred)

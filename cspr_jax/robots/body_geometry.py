@@ -9,9 +9,9 @@ from cspr_jax.robots.spool_plane import is_on_line
 
 # Points nearer to each other than this part of the largest distance are one point.
 SAME = 1e-9
-# Rounding that is allowed to an inertia tensor: of its symmetry, and of a flat body's I1 + I2 = I3.
+# Tolerance for rounding of an inertia tensor: of its symmetry, and of I1 + I2 = I3 for a flat body.
 INERTIA_TOLERANCE = 1e-9
-# Part of the length of a rod that its mass centre may lie beside the line of its attachment points.
+# The mass centre of a rod may lie beside the line of its attachment points by this part of its length.
 BESIDE = 1e-6
 
 
@@ -20,20 +20,20 @@ def is_same(points: np.ndarray, first: int, second: int) -> bool:
 
     Args:
         points: (n, 3) m.
-        first: number of one, from 0 on.
+        first: index of one of them.
 
     Returns:
-        whether they are nearer to each other than rounding.
+        whether their distance is within rounding.
     """
     span = np.ptp(points, axis=0).max()
     return bool(np.linalg.norm(points[first] - points[second]) <= SAME * span)
 
 
-def checked_platform(given, count: int, pattern: Pattern) -> np.ndarray:
+def checked_platform(platform_points, count: int, pattern: Pattern) -> np.ndarray:
     """Attachment points of a body.
 
     Args:
-        given: (n_cables, 3) in platform axes, m.
+        platform_points: (n_cables, 3) in platform axes, m.
         count: number of cables.
 
     Returns:
@@ -43,7 +43,7 @@ def checked_platform(given, count: int, pattern: Pattern) -> np.ndarray:
         InputError: wrong shape, another number, not finite; on one line, or not on one where the pattern asks for it;
             out of the plane of a planar platform.
     """
-    points = checked_coordinates("platform_points", given, pattern.dof)
+    points = checked_coordinates("platform_points", platform_points, pattern.dof)
     if len(points) != count:
         raise InputError(
             "platform_points", None, f"must be {count}, as many as base_points", fault=f"{len(points)} points"
@@ -65,23 +65,23 @@ def checked_platform(given, count: int, pattern: Pattern) -> np.ndarray:
     return points
 
 
-def checked_centre(given, platform: np.ndarray, pattern: Pattern) -> np.ndarray:
+def checked_centre(centre_of_mass, platform: np.ndarray, pattern: Pattern) -> np.ndarray:
     """Mass centre of a body.
 
     Args:
-        given: (3,) in platform axes, m.
+        centre_of_mass: (3,) in platform axes, m.
         platform: (n_cables, 3) attachment points, m.
 
     Returns:
         (3,) m.
 
     Raises:
-        InputError: wrong shape, not finite, out of a planar platform's plane, or beside a rod's line, where its weight
-            would turn it about that.
+        InputError: wrong shape, not finite, out of a planar platform's plane, or beside the line of a rod, about which
+            its weight would turn it.
     """
-    centre = np.asarray(given, float)
+    centre = np.asarray(centre_of_mass, float)
     if centre.shape != (3,) or not (np.abs(centre) <= LARGEST_LENGTH).all():
-        raise InputError("centre_of_mass", given, "three coordinates, at most 1e6 m")
+        raise InputError("centre_of_mass", centre_of_mass, "three coordinates, at most 1e6 m")
     if pattern.is_planar and centre[1] != 0.0:
         raise InputError("centre_of_mass", centre.tolist(), "a point with y = 0: the plane of a planar robot")
     if pattern.along_line:
@@ -93,12 +93,12 @@ def checked_centre(given, platform: np.ndarray, pattern: Pattern) -> np.ndarray:
     return centre
 
 
-def checked_inertia(given, pattern: Pattern) -> np.ndarray:
+def checked_inertia(inertia, pattern: Pattern) -> np.ndarray:
     """Inertia tensor of a body.
 
     Args:
-        given: (3, 3) about the mass centre, platform axes, kg m^2.
-        pattern: of the body. Of a planar platform only the moment about y counts, and a rod may have none about its
+        inertia: (3, 3) about the mass centre, platform axes, kg m^2.
+        pattern: of the body. For a planar platform only the moment about y counts, and a rod may have none about its
             line.
 
     Returns:
@@ -107,9 +107,9 @@ def checked_inertia(given, pattern: Pattern) -> np.ndarray:
     Raises:
         InputError: wrong shape, not finite, not symmetric, not positive definite, or of no real body.
     """
-    tensor = np.asarray(given, float)
+    tensor = np.asarray(inertia, float)
     if tensor.shape != (3, 3) or not np.isfinite(tensor).all():
-        raise InputError("inertia", given, "three rows of three finite numbers, kg m^2")
+        raise InputError("inertia", inertia, "three rows of three finite numbers, kg m^2")
     scale = np.abs(tensor).max()
     if np.abs(tensor - tensor.T).max() > INERTIA_TOLERANCE * scale:
         raise InputError("inertia", tensor.tolist(), "a symmetric tensor")

@@ -1,4 +1,4 @@
-"""Cables of any robot: what they are made of; their tensions, lengths and rates, by the balance of its kind."""
+"""Cables of any robot: diameters and pulleys; tensions, lengths and rates, by the balance of its kind."""
 
 import dataclasses
 from functools import partial
@@ -39,7 +39,7 @@ def with_cables(robot: RobotKind, *, cable_diameter=None, pulley_radius=None, pu
         the robot.
 
     Raises:
-        InputError: a diameter or pulleys that are none.
+        InputError: an invalid diameter, or invalid pulleys.
     """
     changes: dict[str, Any] = {}
     if cable_diameter is not None:
@@ -58,17 +58,17 @@ def with_cables(robot: RobotKind, *, cable_diameter=None, pulley_radius=None, pu
 
 @partial(jax.jit, static_argnames=("rule",))
 def tensions(robot: AnyRobot, state: State, limits: Limits = NO_LIMITS, rule: str = CENTRED) -> Array:
-    """Cable tensions; of redundant cables those of a rule.
+    """Cable tensions; where cables are redundant, the tensions that a rule chooses.
 
     Args:
         robot: z down.
         state: in the robot's axes.
-        limits: of the tensions of redundant cables; 0 and none where they are not given.
-        rule: that chooses these, a name of `robots.tension_rule_table`; known when a function is compiled.
+        limits: limits of the tensions of redundant cables; 0 and infinity where they are not given.
+        rule: rule that chooses tensions, a name of `robots.tension_rule_table`; known when a function is compiled.
 
     Returns:
-        (n_cables,) in cable order, N; negative where a cable would have to push. Of redundant cables, where no tensions
-        keep the limits, those of least norm.
+        (n_cables,) in cable order, N; negative where a cable would have to push. Where no tensions of redundant cables
+        keep the limits, the tensions of least norm.
     """
     if robot.n_cables > robot.dof:
         return shared(robot, state, limits, rule).tensions
@@ -94,7 +94,7 @@ def shared(robot: AnyRobot, state: State, limits: Limits, rule: str) -> Distribu
 
 
 def _units(robot: AnyRobot) -> Array:
-    # (dof,) by which the components of wrenches are divided: moments by the size of the platform.
+    # Return the divisors (dof,) of the components of wrenches: for moments the size of the platform.
     forces = np.ones(len(PATTERNS[robot.pattern].forces))
     if not isinstance(robot, PlatformRobot):
         return jnp.asarray(forces)

@@ -1,7 +1,7 @@
 """Clearance of many poses: how far cables are from each other, from obstacles and from their own platform, signed.
 
-Coordinates are those of the robot that is given; shapes have the same axes, its platform's own shape those of the
-platform, from the mass centre. Every meeting of a scene has a kernel of `clearance_lanes`, compiled once a robot.
+Coordinates are those of the given robot, and shapes have the same axes; the shape of the platform has platform axes,
+from the mass centre. Every kind of meeting in a scene has a kernel of `clearance_kernels`, compiled once a robot.
 """
 
 import dataclasses
@@ -20,12 +20,13 @@ from cspr_jax.robots.platform import PlatformRobot, pairs_apart
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.robots.shapes import Body, Box, Cylinder, Hull, Obstacle, Sphere, hull, is_flat
 
-# Poses of a batch on a CPU: of 16384 to 131072 about the same.
+# Poses of a batch on a CPU; rates are about the same from 16384 to 131072.
 BATCH = 65_536
-# The part of a cable next to its attachment point that is not held against it is so many diameters long, or has this
-# part of the size of the platform's shape.
+# The part of a cable next to its attachment point for which contacts with the platform do not count is so many
+# diameters long, or this part of the size of the platform's shape.
 LEAVE_DIAMETERS, LEAVE_SIZE = 10.0, 0.01
-# Rounding of a clearance, over machine epsilon and the largest coordinate of pose, robot and obstacles; 2.2 was met.
+# Rounding of a clearance, over machine epsilon and the largest coordinate of pose, robot and obstacles; the largest
+# value that was met is 2.2.
 ROUNDING = 16.0
 
 Kind = Literal["cables", "obstacle", "platform", "platform-obstacle"]
@@ -37,8 +38,8 @@ class Meeting(NamedTuple):
     Fields:
         kind: "cables": two cables; "obstacle": a cable and an obstacle; "platform": a cable and its own platform;
             "platform-obstacle": the platform and an obstacle.
-        cable: number of the cable, the first of two, from 0 on; -1 of the platform.
-        other: number of the other cable or of the obstacle, from 0 on; -1 of the platform.
+        cable: number of the cable, the first of two, from 0 on; -1 for the platform.
+        other: number of the other cable or of the obstacle, from 0 on; -1 for the platform.
     """
 
     kind: Kind
@@ -48,16 +49,16 @@ class Meeting(NamedTuple):
 
 @dataclasses.dataclass(frozen=True)
 class Scene:
-    """A robot among what its cables can meet.
+    """A robot among the bodies that its cables can meet.
 
     Fields:
         base_points: (n_cables, 3) m.
-        platform_points: (n_cables, 3) platform axes, from the mass centre, m; zero of a point mass.
+        platform_points: (n_cables, 3) platform axes, from the mass centre, m; zero for a point mass.
         diameters: (n_cables,) m.
         pairs: cables that share neither spool nor platform point.
         obstacles: shapes fixed in space.
-        body: shape of the platform in its axes, from the mass centre; None: it is not looked at.
-        leave: length of each cable next to its attachment point that is not held against its own platform, m.
+        body: shape of the platform in its axes, from the mass centre; None: the platform does not count.
+        leave: length of each cable next to its attachment point for which contacts with the platform do not count, m.
     """
 
     base_points: np.ndarray
@@ -84,12 +85,12 @@ class Clearances(NamedTuple):
     """Clearances of poses.
 
     Fields:
-        clearance: (n,) the least of all, m; negative where two bodies meet; inf where nothing can meet.
-        nearest: (n,) place among `Scene.meetings` of what is the nearest; -1 where nothing can meet.
-        cables: (n,) the least of two cables, m; inf where none can meet.
-        obstacles: (n,) the least of obstacles with cables and platform, m.
-        platform: (n,) the least of cables with their own platform, m; of whole cables never above `Scene.leave`.
-        is_open: (n,) whether the least is nearer to the threshold than rounding lets it be told.
+        clearance: (n,) the least of all clearances, m; negative where two bodies meet; inf where nothing can meet.
+        nearest: (n,) index in `Scene.meetings` of the nearest two bodies; -1 where nothing can meet.
+        cables: (n,) the least clearance of two cables, m; inf where none can meet.
+        obstacles: (n,) the least clearance of obstacles from cables and platform, m.
+        platform: (n,) the least clearance of cables from their own platform, m; of whole cables at most `Scene.leave`.
+        is_open: (n,) whether the least clearance is within rounding of the threshold.
     """
 
     clearance: np.ndarray
@@ -108,16 +109,16 @@ def scene(
     body: Body | None = None,
     leave: float | None = None,
 ) -> Scene:
-    """A robot among what its cables can meet.
+    """A robot among the bodies that its cables can meet.
 
     Args:
         robot: a platform, or a point mass, whose cables never meet each other.
         diameter: of the cables, one number or (n_cables,), m.
         obstacles: shapes fixed in space, in the robot's axes.
-        body: shape of the platform in its axes, from the mass centre; see `attachment_hull`. None: cables are not
-            held against their platform, nor it against obstacles.
-        leave: length of each cable next to its attachment point that is not held against its own platform, m; None:
-            ten diameters, or a hundredth of the shape if that is more.
+        body: shape of the platform in its axes, from the mass centre; see `attachment_hull`. None: contacts of the
+            platform, with cables or obstacles, do not count.
+        leave: length of each cable next to its attachment point for which contacts with the platform do not count, m;
+            None: ten diameters, or a hundredth of the size of the shape if that is more.
 
     Returns:
         the scene.
@@ -164,16 +165,15 @@ def clearances(
     """Clearances of poses.
 
     Args:
-        scene: the robot and what its cables can meet.
+        scene: the robot and the bodies that its cables can meet.
         positions: (n, 3) of the mass centre, m.
         quaternions: (n, 4) unit quaternions, scalar first; None: no rotation.
-        ends: (n, n_cables, 3) where the cables leave their spools, if that moves, m; None: the base points.
-        threshold: the clearance about which verdicts are wanted, m.
-        dtype: of the numbers; of "float32" poses that are open are done again in float64.
+        ends: (n, n_cables, 3) points at which the cables leave their spools, if these move, m; None: the base points.
+        threshold: clearance with which verdicts compare, m.
+        dtype: of the numbers; with "float32" open poses are computed again in float64.
 
     Returns:
-        the clearances, float64; of "float32" good to some 1e-6 of the scene's size where they are not near the
-        threshold.
+        the clearances, float64; with "float32" accurate to some 1e-6 of the scene's size away from the threshold.
 
     Raises:
         InputError: arrays of other shapes.
@@ -184,30 +184,30 @@ def clearances(
     answers = _all(scene, poses, threshold, np.dtype(dtype))
     again = np.flatnonzero(answers.is_open)
     if dtype == "float32" and len(again):
-        for old, new in zip(answers, _all(scene, poses.some(again), threshold, np.dtype("float64")), strict=True):
+        for old, new in zip(answers, _all(scene, poses.rows(again), threshold, np.dtype("float64")), strict=True):
             old[again] = new
     return answers
 
 
-class _Given(NamedTuple):
+class _CheckedPoses(NamedTuple):
     place: np.ndarray  # (n, 3)
-    turn: np.ndarray | None  # (n, 4)
+    quaternion: np.ndarray | None  # (n, 4)
     spools: np.ndarray | None  # (n, n_cables, 3)
 
-    def some(self, which) -> "_Given":
-        turn, spools = (None if x is None else x[which] for x in self[1:])
-        return _Given(self.place[which], turn, spools)
+    def rows(self, index) -> "_CheckedPoses":
+        quaternion, spools = (None if x is None else x[index] for x in self[1:])
+        return _CheckedPoses(self.place[index], quaternion, spools)
 
     def lanes(self, origin: np.ndarray, dtype: np.dtype) -> kernels.PoseLanes:
         def columns(array):
             return tuple(np.ascontiguousarray(column, dtype) for column in array.T)
 
-        turn = None if self.turn is None else columns(self.turn)
+        quaternion = None if self.quaternion is None else columns(self.quaternion)
         ends = None if self.spools is None else [columns(x) for x in np.swapaxes(self.spools - origin, 0, 1)]
-        return kernels.PoseLanes(columns(self.place - origin), turn, ends)
+        return kernels.PoseLanes(columns(self.place - origin), quaternion, ends)
 
 
-def _checked(scene: Scene, positions, quaternions, ends) -> _Given:
+def _checked(scene: Scene, positions, quaternions, ends) -> _CheckedPoses:
     place = np.asarray(positions, float)
     if place.ndim != 2 or place.shape[1] != 3:
         raise InputError("positions", None, "must be (n, 3)", fault=f"an array of shape {place.shape}")
@@ -218,12 +218,12 @@ def _checked(scene: Scene, positions, quaternions, ends) -> _Given:
             raise InputError(name, None, f"must be {shape}", fault=f"an array of shape {array.shape}")
         return array
 
-    turn = checked("quaternions", quaternions, (len(place), 4))
-    return _Given(place, turn, checked("ends", ends, (len(place), len(scene.base_points), 3)))
+    quaternion = checked("quaternions", quaternions, (len(place), 4))
+    return _CheckedPoses(place, quaternion, checked("ends", ends, (len(place), len(scene.base_points), 3)))
 
 
-def _all(scene: Scene, all_poses: _Given, threshold: float, dtype: np.dtype) -> Clearances:
-    # From the centroid of the spools, so that float32 has the digits where they are needed.
+def _all(scene: Scene, all_poses: _CheckedPoses, threshold: float, dtype: np.dtype) -> Clearances:
+    # Take coordinates from the centroid of the spools, so that float32 has its digits where they are needed.
     origin = scene.base_points.mean(0)
     terms = list(_terms(scene, origin, dtype))
     extent = max(float(np.abs(x).max()) for x in (scene.base_points - origin, scene.platform_points))
@@ -231,12 +231,12 @@ def _all(scene: Scene, all_poses: _Given, threshold: float, dtype: np.dtype) -> 
     bound = ROUNDING * float(np.finfo(dtype).eps)
 
     def one(part: slice) -> Clearances:
-        poses = all_poses.some(part).lanes(origin, dtype)
+        poses = all_poses.rows(part).lanes(origin, dtype)
         answers = in_batches(lambda batch: tuple(term(batch) for _, _, term in terms), poses, size=BATCH)
         answer = _least([(kind, first, x) for (kind, first, _), x in zip(terms, answers, strict=True)])
         far = [np.abs(x) for x in poses.position]
         size = np.maximum(np.maximum(np.maximum(far[0], far[1]), far[2]), reach)
-        # NaN is open.
+        # NaN compares as false: such poses stay open.
         return answer._replace(is_open=~(np.abs(answer.clearance - threshold) > bound * size))
 
     if not terms:
@@ -255,7 +255,7 @@ def _least(terms: Sequence[tuple[Kind, int, np.ndarray]]) -> Clearances:
     _, first, distances = terms[0]
     clearance, nearest = distances.real.copy(), distances.imag.astype(np.int32) + np.int32(first)
     for _, first, distances in terms[1:]:
-        # A pose that gives NaN has it from the first kernel on, and keeps it.
+        # A pose with NaN has it from the first kernel on, and keeps it.
         is_less = distances.real < clearance
         np.copyto(clearance, distances.real, where=is_less)
         np.copyto(nearest, distances.imag.astype(np.int32) + np.int32(first), where=is_less)
@@ -304,7 +304,7 @@ def _solid(shape: Obstacle | Hull, origin: np.ndarray):
     if isinstance(shape, Cylinder):
         return kernels.Rod(*map(leaf, (shape.start - origin, shape.end - shape.start, shape.radius)))
     if isinstance(shape, Box):
-        return kernels.Brick(*map(leaf, (shape.centre - origin, shape.half, shape.turn)))
+        return kernels.Brick(*map(leaf, (shape.centre - origin, shape.half, shape.rotation)))
     return kernels.Polyhedron(*map(leaf, (shape.normals, shape.offsets, shape.triangles, shape.edges, shape.sides)))
 
 
@@ -312,11 +312,11 @@ def _corners(shape: Body) -> np.ndarray:
     if isinstance(shape, Hull):
         return shape.triangles.reshape(-1, 3)
     signs = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), -1).reshape(-1, 3)
-    return shape.centre + (signs * shape.half) @ shape.turn.T
+    return shape.centre + (signs * shape.half) @ shape.rotation.T
 
 
 def _reach(shape: Obstacle, origin: np.ndarray) -> float:
-    # Largest coordinate.
+    # Return the largest coordinate.
     if isinstance(shape, Box):
         return float(np.abs(_corners(shape) - origin).max())
     ends = [shape.centre] if isinstance(shape, Sphere) else [shape.start, shape.end]

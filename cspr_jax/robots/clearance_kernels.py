@@ -1,6 +1,7 @@
-"""Compiled functions of `clearance`: the nearest of each kind of meeting, one lane a pose.
+"""Compiled functions of `clearance`: the nearest bodies of each kind of meeting, one lane a pose.
 
-Each gives one complex number a pose, of `clearance_lanes.nearest`: the clearance, m, and which of its meetings it is.
+Each gives one complex number a pose, as `clearance_lanes.nearest` does: the clearance, m, and the number of the
+meeting.
 """
 
 from collections.abc import Sequence
@@ -58,7 +59,7 @@ class PoseLanes(NamedTuple):
     Fields:
         position: three arrays, m.
         quaternion: four arrays of a unit quaternion, scalar first; None: no rotation.
-        ends: where each cable leaves its spool, three arrays each, m; None: the base points.
+        ends: point at which each cable leaves its spool, three arrays each, m; None: the base points.
     """
 
     position: Vector
@@ -83,7 +84,7 @@ class Rod(NamedTuple):
 
     Fields:
         start: (3,) m.
-        ray: (3,) from there to the end, m.
+        ray: (3,) from the start to the end, m.
         radius: () m.
     """
 
@@ -98,16 +99,16 @@ class Brick(NamedTuple):
     Fields:
         centre: (3,) m.
         half: (3,) halves of the lengths of its edges, m.
-        turn: (3, 3) its axes, one a column.
+        rotation: (3, 3) axes of the box, one a column.
     """
 
     centre: Array
     half: Array
-    turn: Array
+    rotation: Array
 
 
 Solid: TypeAlias = Ball | Rod | Brick
-Own: TypeAlias = Brick | Polyhedron
+BodyShape: TypeAlias = Brick | Polyhedron
 
 
 def _three(array: Array) -> Vector:
@@ -119,15 +120,15 @@ def _less(a: Vector, b: Vector) -> Vector:
 
 
 def _rotation(poses: PoseLanes) -> Matrix | None:
-    return None if poses.quaternion is None else lanes.rotation(poses.quaternion)
+    return None if poses.quaternion is None else lanes.rotation_matrix(poses.quaternion)
 
 
 def _cables(points: Points, poses: PoseLanes) -> tuple[Sequence[Vector], Sequence[Vector]]:
     # Return the points at which cables leave their spools, and the rays from there to the platform.
-    turn, count = _rotation(poses), points.base.shape[0]
+    rotation, count = _rotation(poses), points.base.shape[0]
     arms = [_three(points.platform[k]) for k in range(count)]
-    if turn is not None:
-        arms = [lanes.turned(turn, arm) for arm in arms]
+    if rotation is not None:
+        arms = [lanes.turned(rotation, arm) for arm in arms]
     ends = [_three(points.base[k]) for k in range(count)] if poses.ends is None else list(poses.ends)
     return ends, [tuple(poses.position[i] + arms[k][i] - ends[k][i] for i in range(3)) for k in range(count)]
 
@@ -147,8 +148,8 @@ def of_cables(points: Points, poses: PoseLanes, pairs: np.ndarray) -> Array:
 
 @jax.jit
 def _lines(points: Points, poses: PoseLanes) -> tuple[list[Array] | None, list[Array]]:
-    # Components of where cables leave their spools, if that moves, and from there to the platform, (n_cables, n) each:
-    # a loop over what its own call has stored would be slow.
+    # Return the points at which cables leave their spools, None if these are fixed, and the rays from there to the
+    # platform, components (n_cables, n): a loop over values that its own compiled call has stored would be slow.
     if poses.ends is not None:
         ends, rays = _cables(points, poses)
         return [jnp.stack([end[i] for end in ends]) for i in range(3)], [
@@ -156,9 +157,9 @@ def _lines(points: Points, poses: PoseLanes) -> tuple[list[Array] | None, list[A
         ]
     shape = points.base.shape[0], len(poses.position[0])
     arms = [jnp.broadcast_to(points.platform[:, i, None], shape) for i in range(3)]
-    turn = _rotation(poses)
-    if turn is not None:
-        arms = list(lanes.turned([[jnp.broadcast_to(x[None], shape) for x in row] for row in turn], arms))
+    rotation = _rotation(poses)
+    if rotation is not None:
+        arms = list(lanes.turned([[jnp.broadcast_to(x[None], shape) for x in row] for row in rotation], arms))
     return None, [poses.position[i][None] + arms[i] - points.base[:, i, None] for i in range(3)]
 
 
@@ -174,7 +175,7 @@ def _nearest_pair(points: Points, starts: list[Array] | None, rays: list[Array],
         (i, j), place = pair
         thick = 0.5 * (points.diameters[i] + points.diameters[j])
         distance = segments(*line(i), *line(j)) - thick
-        # As `clearance_lanes.nearest` does: the first of equal ones, and NaN stays.
+        # Keep the first of equal distances, and NaN, as `clearance_lanes.nearest` does.
         is_kept = jnp.isnan(jnp.real(best)) | (distance >= jnp.real(best))
         return jnp.where(is_kept, best, lax.complex(distance, jnp.full_like(distance, place))), None
 
@@ -207,95 +208,95 @@ def of_obstacle(points: Points, poses: PoseLanes, solid: Solid) -> Array:
 
 
 def _in_brick(brick: Brick, start: Vector, ray: Vector) -> tuple[Vector, Vector]:
-    # A segment in the axes of a box, from its centre.
-    axes = [_three(row) for row in brick.turn]
+    # Return a segment in the axes of a box, from the centre of the box.
+    axes = [_three(row) for row in brick.rotation]
     return lanes.turned_back(axes, _less(start, _three(brick.centre))), lanes.turned_back(axes, ray)
 
 
 @jax.jit
-def of_platform(points: Points, poses: PoseLanes, own: Own, leave: Array) -> Array:
+def of_platform(points: Points, poses: PoseLanes, body: BodyShape, leave: Array) -> Array:
     """The cable that is the nearest to its own platform.
 
     Args:
         poses: lanes (n,).
-        own: shape of the platform in its axes.
+        body: shape of the platform in its axes.
         leave: () length next to the attachment point that is left out, m.
 
     Returns:
         (n,) complex: distance from the surface less half a diameter, m, and the cable.
     """
-    turn, gaps = _rotation(poses), []
+    rotation, gaps = _rotation(poses), []
     _, rays = _cables(points, poses)
     for k, ray in enumerate(rays):
-        away = tuple(-x for x in _inward(turn, ray))
+        away = tuple(-x for x in _inward(rotation, ray))
         length = jnp.sqrt(lanes.dot(away, away))
-        # A cable that is shorter than that keeps only its end.
+        # A cable that is shorter than this length keeps only its end.
         part = jnp.where(length > leave, leave / jnp.where(length > leave, length, 1.0), 1.0)
         start = tuple(x + part * y for x, y in zip(_three(points.platform[k]), away, strict=True))
         rest = tuple((1.0 - part) * x for x in away)
-        gaps.append(_from_own(own, start, rest) - 0.5 * points.diameters[k])
+        gaps.append(_from_body(body, start, rest) - 0.5 * points.diameters[k])
     return nearest(gaps)
 
 
-def _from_own(body: Own, start: Vector, ray: Vector) -> Array:
+def _from_body(body: BodyShape, start: Vector, ray: Vector) -> Array:
     if isinstance(body, Brick):
         return segment_box(*_in_brick(body, start, ray), _three(body.half))
     return segment_hull(start, ray, body)
 
 
 @jax.jit
-def of_body(poses: PoseLanes, own: Own, solid: Ball | Rod) -> Array:
+def of_body(poses: PoseLanes, body: BodyShape, solid: Ball | Rod) -> Array:
     """The platform and a sphere or a cylinder.
 
     Args:
         poses: lanes (n,).
-        own: shape of the platform in its axes.
+        body: shape of the platform in its axes.
 
     Returns:
         (n,) complex: signed distance, m, and 0.
     """
-    zero, turn = jnp.zeros_like(poses.position[0]), _rotation(poses)
+    zero, rotation = jnp.zeros_like(poses.position[0]), _rotation(poses)
     rod = Rod(solid.centre, jnp.zeros_like(solid.centre), solid.radius) if isinstance(solid, Ball) else solid
-    start = _inward(turn, _less(_three(rod.start), poses.position))
-    ray = _inward(turn, [zero + x for x in _three(rod.ray)])
-    return nearest([_from_own(own, start, ray) - rod.radius])
+    start = _inward(rotation, _less(_three(rod.start), poses.position))
+    ray = _inward(rotation, [zero + x for x in _three(rod.ray)])
+    return nearest([_from_body(body, start, ray) - rod.radius])
 
 
 @jax.jit
-def of_boxes(poses: PoseLanes, own: Brick, solid: Brick) -> Array:
+def of_boxes(poses: PoseLanes, body: Brick, solid: Brick) -> Array:
     """The platform, a box, and another box: the largest gap between their shadows on a line.
 
     Args:
         poses: lanes (n,).
-        own: shape of the platform in its axes.
+        body: shape of the platform in its axes.
 
     Returns:
         (n,) complex: no larger than the signed distance, with its sign, m, and 0.
     """
-    zero, turn = jnp.zeros_like(poses.position[0]), _rotation(poses)
-    axes = [_three(row) for row in own.turn]
-    edges = [lanes.turned_back(axes, _inward(turn, _three(column))) for column in solid.turn.T]
-    away = _inward(turn, _less(_three(solid.centre), poses.position))
-    centre, _ = _in_brick(own, away, [zero, zero, zero])
-    return nearest([boxes(_three(own.half), centre, [tuple(zero + x for x in e) for e in edges], _three(solid.half))])
+    zero, rotation = jnp.zeros_like(poses.position[0]), _rotation(poses)
+    axes = [_three(row) for row in body.rotation]
+    edges = [lanes.turned_back(axes, _inward(rotation, _three(column))) for column in solid.rotation.T]
+    away = _inward(rotation, _less(_three(solid.centre), poses.position))
+    centre, _ = _in_brick(body, away, [zero, zero, zero])
+    return nearest([boxes(_three(body.half), centre, [tuple(zero + x for x in e) for e in edges], _three(solid.half))])
 
 
 @jax.jit
-def of_hull_box(poses: PoseLanes, own: Polyhedron, solid: Brick) -> Array:
+def of_hull_box(poses: PoseLanes, body: Polyhedron, solid: Brick) -> Array:
     """The platform, a convex polyhedron, and a box: the largest gap between their shadows on a line.
 
     Args:
         poses: lanes (n,).
-        own: shape of the platform in its axes.
+        body: shape of the platform in its axes.
 
     Returns:
         (n,) complex: no larger than the signed distance, with its sign, m, and 0.
     """
-    zero, turn = jnp.zeros_like(poses.position[0]), _rotation(poses)
-    edges = [tuple(zero + x for x in _inward(turn, _three(column))) for column in solid.turn.T]
-    centre = _inward(turn, _less(_three(solid.centre), poses.position))
-    return nearest([hull_box(own, centre, edges, _three(solid.half))])
+    zero, rotation = jnp.zeros_like(poses.position[0]), _rotation(poses)
+    edges = [tuple(zero + x for x in _inward(rotation, _three(column))) for column in solid.rotation.T]
+    centre = _inward(rotation, _less(_three(solid.centre), poses.position))
+    return nearest([hull_box(body, centre, edges, _three(solid.half))])
 
 
-def _inward(turn: Matrix | None, vector: Vector) -> Vector:
-    return vector if turn is None else lanes.turned_back(turn, vector)
+def _inward(rotation: Matrix | None, vector: Vector) -> Vector:
+    return vector if rotation is None else lanes.turned_back(rotation, vector)

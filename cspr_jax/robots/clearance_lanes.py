@@ -1,8 +1,9 @@
-"""Signed distances of cables from each other and from solid shapes, one lane a pose: no branch, no NaN of finite ends.
+"""Signed distances of cables from each other and from solid shapes, one lane a pose, without branches.
 
-A cable is a segment without thickness here; who asks takes off half its diameter. Every formula is exact outside of the
-shape. Products that vanish for parallel segments are taken of vector products, not of differences of squares, so that
-their rounding falls with the angle and the distance keeps its digits at every angle.
+A cable is a segment without thickness here; callers subtract half the diameter. Finite ends never give NaN. Every
+formula is exact outside of the shape. Products that vanish for parallel segments are computed from vector products, not
+from differences of squares, so that their rounding falls with the angle and the distance keeps its digits at every
+angle.
 """
 
 from collections.abc import Sequence
@@ -19,7 +20,7 @@ Numbers = Sequence[Array]
 
 
 def _tiny(template: Array) -> Array:
-    # Return a number that is nothing beside a sum of squares, and keeps 0 / 0 from being NaN.
+    # Return a number that is negligible beside a sum of squares, and keeps 0 / 0 from being NaN.
     return jnp.asarray(np.finfo(template.dtype).tiny, template.dtype)
 
 
@@ -28,7 +29,7 @@ def _greater(a: Array, b: Array) -> Array:
 
 
 def _fraction(x: Array) -> Array:
-    # Into [0, 1]. One instruction each, where `jnp.clip` takes care of NaN: what is not finite shows in the distance.
+    # Clip to [0, 1] by one instruction each; `jnp.clip` would take care of NaN, which shows in the distance anyway.
     return lesser(_greater(x, jnp.zeros_like(x)), jnp.ones_like(x))
 
 
@@ -45,15 +46,15 @@ def segments(a: Vector, u: Vector, b: Vector, v: Vector) -> Array:
 
     Args:
         a: start of the first, m.
-        u: from there to its end, m; may be zero.
+        u: from start to end of the first, m; may be zero.
         b: start of the second, m.
-        v: from there to its end, m; may be zero.
+        v: from start to end of the second, m; may be zero.
 
     Returns:
         (...) m.
     """
-    # The nearest points of the lines, then from end to end: the last two steps are exact for one at an end, and for
-    # parallel lines whatever the first has found.
+    # Find the nearest points of the lines, then clip each to its segment: the last two steps are exact where one point
+    # is an end, and for parallel lines wherever the first step starts.
     apart, normal = _less(b, a), cross(u, v)
     uu, vv, uv, tiny = dot(u, u), dot(v, v), dot(u, v), _tiny(apart[0] * u[0])
     s = _fraction(dot(cross(apart, v), normal) / _greater(dot(normal, normal), tiny))
@@ -69,7 +70,7 @@ def point_segment(point: Vector, a: Vector, u: Vector) -> Array:
     Args:
         point: m.
         a: start of the segment, m.
-        u: from there to its end, m; may be zero.
+        u: from start to end of the segment, m; may be zero.
 
     Returns:
         (...) m.
@@ -85,11 +86,11 @@ def segment_box(a: Vector, u: Vector, half: Numbers) -> Array:
 
     Args:
         a: start of the segment from the centre of the box, axes of the box, m.
-        u: from there to its end, m; may be zero.
+        u: from start to end of the segment, m; may be zero.
         half: three halves of the lengths of its edges, m.
 
     Returns:
-        (...) m: the distance outside; where the segment enters the box, minus the least translation that parts them.
+        (...) m: the distance outside; where the segment enters the box, minus the least translation that parts the two.
     """
     apart = _parting(a, u, half)
     return jnp.where(apart > 0.0, _outside_box(a, u, half), apart)
@@ -98,8 +99,9 @@ def segment_box(a: Vector, u: Vector, half: Numbers) -> Array:
 def _outside_box(a: Vector, u: Vector, half: Numbers) -> Array:
     """Distance of a segment from a box.
 
-    Half the derivative of its square along the segment rises and is linear between the six planes of the faces: the
-    last of them (or of the ends) where it is not positive, the first where it is not negative, and what lies between.
+    Half the derivative of the squared distance along the segment rises, and is linear between the six planes of the
+    faces. Its zero lies between the last plane (or end) at which it is not positive and the first at which it is not
+    negative.
     """
 
     def slope(part):
@@ -110,7 +112,7 @@ def _outside_box(a: Vector, u: Vector, half: Numbers) -> Array:
     start, stop, rise, fall = zero, one, slope(zero), slope(one)
     is_first, is_last = rise >= 0.0, fall <= 0.0
     for k in range(3):
-        # For a segment that lies in a plane any place will do.
+        # For a segment that lies in a plane of a face any place will do.
         inverse = 1.0 / jnp.where(u[k] == 0.0, jnp.ones_like(u[k]), u[k])
         for side in (-half[k], half[k]):
             part = _fraction((side - a[k]) * inverse)
@@ -130,15 +132,15 @@ def _outside_box(a: Vector, u: Vector, half: Numbers) -> Array:
 
 
 def _beyond(point: Vector, half: Numbers) -> Vector:
-    # From the nearest point of the box.
+    # Return the vector to a point from the nearest point of the box.
     return tuple(x - _greater(lesser(x, h), -h) for x, h in zip(point, half, strict=True))
 
 
 def _parting(a: Vector, u: Vector, half: Numbers) -> Array:
     """Largest gap between the shadows of a segment and a box on a line: not positive where they meet.
 
-    The lines are the normals to the faces, and to the segment and an edge: those to the faces of the sum of both
-    shapes, so that the largest gap, negative, is minus the least translation that parts them.
+    The lines are the normals to the faces of the box, and to the segment and an edge: the normals to the faces of the
+    sum of both shapes. So a negative largest gap is minus the least translation that parts the shapes.
     """
     w = tuple(0.5 * x for x in u)
     c = tuple(x + y for x, y in zip(a, w, strict=True))
@@ -156,14 +158,14 @@ def _parting(a: Vector, u: Vector, half: Numbers) -> Array:
 
 
 def nearest(values: Sequence[Array]) -> Array:
-    """The smallest of several arrays and which it is, as one complex number, since XLA computes two outputs twice.
+    """The smallest of several arrays and its index, as one complex number, since XLA computes two outputs twice.
 
     Args:
         values: arrays (...) of real numbers.
 
     Returns:
-        (...) complex: the smallest, and i times its place among the values, the first of equal ones; NaN is smallest if
-        it is the first.
+        (...) complex: the smallest value plus i times its index among the values, the first of equal ones; NaN is
+        smallest if it comes first.
     """
     least, place = values[0], jnp.zeros_like(values[0])
     for k, value in enumerate(values[1:], 1):
@@ -195,11 +197,11 @@ def segment_hull(a: Vector, u: Vector, hull: Polyhedron) -> Array:
 
     Args:
         a: start of the segment, m.
-        u: from there to its end, m; may be zero.
+        u: from start to end of the segment, m; may be zero.
 
     Returns:
-        (...) m: the distance outside; where the segment enters, minus the depth of the middle of its part inside, from
-        the nearest face. Half of the depth of its deepest point, or more.
+        (...) m: the distance outside; where the segment enters, minus the depth, below the nearest face, of the middle
+        of its part inside, which is at least half of the depth of its deepest point.
     """
     zero = jnp.zeros_like(a[0] + u[0])
     count = len(hull.offsets)
@@ -207,7 +209,7 @@ def segment_hull(a: Vector, u: Vector, hull: Polyhedron) -> Array:
     def clip(face, ends):
         high, rate = _of_face(hull, face, a, u)
         meet = -high / jnp.where(rate == 0.0, jnp.ones_like(rate), rate)
-        # A segment along the plane of a face is outside of it, or inside, as a whole.
+        # A segment parallel to a face lies outside of its plane, or inside, as a whole.
         first = jnp.where(rate < 0.0, _greater(meet, ends[0]), ends[0])
         last = jnp.where(rate > 0.0, lesser(meet, ends[1]), ends[1])
         return first, jnp.where((rate == 0.0) & (high > 0.0), -jnp.ones_like(last), last)
@@ -224,14 +226,14 @@ def segment_hull(a: Vector, u: Vector, hull: Polyhedron) -> Array:
 
 
 def _of_face(hull: Polyhedron, face: Array, a: Vector, u: Vector) -> tuple[Array, Array]:
-    # Height of a start above the plane of a face, and its growth along the segment.
+    # Return the height of a start above the plane of a face, and its growth along the segment.
     normal, corner = hull.normals[face], hull.triangles[face, 0]
     three = [normal[k] for k in range(3)]
     return dot(three, [a[k] - corner[k] for k in range(3)]), dot(three, u)
 
 
 def _outside_hull(a: Vector, u: Vector, hull: Polyhedron) -> Array:
-    """Distance from a polyhedron that a segment does not enter: of an edge, or of an end from the inside of a face."""
+    """Distance of a segment from a polyhedron that it does not enter: from an edge, or of an end from a face."""
 
     def to_edge(edge, least):
         start, end = hull.edges[edge, 0], hull.edges[edge, 1]
@@ -241,13 +243,13 @@ def _outside_hull(a: Vector, u: Vector, hull: Polyhedron) -> Array:
         normal, triangle = hull.normals[face], hull.triangles[face]
         for point in (a, tuple(x + y for x, y in zip(a, u, strict=True))):
             high = dot([normal[k] for k in range(3)], [point[k] - triangle[0, k] for k in range(3)])
-            is_above, turns = high >= 0.0, []
+            is_above, areas = high >= 0.0, []
             for i in range(3):
                 side, out = triangle[(i + 1) % 3] - triangle[i], [point[k] - triangle[i, k] for k in range(3)]
-                turns.append(dot([normal[k] for k in range(3)], cross([side[k] for k in range(3)], out)))
-            # Either way around.
-            inside = ((turns[0] >= 0.0) & (turns[1] >= 0.0) & (turns[2] >= 0.0)) | (
-                (turns[0] <= 0.0) & (turns[1] <= 0.0) & (turns[2] <= 0.0)
+                areas.append(dot([normal[k] for k in range(3)], cross([side[k] for k in range(3)], out)))
+            # Triangles may be ordered either way around.
+            inside = ((areas[0] >= 0.0) & (areas[1] >= 0.0) & (areas[2] >= 0.0)) | (
+                (areas[0] <= 0.0) & (areas[1] <= 0.0) & (areas[2] <= 0.0)
             )
             least = jnp.where(is_above & inside & (high < least), high, least)
         return least
@@ -257,31 +259,31 @@ def _outside_hull(a: Vector, u: Vector, hull: Polyhedron) -> Array:
     return lax.fori_loop(0, len(hull.offsets), to_face, least)
 
 
-def boxes(own: Numbers, centre: Vector, axes: Sequence[Vector], half: Numbers) -> Array:
-    """Largest gap between the shadows of two boxes on a line, in the axes of the first, around the origin.
+def boxes(first: Numbers, centre: Vector, axes: Sequence[Vector], half: Numbers) -> Array:
+    """Largest gap between the shadows of two boxes on a line, in the axes of the first box, which is around the origin.
 
     Args:
-        own: three halves of the lengths of the edges of the first, m.
-        centre: of the second, m.
-        axes: three unit vectors of the second.
-        half: three halves of the lengths of its edges, m.
+        first: three halves of the lengths of the edges of the first box, m.
+        centre: centre of the second box, m.
+        axes: three unit vectors along the edges of the second box.
+        half: three halves of the lengths of the edges of the second box, m.
 
     Returns:
-        (...) m: no larger than the distance, positive exactly where they are apart; else minus the least translation
-        that parts them.
+        (...) m: no larger than the distance, positive exactly where the boxes are apart; else minus the least
+        translation that parts them.
     """
     gap = jnp.full_like(centre[0] + axes[0][0], -jnp.inf)
     for k in range(3):
-        reach = own[k] + sum(half[j] * jnp.abs(axes[j][k]) for j in range(3))
+        reach = first[k] + sum(half[j] * jnp.abs(axes[j][k]) for j in range(3))
         gap = _greater(jnp.abs(centre[k]) - reach, gap)
-        reach = half[k] + sum(own[j] * jnp.abs(axes[k][j]) for j in range(3))
+        reach = half[k] + sum(first[j] * jnp.abs(axes[k][j]) for j in range(3))
         gap = _greater(jnp.abs(dot(centre, axes[k])) - reach, gap)
     for axis in axes:
         for i, j in ((1, 2), (2, 0), (0, 1)):
-            # Across an edge of each: the line has no part along the third axis of the first.
+            # The line is normal to an edge of each box, so that its component along this axis of the first is zero.
             x, y = -axis[j], axis[i]
             square = x * x + y * y
-            reach = own[i] * jnp.abs(x) + own[j] * jnp.abs(y)
+            reach = first[i] * jnp.abs(x) + first[j] * jnp.abs(y)
             reach = reach + sum(h * jnp.abs(e[i] * x + e[j] * y) for h, e in zip(half, axes, strict=True))
             tiny = _tiny(square)
             across = (jnp.abs(centre[i] * x + centre[j] * y) - reach) / jnp.sqrt(_greater(square, tiny))
@@ -293,17 +295,17 @@ def boxes(own: Numbers, centre: Vector, axes: Sequence[Vector], half: Numbers) -
 def hull_box(hull: Polyhedron, centre: Vector, axes: Sequence[Vector], half: Numbers) -> Array:
     """Largest gap between the shadows of a convex polyhedron and a box on a line, in the axes of the polyhedron.
 
-    The lines are the normals to the faces of both, and to an edge of each where the edge of the polyhedron is the
-    farthest that it reaches along the line: those to the faces of the sum of both shapes.
+    The lines are the normals to the faces of both shapes, and to an edge of each if the polyhedron reaches farthest
+    along the line at its edge: the normals to the faces of the sum of both shapes.
 
     Args:
-        centre: of the box, m.
-        axes: three unit vectors of the box.
-        half: three halves of the lengths of its edges, m.
+        centre: centre of the box, m.
+        axes: three unit vectors along the edges of the box.
+        half: three halves of the lengths of the edges of the box, m.
 
     Returns:
-        (...) m: no larger than the distance, positive exactly where they are apart; else minus the least translation
-        that parts them.
+        (...) m: no larger than the distance, positive exactly where the shapes are apart; else minus the least
+        translation that parts them.
     """
 
     def gap(line, reached):
@@ -332,15 +334,16 @@ def _of_edge(hull: Polyhedron, edge: Array, axes: Sequence[Vector], gap, largest
         [hull.edges[edge, 0, k] for k in range(3)],
         [[hull.sides[edge, i, k] for k in range(3)] for i in (0, 1)],
     )
-    along, turn = [hull.edges[edge, 1, k] - start[k] for k in range(3)], cross(a, b)
+    along, sense = [hull.edges[edge, 1, k] - start[k] for k in range(3)], cross(a, b)
     for axis in axes:
         line = cross(along, axis)
-        # Rounding has left a part along the edge if the edges are nearly parallel.
+        # Remove the part along the edge that rounding leaves if the edges are nearly parallel.
         part = dot(line, along) / dot(along, along)
         line = tuple(x - part * y for x, y in zip(line, along, strict=True))
         square = dot(line, line)
-        from_a, to_b = dot(cross(a, line), turn), dot(cross(line, b), turn)
-        # Between the normals of both faces, one way or the other: there the edge reaches farthest.
+        from_a, to_b = dot(cross(a, line), sense), dot(cross(line, b), sense)
+        # The edge reaches farthest where the line lies between the normals of both faces, in one direction or the
+        # other.
         one = jnp.ones_like(square)
         sign = jnp.where(
             (from_a >= 0.0) & (to_b >= 0.0), one, jnp.where((from_a <= 0.0) & (to_b <= 0.0), -one, 0.0 * one)

@@ -8,10 +8,10 @@ from cspr_jax.robots.robot import check_determined
 
 
 def pseudotensions(robot: PointMassRobot, position: Array, acceleration: Array) -> Array:
-    """Pseudotensions kappa, thesis (2.12) to (2.14), of a planar robot (1.15) and (1.16): Adj(M) (p'' - g).
+    """Pseudotensions kappa, thesis (2.12) to (2.14), for a planar robot (1.15) and (1.16): Adj(M) (p'' - g).
 
-    They have the sign of the tensions below the spools, and need no division. The sign is
-    corrected for spools numbered the other way round, so that it never depends on the labels.
+    Below the spools they have the sign of the tensions, and they need no division. The sign is corrected for spools
+    numbered the other way round, so that it never depends on the order of the cables.
 
     Args:
         robot: a point mass on three cables, or on two in a plane.
@@ -101,6 +101,6 @@ def cable_motion(
 
 
 def _planar_adjugate(rays: Array) -> Array:
-    # Rows whose product with p'' - g are the two unknowns' numerators by Cramer's rule, in the plane y = 0.
+    # Return rows whose products with p'' - g are the numerators of both unknowns by Cramer's rule, in the plane y = 0.
     turned = jnp.stack([rays[:, 2], jnp.zeros_like(rays[:, 0]), -rays[:, 0]], axis=1)
     return jnp.stack([turned[1], -turned[0]])

@@ -18,10 +18,10 @@ class Contacts(NamedTuple):
 
     Fields:
         pairs: (n_pairs, 2) indices of cables.
-        sides: (n_cables, 2, 3) along the edges of the sector of each platform point, platform axes, m: it extends from
-            the second to the first, counterclockwise about the normal, and is half of the plane for a point on an edge.
-            Both are zero where it is all of the plane, around a point inside.
-        normal: (3,) of the platform, platform axes.
+        sides: (n_cables, 2, 3) vectors along the edges of the sector of each platform point, platform axes, m. The
+            sector extends from the second side to the first, counterclockwise about the normal; for a point on an edge
+            it is half of the plane. Both sides are zero where it is the whole plane, around a point inside.
+        normal: (3,) normal of the platform, platform axes.
     """
 
     pairs: np.ndarray
@@ -46,12 +46,12 @@ def contacts(robot: PlatformRobot) -> Contacts:
 
 
 def _sector(points: np.ndarray, flat: np.ndarray, corner: int) -> np.ndarray:
-    # Edges of the convex hull as one of its points sees it, (2, 3); cables that share a point share its sector.
+    # Return the sides of the sector of a point, (2, 3); cables that share a point share its sector.
     away = flat - flat[corner]
     others = np.flatnonzero(np.linalg.norm(away, axis=1) > SAME * np.linalg.norm(flat, axis=1).max())
     angles = np.arctan2(away[others, 1], away[others, 0])
     order = np.argsort(angles)
-    # The widest angle in which no other point lies is outside.
+    # The widest angle without other points lies outside of the hull.
     free = np.diff(angles[order], append=angles[order[0]] + 2.0 * np.pi)
     widest = int(free.argmax())
     if free[widest] < np.pi - SAME:
@@ -80,10 +80,10 @@ def between(a: Array, u: Array, b: Array, v: Array) -> Array:
     """The shortest vectors between segments a + s u and b + t v, s and t in [0, 1].
 
     Args:
-        a: (..., 3) where the first ones start, m.
-        u: (..., 3) along them, m.
-        b: (..., 3) likewise of the second ones.
-        v: (..., 3).
+        a: (..., 3) starts of the first segments, m.
+        u: (..., 3) from start to end of the first, m.
+        b: (..., 3) starts of the second segments, m.
+        v: (..., 3) from start to end of the second, m.
 
     Returns:
         (..., 3) from the first to the second, m.
@@ -96,15 +96,15 @@ def nearest(a: Array, u: Array, b: Array, v: Array) -> tuple[Array, Array]:
     """Find where segments a + s u and b + t v are nearest to each other.
 
     Args:
-        a: (..., 3) where the first ones start, m.
-        u: (..., 3) along them, m.
-        b: (..., 3) likewise of the second ones.
-        v: (..., 3).
+        a: (..., 3) starts of the first segments, m.
+        u: (..., 3) from start to end of the first, m.
+        b: (..., 3) starts of the second segments, m.
+        v: (..., 3) from start to end of the second, m.
 
     Returns:
         s and t, (...) each, in [0, 1].
     """
-    # The nearest points of the lines, then of the ends.
+    # Find the nearest points of the lines, then clip them to the segments.
     apart = b - a
     uu, uv, vv = (jnp.sum(x * y, axis=-1) for x, y in ((u, u), (u, v), (v, v)))
     au, av = jnp.sum(apart * u, axis=-1), jnp.sum(apart * v, axis=-1)
@@ -134,29 +134,29 @@ def cables_cross(before: np.ndarray, after: np.ndarray) -> np.ndarray:
 
     Args:
         before: (..., n_pairs, 3) of `gaps`.
-        after: (..., n_pairs, 3).
+        after: (..., n_pairs, 3) likewise.
 
     Returns:
-        (..., n_pairs).
+        mask (..., n_pairs).
     """
     return np.einsum("...k,...k->...", before, after) <= 0.0
 
 
 def platform_hit(sides: np.ndarray, normal: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Cables that passed over the platform between two instants: as in the text, in platform axes.
+    """Cables that passed over the platform between two instants, as in the thesis, in platform axes.
 
     Args:
         sides: (n_cables, 2, 3) of `contacts`.
         normal: (3,) of `contacts`.
         before: (..., n_cables, 3) of `cable_directions`.
-        after: (..., n_cables, 3).
+        after: (..., n_cables, 3) likewise.
 
     Returns:
-        (..., n_cables).
+        mask (..., n_cables).
     """
     high, low = before @ normal, after @ normal
     through = high * low <= 0.0
-    # The direction within the platform's plane: a combination of both directions with positive weights.
+    # Find the direction within the platform's plane, a combination of both directions with positive weights.
     weight = np.abs(low)[..., None] * before + np.abs(high)[..., None] * after
     first, second = (np.einsum("...jk,jk->...j", weight, np.cross(normal, sides[:, k])) for k in (1, 0))
     return through & (first >= 0.0) & (second <= 0.0)

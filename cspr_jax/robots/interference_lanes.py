@@ -12,7 +12,7 @@ from cspr_jax.robots.wrench_lanes import CableLanes
 TINY = 1e-30  # m^2
 
 
-def gaps(base_points: Array, pairs: Sequence[tuple[int, int]], wires: CableLanes) -> list[Vector]:
+def gaps(base_points: Array, pairs: Sequence[tuple[int, int]], cables: CableLanes) -> list[Vector]:
     """The shortest vectors between cables.
 
     Args:
@@ -25,7 +25,7 @@ def gaps(base_points: Array, pairs: Sequence[tuple[int, int]], wires: CableLanes
     vectors = []
     for i, j in pairs:
         apart = [base_points[j, k] - base_points[i, k] for k in range(3)]
-        vectors.append(gap(apart, wires.rays[i], wires.rays[j]))
+        vectors.append(gap(apart, cables.rays[i], cables.rays[j]))
     return vectors
 
 
@@ -33,9 +33,9 @@ def gap(apart: Vector, u: Vector, v: Vector) -> Vector:
     """The shortest vector between two segments; `interference.between` in lanes.
 
     Args:
-        apart: from where the first one starts to where the second one does, m.
-        u: along the first one.
-        v: along the second one.
+        apart: from the start of the first to the start of the second, m.
+        u: from start to end of the first, m.
+        v: from start to end of the second, m.
 
     Returns:
         from the first to the second, m.
@@ -52,15 +52,15 @@ def gap(apart: Vector, u: Vector, v: Vector) -> Vector:
 
 
 def residual(sides: tuple[Vector, Vector], normal: Vector, seen: Vector) -> Vector:
-    """Rest of a cable after its projection onto the sector of its corner.
+    """Residual of the projection of a cable onto the sector of its corner.
 
     Args:
-        sides: of the sector, as in `interference.Contacts`.
+        sides: sides of the sector, as in `interference.Contacts`.
         normal: unit normal of the platform's plane.
         seen: the cable from the platform, platform axes, m.
 
     Returns:
-        normal to the projection, and as long as the distance of the cable's end from the sector, m.
+        a vector normal to the projection, as long as the distance of the cable's end from the sector, m.
     """
     height = dot(normal, seen)
     up = tuple(height * n for n in normal)
@@ -80,24 +80,24 @@ def residual(sides: tuple[Vector, Vector], normal: Vector, seen: Vector) -> Vect
     return tuple(jnp.where(inside, w, jnp.where(is_first, a, b)) for w, a, b in zip(up, *left, strict=True))
 
 
-def cable_directions(wires: CableLanes, turn: Matrix) -> list[Vector]:
+def cable_directions(cables: CableLanes, rotation: Matrix) -> list[Vector]:
     """The cables from the platform to the spools, in the platform's axes; not of unit length.
 
     Args:
-        turn: rows of the rotation matrix.
+        rotation: rows of the rotation matrix.
 
     Returns:
         one vector a cable, platform axes, m.
     """
-    return [turned_back(turn, tuple(-x for x in ray)) for ray in wires.rays]
+    return [turned_back(rotation, tuple(-x for x in ray)) for ray in cables.rays]
 
 
 def as_arrays(between: Sequence[Vector], directions: Sequence[Vector]) -> tuple[Array, Array]:
     """Vectors as the arrays that `interference` takes.
 
     Args:
-        between: of `gaps`, (n,) each.
-        directions: of `cable_directions`.
+        between: vectors of `gaps`, (n,) each.
+        directions: vectors of `cable_directions`.
 
     Returns:
         (n, n_pairs, 3) and (n, n_cables, 3).

@@ -1,4 +1,4 @@
-"""Robots in the axes of the kernels: from the centroid of their spools, z down."""
+"""Robots in the axes of the kernels: origin at the centroid of the spools, z down."""
 
 import dataclasses
 from typing import Any, TypeVar
@@ -16,7 +16,7 @@ RobotKind = TypeVar("RobotKind", bound=PointMassRobot | PlatformRobot)
 
 
 def centred(robot: RobotKind) -> tuple[RobotKind, Frame]:
-    """A robot as the kernels take it: from the centroid of its spools, z down, without limits.
+    """A robot as the kernels take it: origin at the centroid of its spools, z down, without limits.
 
     Args:
         robot: in its own axes.

@@ -1,4 +1,4 @@
-"""Limits of a robot beyond taut cables, and what is uncertain about it: data only."""
+"""Limits of a robot beyond taut cables, and its uncertainty: data only."""
 
 import dataclasses
 
@@ -9,11 +9,11 @@ from jax import Array
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class Uncertainty:
-    """Uncertainty of a robot, for all of which a motion is to be feasible.
+    """Uncertainty of a robot: a motion must be feasible for all robots within it.
 
     Fields:
-        spool_positions: () radius of the ball around each spool that holds it, m.
-        mass_centre: () radius of the ball around the mass centre that holds it, platform axes, m; 0 of a point mass.
+        spool_positions: () radius of the ball in which each spool lies, m.
+        mass_centre: () radius of the ball in which the mass centre lies, platform axes, m; 0 for a point mass.
         mass_factor: () from 1 on; the mass, and with it the inertia, is between 1 / factor and factor times its value.
     """
 
@@ -25,16 +25,16 @@ class Uncertainty:
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class Limits:
-    """Limits beyond taut cables; None where there is none.
+    """Limits beyond taut cables; None for limits that are not set.
 
     Fields:
         tension_min: (n_cables,) N.
         tension_max: (n_cables,) N.
         floor: () z of the floor, z down, m.
         cable_length_max: (n_cables,) m.
-        cable_speed_max: (n_cables,) m/s, of paying out and of winding in.
+        cable_speed_max: (n_cables,) m/s, both for paying out and for winding in.
         cable_acceleration_max: (n_cables,) m/s^2, of either sign.
-        uncertainty: for all of which limits are to be met and cables taut.
+        uncertainty: robots for all of which limits must be met and cables be taut.
     """
 
     tension_min: Array | None = None

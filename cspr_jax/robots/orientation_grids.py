@@ -13,12 +13,12 @@ NEAR = 1.5
 
 
 class OrientationGrid(NamedTuple):
-    """Orientations and which of them are neighbours.
+    """Orientations, and pairs of neighbours among them.
 
     Fields:
         angles: (n, 3) tilt and torsion (phi, theta, sigma), rad.
-        volume: (n,) part of SO(3) that each stands for.
-        neighbours: (m, 2) indices.
+        volume: (n,) part of SO(3) that each orientation stands for.
+        neighbours: (m, 2) indices of neighbours.
         start: index of the reference orientation.
     """
 
@@ -38,12 +38,12 @@ def tilt_torsion_grid(divisions: int) -> OrientationGrid:
         the grid; neighbours differ by one step in one angle.
     """
     count, step = 2 * divisions, math.pi / divisions
-    turn = np.arange(count) * step
-    torsion = np.where(turn > math.pi, turn - 2.0 * math.pi, turn)
+    circle = np.arange(count) * step
+    torsion = np.where(circle > math.pi, circle - 2.0 * math.pi, circle)
     tilts = np.arange(1, divisions) * step
     # Index of (tilt, azimuth, torsion), after the untilted ones.
     index = count + np.arange(len(tilts) * count * count).reshape(len(tilts), count, count)
-    mesh = np.meshgrid(tilts, turn, torsion, indexing="ij")
+    mesh = np.meshgrid(tilts, circle, torsion, indexing="ij")
     tilted = np.stack([mesh[1].ravel(), mesh[0].ravel(), mesh[2].ravel()], axis=1)
     upright = np.stack([np.zeros(count), np.zeros(count), torsion], axis=1)
     steps = [
@@ -54,7 +54,7 @@ def tilt_torsion_grid(divisions: int) -> OrientationGrid:
         (np.arange(count), np.roll(np.arange(count), -1)),
     ]
     neighbours = np.concatenate([np.stack([a.ravel(), b.ravel()], axis=1) for a, b in steps])
-    # Each value of the tilt stands for a band of tilt around it, of this area.
+    # Each tilt stands for a band of tilts around it, of this area.
     area = np.cos(tilts - 0.5 * step) - np.cos(tilts + 0.5 * step)
     volume = np.repeat(area * step**2 / (8.0 * math.pi**2), count * count)
     cap = (1.0 - math.cos(0.5 * step)) * 2.0 * math.pi * step / (8.0 * math.pi**2)
@@ -64,14 +64,14 @@ def tilt_torsion_grid(divisions: int) -> OrientationGrid:
 def equal_volume_grid(divisions: int) -> OrientationGrid:
     """Cells of equal volume, nearly as wide as they are long, pi / divisions apart.
 
-    Cells of equal area on the sphere of tilts (bands of equal cells) times equal torsions: by the metric of SO(3) a
-    torsion moves at a right angle to the tilts.
+    They are products of cells of equal area on the sphere of tilts (in bands of equal cells) with equal steps of
+    torsion: in the metric of SO(3) a torsion moves at a right angle to the tilts.
 
     Returns:
         the grid; neighbours are up to 1.5 steps apart.
     """
     count, step = 2 * divisions, math.pi / divisions
-    cells = [1]  # around the vertical, then band by band
+    cells = [1]  # numbers of cells: one around the vertical, then band by band
     cap = math.acos(1.0 - 2.0 / (4.0 * math.pi / step**2))
     bands = max(1, round((math.pi - 2.0 * cap) / step))
     height = (math.pi - 2.0 * cap) / bands
@@ -80,13 +80,13 @@ def equal_volume_grid(divisions: int) -> OrientationGrid:
         cells.append(max(1, round(2.0 * math.pi * area / step**2)))
     cells.append(1)
     edges = np.concatenate([[0], np.cumsum(cells)]) / sum(cells)
-    # Bands are moved so that all cells have the same area; each stands at the middle of its area.
+    # Shift bands so that all cells have the same area; each orientation is at the middle of the area of its cell.
     middle = np.arccos(1.0 - (edges[:-1] + edges[1:]))
     middle[0], middle[-1] = 0.0, math.pi
     tilt = np.repeat(middle, cells)
     azimuth = np.concatenate([(np.arange(n) + 0.5 * (i % 2)) * 2.0 * math.pi / n for i, n in enumerate(cells)])
-    turn = np.arange(count) * step
-    torsion = np.where(turn > math.pi, turn - 2.0 * math.pi, turn)
+    circle = np.arange(count) * step
+    torsion = np.where(circle > math.pi, circle - 2.0 * math.pi, circle)
     angles = np.stack([np.repeat(azimuth, count), np.repeat(tilt, count), np.tile(torsion, len(tilt))], axis=1)
     return OrientationGrid(angles, np.full(len(angles), 1.0 / len(angles)), _near(angles, NEAR * step), 0)
 
@@ -94,15 +94,15 @@ def equal_volume_grid(divisions: int) -> OrientationGrid:
 def cone_grid(divisions: int, tilt: float, torsion: float) -> tuple[np.ndarray, np.ndarray]:
     """Orientations of a cone of tilts, its boundary included, some pi / divisions apart.
 
-    Rings of tilts times torsions, each at the middle of the part of SO(3) that it stands for, but for those of the
-    boundary, which lie on it.
+    They are products of rings of tilts with torsions. Each is at the middle of the part of SO(3) that it stands for,
+    except orientations on the boundary.
 
     Args:
-        tilt: the largest, in [0, pi], rad.
-        torsion: the largest of either sign, in [0, pi], rad.
+        tilt: largest tilt, in [0, pi], rad.
+        torsion: largest torsion of either sign, in [0, pi], rad.
 
     Returns:
-        (n, 3) tilt and torsion (phi, theta, sigma), rad; (n,) part of the cone that each stands for.
+        (n, 3) tilt and torsion (phi, theta, sigma), rad; (n,) part of the cone that each orientation stands for.
     """
     step = math.pi / divisions
     rings = math.ceil(tilt / step - 1e-9)
@@ -111,10 +111,10 @@ def cone_grid(divisions: int, tilt: float, torsion: float) -> tuple[np.ndarray, 
     areas = np.diff(-np.cos(edges)) if rings else np.ones(1)
     counts = [max(1, math.ceil(2.0 * math.pi * math.sin(x) / step - 1e-9)) for x in tilts]
     azimuth = np.concatenate([np.arange(n) * 2.0 * math.pi / n for n in counts])
-    turns = math.ceil(torsion / step - 1e-9)
-    sigma = np.linspace(-torsion, torsion, 2 * turns + 1)
+    steps = math.ceil(torsion / step - 1e-9)
+    sigma = np.linspace(-torsion, torsion, 2 * steps + 1)
     widths = np.ones(len(sigma))
-    if turns:
+    if steps:
         widths[[0, -1]] = 0.5
     angles = np.stack(
         [np.repeat(azimuth, len(sigma)), np.repeat(np.repeat(tilts, counts), len(sigma)), np.tile(sigma, len(azimuth))],
@@ -124,24 +124,24 @@ def cone_grid(divisions: int, tilt: float, torsion: float) -> tuple[np.ndarray, 
     return angles, volume / volume.sum()
 
 
-def turn_grid(divisions: int, turn: float) -> tuple[np.ndarray, np.ndarray]:
-    """Turns about y, some pi / divisions apart.
+def planar_grid(divisions: int, largest: float) -> tuple[np.ndarray, np.ndarray]:
+    """Rotations about y, some pi / divisions apart.
 
     Args:
-        turn: the largest of either sign, in [0, pi], rad.
+        largest: largest angle of either sign, in [0, pi], rad.
 
     Returns:
-        (n, 3) tilt and torsion (phi, theta, sigma), rad; (n,) part of the turns that each stands for.
+        (n, 3) tilt and torsion (phi, theta, sigma), rad; (n,) part of all rotations that each stands for.
     """
-    steps = math.ceil(turn * divisions / math.pi - 1e-9)
-    theta, widths = np.linspace(-turn, turn, 2 * steps + 1), np.ones(2 * steps + 1)
+    steps = math.ceil(largest * divisions / math.pi - 1e-9)
+    theta, widths = np.linspace(-largest, largest, 2 * steps + 1), np.ones(2 * steps + 1)
     if steps:
         widths[[0, -1]] = 0.5
     return np.stack([np.full_like(theta, 0.5 * math.pi), theta, np.zeros_like(theta)], axis=1), widths / widths.sum()
 
 
 def _near(angles: np.ndarray, angle: float) -> np.ndarray:
-    # Both quaternions of an orientation are in the tree; each pair is counted once.
+    # Both quaternions of an orientation are in the tree; count each pair once.
     quaternions = from_tilt_torsion(angles)
     tree = cKDTree(np.concatenate([quaternions, -quaternions]))
     pairs = tree.query_pairs(2.0 * math.sin(0.25 * angle), output_type="ndarray") % len(quaternions)

@@ -1,4 +1,4 @@
-"""Six cables in three parallel pairs, and the point mass on three cables that a platform on them is.
+"""Six cables in three parallel pairs, and the equivalent point mass on three cables.
 
 The cables of a pair run from A and A' to B and B' with A - A' = B - B', and one winch keeps them equally long: a
 parallelogram, so that the platform only translates. With the mass centre P on the line through B and B', at
@@ -17,10 +17,11 @@ from cspr_jax.errors import InputError
 from cspr_jax.robots.spool_plane import is_on_line, is_vertical
 
 COUNT = 6
-# Parts of the size, the largest distance of a spool from the centroid of all, that the cables of a pair may miss being
-# parallel, and the mass centre the line between them; and parts of that line, at which the mass centre may not end.
+# Tolerance, as part of the size (the largest distance of a spool from the centroid of all): for cables of a pair to be
+# parallel, and for the mass centre to lie on the line between them; as part of this line, the distance that the mass
+# centre must keep from its ends.
 TOLERANCE = 1e-6
-# Determinant of unit moments below which cables let the platform turn, and how far about the spools it is looked at.
+# Below this determinant of unit moments cables let the platform turn; and how far around the spools this is tested.
 SMALLEST_MOMENTS = 1e-6
 _PLACES = np.array([[0.3, 0.2, 1.0], [-0.5, 0.4, 0.7], [0.1, -0.7, -1.1]])
 ALLOWED = "must be six cables in three parallel pairs, with the mass centre between the points of each pair"
@@ -31,8 +32,9 @@ class ParallelPairs:
     """Three pairs of parallel cables.
 
     Fields:
-        cables: (3, 2) numbers of the cables from 0 on, in the order of the first one of each pair.
-        shares: (3, 2) of each in the tension of its pair, which is that of the equivalent's cable; 1 in sum.
+        cables: (3, 2) numbers of the cables from 0 on; pairs are in the order of their first cables.
+        shares: (3, 2) share of each cable in the tension of its pair, which is the tension of the equivalent's cable; 1
+            in sum.
         exit_points: (3, 3) spools of the equivalent, in the axes of the spools, m.
     """
 
@@ -44,7 +46,7 @@ class ParallelPairs:
         """Tensions of all cables.
 
         Args:
-            of_pairs: (..., 3) of the equivalent's cables, N.
+            of_pairs: (..., 3) tensions of the equivalent's cables, N.
 
         Returns:
             (..., 6) in the order of the robot's cables, N.
@@ -55,16 +57,16 @@ class ParallelPairs:
         return each
 
     def bound(self, of_cables, *, is_tension: bool, is_least: bool) -> np.ndarray:
-        """Limits of the pairs that keep those of all cables.
+        """Limits of the pairs with which all cables keep their limits.
 
         Args:
             of_cables: () or (6,) limits of the cables.
-            is_tension: whether they bound the tensions, which the cables of a pair share; what else they bound is the
-                same for both.
-            is_least: whether they bound from below.
+            is_tension: whether the limits are on tensions, which the cables of a pair share; all other quantities are
+                the same for both cables.
+            is_least: whether they are lower limits.
 
         Returns:
-            (3,) limits of the equivalent's cables: the tighter of the two of each pair.
+            (3,) limits of the equivalent's cables: the tighter of the two in each pair.
         """
         limits = np.broadcast_to(np.asarray(of_cables, float), (COUNT,))[self.cables]
         limits = limits / self.shares if is_tension else limits
@@ -75,9 +77,9 @@ def parallel_pairs(base_points, platform_points) -> ParallelPairs:
     """The three pairs of a robot.
 
     Args:
-        base_points: (n_cables, 3) where the cables leave their spools, m.
-        platform_points: (n_cables, 3) where they are attached, from the mass centre, in axes parallel to those of the
-            spools; m.
+        base_points: (n_cables, 3) points at which the cables leave their spools, m.
+        platform_points: (n_cables, 3) points at which they are attached, from the mass centre, in axes parallel to
+            those of the spools; m.
 
     Returns:
         the pairs.
@@ -106,7 +108,7 @@ def _fault(words: str) -> InputError:
 
 
 def _matched(offsets: np.ndarray, room: float) -> np.ndarray:
-    # Cables of a pair have the same offset A - B. Of the fifteen ways to match six, the one that misses least.
+    # Cables of a pair have the same offset A - B. Of the fifteen ways to match six cables, take the one that fits best.
     apart = np.linalg.norm(offsets[:, None] - offsets, axis=2)
     misses = {way: max(apart[pair] for pair in way) for way in _ways(tuple(range(COUNT)))}
     way = min(misses, key=lambda known: misses[known])
@@ -131,7 +133,7 @@ def _ways(left: tuple[int, ...]) -> list[tuple[tuple[int, int], ...]]:
 
 
 def _shares(platform: np.ndarray, first: int, second: int, room: float) -> tuple[float, float]:
-    # With the moments of both about the mass centre in balance.
+    # Return the shares with which the moments of both cables about the mass centre are in balance.
     along = platform[second] - platform[first]
     square = float(along @ along)
     if not np.sqrt(square) > room:
@@ -149,8 +151,9 @@ def _shares(platform: np.ndarray, first: int, second: int, room: float) -> tuple
 
 
 def _refuse_turning(exits: np.ndarray, along: np.ndarray) -> None:
-    # Moments of pairs are along x cable. Where the lines of the spools meet in one point O, they are all normal to the
-    # line from O to the platform, wherever it is, and it can turn about that; somewhere else they are as a rule not.
+    # The moment of a pair is `along` x cable. If the lines of the spools meet in one point O, all moments are normal to
+    # the line from O to the platform, wherever it is, so that it can turn about this line; otherwise, as a rule, they
+    # are not.
     size = np.linalg.norm(exits - exits.mean(0), axis=1).max()
     for place in exits.mean(0) + size * _PLACES:
         cables = place - exits

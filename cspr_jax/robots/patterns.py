@@ -1,4 +1,4 @@
-"""Table of motion patterns: which motions an effector makes, R rotations and T translations; no jax here."""
+"""Table of motion patterns: how an effector can move, with R for rotations and T for translations; no jax here."""
 
 import dataclasses
 
@@ -9,10 +9,10 @@ class Pattern:
 
     Fields:
         name: as files give it.
-        description: of the robots that make it, for people.
-        forces: fixed axes, 0 to 2, of the forces that the cables balance; guides or a joint carry the others.
-        moments: axes of the moments that the cables balance: fixed ones; with `along_line` none, since those are two
-            axes of the platform, normal to the line of its attachment points.
+        description: of the robots with this pattern, for people.
+        forces: fixed axes, 0 to 2, of the forces that the cables balance; guides or a joint carry all other forces.
+        moments: fixed axes of the moments that the cables balance; empty with `along_line`, where the axes are two of
+            the platform, normal to the line of its attachment points.
         along_line: whether all cables are attached on one line of the platform, about which it does not turn.
         is_jointed: whether the effector turns about a fixed joint, the origin of its frame; moments are about it.
     """
@@ -31,7 +31,7 @@ class Pattern:
 
     @property
     def is_planar(self) -> bool:
-        """Tell whether all lies in the plane y = 0."""
+        """Tell whether the robot lies in the plane y = 0."""
         return self.forces == (0, 2)
 
     @property

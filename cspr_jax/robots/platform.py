@@ -1,7 +1,7 @@
 """Bodies on cables, of any pattern of motion: geometry, mass, inertia, limits, wrenches.
 
-Axes are as of `robots.point_mass`. `robots.patterns` says which forces and moments the cables balance; what a planar
-platform or a rod leaves out vanishes, and a joint carries the others.
+Axes are those of `robots.point_mass`. `robots.patterns` says which forces and moments the cables balance. All other
+components are zero for a planar platform or a rod, and a joint carries them where there is one.
 """
 
 import dataclasses
@@ -37,20 +37,21 @@ class PlatformRobot:
     """A body on cables: a rigid platform, or one of another pattern that turns.
 
     Fields:
-        base_points: (n_cables, 3) where the cables leave their spools, in cable order, of pulleys where they enter; m.
-        platform_points: (n_cables, 3) where they are attached, from the mass centre, of a robot on a joint from the
-            joint, in platform axes, which are parallel to the fixed ones in the reference orientation; m.
+        base_points: (n_cables, 3) points at which the cables leave their spools, or enter their pulleys, in cable
+            order; m.
+        platform_points: (n_cables, 3) points at which they are attached, from the mass centre, or from the joint of a
+            robot on a joint, in platform axes, which are parallel to the fixed ones in the reference orientation; m.
         mass: () kg.
         inertia: (3, 3) about the mass centre, platform axes, kg m^2.
         gravity: () downwards, m/s^2.
-        joints: for each cable the first one that is attached at the same point; known when a function is compiled, so
-            that the point is computed once. Who replaces points so that others coincide replaces it too.
+        joints: for each cable the first cable that is attached at the same point; known when a function is compiled, so
+            that the point is computed once. Whoever replaces points so that others coincide must replace it, too.
         limits: limits beyond taut cables.
         name: for people.
-        z_axis: where z points, "down" or "up"; known when a function is compiled.
-        pattern: name of its row of `robots.patterns`; known when a function is compiled.
-        centre_of_mass: (3,) from the origin of the platform frame, in platform axes, m; None: that origin.
-        pulleys: between base points and cables; None: the cables leave from the base points.
+        z_axis: direction of z, "down" or "up"; known when a function is compiled.
+        pattern: name of a row of `robots.patterns`; known when a function is compiled.
+        centre_of_mass: (3,) from the origin of the platform frame, in platform axes, m; None: at the origin.
+        pulleys: pulleys between base points and cables; None: the cables leave from the base points.
         cable_diameter: () m; None: 0.
     """
 
@@ -95,7 +96,7 @@ class PlatformRobot:
         return self._balanced(state.rotation, force, moment)
 
     def _balanced(self, rotation: Array, force: Array, moment: Array) -> Array:
-        # Keep of the forces and moments, (3, ...) each, the components that the cables balance.
+        # Keep the components of forces and moments, (3, ...) each, that the cables balance.
         row = PATTERNS[self.pattern]
         turning = (rotation @ across_line(self)).T @ moment if row.along_line else moment[np.array(row.moments)]
         return jnp.concatenate([force[np.array(row.forces, int)], turning])
@@ -128,9 +129,9 @@ def platform_robot(  # noqa: PLR0913
     """A platform on cables, its geometry and inertia checked.
 
     Args:
-        base_points: (n_cables, 3) spool points, as many as degrees of freedom or more, m; of a planar platform y = 0.
-        platform_points: (n_cables, 3) attachment points in platform axes, m; of a planar platform y = 0, of a rod on
-            one line with the mass centre, of a robot on a joint from the joint.
+        base_points: (n_cables, 3) spool points, as many as degrees of freedom or more, m; y = 0 for a planar platform.
+        platform_points: (n_cables, 3) attachment points in platform axes, m; y = 0 for a planar platform, on one line
+            with the mass centre for a rod, from the joint for a robot on a joint.
         mass: kg, positive.
         inertia: (3, 3) about the mass centre, platform axes, kg m^2; symmetric, positive definite, of a real body.
         centre_of_mass: (3,) in platform axes, m; None: their origin.
@@ -188,7 +189,7 @@ def across_line(robot: PlatformRobot) -> Array:
 
 
 def _spin_moment(robot: PlatformRobot, state: State) -> Array:
-    # Rate of the angular momentum about the mass centre, (3.8), or about a joint; N m.
+    # Return the rate of the angular momentum about the mass centre, (3.8), or about a joint; N m.
     inertia = state.rotation @ robot.inertia @ state.rotation.T
     if PATTERNS[robot.pattern].is_jointed and robot.centre_of_mass is not None:
         arm = state.rotation @ robot.centre_of_mass
@@ -212,7 +213,7 @@ def rays(robot: PlatformRobot, position: Array, rotation: Array) -> tuple[Array,
 
 
 def wrench_per_mass(robot: PlatformRobot, state: State) -> Array:
-    """Right-hand side of (3.11): what the cables must supply per mass.
+    """Right-hand side of (3.11): the wrench that the cables must supply, per mass.
 
     Returns:
         (6,) p'' - g, m/s^2, and the rate of the angular momentum (3.8) over the mass, m^2/s^2.

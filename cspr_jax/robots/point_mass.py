@@ -1,7 +1,7 @@
 """Point-mass robots: geometry, mass, gravity, limits, wrenches.
 
-A robot that is loaded or made has the axes of its file. Kernels take it from the centroid of its spools and with z
-down, as `robots.kernel_axes.centred` gives it.
+A robot that is loaded or built has the axes of its file. Kernels take it with the origin at the centroid of its spools
+and with z down, as `robots.kernel_axes.centred` gives it.
 """
 
 import dataclasses
@@ -38,15 +38,15 @@ class PointMassRobot:
     """A point mass on three cables or more, on two or more in the plane y = 0, or on a vertical guide.
 
     Fields:
-        base_points: (n_cables, 3) where the cables leave their spools, one a row, in cable order, of pulleys where they
-            enter; m.
-        mass: () of the effector, kg.
+        base_points: (n_cables, 3) points at which the cables leave their spools, or enter their pulleys, in cable
+            order; m.
+        mass: () mass of the effector, kg.
         gravity: () downwards, m/s^2.
         limits: limits beyond taut cables.
         name: for people.
-        z_axis: where z points, "down" or "up"; known when a function is compiled.
+        z_axis: direction of z, "down" or "up"; known when a function is compiled.
         dof: degrees of freedom, 3, 2 in the plane y = 0, or 1 on a guide; known when a function is compiled.
-        pulleys: between base points and cables; None: the cables leave from the base points.
+        pulleys: pulleys between base points and cables; None: the cables leave from the base points.
         cable_diameter: () m; None: 0.
     """
 
@@ -62,7 +62,7 @@ class PointMassRobot:
 
     @property
     def pattern(self) -> str:
-        """Name of its row of `robots.patterns`."""
+        """Name of a row of `robots.patterns`."""
         return f"{self.dof}T"
 
     @property
@@ -80,11 +80,11 @@ class PointMassRobot:
 
     @property
     def _directions(self) -> np.ndarray:
-        # In which the effector moves: x and z in the plane y = 0.
+        # Return the axes along which the effector moves: x and z in the plane y = 0.
         return np.array(PATTERNS[self.pattern].forces)
 
 
-# The name stays outside: compiled functions do not see it, and are not compiled again for another one.
+# Compiled functions do not see the name, so that they are not compiled again for another one.
 jax.tree_util.register_dataclass(
     PointMassRobot,
     ["base_points", "mass", "gravity", "limits", "pulleys", "cable_diameter"],
@@ -149,12 +149,12 @@ def _check_planar(points: np.ndarray) -> None:
         raise InputError("base_points", points.tolist(), "two spools on a level line")
 
 
-def checked_points(key: str, given, least: int) -> np.ndarray:
+def checked_points(key: str, points, least: int) -> np.ndarray:
     """Points of a robot's geometry.
 
     Args:
         key: named in errors.
-        given: (n, 3) m.
+        points: (n, 3) m.
         least: smallest number of them.
 
     Returns:
@@ -163,18 +163,18 @@ def checked_points(key: str, given, least: int) -> np.ndarray:
     Raises:
         InputError: fewer, another shape, not finite, too far away; three or more on one line, or two at one place.
     """
-    points = checked_coordinates(key, given, least)
+    points = checked_coordinates(key, points, least)
     if least > PLANAR and is_on_line(points):
         raise InputError(key, points.tolist(), "points that are not on one line, or coincident")
     return points
 
 
-def checked_coordinates(key: str, given, least: int) -> np.ndarray:
+def checked_coordinates(key: str, coordinates, least: int) -> np.ndarray:
     """Points, wherever they lie.
 
     Args:
         key: named in errors.
-        given: (n, 3) m.
+        coordinates: (n, 3) m.
         least: smallest number of them.
 
     Returns:
@@ -183,13 +183,13 @@ def checked_coordinates(key: str, given, least: int) -> np.ndarray:
     Raises:
         InputError: fewer, another shape, not finite, too far away.
     """
-    if isinstance(given, jax.core.Tracer):
+    if isinstance(coordinates, jax.core.Tracer):
         raise InputError(key, "a traced array", "numbers; to differentiate, dataclasses.replace(robot, ...) takes both")
-    points = np.asarray(given, float)
+    points = np.asarray(coordinates, float)
     if points.ndim != 2 or points.shape[1] != 3 or not (np.abs(points) <= LARGEST_LENGTH).all():
-        raise InputError(key, given, f"{least} points or more of three coordinates, at most 1e6 m")
+        raise InputError(key, coordinates, f"{least} points or more of three coordinates, at most 1e6 m")
     if len(points) < least:
-        raise InputError(key, given, f"must be {least} or more, one a cable", fault=f"{len(points)} points")
+        raise InputError(key, coordinates, f"must be {least} or more, one a cable", fault=f"{len(points)} points")
     return points
 
 
@@ -197,7 +197,7 @@ def pulls(robot: Robot, targets: Array) -> Array:
     """Unit vectors of the cables, from the effector on; with pulleys those of the free cables.
 
     Args:
-        targets: (n_cables, 3) or (1, 3) where the cables are attached, in the axes of the spools, m.
+        targets: (n_cables, 3) or (1, 3) points at which the cables are attached, in the axes of the spools, m.
 
     Returns:
         (n_cables, 3).
@@ -211,7 +211,7 @@ def pulls(robot: Robot, targets: Array) -> Array:
 
 
 def relative_acceleration(robot: PointMassRobot, acceleration: Array) -> Array:
-    """Acceleration beyond that of free fall, p'' - g.
+    """Acceleration relative to free fall, p'' - g.
 
     Args:
         acceleration: (3,) z down, m/s^2.
@@ -223,7 +223,7 @@ def relative_acceleration(robot: PointMassRobot, acceleration: Array) -> Array:
 
 
 def check_numbers(mass: float, gravity: float) -> None:
-    """Refuse a mass or a gravity that is none.
+    """Refuse an invalid mass or gravity.
 
     Args:
         mass: kg.
@@ -238,7 +238,7 @@ def check_numbers(mass: float, gravity: float) -> None:
 
 
 def check_axis(z_axis: str) -> None:
-    """Refuse a z axis that points nowhere.
+    """Refuse an unknown direction of z.
 
     Raises:
         InputError: neither "down" nor "up".
@@ -251,7 +251,7 @@ def is_planar(robot: PointMassRobot) -> bool:
     """Tell whether the robot moves in the plane y = 0.
 
     Returns:
-        the claim; known when a function is compiled.
+        whether it does; known when a function is compiled.
     """
     return robot.dof == PLANAR
 
@@ -263,7 +263,7 @@ def rest_point(z0):
         z0: (...) depth, m.
 
     Returns:
-        (..., 3) from the centroid, z down, m; NumPy of NumPy.
+        (..., 3) from the centroid, z down, m; a NumPy array for NumPy numbers.
     """
     xp = jnp if isinstance(z0, jax.Array) else np
     z0 = xp.asarray(z0)
@@ -287,7 +287,7 @@ def spool_radius(robot: Robot) -> Array:
 def plane_normal(robot: Robot) -> Array:
     """Normal of the spool plane, scaled so that its vertical component is 1.
 
-    Of more than three spools it is the plane of least squares. The depth below the plane, measured along the
+    For more than three spools it is the plane of least squares. The depth of p below the plane, measured along the
     vertical, is normal . p.
 
     Args:

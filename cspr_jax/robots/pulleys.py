@@ -1,10 +1,10 @@
-"""Find where a cable leaves a swivelling pulley, and how much of it is wrapped around.
+"""Points at which cables leave swivelling pulleys, and lengths that are wrapped around these.
 
 A cable reaches the pulley at its entry point A, running along the swivel axis k, about which the pulley turns towards
 the attachment point B. All lies in one plane: with e the unit vector normal to k on the side of B, the centre is
-C = A + r e. Let v = B - C, s^2 = v.v - r^2 and K the turn by a right angle that takes -e to k: of the unit vectors n,
-from C to where the cable leaves, and t = K n along the cable, v = r n + s t. Hence n = (r v - s K v) / v.v and
-t = (s v + r K v) / v.v, and no angle is needed but that of the wrapped arc, counted from A.
+C = A + r e. Let v = B - C, s^2 = v.v - r^2, and K the rotation by a right angle that takes -e to k. With unit vectors
+n, from C to the point at which the cable leaves, and t = K n along the cable, v = r n + s t. Hence
+n = (r v - s K v) / v.v and t = (s v + r K v) / v.v; the only angle needed is that of the wrapped arc, counted from A.
 """
 
 import dataclasses
@@ -28,7 +28,7 @@ class Pulleys:
     """Swivelling pulleys of a robot; the base points are their entry points.
 
     Fields:
-        radius: (n_cables,) of the cable's centre line, 0 or more; m.
+        radius: (n_cables,) radius of the cable's centre line, 0 or more; m.
         axes: (n_cables, 3) unit vectors of the swivel axes, in the direction in which the cables run when they enter.
     """
 
@@ -40,10 +40,10 @@ class Exit(NamedTuple):
     """A cable behind its pulley. Vectors are arrays (..., 3), or three arrays (...) as lanes.
 
     Fields:
-        point: where the cable leaves the pulley, m.
-        direction: unit vector from there to the attachment point.
+        point: point at which the cable leaves the pulley, m.
+        direction: unit vector from the point to the attachment point.
         wrapped: (...) length on the pulley, m.
-        free: (...) length from the pulley to the attachment point, m; NaN where that lies within the pulley.
+        free: (...) length from the pulley to the attachment point, m; NaN where the latter lies within the pulley.
     """
 
     point: Array | Vector
@@ -59,7 +59,7 @@ def pulleys_of(radius, axes, n_cables: int, z_axis: str) -> Pulleys:
         radius: () or (n_cables,) m.
         axes: (3,) or (n_cables, 3) swivel axes, of any length; None: straight up.
         n_cables: number of cables.
-        z_axis: where z points, "down" or "up".
+        z_axis: direction of z, "down" or "up".
 
     Returns:
         the pulleys, float64 NumPy leaves.
@@ -128,19 +128,19 @@ def exit_lanes(entry: Vector, axis: Vector, radius: Array, target: Vector) -> Ex
 
 
 def _nonzero(width):
-    # Above or below the entry point any side is as good, and none is taken.
+    # Avoid a division by zero for attachment points above or below the entry point, where any side is as good.
     return jnp.where(width > 0.0, width, 1.0)
 
 
 def _in_plane(radius, wide, high):
-    # Point and direction along e and k, from A; `wide` and `high` are those of B.
+    # Return point and direction along e and k, from A; `wide` and `high` are the components of B.
     x, z = wide - radius, high
     square = x * x + z * z
     free = jnp.sqrt(square - radius * radius)
     # K v = (z, -x)
     normal = ((radius * x - free * z) / square, (radius * z + free * x) / square)
     along = ((free * x + radius * z) / square, (free * z - radius * x) / square)
-    around = jnp.arctan2(z, -x)  # of B about C, from A on
+    around = jnp.arctan2(z, -x)  # angle of B about C, from A on
     around = jnp.where(z < 0.0, around + 2.0 * jnp.pi, around)
     wrapped = radius * jnp.maximum(around - jnp.arctan2(free, radius), 0.0)
     return (radius + radius * normal[0], radius * normal[1]), along, wrapped, free

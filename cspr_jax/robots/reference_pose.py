@@ -1,10 +1,10 @@
 """The reference orientation of a platform, and whether it hangs still there, thesis sections 3.4.3 and 3.9.
 
-The plane of the attachment points is level, and the platform is turned about the vertical so that the squares of the
-level parts of the cables are smallest in sum. The text adds up the level parts of unit vectors along the cables
-instead: the same for the symmetric robots that it treats, but elsewhere its minimum can lie where the tensions are
-unequal (NIST RoboCrane at a depth of its spools' radius), while the squares make them equal, (3.14), at every depth.
-It is computed, not assumed, and so is the sign of det J.
+The plane of the attachment points is level, and the platform is turned about the vertical so that the sum of the
+squares of the level components of the cables is the smallest. The thesis adds up the level components of unit vectors
+along the cables instead. This is the same for the symmetric robots that it treats; elsewhere its minimum can lie where
+the tensions are unequal (NIST RoboCrane at a depth of its spools' radius), while the squares make them equal, (3.14),
+at every depth. The reference orientation is computed, not assumed, and so is the sign of det J.
 """
 
 import dataclasses
@@ -24,9 +24,9 @@ from cspr_jax.robots import wrench_balance
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import rest_point
 
-# Axes that differ less from the reference ones are taken to be these.
+# Axes that differ less than this from the reference axes count as equal to them.
 ALIGNED = 1e-6
-# Smallest tension over the mean one that counts.
+# Cables count as slack below this part of the mean tension.
 SMALLEST_TENSION = 1e-6
 
 _CHANGE_LINES = (
@@ -44,9 +44,9 @@ class Reference(NamedTuple):
 
     Fields:
         robot: the robot, its platform axes parallel to the fixed ones in the reference orientation.
-        rotation: (3, 3) from the axes of the robot file to these.
-        determinant: of `robots.wrench_balance.normalised_determinant` at P0; its sign is the one that must not change.
-        tensions: (n_cables,) at rest in P0 over their mean.
+        rotation: (3, 3) from the axes of the robot file to these platform axes.
+        determinant: value of `robots.wrench_balance.normalised_determinant` in P0, whose sign must not change.
+        tensions: (n_cables,) tensions at rest in P0 over their mean.
     """
 
     robot: PlatformRobot
@@ -58,14 +58,14 @@ class Reference(NamedTuple):
 def aligned(robot: PlatformRobot) -> tuple[PlatformRobot, np.ndarray]:
     """A robot whose platform axes are parallel to the fixed ones in the reference orientation.
 
-    On more cables than degrees of freedom a platform hangs still in many orientations: the reference one is then that
-    in which its axes are parallel to those of the robot file.
+    On more cables than degrees of freedom a platform hangs still in many orientations. Its reference orientation is
+    then the one in which its axes are parallel to those of the robot file.
 
     Args:
         robot: centred, in any platform axes; jax may be tracing its spools, but not its platform points.
 
     Returns:
-        the robot, and the rotation (3, 3) from its former axes to these.
+        the robot, and the rotation (3, 3) from its former axes to the new ones.
     """
     if robot.n_cables > robot.dof:
         return robot, np.eye(3)
@@ -102,7 +102,7 @@ def reference_pose(robot: PlatformRobot, z0: float) -> Reference:
     if not wrench_balance.is_regular(abs(size)):
         fault = f"{place} is singular (determinant {size:.1g}, at least {wrench_balance.SINGULAR:g} counts): "
         raise InputError("platform_points", None, _CHANGE_LINES, fault=fault + _free(turned, hub))
-    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):  # of numbers near none at all
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):  # all tensions may be zero, or not finite
         share = still / np.abs(still).mean()
     if not (np.isfinite(share) & (share > SMALLEST_TENSION)).all():
         slack = int(np.argmin(np.where(np.isfinite(share), share, -np.inf)))
@@ -112,7 +112,7 @@ def reference_pose(robot: PlatformRobot, z0: float) -> Reference:
 
 
 def _free(robot: PlatformRobot, hub: np.ndarray) -> str:
-    # The small motion that lengthens no cable: a turn and a shift, lengths over the platform's size.
+    # Find the small motion that changes no cable length, a shift and a rotation, and name its largest part.
     points = np.asarray(robot.platform_points)
     cables = np.asarray(robot.base_points) - hub - points
     along = cables / np.linalg.norm(cables, axis=1, keepdims=True)
@@ -135,17 +135,17 @@ def _standing(robot: PlatformRobot, hub: Array) -> tuple[Array, Array]:
 
 
 def _level_and_straight(robot: PlatformRobot) -> np.ndarray:
-    # Choose that side of the platform, of both, whose points come nearer to below their spools.
+    # Choose the side of the platform with which its points come nearer to being below their spools.
     points, base = np.asarray(robot.platform_points), np.asarray(robot.base_points)
     normal = np.linalg.svd(points - points.mean(0))[2][2]
     sides = [_to_vertical(sign * normal) for sign in (1.0, -1.0)]
-    turns = [_straightest(points @ side.T, base) for side in sides]
-    best = int(np.argmax([nearness for _, nearness in turns]))
-    return about_vertical(turns[best][0]) @ sides[best]
+    torsions = [_straightest(points @ side.T, base) for side in sides]
+    best = int(np.argmax([nearness for _, nearness in torsions]))
+    return about_vertical(torsions[best][0]) @ sides[best]
 
 
 def _traced(robot: PlatformRobot) -> Any:
-    # The same, where jax is tracing the spools: on these depends the turn about the vertical alone.
+    # Do the same where jax is tracing the spools, on which only the rotation about the vertical depends.
     points = np.asarray(robot.platform_points)
     normal = np.linalg.svd(points - points.mean(0))[2][2]
     both = []
@@ -155,15 +155,15 @@ def _traced(robot: PlatformRobot) -> Any:
         across = x @ robot.base_points[:, 1] - y @ robot.base_points[:, 0]
         nearness = jnp.hypot(along, across)
         zero, one = jnp.zeros_like(along), jnp.ones_like(along)
-        turn = jnp.stack([along, -across, zero, across, along, zero, zero, zero, nearness]).reshape(3, 3) / nearness
-        both.append((nearness, jnp.where(nearness > ALIGNED * one, turn, jnp.eye(3)) @ side))
+        about_z = jnp.stack([along, -across, zero, across, along, zero, zero, zero, nearness]).reshape(3, 3) / nearness
+        both.append((nearness, jnp.where(nearness > ALIGNED * one, about_z, jnp.eye(3)) @ side))
     (first, rotation), (second, other) = both
     chosen = jnp.where(first >= second, rotation, other)
     return jnp.where(jnp.max(jnp.abs(chosen - jnp.eye(3))) < ALIGNED, jnp.eye(3), chosen)
 
 
 def _to_vertical(normal: np.ndarray) -> np.ndarray:
-    # The smallest rotation that takes a unit vector to +z.
+    # Return the smallest rotation that takes a unit vector to +z.
     axis = np.cross(normal, [0.0, 0.0, 1.0])
     sine, cosine = np.linalg.norm(axis), normal[2]
     if sine < ALIGNED:
@@ -172,7 +172,7 @@ def _to_vertical(normal: np.ndarray) -> np.ndarray:
 
 
 def _straightest(points: np.ndarray, base: np.ndarray) -> tuple[float, float]:
-    # The torsion with the smallest squares, and how near the points then are: the sum of a . b over the cables.
+    # Return the torsion with the smallest sum of squares, and how near the points then are: the sum of a . b.
     along = float((points[:, :2] * base[:, :2]).sum())
     across = float((points[:, 0] * base[:, 1] - points[:, 1] * base[:, 0]).sum())
     nearness = math.hypot(along, across)

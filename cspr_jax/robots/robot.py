@@ -59,8 +59,8 @@ class Robot(Protocol):
             state: position, and the rotation of a platform; z down.
 
         Returns:
-            (dof, n_cables), one column a cable: the force, of a platform the moment about its mass centre, or about its
-            joint, below it, m; of both the components that its pattern balances.
+            (dof, n_cables), one column a cable: the force; for a platform, below it, the moment about its mass centre
+            or joint, m; of both only the components that the pattern balances.
         """
 
     def inertial_wrench(self, state: State) -> Array:
@@ -70,11 +70,11 @@ class Robot(Protocol):
             state: the state; z down.
 
         Returns:
-            (dof,) force, N, of a platform the moment after it, N m; components as in `wrench_matrix`.
+            (dof,) force, N; for a platform then the moment, N m; components as in `wrench_matrix`.
         """
 
 
-MOVED = ("2T", "3T", "3R3T")  # patterns that trajectories and searches know; workspaces know all
+MOVED = ("2T", "3T", "3R3T")  # patterns of trajectories and searches; workspaces take all patterns
 
 
 def check_moved(robot: Robot) -> None:

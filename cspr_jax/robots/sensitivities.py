@@ -1,14 +1,14 @@
 """Sensitivity of an effector to errors of its cable lengths, Machines 11 (2), 2023, 224, (7), at one place.
 
-With K the rates of the cable lengths over velocity and angular velocity, one row (e, b x e) a cable, a small error
-d rho of the lengths moves the effector by K^-1 d rho. The largest displacement of all errors up to one unit in each
-cable is the induced norm (infinity, 2) of the upper rows of K^-1, sigma_p; the largest turn that of the lower rows,
-sigma_r. A norm is convex, so that its largest value over the cube of errors lies at a corner: the maximum over all
-signs is exact. (The text's J has the other sign in its lower rows; no norm sees it.)
+Let K be the matrix from velocity and angular velocity to the rates of the cable lengths, one row (e, b x e) a cable; a
+small error d rho of the lengths then moves the effector by K^-1 d rho. The largest displacement for errors up to one
+unit in each cable is the induced norm (infinity, 2) of the upper rows of K^-1, sigma_p; the largest rotation is that of
+the lower rows, sigma_r. A norm is convex, so that its largest value over the cube of errors lies at a corner: the
+maximum over all signs is exact. (J in the paper has the other sign in its lower rows, which changes no norm.)
 
 No sigma_p is below d / sqrt(n) for n cables and d translations: the mean square over the corners is the squared
-Frobenius norm of the upper rows, and of those that invert n unit vectors e no sum of squares is below d^2 / n. So it is
-at least sqrt 3 with three cables, where only cables at right angles reach it.
+Frobenius norm of the upper rows, which for an inverse of n unit vectors e is at least d^2 / n. So sigma_p is at least
+sqrt 3 with three cables, and only cables at right angles reach this.
 """
 
 import itertools
@@ -31,7 +31,7 @@ class Sensitivities(NamedTuple):
 
     Fields:
         sigma_p: () largest displacement over the largest error of a cable, m/m.
-        sigma_r: () largest turn of a platform over that error, rad/m; NaN for a point mass.
+        sigma_r: () largest rotation of a platform over that error, rad/m; NaN for a point mass.
     """
 
     sigma_p: Array
@@ -39,7 +39,7 @@ class Sensitivities(NamedTuple):
 
 
 def sensitivities(robot: Robot, position: Array, rotation: Array | None = None) -> Sensitivities:
-    """Sensitivities of a robot with as many cables as degrees of freedom, errors of all of them independent.
+    """Sensitivities of a robot with as many cables as degrees of freedom, errors of all lengths independent.
 
     Args:
         position: (3,) m.
@@ -52,21 +52,22 @@ def sensitivities(robot: Robot, position: Array, rotation: Array | None = None) 
         InputError: what `check_determined` refuses.
     """
     check_determined(robot)
-    turn = jnp.eye(_TRANSLATIONS) if rotation is None else rotation
-    rates = -robot.wrench_matrix(at_rest(position, turn)).T
+    rotation = jnp.eye(_TRANSLATIONS) if rotation is None else rotation
+    rates = -robot.wrench_matrix(at_rest(position, rotation)).T
     inverse, determinant = solved(rates, jnp.eye(robot.dof))
     if isinstance(robot, PlatformRobot):
-        determinant = normalised_determinant(robot, position, turn)
+        determinant = normalised_determinant(robot, position, rotation)
     return _of_inverse(inverse[:_TRANSLATIONS], inverse[_TRANSLATIONS:], determinant)
 
 
 def pair_sensitivities(exit_points: Array, along: Array, size: Array, position: Array) -> Sensitivities:
     """Sensitivities of a platform on three parallel pairs of cables in closed form, as (A1) and (A2).
 
-    Of a pair with shares 1 - lambda and lambda, whose points are d apart, the rows of K give
+    For a pair with shares 1 - lambda and lambda, whose points are d apart, the rows of K give
     (1 - lambda) rho' + lambda rho'' = e . p' and rho'' - rho' = (d x e) . omega. Independent errors of six lengths move
-    the platform as far as those of three winches: the weighted means of both reach the same cube, whatever the shares.
-    Their differences turn it, up to twice the error of each; errors of winches alone, equal in a pair, turn it not.
+    the platform as far as errors of three winches: the weighted means of both fill the same cube, whatever the shares.
+    Differences within pairs, up to twice the error of each length, turn the platform; errors of winches, equal in a
+    pair, do not.
 
     Args:
         exit_points: (3, 3) spools of the equivalent, m.
@@ -91,7 +92,7 @@ def _of_inverse(translations: Array, rotations: Array, determinant: Array) -> Se
 
 
 def _largest(rows: Array) -> Array:
-    # Opposite corners give the same length: the last sign stays.
+    # Opposite corners give the same length, so that the last sign can stay.
     count = rows.shape[1]
     signs = np.array([(*corner, 1.0) for corner in itertools.product((-1.0, 1.0), repeat=count - 1)])
     return jnp.max(jnp.linalg.norm(signs @ rows.T, axis=1))

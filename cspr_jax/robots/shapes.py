@@ -8,9 +8,10 @@ import numpy as np
 from cspr_jax.arithmetic.frames import IDENTITY, Frame
 from cspr_jax.errors import InputError
 
-# Beyond it squares of lengths lose their meaning; as in `robots.point_mass`, with jax.
+# Squares of larger lengths lose their meaning; the same number as in `robots.point_mass`, which imports jax.
 LARGEST_LENGTH = 1e6
-# The length of a unit quaternion may differ from 1 by this; as in `arithmetic.rotations`, which comes with jax.
+# The length of a unit quaternion may differ from 1 by this; the same number as in `arithmetic.rotations`, which imports
+# jax.
 UNIT_TOLERANCE = 1e-6
 # Points nearer to a plane than this part of their extent lie in it.
 FLAT = 1e-9
@@ -35,11 +36,11 @@ class Sphere:
 
 @dataclasses.dataclass(frozen=True)
 class Cylinder:
-    """A cylinder with half a ball at each end: all that is as near to its axis, a segment.
+    """A cylinder with half a ball at each end: all points within the radius of a segment, its axis.
 
     Fields:
-        start: (3,) of the axis, m.
-        end: (3,) of the axis, m.
+        start: (3,) start of the axis, m.
+        end: (3,) end of the axis, m.
         radius: m.
         name: for people.
     """
@@ -57,13 +58,13 @@ class Box:
     Fields:
         centre: (3,) m.
         half: (3,) halves of the lengths of its edges, m.
-        turn: (3, 3) its axes, one a column.
+        rotation: (3, 3) axes of the box, one a column.
         name: for people.
     """
 
     centre: np.ndarray
     half: np.ndarray
-    turn: np.ndarray
+    rotation: np.ndarray
     name: str = "box"
 
 
@@ -73,9 +74,9 @@ class Hull:
 
     Fields:
         normals: (n_faces, 3) outward unit normals of its triangles.
-        offsets: (n_faces,) their products with points of the triangle, m.
+        offsets: (n_faces,) products of the normals with points of their triangles, m.
         triangles: (n_faces, 3, 3) corners, m.
-        edges: (n_edges, 2, 3) ends of the edges, those within a flat face left out, m.
+        edges: (n_edges, 2, 3) ends of the edges, without edges inside of a flat face, m.
         sides: (n_edges, 2, 3) outward normals of the two faces beside each edge.
         name: for people.
     """
@@ -112,8 +113,8 @@ def cylinder(start, end, radius: float, *, name: str = "cylinder") -> Cylinder:
     """A cylinder with round ends, its numbers checked.
 
     Args:
-        start: (3,) of the axis, m.
-        end: (3,) of the axis, m; may be the start.
+        start: (3,) start of the axis, m.
+        end: (3,) end of the axis, m; may be the start.
         radius: m, not negative.
 
     Returns:
@@ -131,7 +132,7 @@ def box(centre, size, quaternion=IDENTITY, *, name: str = "box") -> Box:
     Args:
         centre: (3,) m.
         size: (3,) lengths of its edges, m, not negative.
-        quaternion: (4,) its orientation, scalar first.
+        quaternion: (4,) unit quaternion of the orientation, scalar first.
 
     Returns:
         the box.
@@ -139,20 +140,21 @@ def box(centre, size, quaternion=IDENTITY, *, name: str = "box") -> Box:
     Raises:
         InputError: not three coordinates or lengths, one negative, or not a unit quaternion.
     """
-    lengths, turn = _point("size", size), np.asarray(quaternion, float)
+    lengths, components = _point("size", size), np.asarray(quaternion, float)
     if not (lengths >= 0.0).all():
         raise InputError("size", size, "three lengths, none negative")
-    if turn.shape != (4,) or not abs(np.linalg.norm(turn) - 1.0) <= UNIT_TOLERANCE:
+    if components.shape != (4,) or not abs(np.linalg.norm(components) - 1.0) <= UNIT_TOLERANCE:
         raise InputError("quaternion", quaternion, "four numbers of a unit quaternion, scalar first")
-    return Box(_point("centre", centre), 0.5 * lengths, rotation_matrix(turn / np.linalg.norm(turn)), name)
+    rotation = rotation_matrix(components / np.linalg.norm(components))
+    return Box(_point("centre", centre), 0.5 * lengths, rotation, name)
 
 
 def box_between(lowest, highest, *, name: str = "box") -> Box:
     """A box along the axes.
 
     Args:
-        lowest: (3,) corner of the least coordinates, m.
-        highest: (3,) corner of the largest, m.
+        lowest: (3,) corner with the least coordinates, m.
+        highest: (3,) corner with the largest coordinates, m.
 
     Returns:
         the box.
@@ -187,7 +189,7 @@ def hull(points, *, name: str = "hull") -> Hull:
         raise InputError("points", coordinates.tolist(), "four points or more that are not all in a plane")
     convex = ConvexHull(coordinates)
     corners, normals = convex.simplices, convex.equations[:, :3]
-    # Once more in the corners, whose coordinates it has to fit.
+    # Compute offsets once more from the corners, to whose coordinates they must fit.
     offsets = np.einsum("fi,fi->f", normals, coordinates[corners].mean(1))
     edges, sides = [], []
     for face, (simplex, others) in enumerate(zip(corners, convex.neighbors, strict=True)):
@@ -205,7 +207,7 @@ def is_flat(points: np.ndarray) -> bool:
         points: (n, 3) m.
 
     Returns:
-        whether they span no volume, but for rounding.
+        whether they span no volume beyond rounding.
     """
     if len(points) < 4:
         return True
@@ -220,10 +222,10 @@ def is_within(shape: Body, points: np.ndarray) -> np.ndarray:
         points: (n, 3) m.
 
     Returns:
-        (n,) whether none is outside by more than `WITHIN`.
+        (n,) whether each is outside by at most `WITHIN`.
     """
     if isinstance(shape, Box):
-        out = (np.abs((points - shape.centre) @ shape.turn) - shape.half).max(1)
+        out = (np.abs((points - shape.centre) @ shape.rotation) - shape.half).max(1)
     else:
         out = (points @ shape.normals.T - shape.offsets).max(1)
     return out <= WITHIN
@@ -234,7 +236,7 @@ def inward(shape: Obstacle, frame: Frame) -> Obstacle:
 
     Args:
         shape: in the axes of the file.
-        frame: these axes.
+        frame: the axes of the file.
 
     Returns:
         the obstacle, from the centroid of the spools, z down.
@@ -243,21 +245,21 @@ def inward(shape: Obstacle, frame: Frame) -> Obstacle:
         return dataclasses.replace(shape, start=frame.inward(shape.start), end=frame.inward(shape.end))
     if isinstance(shape, Sphere):
         return dataclasses.replace(shape, centre=frame.inward(shape.centre))
-    return dataclasses.replace(shape, centre=frame.inward(shape.centre), turn=frame.turned(shape.turn.T).T)
+    return dataclasses.replace(shape, centre=frame.inward(shape.centre), rotation=frame.turned(shape.rotation.T).T)
 
 
 def turned(shape: Body, frame: Frame) -> Body:
-    """A platform's own shape in the axes that its points have in the kernels.
+    """The shape of a platform in the platform axes of the kernels.
 
     Args:
         shape: in platform axes as in the robot file.
         frame: the axes of the file.
 
     Returns:
-        the shape, from the same point.
+        the shape, with the same origin.
     """
     if isinstance(shape, Box):
-        return dataclasses.replace(shape, centre=frame.turned(shape.centre), turn=frame.turned(shape.turn.T).T)
+        return dataclasses.replace(shape, centre=frame.turned(shape.centre), rotation=frame.turned(shape.rotation.T).T)
     normals, triangles, edges, sides = map(frame.turned, (shape.normals, shape.triangles, shape.edges, shape.sides))
     return dataclasses.replace(shape, normals=normals, triangles=triangles, edges=edges, sides=sides)
 
@@ -282,7 +284,7 @@ def rotation_matrix(quaternion) -> np.ndarray:
         quaternion: (4,) scalar first.
 
     Returns:
-        (3, 3) from the turned axes.
+        (3, 3) from the rotated axes to the fixed ones.
     """
     w, x, y, z = np.asarray(quaternion, float)
     vector = np.array([x, y, z])

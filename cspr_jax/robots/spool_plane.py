@@ -1,12 +1,12 @@
-"""How points of a robot's geometry are spread: on a line, in a vertical plane. NumPy alone, since files ask too."""
+"""Tests whether points of a robot lie on a line, or in a vertical plane. NumPy alone, since files are checked too."""
 
 import numpy as np
 
-# Below these ratios points count as lying on a line, and their plane as vertical.
+# Below this ratio points count as lying on a line, or their plane as vertical.
 SMALLEST_AREA_RATIO = 1e-6
 SMALLEST_LEVEL_RATIO = 1e-3
-# Points nearer to P0 than this part of the size of a robot are at rest there; points as near to a line through P0 are
-# on it.
+# Points nearer to P0 than this part of the size of a robot count as being at P0; points as near to a line through P0,
+# as being on it.
 AT_P0 = 1e-9
 
 
@@ -29,22 +29,22 @@ def is_on_line(points: np.ndarray) -> bool:
         points: (n, m), n >= 2, m >= 2.
 
     Returns:
-        the claim.
+        whether they do.
     """
     sizes = spread(points)
     return not sizes[1] > SMALLEST_AREA_RATIO * sizes[0]
 
 
 def is_vertical(points: np.ndarray) -> bool:
-    """Tell whether the plane of points, of more than three that of least squares, is vertical.
+    """Tell whether the plane of points is vertical; of more than three points, the plane of least squares.
 
     Args:
         points: (n, 3), n >= 3, not on a line.
 
     Returns:
-        the claim.
+        whether it is.
     """
-    # The product of both spreads from above, over that of both in space: how far the plane is from vertical.
+    # Compare the area seen from above with the area in space, each as a product of two spreads.
     spreads, level = spread(points), spread(points[:, :2])
     return not level[0] * level[1] > SMALLEST_LEVEL_RATIO * spreads[0] * spreads[1]
 
@@ -67,10 +67,10 @@ def in_plane(base_points: np.ndarray, points: np.ndarray, *, planar: bool = Fals
     Args:
         base_points: (n, 3) spools.
         points: (k, 3).
-        planar: whether the robot is planar, of whose plane that of the spools is a line.
+        planar: whether the robot is planar, so that a line through the spools takes the place of their plane.
 
     Returns:
-        (k,) whether each does; none where the spools lie in no plane, in a vertical one, or on a line in space.
+        (k,) mask; no point where the spools lie in no plane, in a vertical plane, or on a line in space.
     """
     spools = np.concatenate([base_points, base_points + np.array([0.0, 1.0, 0.0])]) if planar else base_points
     if len(spools) < 3 or is_on_line(spools) or is_vertical(spools):

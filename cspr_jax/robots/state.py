@@ -1,4 +1,4 @@
-"""State of an effector at one instant: where it is, and how it moves."""
+"""State of an effector at one instant: position, orientation and their derivatives."""
 
 from typing import NamedTuple
 
@@ -16,13 +16,13 @@ class State(NamedTuple):
         angular_velocity: (3,) fixed axes, rad/s; None for a point mass.
         angular_acceleration: (3,) fixed axes, rad/s^2; None for a point mass.
         quaternion: (4,) the rotation as a unit quaternion, scalar first, continuous along a motion; None where it is
-            not asked for.
+            not needed.
     """
 
     position: Array
     velocity: Array
     acceleration: Array
-    # A platform's are always there: what handles platforms need not ask.
+    # They are typed as arrays, since platforms always have them.
     rotation: Array = None  # type: ignore[assignment]
     angular_velocity: Array = None  # type: ignore[assignment]
     angular_acceleration: Array = None  # type: ignore[assignment]

@@ -14,7 +14,7 @@ DEPTHS = np.linspace(-0.95, 1.0, 40)
 
 
 def slack_at_rest(robot: AnyRobot, limits: Limits) -> str | None:
-    """Reason why a robot cannot hang still with every cable taut; several cables share its weight in many ways.
+    """Reason why a robot cannot hang still with every cable taut, whichever way the cables share its weight.
 
     Args:
         robot: centred; a platform keeps the orientation of its file, on the vertical through the centroid.

@@ -1,4 +1,4 @@
-"""Turns and mirrors about the vertical that leave a platform robot what it is: found by trying, not assumed."""
+"""Rotations about the vertical and mirror planes that leave a platform robot unchanged: tried, not assumed."""
 
 import math
 from typing import NamedTuple
@@ -19,8 +19,8 @@ class Symmetries(NamedTuple):
     """Symmetries that leave a robot unchanged, but for the order of its cables.
 
     Fields:
-        fold: largest k for which a turn by 2 pi / k about the vertical through the centroid does.
-        mirrors: directions (azimuths in [0, pi[) of the vertical planes through it that do.
+        fold: largest k for which a rotation by 2 pi / k about the vertical through the centroid is a symmetry.
+        mirrors: azimuths, in [0, pi[, of the vertical mirror planes through the centroid.
     """
 
     fold: int
@@ -37,7 +37,7 @@ def symmetries(robot: PlatformRobot) -> Symmetries:
         robot: centred, in its reference axes.
 
     Returns:
-        those found.
+        the symmetries.
     """
     fold = next(k for k in range(LARGEST_FOLD, 0, -1) if _maps(robot, about_vertical(2.0 * math.pi / k)))
     # A mirror plane goes through a spool or halves the angle between two.
@@ -53,7 +53,7 @@ def symmetries(robot: PlatformRobot) -> Symmetries:
 
 
 def folded(symmetry: Symmetries, azimuths: np.ndarray) -> np.ndarray:
-    """Azimuths that stand for others, at which the robot can do the same.
+    """Azimuths that represent all others at which the robot can do the same.
 
     Args:
         azimuths: (n,) directions from the vertical through the centroid, rad.
@@ -67,10 +67,10 @@ def folded(symmetry: Symmetries, azimuths: np.ndarray) -> np.ndarray:
 
 
 def alike(symmetry: Symmetries, places: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """Orientations that stand for others: where a place lies on a mirror plane, the plane joins them in pairs.
+    """Orientations that represent others: at a place on a mirror plane, the plane joins orientations in pairs.
 
     Args:
-        places: (n, m) x and y from the vertical through the centroid, and whatever else tells places apart.
+        places: (n, m) x and y from the vertical through the centroid, and all else that distinguishes places.
         angles: (n, 3) tilt and torsion in the cylindrical frame of each place, rad.
 
     Returns:
@@ -82,8 +82,8 @@ def alike(symmetry: Symmetries, places: np.ndarray, angles: np.ndarray) -> np.nd
         return stands
     # The axis of the tilt is no vector: phi becomes pi - phi, and sigma -sigma.
     both = np.concatenate([angles[mirrored], np.array([math.pi, 0.0, 0.0]) + angles[mirrored] * [-1.0, 1.0, -1.0]])
-    turns = [f(both[:, i]) for i in (0, 2) for f in (np.cos, np.sin)]
-    keys = np.round(np.stack([*turns, both[:, 1], *np.tile(places[mirrored], (2, 1)).T], axis=1), KEY_DIGITS) + 0.0
+    units = [f(both[:, i]) for i in (0, 2) for f in (np.cos, np.sin)]
+    keys = np.round(np.stack([*units, both[:, 1], *np.tile(places[mirrored], (2, 1)).T], axis=1), KEY_DIGITS) + 0.0
     same = np.unique(keys, axis=0, return_inverse=True)[1].reshape(2, -1).min(0)
     _, first, group = np.unique(same, return_index=True, return_inverse=True)
     stands[mirrored] = mirrored[first[group]]

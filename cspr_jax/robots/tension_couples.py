@@ -14,7 +14,7 @@ def is_rectangle(base_points: np.ndarray) -> bool:
         base_points: (n_cables, 3) m.
 
     Returns:
-        the claim, to 1e-9 of the diagonal.
+        whether they are, to 1e-9 of the diagonal.
     """
     points = np.asarray(base_points, float)
     if points.shape != (4, SPATIAL):
@@ -33,21 +33,21 @@ def tension_couples(robot: PointMassRobot, position: Array, acceleration: Array)
     """Tension couples T12, T23, T34, T41 of a point mass on four cables, Boralugoda (2019), (30) to (33).
 
     A couple is the pull of two cables whose spools are the ends of a side, as seen along that side, where both lie in
-    one line. Unlike the tensions they follow from the motion alone: each two opposite ones share the force.
+    one line. Unlike the tensions, couples follow from the motion alone: each two opposite couples share the force.
 
     Args:
-        robot: a point mass whose spools are the corners of a level rectangle, see `is_rectangle`; elsewhere what is
-            returned means nothing.
+        robot: a point mass whose spools are the corners of a level rectangle, see `is_rectangle`; for other robots the
+            result means nothing.
         position: (3,) z down, m.
         acceleration: (3,) m/s^2.
 
     Returns:
-        (n_cables,) N: each of the cable of that place and the one after. Negative: a push, which cables cannot give.
-        Infinite or NaN in the spool plane.
+        (n_cables,) couple of each cable and the next one, N; negative where they would have to push, infinite or NaN in
+        the spool plane.
     """
     spools = robot.base_points
     force = robot.mass * relative_acceleration(robot, acceleration)
-    # From each side across to the opposite one.
+    # Vectors from each side across to the opposite side.
     across = jnp.roll(spools, -2, axis=0) - jnp.roll(spools, -1, axis=0)
     width = jnp.linalg.norm(across, axis=1)
     rays = position[None] - spools

@@ -1,13 +1,13 @@
-"""Tensions of a robot with more cables than it needs, at one instant: the least ones, and those far from their limits.
+"""Tensions of a robot with more cables than it needs, at one instant: the least ones, or the farthest from limits.
 
-All tensions that give a wrench are t = t0 + N^T x: t0 the least of all, N an orthonormal basis of what pulls on
-nothing, so that the least tensions within limits are those of the shortest feasible x. Of one or two components of x
-(d + 1 or d + 2 cables) it is 0, or on the line of one limit the nearest to 0, or where the lines of two limits meet:
-the nearest feasible of all these. Of more, the limit that is kept worst is fixed, again and again, as in the improved
-closed form of Pott (2013); a limit that then holds a tension back is let go again (Goldfarb and Idnani 1983), which
-makes the answer exact, and ends with a proof where there is none.
+All tensions that give a wrench are t = t0 + N^T x: t0 is the least of all, N an orthonormal basis of tensions without a
+wrench, so that the least tensions within limits belong to the shortest feasible x. With one or two components of x
+(d + 1 or d + 2 cables) this is the nearest feasible point among 0, the point of the line of each limit nearest to 0,
+and the points where the lines of two limits meet. With more components, the limit that is broken most is fixed, again
+and again, as in the improved closed form of Pott (2013); a limit that then holds a tension back is let go again
+(Goldfarb and Idnani 1983), which makes the answer exact, and proves that there is none where there is none.
 
-The largest distance from the limits is that of the set of wrenches: a limit of it is a face, `wrench_sets`.
+The largest distance from the limits is the distance of the wrench from the nearest face of `wrench_sets`.
 """
 
 import functools
@@ -23,11 +23,13 @@ from cspr_jax.arithmetic.elementary import solved
 from cspr_jax.errors import InputError
 from cspr_jax.robots.wrench_sets import FLAT, normals_to, spanning, wrench_faces
 
-# Over the largest tension: a limit counts as kept within this; of the points that are compared, within the other.
+# A limit counts as kept within the first of these parts of the largest tension; for points that are compared, within
+# the second.
 WITHIN, ROUNDING = 1e-9, 1e-11
-# A unit vector depends on others if less than this is left of it beside them.
+# A unit vector depends on others if its component normal to them is shorter than this.
 DEPENDENT = 1e-10
-# Steps of the search for the limits that are reached, over the number of cables; random cases take fewer than two.
+# Largest number of steps of the search for the limits that are reached, over the number of cables; random cases take
+# fewer than two.
 LONGEST = 10
 
 
@@ -35,9 +37,9 @@ class Distribution(NamedTuple):
     """Tensions of all cables at one instant.
 
     Fields:
-        tensions: (n_cables,) N. Where none are feasible, or those that a rule finds are not, those of least norm,
+        tensions: (n_cables,) N. Where none are feasible, or a rule finds none that are, the tensions of least norm,
             whatever the limits. They may not be finite where the cables do not span all components of a wrench.
-        residual: () size of W t - w, over 1 + that of w.
+        residual: () length of W t - w, over 1 + the length of w.
         is_within: () whether all limits are kept, to 1e-9 of the largest tension, and W has full rank.
     """
 
@@ -50,8 +52,8 @@ class AllTensions(NamedTuple):
     """All tensions that give a wrench: least + x @ kernel.
 
     Fields:
-        least: (n_cables,) those of least norm, N.
-        kernel: (n_free, n_cables) orthonormal rows that pull on nothing, one for each cable more than needed.
+        least: (n_cables,) tensions of least norm, N.
+        kernel: (n_free, n_cables) orthonormal rows of tensions without a wrench, one for each cable more than needed.
         is_regular: () whether the cables span all components of a wrench.
     """
 
@@ -77,7 +79,7 @@ def least_norm(matrix: Array, wrench: Array, tension_min: Array, tension_max: Ar
 
     Args:
         matrix: (dof, n_cables) unit columns: wrenches of unit tensions, moments over a length.
-        wrench: (dof,) what the cables must supply, N.
+        wrench: (dof,) wrench that the cables must supply, N.
         tension_min: (n_cables,) N.
         tension_max: (n_cables,) N, inf for none.
 
@@ -94,11 +96,11 @@ def least_norm(matrix: Array, wrench: Array, tension_min: Array, tension_max: Ar
 
 @jax.jit
 def centred(matrix: Array, wrench: Array, tension_min: Array, tension_max: Array) -> tuple[Distribution, Array]:
-    """The tensions that are farthest from their limits, of these the least.
+    """The tensions that are farthest from their limits; among these the least.
 
     Args:
         matrix: (dof, n_cables) unit columns: wrenches of unit tensions, moments over a length.
-        wrench: (dof,) what the cables must supply, N.
+        wrench: (dof,) wrench that the cables must supply, N.
         tension_min: (n_cables,) N.
         tension_max: (n_cables,) N, inf for none.
 
@@ -119,7 +121,9 @@ def centred(matrix: Array, wrench: Array, tension_min: Array, tension_max: Array
     return answer, jnp.where(solutions.is_regular, largest, -jnp.inf)
 
 
-def checked(matrix: Array, wrench: Array, low: Array, high: Array, every: AllTensions, tensions: Array) -> Distribution:
+def checked(
+    matrix: Array, wrench: Array, low: Array, high: Array, solutions: AllTensions, tensions: Array
+) -> Distribution:
     """Tensions with their residual and verdict.
 
     Args:
@@ -127,16 +131,16 @@ def checked(matrix: Array, wrench: Array, low: Array, high: Array, every: AllTen
         wrench: (dof,) N.
         low: (n_cables,) N.
         high: (n_cables,) N, inf for none.
-        every: of `all_tensions`.
-        tensions: (n_cables,) what a rule has found, N.
+        solutions: of `all_tensions`.
+        tensions: (n_cables,) tensions that a rule has found, N.
 
     Returns:
-        the tensions (n_cables,), those of least norm where they do not keep the limits; () residual; () whether what
-        is returned does.
+        the tensions (n_cables,), replaced by those of least norm where they break limits; () residual; () whether the
+        returned tensions keep the limits.
     """
-    tensions = jnp.where(keeps(tensions, low, high), tensions, every.least)
+    tensions = jnp.where(keeps(tensions, low, high), tensions, solutions.least)
     residual = jnp.linalg.norm(matrix @ tensions - wrench) / (1.0 + jnp.linalg.norm(wrench))
-    return Distribution(tensions, residual, every.is_regular & keeps(tensions, low, high))
+    return Distribution(tensions, residual, solutions.is_regular & keeps(tensions, low, high))
 
 
 def keeps(tensions: Array, low: Array, high: Array) -> Array:
@@ -190,7 +194,7 @@ def all_tensions(matrix: Array, wrench: Array) -> AllTensions:
 def _frame(matrix: Array, wrench: Array) -> tuple[Array, Array, Array]:
     """Orthonormal rows (n, n), those of W first; (n,) their products with tensions; (n,) their lengths at first.
 
-    By Gram and Schmidt, the longest first: of the rows of W, then of the unit vectors (whose products mean nothing).
+    By Gram and Schmidt, the longest vector first: the rows of W, then unit vectors, whose products mean nothing.
     """
     dof, count = matrix.shape
     is_row = np.arange(dof + count) < dof
@@ -199,7 +203,7 @@ def _frame(matrix: Array, wrench: Array) -> tuple[Array, Array, Array]:
         rest, products, frame, along = carry
         square = jnp.where(is_row == (k < dof), jnp.sum(rest**2, axis=1), -1.0)
         place = jnp.argmax(square)
-        # The parts along the others that rounding has left in it are taken off here.
+        # Subtract the components along the other rows that rounding has left.
         again = frame @ rest[place]
         vector = rest[place] - again @ frame
         length = jnp.linalg.norm(vector)
@@ -216,7 +220,7 @@ def _frame(matrix: Array, wrench: Array) -> tuple[Array, Array, Array]:
 
 
 def _shortest(solutions: AllTensions, low: Array, high: Array) -> Array:
-    """The shortest x (r,) within limits; where there is none, one that is not far beyond them."""
+    """The shortest x (r,) within limits; where there is none, an x that is not far beyond them."""
     freedom = solutions.kernel.shape[0]
     if freedom == 0:
         return jnp.zeros(0)
@@ -226,13 +230,13 @@ def _shortest(solutions: AllTensions, low: Array, high: Array) -> Array:
     tensions = solutions.least[None] + points @ solutions.kernel
     excess = jnp.max(jnp.abs(beyond(tensions, low[None], high[None])), axis=1)
     is_within = is_point & (excess <= ROUNDING * jnp.max(jnp.abs(tensions), axis=1))
-    # If the limits leave but one point, rounding can leave none.
+    # If the limits leave only one point, rounding can leave none.
     worse = jnp.where(is_within.any(), jnp.where(is_within, jnp.sum(points**2, axis=1), jnp.inf), excess)
     return points[jnp.argmin(jnp.where(is_point, worse, jnp.inf))]
 
 
 def _candidates(solutions: AllTensions, low: Array, high: Array) -> tuple[Array, Array]:
-    """Points where the shortest of one or two components can be, (k, r), and whether each is a point."""
+    """Candidates for the shortest x of one or two components, (k, r), and a mask of those that exist."""
     freedom, count = solutions.kernel.shape
     rows = jnp.concatenate([solutions.kernel.T, solutions.kernel.T])
     limits = jnp.concatenate([low, high])
@@ -261,9 +265,10 @@ def _pairs(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 class _ActiveSet(NamedTuple):
-    # For the limits that the shortest x reaches. At each step x = pulls @ kernel.T is the shortest for some limits.
+    # State of the search for the limits that the shortest x reaches. At each step x = pulls @ kernel.T is the shortest
+    # for some limits.
     point: Array  # (r,)
-    pulls: Array  # (n,) of the sign of `sides`, and of that of the limit sought
+    pulls: Array  # (n,) with the signs of `sides`, and of the limit sought
     sides: Array  # (n,) 1 held at its smallest tension, -1 at its largest, 0 free
     sought: Array  # () the cable whose limit is next
     is_seeking: Array  # ()
@@ -321,29 +326,29 @@ def _step(solutions: AllTensions, low: Array, high: Array, search: _ActiveSet) -
 
 
 def _at_limits(solutions: AllTensions, low: Array, high: Array, sides: Array) -> Array:
-    # Return the shortest x with so many tensions at their limits.
+    # Return the shortest x at which the tensions with a side are at their limits.
     limits = jnp.where(sides > 0.0, low, jnp.where(sides < 0.0, high, 0.0))
     offsets = jnp.where(sides == 0.0, 0.0, limits - solutions.least)
     return projected(solutions.kernel, sides != 0.0, jnp.zeros(solutions.kernel.shape[0]), offsets)[0]
 
 
-def projected(kernel: Array, is_held: Array, vector: Array, wanted: Array) -> tuple[Array, Array]:
-    """The nearest to a vector with given products with columns of the kernel, and what of each column is taken off.
+def projected(kernel: Array, is_held: Array, vector: Array, products: Array) -> tuple[Array, Array]:
+    """The vector nearest to another one that has given products with columns of the kernel.
 
     Args:
         kernel: (m, n_cables).
-        is_held: (n_cables,) whose products are given.
-        vector: (m,).
-        wanted: (n_cables,) the products.
+        is_held: (n_cables,) mask of the columns with given products.
+        vector: (m,) the other vector.
+        products: (n_cables,) the products.
 
     Returns:
-        (m,); (n_cables,).
+        (m,) the vector; (n_cables,) multiples of the columns that are subtracted.
     """
     freedom = kernel.shape[0]
     held = jnp.where(is_held[None], kernel, 0.0)
     above = jnp.concatenate([jnp.eye(freedom), held], axis=1)
     below = jnp.concatenate([held.T, jnp.diag(jnp.where(is_held, 0.0, 1.0))], axis=1)
-    right = jnp.concatenate([vector, jnp.where(is_held, wanted, 0.0)])
+    right = jnp.concatenate([vector, jnp.where(is_held, products, 0.0)])
     solution = solved(jnp.concatenate([above, below]), right[:, None])[0][:, 0]
     return solution[:freedom], solution[freedom:]
 
@@ -358,7 +363,7 @@ def _largest_distance(matrix: Array, wrench: Array, low: Array, high: Array, sol
     is_face = jnp.isfinite(faces.offsets) & (moves > 0.0)
     each = jnp.where(is_face, faces.slacks(lax.stop_gradient(wrench)) / jnp.where(is_face, moves, 1.0), jnp.inf)
     nearest = jnp.argmin(each)
-    # Compute the distance from that face alone once more, now differentiable: infinite limits have no place in it.
+    # Compute the distance from the nearest face once more, now differentiable: infinite limits must not appear in it.
     half = each.size // 2
     normal = normals_to(matrix)[nearest % half] * jnp.where(nearest < half, 1.0, -1.0)
     normal = normal / lax.stop_gradient(jnp.max(jnp.abs(normal)))

@@ -1,8 +1,8 @@
 """The least tensions within limits of many poses, one lane a pose: the fast form of `tension_distribution.least_norm`.
 
-For one or two cables more than components. All tensions are t0 + N^T x, by Gram and Schmidt, each row twice. The
-shortest feasible x is 0, or lies on the line where one cable is at a limit, as near to 0 as the others let it be: on
-each line they leave an interval, whose nearest point is a foot or where two lines meet.
+It serves robots with one or two cables more than components. All tensions are t0 + N^T x, by Gram and Schmidt, each row
+twice. The shortest feasible x is 0, or lies on the line where one cable is at a limit, as near to 0 as the other cables
+allow: on each line they leave an interval, whose point nearest to 0 is a foot of the line or a point where lines meet.
 """
 
 from collections.abc import Sequence
@@ -21,11 +21,12 @@ from cspr_jax.robots.wrench_sets import FLAT
 
 Lanes = Sequence[Array]
 
-# Components of x that are known here.
+# Numbers of components of x that are treated here.
 FREE = (1, 2)
 # Poses of a batch on a CPU, whose some hundred arrays fit a cache.
 BATCH = 4096
-# The slow form decides if other rows of a wrench matrix leave less than this of one, over the largest.
+# The slow form decides if the component of some row of a wrench matrix normal to the others is shorter than this part
+# of the longest.
 UNCERTAIN = 1e-5
 
 
@@ -37,7 +38,7 @@ def _dot(a: Lanes, b: Lanes) -> Array:
 
 
 def _apart(vector: Lanes, units: Sequence[Lanes], one: Array) -> tuple[Lanes, Lanes]:
-    """Rest of a vector beside unit vectors, and its products with them; twice, against rounding."""
+    """Component of a vector normal to unit vectors, and its products with them; computed twice, against rounding."""
     total: Lanes = [jnp.zeros_like(vector[0])] * len(units)
     for _ in range(2):
         products = stored([_dot(vector, unit) for unit in units], one)
@@ -49,7 +50,8 @@ def _apart(vector: Lanes, units: Sequence[Lanes], one: Array) -> tuple[Lanes, La
 
 @jax.jit
 def _all_tensions(matrix: Array, wrench: Array, one: Array) -> tuple[list[Array], list[list[Array]], Array]:
-    # matrix (dof, n_cables, n), wrench (dof, n): t0, N, and the shortest rest of a row over the longest.
+    # Take matrix (dof, n_cables, n) and wrench (dof, n); return t0, N, and the shortest normal component of a row over
+    # the longest.
     dof, count = matrix.shape[:2]
     units: list[Lanes] = []
     along: list[Array] = []
@@ -64,7 +66,7 @@ def _all_tensions(matrix: Array, wrench: Array, one: Array) -> tuple[list[Array]
     least = [_dot(along, [unit[k] for unit in units]) for k in range(count)]
     kernel: list[list[Array]] = []
     for _ in range(count - dof):
-        # The cable that the others leave the most of.
+        # Take the cable whose unit vector has the longest component normal to the rows so far.
         rest = [1.0 - _dot(column, column) for column in ([unit[k] for unit in units] for k in range(count))]
         place, most = jnp.zeros_like(rest[0]), rest[0]
         for k, value in enumerate(rest[1:], 1):
@@ -81,14 +83,14 @@ def _all_tensions(matrix: Array, wrench: Array, one: Array) -> tuple[list[Array]
 
 
 def _interval(values: Lanes, rates: Lanes, low: Lanes, high: Lanes, rounding: Array) -> tuple[Array, Array]:
-    """Ends of the numbers s for which values + s * rates keep limits; the first is above the other where none do."""
+    """Ends of the interval of s in which values + s * rates keep limits, in reverse order where it is empty."""
     first, last = jnp.full_like(values[0], -jnp.inf), jnp.full_like(values[0], jnp.inf)
     for value, rate, least, most in zip(values, rates, low, high, strict=True):
         moves = jnp.abs(rate) > FLAT
         inverse = 1.0 / jnp.where(moves, rate, 1.0)
         to_least, to_most = (least - rounding - value) * inverse, (most + rounding - value) * inverse
         near, far = lesser(to_least, to_most), jnp.where(to_least > to_most, to_least, to_most)
-        # A tension that does not move keeps its limits everywhere or nowhere.
+        # A tension with rate zero keeps its limits everywhere or nowhere.
         is_kept = (value >= least - rounding) & (value <= most + rounding)
         near, far = jnp.where(moves, near, -jnp.inf), jnp.where(moves | is_kept, far, -jnp.inf)
         far = jnp.where(moves | ~is_kept, far, jnp.inf)
@@ -97,13 +99,13 @@ def _interval(values: Lanes, rates: Lanes, low: Lanes, high: Lanes, rounding: Ar
 
 
 def _nearest(first: Array, last: Array) -> Array:
-    # To 0, of an interval.
+    # Return the point of an interval that is nearest to 0.
     return jnp.where(first > 0.0, first, jnp.where(last < 0.0, last, 0.0))
 
 
 @jax.jit
 def _on_line(least: Lanes, kernel: Sequence[Lanes], low: Lanes, high: Lanes, size: Array) -> Array:
-    # The shortest x with the first cable at a limit, as a complex number; not finite where there is none.
+    # Return the shortest x with the first cable at a limit, as a complex number; not finite where there is none.
     (a, *others), (b, *more) = kernel
     square = a * a + b * b
     inverse = 1.0 / jnp.where(square > FLAT**2, square, 1.0)
@@ -123,7 +125,7 @@ def _on_line(least: Lanes, kernel: Sequence[Lanes], low: Lanes, high: Lanes, siz
 
 @jax.jit
 def _in_interval(least: Lanes, kernel: Sequence[Lanes], low: Lanes, high: Lanes, size: Array) -> Array:
-    # The shortest x of one component.
+    # Return the shortest x of one component.
     first, last = _interval(least, kernel[0], low, high, ROUNDING * size)
     along = jnp.where(first <= last, _nearest(first, last), jnp.inf)
     return lax.complex(along, jnp.zeros_like(along))
@@ -147,7 +149,7 @@ def _shortest(least: Lanes, low: Lanes, high: Lanes, size: Array, points: Sequen
     for point in points[1:]:
         square = point.real * point.real + point.imag * point.imag
         best, shortest = jnp.where(square < shortest, point, best), lesser(square, shortest)
-    # No point: not finite.
+    # The result is not finite where no point is within limits.
     return jnp.where(within, jnp.zeros_like(best), best)
 
 
@@ -187,7 +189,7 @@ def _of_batch(batch: tuple[np.ndarray, ...]) -> tuple[tuple[Array, ...], Array, 
     if len(kernel) == 1:
         points = [_in_interval(least, kernel, lows, highs, size)]
     else:
-        # Each cable in turn is the first: one program for all.
+        # Take each cable in turn as the first, so that one compiled function serves all.
         points = []
         for k in range(len(lows)):
             rolled = [[x[k], *x[:k], *x[k + 1 :]] for x in (least, *kernel, lows, highs)]
@@ -204,12 +206,12 @@ def least_norms(
 
     Args:
         matrices: (n, dof, n_cables) float64, unit columns; one or two cables more than components.
-        wrenches: (n, dof) N.
-        low: (n, n_cables) N.
-        high: (n, n_cables) N, inf for none.
+        wrenches: (n, dof) wrenches that the cables must supply, N.
+        low: (n, n_cables) smallest tensions, N.
+        high: (n, n_cables) largest tensions, N, inf for none.
 
     Returns:
-        NumPy arrays, tensions (n, n_cables) N, residual (n,), whether within limits (n,); (n,) whether cables are so
+        NumPy arrays: tensions (n, n_cables) N, residual (n,), whether within limits (n,); (n,) whether cables are so
         near to not spanning all components that `least_norm` should decide.
     """
 

@@ -11,15 +11,15 @@ def by_program(matrix: np.ndarray, wrench: np.ndarray, low: np.ndarray | None, h
 
     Args:
         matrix: (dof, n_cables) wrench matrix, moments over a length.
-        wrench: (dof,) what the cables must supply, N.
-        low: (n_cables,) N; None: wrench closure is asked about, s <= t <= 1 - s with no wrench at all; the rank of the
-            matrix is not looked at.
-        high: (n_cables,) N, inf for none; None: likewise.
+        wrench: (dof,) wrench that the cables must supply, N.
+        low: (n_cables,) smallest tensions, N; None: test wrench closure, s <= t <= 1 - s without a wrench, whatever the
+            rank of the matrix.
+        high: (n_cables,) largest tensions, N, inf for none; None: likewise.
 
     Returns:
         whether the largest s is positive.
     """
-    from scipy.optimize import linprog  # takes long to import, and few ask
+    from scipy.optimize import linprog  # takes long to import, and is rarely needed
 
     dof, count = matrix.shape
     if low is None or high is None:
@@ -33,7 +33,7 @@ def by_program(matrix: np.ndarray, wrench: np.ndarray, low: np.ndarray | None, h
         b_ub=limits[is_finite],
         A_eq=np.c_[matrix, np.zeros(dof)],
         b_eq=wrench,
-        # Without largest tensions s may have no bound of its own.
+        # Without largest tensions s may have no bound: give it one.
         bounds=[*[(None, None)] * count, (None, np.abs(wrench).max() + 1.0)],
     )
     return bool(program.status == 0 and program.x[-1] > 0.0)
@@ -44,13 +44,13 @@ def by_squares(matrix: np.ndarray, wrench: np.ndarray, low: np.ndarray | None, h
 
     Args:
         matrix: (dof, n_cables) wrench matrix, moments over a length.
-        wrench: (dof,) what the cables must supply, N.
-        low: (n_cables,) N; None: wrench closure is asked about, by tensions of 1 or more without a wrench; the rank of
-            the matrix is not looked at.
-        high: (n_cables,) N, inf for none; None: likewise.
+        wrench: (dof,) wrench that the cables must supply, N.
+        low: (n_cables,) smallest tensions, N; None: test wrench closure, by tensions of 1 or more without a wrench,
+            whatever the rank of the matrix.
+        high: (n_cables,) largest tensions, N, inf for none; None: likewise.
 
     Returns:
-        whether the residual is below 1e-6 of what is wanted.
+        whether the residual is below 1e-6 of the right-hand side.
     """
     from scipy.optimize import nnls
 
@@ -58,7 +58,7 @@ def by_squares(matrix: np.ndarray, wrench: np.ndarray, low: np.ndarray | None, h
     if low is None or high is None:
         low, high, wrench = np.ones(count), np.full(count, np.inf), np.zeros(dof)
     bounded = np.flatnonzero(np.isfinite(high))
-    # The slack that is left to each largest tension is one more unknown.
+    # The slack of each largest tension is one more unknown.
     system = np.zeros((dof + len(bounded), count + len(bounded)))
     system[:dof, :count] = matrix
     system[dof + np.arange(len(bounded)), bounded] = 1.0

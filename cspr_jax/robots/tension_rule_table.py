@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-CENTRED = "centred"  # that of plans which name none
+CENTRED = "centred"  # rule of plans that name none
 
 
 class TensionRule(NamedTuple):
@@ -10,9 +10,9 @@ class TensionRule(NamedTuple):
 
     Fields:
         name: as files and callers write it.
-        sentence: what it finds.
+        sentence: description of the tensions that it finds.
         is_bounded: whether every cable needs a largest tension.
-        is_exact: whether it finds tensions wherever there are any.
+        is_exact: whether it finds feasible tensions wherever there are any.
     """
 
     name: str

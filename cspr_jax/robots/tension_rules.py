@@ -1,9 +1,9 @@
 """Rules that choose among the tensions of more cables than needed: a table, and the rules that are not exact.
 
-`tension_distribution` has the exact ones. The closed forms are what controllers compute, and no tests of a workspace:
-they can miss tensions that are there. At 100,000 random poses of a suspended robot on eight cables the closed form
-found tensions for 12 % of the feasible ones (35 % with wider limits), the improved one for 98.8 % (99.6 %), and neither
-found false ones.
+`tension_distribution` has the exact rules. The closed forms are what controllers compute; they are no tests of a
+workspace, since they can miss feasible tensions. Among 100,000 random poses of a suspended robot on eight cables the
+closed form found tensions for 12 % of the feasible poses (35 % with wider limits), the improved one for 98.8 % (99.6
+%), and neither found false ones.
 """
 
 from collections.abc import Callable
@@ -33,14 +33,14 @@ from cspr_jax.robots.tension_distribution_lanes import FREE, least_norms
 from cspr_jax.robots.tension_rule_table import TENSION_RULES
 
 BATCH = 4096
-# The p-norm takes so many steps of Newton's method, over which the weight of the limits falls from first to last;
-# compares so many lengths of each; and goes no farther than this part of the way to the nearest limit.
+# The p-norm takes so many steps of Newton's method, while the weight of the limits falls from first to last; compares
+# so many lengths of each step; and goes no farther than this part of the way to the nearest limit.
 STEPS, LENGTHS, KEPT = 60, 24, 0.99
 FIRST_WEIGHT, LAST_WEIGHT, LAST_STEPS = 1e-1, 1e-14, 12
-# Tensions nearer to the reference than this part of the largest distance are taken as that far from it: a second
-# derivative would be infinite there.
+# Tensions nearer to the reference than this part of the largest distance count as being at this distance: nearer, a
+# second derivative would be infinite.
 NEAR = 1e-9
-# Cables without a largest tension: over the largest tension in sight, where the search may begin.
+# For cables without a largest tension the search may begin at this multiple of the largest tension in sight.
 FAR = 10.0
 EXPONENT, LEAST_EXPONENT, LARGEST_EXPONENT = 4.0, 1.01, 100.0
 
@@ -53,7 +53,7 @@ def closed_form(matrix: Array, wrench: Array, tension_min: Array, tension_max: A
 
     Args:
         matrix: (dof, n_cables) unit columns: wrenches of unit tensions, moments over a length.
-        wrench: (dof,) what the cables must supply, N.
+        wrench: (dof,) wrench that the cables must supply, N.
         tension_min: (n_cables,) N.
         tension_max: (n_cables,) N, finite.
 
@@ -73,13 +73,13 @@ def closed_form(matrix: Array, wrench: Array, tension_min: Array, tension_max: A
 
 @jax.jit
 def improved_closed_form(matrix: Array, wrench: Array, tension_min: Array, tension_max: Array) -> Distribution:
-    """The closed form, where the cable that is the farthest beyond a limit is held there, again and again.
+    """The closed form, in which the cable farthest beyond a limit is held at the limit, again and again.
 
-    Pott (2013). A cable that is held is never let go, so that tensions can be missed, though few.
+    Pott (2013). A held cable is never let go, so that feasible tensions can be missed, though rarely.
 
     Args:
         matrix: (dof, n_cables) unit columns: wrenches of unit tensions, moments over a length.
-        wrench: (dof,) what the cables must supply, N.
+        wrench: (dof,) wrench that the cables must supply, N.
         tension_min: (n_cables,) N.
         tension_max: (n_cables,) N, finite.
 
@@ -113,7 +113,7 @@ def improved_closed_form(matrix: Array, wrench: Array, tension_min: Array, tensi
 
 
 def _as_found(answer: Distribution, tensions: Array, low: Array, high: Array) -> Distribution:
-    # Tensions of least norm stand in for what a rule misses: if they keep the limits, the rule has missed them still.
+    # Tensions of least norm replace those that break limits; even if they keep the limits, the rule has missed them.
     return answer._replace(is_within=answer.is_within & keeps(tensions, low, high))
 
 
@@ -123,12 +123,12 @@ def p_norm(
 ) -> Distribution:
     """The tensions within limits whose p-norm about reference tensions is the least; exact to 1e-6 of their range.
 
-    By Newton's method along the path of logarithmic barriers, which ends at 1e-14 of the largest value: limits that are
-    reached with a pull are then exact to 1e-10, the others to the root of the weight.
+    By Newton's method along the path of logarithmic barriers, which ends at a weight of 1e-14 of the largest value:
+    active limits are then reached to 1e-10, weakly active ones to the root of the weight.
 
     Args:
         matrix: (dof, n_cables) unit columns: wrenches of unit tensions, moments over a length.
-        wrench: (dof,) what the cables must supply, N.
+        wrench: (dof,) wrench that the cables must supply, N.
         tension_min: (n_cables,) N.
         tension_max: (n_cables,) N, inf for none.
         reference: (n_cables,) N.
@@ -144,7 +144,7 @@ def p_norm(
     size = jnp.max(jnp.abs(solutions.least)) + jnp.max(jnp.abs(tension_min)) + jnp.max(jnp.abs(reference))
     largest = jnp.where(jnp.isfinite(tension_max), tension_max, FAR * size)
     start, room = centred(matrix, wrench, tension_min, largest)
-    # If the limits leave but one point, that point is the answer.
+    # If the limits leave only one point, that point is the answer.
     is_open = room > ROUNDING * size
     tensions = jnp.where(
         is_open,
@@ -186,7 +186,7 @@ def _along_barriers(solutions: AllTensions, start: Array, low: Array, high: Arra
         hessian = (solutions.kernel * bends[None]) @ solutions.kernel.T
         hessian = hessian + jnp.eye(freedom) * (1e-15 * jnp.trace(hessian) + 1e-300)
         way = -solved(hessian, (solutions.kernel @ slope)[:, None])[0][:, 0] @ solutions.kernel
-        # No farther than to a limit.
+        # Go no farther than to a limit.
         up, down = (
             jnp.where(has_largest, below / jnp.where(way > 0.0, way, 1.0), jnp.inf),
             above / jnp.where(way < 0.0, -way, 1.0),
@@ -205,7 +205,7 @@ class Rule(NamedTuple):
     """A rule that chooses tensions.
 
     Fields:
-        function: of matrix, wrench, smallest and largest tensions; the p-norm's of reference and exponent too.
+        function: takes matrix, wrench, smallest and largest tensions; the p-norm also reference and exponent.
         is_bounded: whether every cable needs a largest tension.
     """
 
@@ -233,7 +233,7 @@ def by_rule(rule: str, matrix: Array, wrench: Array, tension_min: Array, tension
     Args:
         rule: a name of `RULES`; known when a function is compiled.
         matrix: (dof, n_cables) unit columns: wrenches of unit tensions, moments over a length.
-        wrench: (dof,) what the cables must supply, N.
+        wrench: (dof,) wrench that the cables must supply, N.
         tension_min: (n_cables,) N.
         tension_max: (n_cables,) N, inf for none; finite where the rule is bounded.
 
@@ -245,7 +245,7 @@ def by_rule(rule: str, matrix: Array, wrench: Array, tension_min: Array, tension
 
 
 def middles(tension_min: Array, tension_max: Array) -> Array:
-    """Middles of the ranges of the tensions, about which the p-norm is taken where nothing else is given.
+    """Middles of the ranges of the tensions, the default reference of the p-norm.
 
     Args:
         tension_min: (...) N.
@@ -272,12 +272,11 @@ def distributions(
 
     Args:
         matrices: (n, dof, n_cables) unit columns: wrenches of unit tensions, moments over a length.
-        wrenches: (n, dof) what the cables must supply, N.
+        wrenches: (n, dof) wrenches that the cables must supply, N.
         tension_min: (n_cables,) or (n, n_cables) N.
         tension_max: (n_cables,) or (n, n_cables) N, inf for none.
         rule: a name of `RULES`.
-        reference: (n_cables,) or (n, n_cables) of the p-norm, N; None: the middles of the ranges, and the smallest
-            tension of a cable without a largest.
+        reference: (n_cables,) or (n, n_cables) of the p-norm, N; None: `middles`.
         exponent: p of the p-norm, from 1.01 to 100.
 
     Returns:
@@ -320,7 +319,7 @@ _COMPILED = {name: jax.jit(jax.vmap(rule.function)) for name, rule in RULES.item
 
 
 def _least_norms(matrix: np.ndarray, wrench: np.ndarray, low: np.ndarray, high: np.ndarray) -> Distribution:
-    # Compute by lanes, and the poses that these cannot decide once more by the slow form.
+    # Compute in lanes, then the poses that these cannot decide by the slow form.
     answer, is_open = least_norms(matrix, wrench, low, high)
     again = np.flatnonzero(is_open)
     if len(again):

@@ -9,7 +9,7 @@ from cspr_jax.robots.point_mass import plane_normal, rest_point
 from cspr_jax.robots.robot import check_determined
 from cspr_jax.robots.state import State
 
-# Normalised determinants up to this count as singular, of whichever sign rounding makes them.
+# Normalised determinants up to this count as singular, since rounding may decide their sign.
 SINGULAR = 1e-6
 
 
@@ -67,17 +67,17 @@ def is_regular(determinant):
     """Tell whether cables can carry every wrench: the rule that decides which poses are singular.
 
     Args:
-        determinant: (...) of `normalised_determinant`, or over that of a pose from which no singularity may part it;
-            NumPy or jax.
+        determinant: (...) of `normalised_determinant`, or its share of that of another pose, which no singularity may
+            separate from this one; NumPy or jax.
 
     Returns:
-        (...) whether it is above `SINGULAR`; False of NaN, and of other signs, beyond a singularity.
+        (...) whether it is above `SINGULAR`; False for NaN, and for a negative share, beyond a singularity.
     """
     return determinant > SINGULAR
 
 
 def determinant_share(robot: PlatformRobot, position: Array, rotation: Array) -> Array:
-    """Normalised determinant over that of the reference orientation at the same depth in the middle.
+    """Normalised determinant over its value in the reference orientation at the same depth in the middle.
 
     Args:
         robot: centred, in its reference axes.
@@ -85,7 +85,7 @@ def determinant_share(robot: PlatformRobot, position: Array, rotation: Array) ->
         rotation: (3, 3).
 
     Returns:
-        () for `is_regular`.
+        () as `is_regular` takes it.
     """
     middle = rest_point(plane_normal(robot) @ position)
     return normalised_determinant(robot, position, rotation) / normalised_determinant(robot, middle, jnp.eye(3))

@@ -1,6 +1,6 @@
 """The wrench balance of many platforms, one lane a case: the fast form of `wrench_balance`, one division at the end.
 
-(3.11) is solved by adjugates, the cables in two groups of three; the determinant falls out of the same products.
+(3.11) is solved by adjugates, with the cables in two groups of three; the same products give the determinant.
 """
 
 import itertools
@@ -14,7 +14,7 @@ from jax import Array
 from cspr_jax.arithmetic.lanes import Matrix, Vector, combined, cross, dot, turned, turned_back
 from cspr_jax.robots.platform import PlatformRobot
 
-CABLES = 6  # what the adjugates and Laplace's expansion here are written for
+CABLES = 6  # the number for which the adjugates and Laplace's expansion here are written
 
 
 class CableLanes(NamedTuple):
@@ -33,10 +33,10 @@ class Balance(NamedTuple):
     """The tensions per mass and length as fractions.
 
     Fields:
-        numerators: six, of mu.
-        denominator: their common one.
+        numerators: six numerators of mu.
+        denominator: common denominator.
         signed: a number with the sign of det J.
-        volume: of the first, third and fifth ray, m^3.
+        volume: volume of the first, third and fifth ray, m^3.
     """
 
     numerators: Sequence[Array]
@@ -45,32 +45,32 @@ class Balance(NamedTuple):
     volume: Array
 
 
-def cables(robot: PlatformRobot, position: Vector, turn: Matrix) -> CableLanes:
-    """The cables, (3.1).
+def cable_lanes(robot: PlatformRobot, position: Vector, rotation: Matrix) -> CableLanes:
+    """Arms and rays of the cables, (3.1).
 
     Args:
         position: of the mass centre, m.
-        turn: rows of the rotation matrix.
+        rotation: rows of the rotation matrix.
 
     Returns:
         the cables.
     """
-    each = {k: turned(turn, [robot.platform_points[k, j] for j in range(3)]) for k in set(robot.joints)}
+    each = {k: turned(rotation, [robot.platform_points[k, j] for j in range(3)]) for k in set(robot.joints)}
     arms = [each[k] for k in robot.joints]
     rays = [tuple(position[i] + arm[i] - robot.base_points[k, i] for i in range(3)) for k, arm in enumerate(arms)]
     return CableLanes(arms, rays)
 
 
 def inertial_wrench(
-    robot: PlatformRobot, acceleration: Vector, turn: Matrix, omega: Vector, spin: Vector
+    robot: PlatformRobot, acceleration: Vector, rotation: Matrix, omega: Vector, angular_acceleration: Vector
 ) -> tuple[Vector, Vector]:
     """Right-hand side of (3.11), per mass.
 
     Args:
         acceleration: m/s^2.
-        turn: rows of the rotation matrix.
+        rotation: rows of the rotation matrix.
         omega: rad/s.
-        spin: rad/s^2.
+        angular_acceleration: rad/s^2.
 
     Returns:
         force, m/s^2, and moment, m^2/s^2.
@@ -78,15 +78,15 @@ def inertial_wrench(
     inertia = robot.inertia / robot.mass
 
     def weighted(vector):
-        own_axes = turned_back(turn, vector)
-        return turned(turn, [dot([inertia[i, j] for j in range(3)], own_axes) for i in range(3)])
+        own_axes = turned_back(rotation, vector)
+        return turned(rotation, [dot([inertia[i, j] for j in range(3)], own_axes) for i in range(3)])
 
-    x, y = weighted(spin), cross(omega, weighted(omega))
+    x, y = weighted(angular_acceleration), cross(omega, weighted(omega))
     force = (acceleration[0], acceleration[1], acceleration[2] - robot.gravity)
     return force, tuple(a + b for a, b in zip(x, y, strict=True))
 
 
-def balance(wires: CableLanes, force: Vector, moment: Vector) -> Balance:
+def balance(cables: CableLanes, force: Vector, moment: Vector) -> Balance:
     """The tensions that give a wrench, (3.11).
 
     Args:
@@ -96,8 +96,8 @@ def balance(wires: CableLanes, force: Vector, moment: Vector) -> Balance:
     Returns:
         the tensions per mass and length.
     """
-    pulls = [tuple(-x for x in ray) for ray in wires.rays]
-    moments = [cross(arm, pull) for arm, pull in zip(wires.arms, pulls, strict=True)]
+    pulls = [tuple(-x for x in ray) for ray in cables.rays]
+    moments = [cross(arm, pull) for arm, pull in zip(cables.arms, pulls, strict=True)]
     first, second = range(0, CABLES, 2), range(1, CABLES, 2)
     a, b = [pulls[k] for k in first], [pulls[k] for k in second]
     adjugate = (cross(a[1], a[2]), cross(a[2], a[0]), cross(a[0], a[1]))
@@ -115,41 +115,41 @@ def balance(wires: CableLanes, force: Vector, moment: Vector) -> Balance:
     odd = [dot(row, rest) for row in inner]
     even = [top[j] * determinant - sum(g[j][n] * odd[n] for n in range(3)) for j in range(3)]
     numerators = [x for pair in zip(even, [d * x for x in odd], strict=True) for x in pair]
-    # Taking the cables in two groups is an odd permutation.
+    # The order of the cables in two groups is an odd permutation.
     return Balance(numerators, d * determinant, -determinant, d)
 
 
-def determinant(wires: CableLanes) -> Array:
-    """Determinant of J, (3.5), in three pairs of cables: the volumes of their forces times those of their moments.
+def determinant(cables: CableLanes) -> Array:
+    """Determinant of J, (3.5), as a sum of volumes of three rays times volumes of the moments of the other three.
 
     Returns:
         (...) m^9.
     """
-    moments = [cross(arm, ray) for arm, ray in zip(wires.arms, wires.rays, strict=True)]
+    moments = [cross(arm, ray) for arm, ray in zip(cables.arms, cables.rays, strict=True)]
     total = jnp.zeros(())
     for three in itertools.combinations(range(CABLES), 3):
         others = [k for k in range(CABLES) if k not in three]
-        a, b, c = (wires.rays[k] for k in three)
+        a, b, c = (cables.rays[k] for k in three)
         d, e, f = (moments[k] for k in others)
-        # Laplace's expansion by the first three columns.
+        # Sign of the term in Laplace's expansion by the first three columns.
         sign = -1.0 if (sum(three) - 3) % 2 else 1.0
         total = total + sign * dot(a, cross(b, c)) * dot(d, cross(e, f))
     return total
 
 
-def normalised_determinant(robot: PlatformRobot, wires: CableLanes) -> Array:
+def normalised_determinant(robot: PlatformRobot, cables: CableLanes) -> Array:
     """Determinant of J with unit cables and the platform's size as unit; see `wrench_balance.normalised_determinant`.
 
     Returns:
         (...).
     """
-    lengths = [jnp.sqrt(dot(ray, ray)) for ray in wires.rays]
+    lengths = [jnp.sqrt(dot(ray, ray)) for ray in cables.rays]
     size = jnp.sqrt(jnp.mean(jnp.sum(robot.platform_points**2, axis=1)))
-    return determinant(wires) / (size**3 * math.prod(lengths[1:], start=lengths[0]))
+    return determinant(cables) / (size**3 * math.prod(lengths[1:], start=lengths[0]))
 
 
 def cable_rates(
-    wires: CableLanes, velocity: Vector, acceleration: Vector, omega: Vector, spin: Vector
+    cables: CableLanes, velocity: Vector, acceleration: Vector, omega: Vector, angular_acceleration: Vector
 ) -> list[list[Array]]:
     """Lengths of the cables and their first two derivatives, (3.2) and (3.3).
 
@@ -157,16 +157,16 @@ def cable_rates(
         velocity: of the mass centre, per unit of time.
         acceleration: likewise.
         omega: angular velocity.
-        spin: angular acceleration.
+        angular_acceleration: likewise.
 
     Returns:
         lengths, rates, accelerations: six arrays (...) each.
     """
     rows = []
-    for arm, ray in zip(wires.arms, wires.rays, strict=True):
+    for arm, ray in zip(cables.arms, cables.rays, strict=True):
         swing = cross(omega, arm)
         pace = combined([(jnp.ones(()), velocity), (jnp.ones(()), swing)])
-        across, inward = cross(spin, arm), cross(omega, swing)
+        across, inward = cross(angular_acceleration, arm), cross(omega, swing)
         pull = tuple(acceleration[i] + across[i] + inward[i] for i in range(3))
         length = jnp.sqrt(dot(ray, ray))
         rate = dot(ray, pace) / length

@@ -1,8 +1,8 @@
-"""Sets of wrenches that cables can give, as faces: of any number of cables, for two, three or six components.
+"""Sets of wrenches that cables can give, as faces: for any number of cables, and two, three or six components.
 
-With tensions between their smallest and their largest the wrenches W t fill a zonotope, without a largest tension a
-cone. Every face of it is parallel to d - 1 independent columns of W, so that the normals to all choices of d - 1
-columns are candidates, each with both signs (hyperplane shifting: Bouchard, Gosselin and Moore 2010; Gouttefarde and
+With tensions between smallest and largest values the wrenches W t fill a zonotope; without largest tensions, a cone.
+Every face is parallel to d - 1 independent columns of W, so that the normals to all choices of d - 1 columns are
+candidates, each with both signs (hyperplane shifting: Bouchard, Gosselin and Moore 2010; Gouttefarde and
 Krut 2010). A candidate bounds nothing where a cable without a largest tension pulls beyond it.
 """
 
@@ -21,9 +21,10 @@ from cspr_jax.robots.point_mass import PLANAR, PointMassRobot, relative_accelera
 from cspr_jax.robots.robot import Robot
 from cspr_jax.robots.state import State
 
-# Columns are unit vectors: d - 1 of them with a volume below this span nothing; a column nearer to a plane lies in it.
+# Columns are unit vectors: d - 1 columns with a volume below this span no face; a column nearer to a plane lies in it.
 FLAT = 1e-12
-# Rounding of a slack, over the size of what it is a difference of; divided by the volume of the face's columns.
+# Rounding of a slack, over the size of the numbers of which it is the difference; to be divided by the volume of the
+# face's columns.
 ROUNDING = 1e-14
 
 
@@ -33,14 +34,15 @@ class Faces:
     """Set of feasible wrenches, or of accelerations: where no slack is negative.
 
     Fields:
-        normals: (..., n_faces, n_components) unit normals that point inside; 0 of a face that bounds nothing.
-        offsets: (..., n_faces) N or m/s^2; -inf of a face that bounds nothing.
-        volumes: (..., n_faces) size of the product of the unit columns that span the face, in [0, 1].
-        apex: (..., n_components) what the smallest tensions give.
+        normals: (..., n_faces, n_components) unit normals that point inside; 0 for a face that bounds nothing.
+        offsets: (..., n_faces) N or m/s^2; -inf for a face that bounds nothing.
+        volumes: (..., n_faces) volume of the unit columns that span the face, in [0, 1].
+        apex: (..., n_components) wrench, or acceleration, of the smallest tensions.
         of_largest: (..., n_faces) whether a largest tension is reached on the face.
         is_regular: (...) whether the set has an inside: the cables span all d components.
-        closure: (...) margin of wrench closure, a pure number in [-1, 1]: positive if the cables, pulled hard enough,
-            resist every wrench. Of every plane that d - 1 unit columns span, the farther columns on its emptier side.
+        closure: (...) margin of wrench closure, a pure number in [-1, 1], positive if the cables, pulled hard enough,
+            resist every wrench: the least, over all planes that d - 1 unit columns span, of the distance of the
+            farthest column on the emptier side.
     """
 
     normals: Array
@@ -58,7 +60,7 @@ class Faces:
             values: (..., n_components) wrenches, or accelerations.
 
         Returns:
-            (..., n_faces) positive inside; inf of a face that bounds nothing.
+            (..., n_faces) positive inside; inf for a face that bounds nothing.
         """
         return jnp.sum(self.normals * values[..., None, :], axis=-1) - self.offsets
 
@@ -69,9 +71,9 @@ class Faces:
             values: (..., n_components) wrenches, or accelerations.
 
         Returns:
-            (...) inside the set the distance from its boundary, inf where it has none; outside of it negative, and no
-            smaller than the distance from the set. Where the cables span less than a plane (of d = 2, a line), the
-            distance from what the smallest tensions give, negative.
+            (...) inside the set the distance from its boundary, inf where it has none; outside negative, in size at
+            most the distance from the set. Where the cables span no plane (with d = 2, no line), minus the distance
+            from the wrench, or acceleration, of the smallest tensions.
         """
         slacks = self.slacks(values)
         least, spanned = jnp.min(slacks, axis=-1), jnp.isfinite(self.offsets).any(-1)
@@ -85,7 +87,7 @@ class Faces:
             values: (..., n_components) wrenches, or accelerations.
 
         Returns:
-            (...) a margin that is nearer to zero is of either sign.
+            (...) a margin nearer to zero than this may have either sign.
         """
         size = jnp.linalg.norm(values, axis=-1)[..., None]
         offsets = jnp.abs(jnp.where(jnp.isfinite(self.offsets), self.offsets, 0.0))
@@ -105,8 +107,9 @@ def _subsets(count: int, size: int) -> np.ndarray:
 
 @functools.cache
 def _level(rows: int, columns: int, size: int) -> tuple[np.ndarray, ...]:
-    # How products of `size` columns follow from those of one column less: parent and last column of each choice of
-    # columns; for each choice of rows the row of the last column, the other rows, and the sign, (n_choices, size) each.
+    # Return how products of `size` columns follow from products of one column less: the parent and the last column of
+    # each choice of columns; for each choice of rows the row of the last column, the other rows, and the sign,
+    # (n_choices, size) each.
     smaller = {tuple(s): i for i, s in enumerate(_subsets(columns, size - 1).tolist())}
     chosen = _subsets(columns, size)
     parent = np.array([smaller[tuple(s[:-1])] for s in chosen.tolist()])
@@ -136,15 +139,15 @@ def normals_to(matrix: Array) -> Array:
         matrix: (dof, n_cables) of dof - 1 columns or more.
 
     Returns:
-        (n_choices, dof) in the order of `spanning`; the product with a column is the determinant of all together.
+        (n_choices, dof) in the order of `spanning`; the product with another column is the determinant of all columns.
     """
     dof, count = matrix.shape
-    products = matrix.T  # of one column, by row
+    products = matrix.T  # products of one column, by row
     for size in range(2, dof):
         parent, last, row, rest, sign = _level(dof, count, size)
         terms = products[parent][:, rest] * matrix.T[last][:, row]
         products = terms @ sign
-    # Rows that a product leaves out, in the order of `_subsets`: the last first.
+    # In the order of `_subsets`, the row that a product leaves out is the last one first.
     signs = np.array([(-1.0) ** (dof - 1 - i) for i in range(dof)])
     return products[:, ::-1] * signs[None]
 
@@ -191,7 +194,7 @@ def wrench_faces(matrix: Array, tension_min: Array, tension_max: Array) -> Faces
 
 
 def _offset(along: Array, low: Array, high: Array) -> Array:
-    # The smallest value of a normal's product with a wrench.
+    # Return the smallest product of each normal with a wrench of the set.
     return jnp.sum(along * jnp.where(along > 0.0, low[None], jnp.where(along < 0.0, high[None], 0.0)), axis=1)
 
 
@@ -206,7 +209,7 @@ def acceleration_faces(robot: PointMassRobot, position: Array, tension_min: Arra
         tension_max: (n_cables,) N, inf for none.
 
     Returns:
-        the faces, of vectors in space; of a planar robot their normals have no y.
+        the faces, whose normals are vectors in space; y is zero for a planar robot.
     """
     still = jnp.zeros_like(position)
     matrix = robot.wrench_matrix(State(position, still, still))
@@ -228,7 +231,8 @@ def tension_range(robot: Robot, limits: Limits) -> tuple[Array, Array]:
         robot: gives the number of cables.
 
     Returns:
-        (n_cables,) N: 0 where no smallest tension is given; (n_cables,) N: inf where no largest is.
+        (n_cables,) smallest tensions, N, 0 where none is given; (n_cables,) largest tensions, N, inf where none is
+        given.
     """
     count = robot.n_cables
     low = jnp.zeros(count) if limits.tension_min is None else jnp.asarray(limits.tension_min)

@@ -15,20 +15,20 @@ Files, each importing only from those above it:
     geometry                unit vectors and wrench matrices of many poses
     required                wrenches that cables must supply
     questions               conditions with their limits and wrenches
-    cocircuits              which cocircuits a robot has
-    worst_cocircuits        the one that decides at a pose
+    cocircuits              cocircuits that a robot has
+    worst_cocircuits        the cocircuit that decides at a pose
     margins                 margins, cocircuit by cocircuit, between two bounds
     exact                   margins of single poses by singular values
     kernels                 compiled margins of many poses
     search                  margins and verdicts of many poses
     cells                   boxes of positions, and bounds over them
-    inside_cells            cells whose every position keeps its tensions
-    outside_cells           cells whose every position lacks them
+    inside_cells            cells in which tensions stay within limits at every position
+    outside_cells           cells in which no tensions within limits suffice at any position
     cell_proofs             proofs of many cells
     shifts                  how far cables move within a cell
     clearances              clearances of robots at rest
     speeds                  speeds of cables
-    whole_cells             cells of maps, halved where open
+    whole_cells             cells of maps, halved where they stay open
     rest_poses              all conditions together, and sets of orientations
     acceleration_search     feasible accelerations at many places
     sensitivities           sensitivities to errors of the cable lengths

@@ -11,7 +11,7 @@ from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.robots.wrench_sets import Faces
 
-# Places computed at a time; of robots with many cables, whose faces are many, fewer.
+# Number of places computed at a time; fewer for robots on many cables, whose faces are many.
 BATCH = 4096
 _ROOM = 1 << 22
 
@@ -21,11 +21,11 @@ def _size(robot: PointMassRobot, power: int) -> int:
 
 
 def reach_of(robot: PointMassRobot, limits: Limits, positions: np.ndarray) -> AccelerationReach:
-    """Feasible accelerations at many places, and how large they are.
+    """Sizes of the sets of feasible accelerations at many places.
 
     Args:
         robot: a point mass, centred, z down.
-        limits: smallest and largest tensions count.
+        limits: only limits of tensions count.
         positions: (n, 3) m.
 
     Returns:
@@ -44,7 +44,7 @@ def faces_of(robot: PointMassRobot, limits: Limits, positions: np.ndarray) -> Fa
 
     Args:
         robot: a point mass, centred, z down.
-        limits: smallest and largest tensions count.
+        limits: only limits of tensions count.
         positions: (n, 3) m.
 
     Returns:

@@ -20,7 +20,7 @@ class FeasibleAccelerationMap(PointMassMap):
     any_cables = True
 
     def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
-        """Refuse more cables than there is room for the corners of their faces."""
+        """Refuse robots on so many cables that the corners of their faces need too much memory."""
         super().__init__(robot_file, keys, file)
         if self._problem.robot.n_cables > MOST_CABLES:
             place, key = robot_file.placed("base_points", file)

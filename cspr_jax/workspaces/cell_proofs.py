@@ -1,4 +1,4 @@
-"""Proofs of cells at one orientation: which keep their tensions, or lack them, at every position; without halving."""
+"""Proofs of cells at one orientation, without halving: that they lie wholly inside a workspace, or wholly outside."""
 
 import numpy as np
 
@@ -12,24 +12,24 @@ from cspr_jax.robots.wrench_sets import spanning
 from cspr_jax.workspaces.cells import Cells, cells_about
 from cspr_jax.workspaces.inside_cells import least_margins
 from cspr_jax.workspaces.outside_cells import are_beyond, are_one_sided
-from cspr_jax.workspaces.questions import CLOSURE, Requirement
+from cspr_jax.workspaces.questions import CLOSURE
 from cspr_jax.workspaces.search import WorkspaceSearch
 from cspr_jax.workspaces.worst_cocircuits import worst_cocircuits
 
-# Cells that are proved at a time, whose arrays fit a cache, and poses whose cocircuits are compared at a time.
+# Cells that are proved at a time, so that their arrays fit a cache; poses whose cocircuits are compared at a time.
 PART, BATCH = 256, 1024
-# Tensions at the centre keep this part of the margin there from their limits. At the whole margin nothing but one
-# point is left, which rounding can miss.
+# Tensions at the centre keep this part of the margin from their limits. At the whole margin only one point is left,
+# which rounding can miss.
 KEPT = 0.98
 
 
 class CellProofs:
     """Proofs of cells at one orientation, without halving."""
 
-    def __init__(self, robot: AnyRobot, asked: Requirement, search: WorkspaceSearch, quaternion: np.ndarray) -> None:
-        """Prepare the proofs for a robot without pulleys and the search of the same question."""
-        self._asked, self._is_closure = asked, asked.condition == CLOSURE
-        self._unbounded = tuple(np.isinf(asked.high).tolist())
+    def __init__(self, robot: AnyRobot, search: WorkspaceSearch, quaternion: np.ndarray) -> None:
+        """Prepare the proofs of the requirement of a search, for its robot, which has no pulleys."""
+        self._requirement, self._is_closure = search.requirement, search.requirement.condition == CLOSURE
+        self._unbounded = tuple(np.isinf(search.requirement.high).tolist())
         self._exits, self._forces = _geometry(robot, quaternion, search.unit)
         # The required wrenches are the same at every place, for the robot does not turn.
         required = search.required(np.zeros(3), quaternion)
@@ -58,14 +58,15 @@ class CellProofs:
             margin: (n,) at the centres, positive.
 
         Returns:
-            (n,) N: tensions keep so far from their limits at every position, or -inf; of wrench closure a number that
-            is positive where the closure of the whole cell is proved. Of ellipsoids of wrenches nothing is.
+            (n,) distance that tensions keep from their limits at every position, N, or -inf; for wrench closure a
+            number that is positive where closure is proved in the whole cell. For ellipsoids of wrenches nothing is
+            proved.
         """
         if not (self._is_finite or self._is_closure):
             return np.full(len(positions), -np.inf)
         units, count = self.matrices(positions), self._exits.shape[0]
-        low, high, loads = self._asked.low, self._asked.high, self._wrenches
-        if self._is_closure:  # by any tensions that pull on nothing
+        low, high, loads = self._requirement.low, self._requirement.high, self._wrenches
+        if self._is_closure:  # tensions without a wrench
             low, high, loads = np.zeros(count), np.full(count, np.inf), np.zeros((1, units.shape[1]))
             room = np.ones((1, 1))
         else:
@@ -88,14 +89,17 @@ class CellProofs:
             half: (n, 3) half sizes, m.
 
         Returns:
-            (n,) whether it is proved.
+            (n,) whether this is proved.
         """
-        low, high = self._asked.low, self._asked.high
+        low, high = self._requirement.low, self._requirement.high
         finite = np.where(self._unbounded, 0.0, high)
-        options = {"condition": "closure" if self._is_closure else "tensions", "unbounded": self._unbounded}
-        worst = in_batches(
-            lambda x: worst_cocircuits(x, self._wrenches, low, finite, **options), self.matrices(positions), size=BATCH
-        )
+        condition = "closure" if self._is_closure else "tensions"
+
+        def kernel(matrices):
+            loads, unbounded = self._wrenches, self._unbounded
+            return worst_cocircuits(matrices, loads, low, finite, condition=condition, unbounded=unbounded)
+
+        worst = in_batches(kernel, self.matrices(positions), size=BATCH)
         held, loads = self._subsets[worst.subset], self._wrenches[worst.load]
 
         def proved(chosen, normals, held):
@@ -129,8 +133,8 @@ def _geometry(robot: AnyRobot, quaternion: np.ndarray, unit: np.ndarray) -> tupl
     forces = np.repeat(axes[list(row.forces)].T[..., None], count, axis=2)
     if not isinstance(robot, PlatformRobot):
         return base, forces / unit[:, None]
-    turn = np.array([[float(x) for x in line] for line in lanes.rotation(tuple(quaternion))])
-    arms = np.asarray(robot.platform_points) @ turn.T
+    rotation = np.array([[float(x) for x in line] for line in lanes.rotation_matrix(tuple(quaternion))])
+    arms = np.asarray(robot.platform_points) @ rotation.T
     moments = np.cross(arms, axes[:, None])  # (3, n_cables, 3)
-    directions = turn @ np.asarray(across_line(robot)) if row.along_line else axes[:, list(row.moments)]
+    directions = rotation @ np.asarray(across_line(robot)) if row.along_line else axes[:, list(row.moments)]
     return base - arms, np.concatenate([forces, (moments @ directions).transpose(0, 2, 1)], axis=1) / unit[:, None]

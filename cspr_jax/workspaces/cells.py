@@ -1,17 +1,17 @@
-"""Cells of a workspace: boxes of positions at one orientation, and bounds of what varies linearly over them; no jax.
+"""Cells of a workspace: boxes of positions at one orientation, and bounds of functions of the position; no jax.
 
 Let a cable's force density be its tension over its length, f_i = t_i / L_i(p), and its ray r_i(p) = e_i - p, where e_i
 is its base point less the arm of its attachment point. At one orientation the wrench of a cable is linear in its ray,
-A_i r_i, so that W(p) t = w is Z(p) f = w, whose columns Z_i(p) = A_i (e_i - p) are affine in the position: of the unit
-vectors' curvature nothing is left but the lengths, which enter the limits of the tensions alone. With positions
-p = p0 + H x, H the half sizes and |x_k| <= 1,
+A_i r_i, so that W(p) t = w becomes Z(p) f = w, whose columns Z_i(p) = A_i (e_i - p) are affine in the position: only
+the lengths remain nonlinear, and they enter only the limits of the tensions. With positions p = p0 + H x, H the half
+sizes and |x_k| <= 1,
 
     Z(p) = Z0 - sum_k x_k N_k,        N_k = H_k [A_1 e_k, ..., A_n e_k],
 
-and a solution that keeps its basis is a power series in x, of which `inside_cells` and `outside_cells` take the terms
-of first and second order as they are and bound the rest by norms.
+and a solution with a fixed basis is a power series in x. `inside_cells` and `outside_cells` keep its terms of first and
+second order and bound the rest by norms.
 
-Arrays are (cells, ...); those over x have an axis of length 3, of the second order two of them.
+Arrays are (cells, ...); coefficients of first order in x have one axis of length 3, those of second order two.
 """
 
 import math
@@ -19,8 +19,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Share of the sizes that enter a sum of up to some hundred products of float64 (2.2e-16 each): what rounding may have
-# added to it, with room for rays, arms and rotations that are rounded themselves.
+# Rounding may have added this share of the sizes to a sum of up to some hundred products of float64 (2.2e-16 each),
+# with room for rays, arms and rotations that are rounded themselves.
 ROUNDING = 1e-12
 
 
@@ -31,7 +31,7 @@ class Cells(NamedTuple):
         matrices: (n, m, n_cables) Z0 at the centres, moments over a length, m.
         changes: (n, 3, m, n_cables) N_k, m.
         rays: (n, n_cables, 3) from attachment point to base point at the centres, m.
-        steps: (n, n_cables, 3) products of unit vectors of the cables with the half sizes, m: by how much lengths fall.
+        steps: (n, n_cables, 3) products of unit vectors of the cables with the half sizes, by which lengths fall, m.
         lengths: (n, n_cables) L_i at the centres, m.
         radius: (n,) from centre to corner, m.
         rounding: (n, n_cables) bound of the rounding of a column of Z, m.
@@ -47,14 +47,14 @@ class Cells(NamedTuple):
 
     @property
     def shortest(self) -> np.ndarray:
-        """Lower bound of the lengths over the cells, (n, n_cables), m; not positive where there is none."""
+        """Lower bound of the lengths over the cells, (n, n_cables), m; not positive where nothing is known."""
         return (self.lengths - self.radius[:, None]) * (1.0 - ROUNDING) - self.rounding
 
     def take(self, chosen: np.ndarray) -> "Cells":
-        """Some of them.
+        """Some of the cells.
 
         Args:
-            chosen: (k,) their places, or (n,) of bool.
+            chosen: (k,) indices, or a mask (n,).
 
         Returns:
             the cells.
@@ -63,7 +63,7 @@ class Cells(NamedTuple):
 
 
 def cells_about(centres: np.ndarray, half: np.ndarray, exits: np.ndarray, wrenches: np.ndarray) -> Cells:
-    """Cells of some centres.
+    """Cells about centres.
 
     Args:
         centres: (n, 3) m.
@@ -90,7 +90,7 @@ def reach(linear: np.ndarray) -> np.ndarray:
     """Largest value of a linear function over the cells.
 
     Args:
-        linear: (..., 3) its coefficients of x.
+        linear: (..., 3) coefficients of x.
 
     Returns:
         (...).
@@ -102,7 +102,7 @@ def least_quadratic(quadratic: np.ndarray) -> np.ndarray:
     """Lower bound of a quadratic form over the cells, each product of two components on its own.
 
     Args:
-        quadratic: (..., 3, 3) its coefficients, not symmetric.
+        quadratic: (..., 3, 3) coefficients, not symmetric.
 
     Returns:
         (...) at most 0.
@@ -113,12 +113,12 @@ def least_quadratic(quadratic: np.ndarray) -> np.ndarray:
 
 
 def norm_reach(vectors: np.ndarray) -> np.ndarray:
-    """Bound of the Euclidean norm of a linear function over the cells, of matrices Frobenius'.
+    """Bound of the norm of a linear function over the cells: Euclidean of vectors, Frobenius' of matrices.
 
     |sum_k x_k v_k|^2 is at most the sum of all |v_k . v_l|.
 
     Args:
-        vectors: (n, 3, ...) its coefficients of x.
+        vectors: (n, 3, ...) coefficients of x.
 
     Returns:
         (n,).
@@ -131,7 +131,7 @@ def pair_norm(vectors: np.ndarray) -> np.ndarray:
     """Bound of the Euclidean norm of a quadratic function over the cells.
 
     Args:
-        vectors: (n, 3, 3, m) its coefficients, not symmetric.
+        vectors: (n, 3, 3, m) coefficients, not symmetric.
 
     Returns:
         (n,).
@@ -142,13 +142,13 @@ def pair_norm(vectors: np.ndarray) -> np.ndarray:
 
 
 def inverse_factor(squares: np.ndarray) -> np.ndarray:
-    """Inverse of the lower Cholesky factor of symmetric matrices; no error where one is not positive definite.
+    """Inverse of the lower Cholesky factor of symmetric matrices, without an error where one is not positive definite.
 
     Args:
         squares: (n, m, m).
 
     Returns:
-        (n, m, m) lower triangular; not finite where there is none.
+        (n, m, m) lower triangular; not finite where the matrix is not positive definite.
     """
     size = squares.shape[1]
     left = np.ascontiguousarray(squares.transpose(1, 2, 0))

@@ -15,17 +15,17 @@ from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.workspaces import geometry
 
 BATCH = 4096
-# Numbers of `schema.meanings.NEAREST_BODIES`; a pose that has nothing to meet takes the last one.
+# Numbers of `schema.meanings.NEAREST_BODIES`; a pose with no body that could be met takes 0.
 KINDS = dict(zip(get_args(Kind), range(1, 5), strict=True))
 
 
 def surroundings(robot: AnyRobot, frame: Frame, obstacles: Sequence[Obstacle] = (), body: Body | None = None) -> Scene:
-    """A robot at rest among what its cables can meet.
+    """A robot at rest among the bodies that its cables can meet.
 
     Args:
         robot: centred, z down.
         frame: axes of the robot file.
-        obstacles: fixed in space, in the axes of the file.
+        obstacles: bodies fixed in space, in the axes of the file.
         body: shape of the platform, in platform axes as in the file, from the mass centre, or from the joint.
 
     Returns:
@@ -48,42 +48,42 @@ def at_rest(robot: AnyRobot, around: Scene, positions: np.ndarray, quaternions: 
     Returns:
         the clearances.
     """
-    turns, ends = quaternions if PATTERNS[robot.pattern].is_body else None, None
+    body_quaternions, ends = quaternions if PATTERNS[robot.pattern].is_body else None, None
     pulleys = robot.pulleys
     if pulleys is not None:
         ends = in_batches(lambda x: geometry.exit_points(robot, pulleys, *x), (positions, quaternions), size=BATCH)
-    return clearances(around, positions, turns, ends=ends)
+    return clearances(around, positions, body_quaternions, ends=ends)
 
 
-def flags(found: Clearances) -> np.ndarray:
-    """Reasons why poses are not free of interference.
+def flags(distances: Clearances) -> np.ndarray:
+    """Flags of the reasons why poses are not free of interference.
 
     Args:
-        found: of `at_rest`.
+        distances: of `at_rest`.
 
     Returns:
         (n,) flags of `Verdict`.
     """
-    verdict = np.zeros(len(found.clearance), FLAGS)
+    verdict = np.zeros(len(distances.clearance), FLAGS)
     for values, flag in (
-        (found.cables, Verdict.CABLE_CABLE),
-        (found.obstacles, Verdict.OBSTACLE),
-        (found.platform, Verdict.CABLE_PLATFORM),
+        (distances.cables, Verdict.CABLE_CABLE),
+        (distances.obstacles, Verdict.OBSTACLE),
+        (distances.platform, Verdict.CABLE_PLATFORM),
     ):
-        # NaN is open.
+        # NaN compares as false: such poses stay open.
         verdict |= np.where(values <= 0.0, flag, 0).astype(FLAGS)
-    return np.where(found.is_open, Verdict.UNDECIDED, verdict).astype(FLAGS)
+    return np.where(distances.is_open, Verdict.UNDECIDED, verdict).astype(FLAGS)
 
 
-def nearest_bodies(around: Scene, found: Clearances) -> np.ndarray:
+def nearest_bodies(around: Scene, distances: Clearances) -> np.ndarray:
     """Kind of the nearest bodies at each pose.
 
     Args:
         around: of `surroundings`.
-        found: of `at_rest`.
+        distances: of `at_rest`.
 
     Returns:
         (n,) numbers of `schema.meanings.NEAREST_BODIES`.
     """
     numbers = np.array([*(KINDS[meeting.kind] for meeting in around.meetings), 0], np.int16)
-    return numbers[found.nearest]
+    return numbers[distances.nearest]

@@ -1,12 +1,13 @@
 """Cocircuits of a wrench matrix: the vectors of its row space with the fewest components that are not zero.
 
-They decide what cables can do. A wrench w is given by tensions within limits, W t = w, with a distance s from all
-limits, if and only if for each cocircuit y and any tensions t0 with W t0 = w the product y . t0 is far enough from
-what the limits allow (hyperplane shifting: Bouchard, Gosselin and Moore 2010; Gouttefarde and Krut 2010). Every wrench
-can be resisted if and only if the rank is full and each cocircuit has components of both signs.
+They decide what cables can do. Tensions at a distance s from all limits give a wrench w, W t = w, if and only if for
+each cocircuit y and any tensions t0 with W t0 = w the product y . t0 keeps a distance, which grows with s, from the
+bounds that the limits set (hyperplane shifting: Bouchard, Gosselin and Moore 2010; Gouttefarde and Krut 2010). Every
+wrench can be resisted if and only if the rank is full and each cocircuit has components of both signs.
 
-There are two ways to all of them: y = c . W, with c normal to dof - 1 columns; and, of six components and up to two
-cables more, the relations among the rows of the null space. One lane a pose: all numbers are arrays (...) of one shape.
+There are two ways to compute all cocircuits: y = c . W, with c normal to dof - 1 columns; and, with six components and
+at most eight cables, the relations among the rows of the null space. One lane a pose: all numbers are arrays (...) of
+one shape.
 """
 
 import itertools
@@ -23,19 +24,19 @@ from cspr_jax.robots.wrench_sets import spanning
 CABLES = 6  # of a base block, in two groups of three
 # Further cables beside a base block.
 MOST_OTHERS = 2
-# Columns are unit vectors: a cocircuit that is shorter than this at every pose that was tried is none.
+# Columns are unit vectors: a vector that is shorter than this at every pose that was tried is no cocircuit.
 NOTHING = 1e-12
 
 Column = Sequence[Array]
 
 
 class CableSubsets(NamedTuple):
-    """Choices of dof - 1 cables whose columns have a normal that is not normal to all others.
+    """Choices of dof - 1 cables whose columns have a normal that is not normal to all other columns.
 
     Fields:
-        table: (n_choices, n_cables) the dof - 1 cables, the others behind them.
-        counts: (n_choices, n_cables - dof + 1) whether the component of each of the others can differ from zero, as
-            numbers; None: all can.
+        table: (n_choices, n_cables) the dof - 1 chosen cables, then the others.
+        counts: (n_choices, n_cables - dof + 1) 1 where the component of another cable can differ from zero, else 0;
+            None: all can.
     """
 
     table: np.ndarray
@@ -43,7 +44,7 @@ class CableSubsets(NamedTuple):
 
 
 def choices_of(matrices: np.ndarray) -> CableSubsets:
-    """Choices of dof - 1 cables that are one at some pose: four cables at one point are none, wherever they are.
+    """Choices of dof - 1 cables that give a cocircuit at some pose; four cables at one point never do.
 
     Args:
         matrices: (n, dof, n_cables) finite wrench matrices of poses, of unit columns.
@@ -52,7 +53,7 @@ def choices_of(matrices: np.ndarray) -> CableSubsets:
         the choices.
 
     Raises:
-        ValueError: a matrix is not finite: as NaN compares with nothing, it would strike out what is there.
+        ValueError: a matrix is not finite: since NaN compares as false, it would strike out cocircuits that exist.
     """
     _check_finite(matrices)
     dof, count = matrices.shape[1:]
@@ -80,10 +81,10 @@ def normal(columns: Sequence[Column]) -> Column:
     """Normal to dof - 1 columns: their generalised cross product.
 
     Args:
-        columns: of dof components each, dof - 1 of them, at least one.
+        columns: dof - 1 columns of dof components, at least one.
 
     Returns:
-        dof components; the product with another column is the determinant of all together.
+        dof components; the product with another column is the determinant of all columns together.
     """
     dof = len(columns) + 1
     if dof == 2:
@@ -96,7 +97,7 @@ def normal(columns: Sequence[Column]) -> Column:
 
 
 def _minors(columns: Sequence[Column]) -> dict[tuple[int, ...], Array]:
-    # Determinants of all choices of as many rows as columns.
+    # Return the determinants of all choices of as many rows as columns.
     dof = len(columns[0])
     minors: dict[tuple[int, ...], Array] = {(row,): columns[0][row] for row in range(dof)}
     for size, column in enumerate(columns[1:], 2):
@@ -109,7 +110,7 @@ def _minors(columns: Sequence[Column]) -> dict[tuple[int, ...], Array]:
 
 
 def _laplace(head: dict, tail: dict, rows: Sequence[int], sign: int) -> Array:
-    # The determinant of some rows by the minors of the first columns and those of the last.
+    # Return the determinant of some rows by the minors of the first columns and those of the last.
     terms, signs, size = list[Array](), list[int](), len(next(iter(head)))
     for places in itertools.combinations(range(len(rows)), size):
         rest = [place for place in range(len(rows)) if place not in places]
@@ -142,13 +143,13 @@ def product(a: Sequence[Array], b: Sequence[Array]) -> Array:
 
 
 def relation(rows: Sequence[Sequence[Array]]) -> Sequence[Array]:
-    """Relation among rows of the null space, one more than it has columns: a cocircuit of their cables.
+    """Relation among rows of the null space, one row more than it has columns: a cocircuit of their cables.
 
     Args:
-        rows: one, of no column; two, of one; or three, of two.
+        rows: one row of no column, two of one column, or three of two columns.
 
     Returns:
-        as many components.
+        as many components as rows.
     """
     if len(rows) == 2:
         return (rows[1][0], -rows[0][0])
@@ -165,8 +166,8 @@ class Block(NamedTuple):
 
     Fields:
         tensions: for each wrench six, in the order of the block.
-        common: what they are multiplied by: the cube of a volume and the determinant of the block.
-        scale: of what their last digits are.
+        common: factor of all tensions: the cube of a volume times the determinant of the block.
+        scale: size of the numbers whose last digits are the error of the tensions.
     """
 
     tensions: Sequence[Sequence[Array]]
@@ -178,8 +179,8 @@ def block(columns: Sequence[Column], wrenches: Sequence[Column]) -> Block:
     """Tensions of six cables by adjugates, the cables in two groups of three; no division.
 
     Args:
-        columns: six, of three forces and three moments each; the forces of the first three should span space.
-        wrenches: of six components each.
+        columns: six columns of three forces and three moments; the forces of the first three should span space.
+        wrenches: six components each.
 
     Returns:
         the tensions.
@@ -189,7 +190,7 @@ def block(columns: Sequence[Column], wrenches: Sequence[Column]) -> Block:
     volume = dot(a[0], adjugate[0])
 
     def reduced(six):
-        # Return the pulls of the first three cables that cancel the force, times the volume, and the moment then left.
+        # Return the pulls of the first three cables that cancel the force, times the volume, and the remaining moment.
         pulls_on_force = [dot(row, six[:3]) for row in adjugate]
         left = tuple(volume * six[3 + i] - sum(c[j][i] * pulls_on_force[j] for j in range(3)) for i in range(3))
         return pulls_on_force, left
@@ -203,13 +204,13 @@ def block(columns: Sequence[Column], wrenches: Sequence[Column]) -> Block:
         last = [dot(row, left) for row in inner]
         first = [pulls_on_force[j] * determinant - sum(pulls[n][j] * last[n] for n in range(3)) for j in range(3)]
         tensions.append([*first, *(volume * x for x in last)])
-    # All are products of two of what is left of columns, and of more that is not above 1.
+    # All tensions are products of two remaining moments and of factors not above 1.
     most = largest([jnp.abs(x) for left in lefts for x in left])
     return Block(tensions, volume * determinant, most * most)
 
 
 def base_order(matrices: np.ndarray) -> tuple[int, ...]:
-    """Order of cables in space whose first six, and of these the first three forces, are the farthest from singular.
+    """Order of the cables in space such that the first six, and the first three forces, are far from singular.
 
     Args:
         matrices: (n, 6, n_cables) of poses, finite, moments over a length.

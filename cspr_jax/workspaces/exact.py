@@ -1,4 +1,4 @@
-"""Margins of poses one by one, by singular values: of any robot, and where the wrench matrix loses rank; no jax."""
+"""Margins of poses one by one, by singular values: for any robot, and where the wrench matrix loses rank; no jax."""
 
 import itertools
 from typing import NamedTuple
@@ -8,7 +8,8 @@ import numpy as np
 from cspr_jax.workspaces.cocircuits import CableSubsets
 from cspr_jax.workspaces.required import RequiredWrenches
 
-# Columns are unit vectors: smaller singular values, over the largest one and at all, count as zero.
+# Singular values count as zero below the first of these parts of the largest one, or below the second number, since
+# columns are unit vectors.
 RANK, NOTHING = 1e-9, 1e-13
 # Components of a cocircuit below this part of the largest one count as zero.
 ZERO = 1e-10
@@ -23,8 +24,8 @@ def cocircuits(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         matrix: (dof, n_cables).
 
     Returns:
-        (k, n_cables) of unit length, one sign of each; (k, dof) the normals c with c^T W = y, in the span; (dof, rank)
-        an orthonormal basis of the span.
+        (k, n_cables) cocircuits y of unit length, one sign of each; (k, dof) the normals c with c^T W = y, in the span;
+        (dof, rank) an orthonormal basis of the span.
     """
     left, sizes, right = np.linalg.svd(matrix, full_matrices=False)
     rank = int((sizes > max(RANK * sizes[0], NOTHING)).sum())
@@ -59,12 +60,12 @@ class Planes(NamedTuple):
 
 
 def margin_planes(matrix: np.ndarray, low: np.ndarray, high: np.ndarray) -> Planes:
-    """Planes whose distances, in newtons of tension, are the margin: one for each cocircuit and sign that bounds it.
+    """Planes that bound the margin by their distances, in newtons of tension: one a cocircuit and sign.
 
     Args:
         matrix: (dof, n_cables).
-        low: (n_cables,) N.
-        high: (n_cables,) N; inf where there is none.
+        low: (n_cables,) smallest tensions, N.
+        high: (n_cables,) largest tensions, N; inf where there is none.
 
     Returns:
         the planes.
@@ -90,11 +91,11 @@ def wrench_margin(
 
     Args:
         matrix: (dof, n_cables).
-        wrenches: what the cables must supply.
-        low: (n_cables,) N.
-        high: (n_cables,) N; inf where there is none: a margin counts against finite limits alone.
-        measure: (dof,) by what the components of normals are multiplied, for the capacity margin, the distance of the
-            wrenches from the faces of what can be supplied; None: the margin of the tensions.
+        wrenches: wrenches that the cables must supply.
+        low: (n_cables,) smallest tensions, N.
+        high: (n_cables,) largest tensions, N; inf where there is none: the margin counts only finite limits.
+        measure: (dof,) factors of the components of normals for the capacity margin, which is the distance of the
+            wrenches from the faces of the set that can be supplied; None: the margin of the tensions.
 
     Returns:
         N; inf where nothing bounds it, -inf where a wrench is outside of the span of the cables.
@@ -127,7 +128,7 @@ def closure_margin(matrix: np.ndarray, choices: CableSubsets) -> float:
 
     Args:
         matrix: (dof, n_cables).
-        choices: of the robot, which say what of its cocircuits is always zero.
+        choices: of the robot, which say which components of its cocircuits are always zero.
 
     Returns:
         the margin, in [-1, 1]; -1 where the cables do not span all components.
@@ -138,14 +139,14 @@ def closure_margin(matrix: np.ndarray, choices: CableSubsets) -> float:
     other = components != 0.0
     most, least = components.max(1, initial=-np.inf, where=other), components.min(1, initial=np.inf, where=other)
     rarer = np.minimum(most, -least) / np.abs(components).max(1)
-    # A component that is zero here and not everywhere may have either sign.
+    # A component that is zero here, but not at every pose, may have either sign.
     always = len(matrix) - 1 + _always_zero(components, choices)
     has_more = (~other).sum(1) > always
     return float(np.where(has_more, np.maximum(rarer, 0.0), rarer).min())
 
 
 def _always_zero(components: np.ndarray, choices: CableSubsets) -> np.ndarray:
-    # How many components more than those of a hyperplane's columns are zero at every pose of the robot.
+    # Return the number of components, beside those of a hyperplane's columns, that are zero at every pose of the robot.
     if choices.counts is None:
         return np.zeros(len(components), int)
     size = components.shape[1] - choices.counts.shape[1]

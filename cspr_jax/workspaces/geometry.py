@@ -1,8 +1,8 @@
 """Geometry of many poses: unit vectors of the cables, columns of the wrench matrix, weights.
 
-Arrays are (n_cables, n): a row a cable, a lane a pose. Turned arms, unit vectors, columns and what follows come from
-compiled calls of their own: in one call XLA would compute each length three times, and loops over what the call itself
-has stored are three times as slow as over its arguments.
+Arrays are (n_cables, n): a row a cable, a lane a pose. Turned arms, unit vectors, columns and all that follows are
+compiled separately: in one call XLA would compute each length three times, and loops over values that the call itself
+has stored are three times as slow as loops over its arguments.
 """
 
 from collections.abc import Sequence
@@ -31,11 +31,11 @@ def wrench_columns(
         robot: z down.
         position: of the mass centre, or of the joint, three arrays (n,), m.
         quaternion: unit quaternion, scalar first, four arrays (n,); None: no rotation.
-        length: () by which moments are divided, m.
+        length: () length by which moments are divided, m.
 
     Returns:
         dof arrays (n_cables, n), a component each; (n,) at least 1: coordinates over the length of the shortest cable,
-        for a difference of coordinates keeps their rounding.
+        since a difference of coordinates keeps their rounding.
     """
     arms = None if quaternion is None else turned_arms(robot, quaternion)
     units, loss = unit_vectors(robot, position, arms)
@@ -57,8 +57,8 @@ def turned_arms(robot: AnyRobot, quaternion: Vector) -> Vector | None:
     if not isinstance(robot, PlatformRobot):
         return None
     shape = robot.n_cables, len(quaternion[0])
-    turn = [[_along(x, shape) for x in row] for row in lanes.rotation(quaternion)]
-    return lanes.turned(turn, _down(robot.platform_points, shape))
+    rotation = [[_along(x, shape) for x in row] for row in lanes.rotation_matrix(quaternion)]
+    return lanes.turned(rotation, _down(robot.platform_points, shape))
 
 
 def _along(lane: Array, shape: tuple[int, int]) -> Array:
@@ -75,7 +75,7 @@ def unit_vectors(robot: AnyRobot, position: Vector, arms: Vector | None) -> tupl
     Args:
         robot: z down.
         position: of the mass centre, or of the joint, three arrays (n,), m.
-        arms: of `turned_arms`; None: of a platform, those of its file.
+        arms: of `turned_arms`; None: a platform is not rotated.
 
     Returns:
         three arrays (n_cables, n); (n,) coordinates over the length of the shortest cable, or 1 if that is more.
@@ -122,8 +122,8 @@ def _columns(
     if row.along_line:
         axes = [_down(jnp.broadcast_to(axis, (shape[0], 3)), shape) for axis in across_line(robot).T]
         if quaternion is not None:
-            turn = [[_along(x, shape) for x in line] for line in lanes.rotation(quaternion)]
-            axes = [lanes.turned(turn, axis) for axis in axes]
+            rotation = [[_along(x, shape) for x in line] for line in lanes.rotation_matrix(quaternion)]
+            axes = [lanes.turned(rotation, axis) for axis in axes]
         about: Sequence[Array] = [lanes.dot(axis, moment) for axis in axes]
     else:
         about = [moment[i] for i in row.moments]
@@ -131,7 +131,7 @@ def _columns(
 
 
 def scales(robot: AnyRobot) -> np.ndarray:
-    """Which components of a wrench are moments.
+    """Mask of the components of a wrench that are moments.
 
     Returns:
         (dof,).
@@ -141,7 +141,7 @@ def scales(robot: AnyRobot) -> np.ndarray:
 
 
 def at_rest(position: Array, quaternion: Array) -> State:
-    """State of an effector that rests.
+    """State of an effector at rest.
 
     Args:
         position: (3,) m.
@@ -187,7 +187,7 @@ def exit_points(robot: AnyRobot, pulleys: Pulleys, positions: Array, quaternions
 
 @jax.jit
 def cable_lengths(robot: AnyRobot, positions: Array, quaternions: Array) -> Array:
-    """Lengths of the cables, from where they enter their pulleys, or from the base points.
+    """Lengths of the cables, from the points where they enter their pulleys, or from the base points.
 
     Args:
         robot: z down.
@@ -239,7 +239,7 @@ def weights(robot: AnyRobot, positions: Array, quaternions: Array) -> Array:
 
 
 def mass_centres(robot: AnyRobot, origins: np.ndarray, quaternions: np.ndarray | None) -> np.ndarray:
-    """Positions of the mass centre, as the kernels take them; of a robot on a joint those of the joint.
+    """Positions of the mass centre, or of the joint of a robot that has one, as the kernels take them.
 
     Args:
         robot: centred, z down.

@@ -1,18 +1,19 @@
-"""Cells whose every position keeps its tensions within limits, from tensions at the centre; no jax.
+"""Cells in which tensions stay within limits at every position, from tensions at the centre; no jax.
 
-With force densities f0 at the centre, Z0 f0 = w, and weights D, those of
+With force densities f0 at the centre, Z0 f0 = w, and weights D, the force densities
 
     f(x) = f0 + D U^T (I - T)^-1 j,    C^-1 Z0 D = U,    T = sum_k x_k T_k,    j = sum_k x_k j_k,
     T_k = C^-1 N_k D U^T,    j_k = C^-1 N_k f0
 
-give Z(x) f(x) = w, where C C^T = Z0 D^2 Z0^T, so that U has orthonormal rows: f moves from f0 by the least sum of
-(df_i / D_i)^2 to first order. D_i is the distance of f0_i from its limits, so that cables near them hardly move. Then
+satisfy Z(x) f(x) = w, where C C^T = Z0 D^2 Z0^T, so that U has orthonormal rows: to first order, f moves from f0 by the
+least sum of (df_i / D_i)^2. D_i is the distance of f0_i from its limits, so that tensions near a limit hardly move.
+Then
 
     f_i(x) = f0_i + D_i (U_i . j + U_i . T j + e_i),    |e_i| <= |U_i| |T| |T j| / (1 - |T|),
 
-and its product with L_i(x), between L0_i - u_i . dp and that plus |dp|^2 / (2 (L0_i - |dp|)), is the tension. C is
-computed: that C^-1 Z0 D U^T is not quite I, and Z0 f0 not quite w, is part of the bounds. Where |T| < 1 the rank of
-Z(x) is full, too, since C^-1 Z(x) D U^T = I - T.
+and the tension is its product with L_i(x), which lies between L0_i - u_i . dp and the same plus
+|dp|^2 / (2 (L0_i - |dp|)). The bounds allow for rounding of C, so that C^-1 Z0 D U^T is not quite I and Z0 f0 not quite
+w. Where |T| < 1 the rank of Z(x) is full, too, since C^-1 Z(x) D U^T = I - T.
 """
 
 from typing import NamedTuple
@@ -23,14 +24,14 @@ from cspr_jax.workspaces.cells import ROUNDING, Cells, inverse_factor, least_qua
 
 
 class _Way(NamedTuple):
-    # Relative change of the force densities over a cell: of first and second order in x, and a bound of the rest.
+    # Relative change of the force densities over a cell: terms of first and second order in x, and a bound of the rest.
     linear: np.ndarray  # (n, n_cables, 3)
     quadratic: np.ndarray  # (n, n_cables, 3, 3)
     rest: np.ndarray  # (n, n_cables)
 
     @property
     def second(self) -> np.ndarray:
-        """Bound of the absolute value of the second order, (n, n_cables)."""
+        """Bound of the absolute value of the term of second order, (n, n_cables)."""
         return -np.minimum(least_quadratic(self.quadratic), least_quadratic(-self.quadratic))
 
 
@@ -40,10 +41,10 @@ def least_margins(
     """Lower bounds of the tension margin over cells.
 
     Args:
-        tensions: (n, n_cables) at the centres, between the limits, that give the wrench, N.
-        wrench: (m,) what the cables must supply, moments over a length, N.
+        tensions: (n, n_cables) tensions at the centres that give the wrench, between the limits, N.
+        wrench: (m,) wrench that the cables must supply, moments over a length, N.
         low: (n_cables,) smallest tensions, at least 0, N.
-        high: (n_cables,) largest ones, inf for none, N.
+        high: (n_cables,) largest tensions, inf for none, N.
 
     Returns:
         (n,) N: at every position of the cell, tensions keep at least so far from their limits; -inf where nothing is
@@ -62,10 +63,10 @@ def tension_bounds(
     """Bounds of tensions that give a wrench everywhere in cells.
 
     Args:
-        tensions: as for `least_margins`, as what follows.
-        wrench: (m,) N.
-        low: (n_cables,) N.
-        high: (n_cables,) N.
+        tensions: (n, n_cables) as for `least_margins`, N.
+        wrench: (m,) likewise, N.
+        low: (n_cables,) likewise, N.
+        high: (n_cables,) likewise, N.
 
     Returns:
         (n, n_cables) smallest tensions of a cell and (n, n_cables) largest, N; -inf and inf where nothing is proved.
@@ -86,10 +87,10 @@ def _way(cells: Cells, densities: np.ndarray, weights: np.ndarray, wrench: np.nd
     rows = inverse @ weighted  # U
     back = rows.transpose(0, 2, 1)
     changes = inverse[:, None] @ cells.changes
-    turns = (changes * weights[:, None, None]) @ back[:, None]  # T_k
+    operators = (changes * weights[:, None, None]) @ back[:, None]  # T_k
     first = (changes @ densities[:, None, :, None])[..., 0]  # j_k
-    second = (turns[:, :, None] @ first[:, None, ..., None])[..., 0]  # T_k j_l
-    # Rounding has left, or may have hidden, so much of C^-1 Z0 D U^T - I and of C^-1 (Z0 f0 - w).
+    second = (operators[:, :, None] @ first[:, None, ..., None])[..., 0]  # T_k j_l
+    # Bound C^-1 Z0 D U^T - I and C^-1 (Z0 f0 - w), which are not zero because of rounding.
     size = np.linalg.norm(inverse, axis=(1, 2))
     parts = np.linalg.norm(weighted, axis=(1, 2)) + norm_reach(cells.changes * weights[:, None, None])
     lost = size * np.linalg.norm(rows, axis=(1, 2)) * (ROUNDING * parts + _length(cells.rounding * weights))
@@ -98,10 +99,10 @@ def _way(cells: Cells, densities: np.ndarray, weights: np.ndarray, wrench: np.nd
     sizes = np.abs(cells.matrices) @ np.abs(densities)[..., None]
     hidden = ROUNDING * (_length(sizes[..., 0]) + _length(wrench)) + (cells.rounding * np.abs(densities)).sum(1)
     residual = _length((inverse @ (supplied - wrench)[..., None])[..., 0]) + size * hidden
-    turn, start = norm_reach(turns) + defect, norm_reach(first)
-    after = np.where(turn < 1.0, 1.0 / (1.0 - turn), np.inf)
-    late = np.minimum(pair_norm(second), norm_reach(turns) * start) + defect * start
-    rest = defect * start + turn * after * late + after * residual
+    norm, start = norm_reach(operators) + defect, norm_reach(first)
+    after = np.where(norm < 1.0, 1.0 / (1.0 - norm), np.inf)
+    late = np.minimum(pair_norm(second), norm_reach(operators) * start) + defect * start
+    rest = defect * start + norm * after * late + after * residual
     columns = _length(back)
     return _Way((first @ rows).transpose(0, 2, 1), _by_cable(second @ rows[:, None]), columns * rest[:, None])
 
@@ -122,7 +123,7 @@ def _tension_range(
     second = way.second
     spread = weights * (reach(way.linear) + second + way.rest)
     lowest, highest = densities - spread, densities + spread
-    # (L0 - u . dp) f, whose first orders may cancel each other.
+    # Expand (L0 - u . dp) f, in which terms of first order may cancel each other.
     relative = weights * lengths
     linear = relative[..., None] * way.linear - densities[..., None] * cells.steps
     mixed = cells.steps[..., :, None] * way.linear[..., None, :]

@@ -18,7 +18,7 @@ from cspr_jax.workspaces import margins
 from cspr_jax.workspaces.cocircuits import CABLES, MOST_OTHERS, CableSubsets, Column, block, normal, product, relation
 from cspr_jax.workspaces.margins import BLOCK_ROUNDING, ROUNDING, CocircuitLimits, Wrenches, length, one_norm
 
-# Up to so many cocircuits there is no loop.
+# Up to so many cocircuits the loop is unrolled.
 UNROLLED = 10
 
 
@@ -27,8 +27,8 @@ class TensionLimits(NamedTuple):
 
     Fields:
         low: (n_cables,) smallest tensions, N.
-        high: (n_cables,) largest ones, inf for none, N.
-        measure: (dof,) by what the components of a normal are multiplied before its length divides a capacity margin.
+        high: (n_cables,) largest tensions, inf for none, N.
+        measure: (dof,) factors of the components of a normal before its length divides a capacity margin.
     """
 
     low: Array
@@ -38,10 +38,10 @@ class TensionLimits(NamedTuple):
 
 @partial(jax.jit, static_argnames=("measure", "is_bounded"))
 def by_normals(
-    every: Sequence[Array],
+    components: Sequence[Array],
     loss: Array,
     wrenches: Wrenches,
-    asked: TensionLimits,
+    tension_limits: TensionLimits,
     choices: CableSubsets,
     *,
     measure: str,
@@ -50,50 +50,50 @@ def by_normals(
     """Margins of poses of any robot, by the normals to dof - 1 cables.
 
     Args:
-        every: columns of the wrench matrix, of `geometry.wrench_columns`.
-        loss: (n,) their errors over rounding, likewise.
-        wrenches: what the cables must supply.
+        components: of the wrench matrix, of `geometry.wrench_columns`.
+        loss: (n,) errors of the components over rounding, likewise.
+        wrenches: wrenches that the cables must supply.
         choices: of `cocircuits.choices_of`.
-        measure: "tensions", "capacity" or "closure"; known when this is compiled, as what follows.
+        measure: "tensions", "capacity" or "closure"; known when this is compiled, as `is_bounded` is.
         is_bounded: whether all largest tensions are finite.
 
     Returns:
         (...) lower bound + i upper bound.
     """
-    dof, template = len(every), every[0][0]
+    dof, template = len(components), components[0][0]
     lanes = wrenches._replace(
         points=[[jnp.broadcast_to(x, template.shape) for x in point] for point in wrenches.points]
     )
     noise = jnp.asarray(ROUNDING * jnp.finfo(template.dtype).eps, template.dtype) * loss
-    reach = jnp.where(jnp.isinf(asked.high), 0.0, jnp.abs(asked.high)) + jnp.abs(asked.low)
+    reach = jnp.where(jnp.isinf(tension_limits.high), 0.0, jnp.abs(tension_limits.high)) + jnp.abs(tension_limits.low)
     size = _size(wrenches)
 
     def pull(row, limits):
-        chosen = [[_row(component, row[i]) for component in every] for i in range(dof - 1)]
+        chosen = [[_row(component, row[i]) for component in components] for i in range(dof - 1)]
         across = normal(chosen) if chosen else [jnp.ones_like(template)]
-        rest = [[_row(component, k) for component in every] for k in row[dof - 1 :]]
+        rest = [[_row(component, k) for component in components] for k in row[dof - 1 :]]
         entries = [product(across, column) for column in rest]
         low, high, counts, scale = limits
         over = one_norm(entries)
         if measure == "capacity":
-            over = length([x * asked.measure[k] for k, x in enumerate(across)])
+            over = length([x * tension_limits.measure[k] for k, x in enumerate(across)])
         error = 2.0 * noise * (scale + size)
         return _pull(entries, low, high, counts, over, noise, error), margins.supports(across, lanes)
 
     rest = choices.table[:, dof - 1 :]
-    limits = asked.low[rest], asked.high[rest], choices.counts, jnp.sum(reach[rest], axis=1)
-    return _least(pull, choices.table, limits, template, asked, measure=measure, is_bounded=is_bounded)
+    limits = tension_limits.low[rest], tension_limits.high[rest], choices.counts, jnp.sum(reach[rest], axis=1)
+    return _least(pull, choices.table, limits, template, tension_limits, measure=measure, is_bounded=is_bounded)
 
 
 def _pull(entries: Sequence[Array], low, high, counts, size: Array, noise: Array, error: Array) -> CocircuitLimits:
     noises = [noise] * len(entries)
-    if counts is not None:  # what is a zero of the robot has no rounding either
+    if counts is not None:  # components that are zero at every pose have no rounding
         entries, noises = ([x * counts[i] for i, x in enumerate(values)] for values in (entries, noises))
     return CocircuitLimits(entries, list(low), list(high), size, noises, error)
 
 
 def _size(wrenches: Wrenches) -> Array:
-    # An upper bound of a wrench.
+    # Return an upper bound of the size of a wrench.
     parts = [one_norm(point) for point in wrenches.points]
     spreads = [jnp.sum(axes) for axes in (wrenches.box, *wrenches.ellipsoids) if axes is not None]
     return sum(spreads, largest(parts))
@@ -119,7 +119,7 @@ def _least(
         return lax.complex(*least), None
 
     largest_one = jnp.inf * jnp.ones_like(template)
-    if measure == "tensions":  # no margin is larger than half of what a cable has
+    if measure == "tensions":  # no margin is larger than half the range of a cable
         largest_one = jnp.minimum(largest_one, 0.5 * jnp.min(tension_limits.high - tension_limits.low))
     count = len(table)
     start = lax.complex(largest_one, largest_one)
@@ -130,8 +130,9 @@ class NullSpace(NamedTuple):
     """Tensions of six cables and up to two more, of many poses; the cables in the order of the block.
 
     Fields:
-        rows: for each cable beyond six (n_cables, n), how tensions change with its own, times a common number.
-        held: (n_cables, n) tensions that supply the wrench, N; 0 beyond six.
+        rows: for each cable beyond the first six (n_cables, n): how tensions change with its tension, times a common
+            number.
+        held: (n_cables, n) tensions that supply the wrench, N; 0 beyond the first six.
         noise: (n,) error of a cocircuit's component.
         loss: (n,) error of the held tensions, N.
         largest: (n,) the largest of the held tensions, N.
@@ -144,27 +145,27 @@ class NullSpace(NamedTuple):
     largest: Array
 
 
-def null_space(every: Sequence[Array], loss: Array, wrench: Column, *, order: tuple[int, ...]) -> NullSpace:
-    """Tensions that pull on nothing, and those that supply one wrench, of robots on six to eight cables in space.
+def null_space(components: Sequence[Array], loss: Array, wrench: Column, *, order: tuple[int, ...]) -> NullSpace:
+    """Tensions without a wrench, and tensions that supply one, of robots on six to eight cables in space.
 
     Args:
-        every: columns of the wrench matrix, of `geometry.wrench_columns`.
-        loss: (n,) their errors over rounding, likewise.
+        components: of the wrench matrix, of `geometry.wrench_columns`.
+        loss: (n,) errors of the components over rounding, likewise.
         wrench: six components, () or (n,), moments over a length, N.
         order: of the cables, those of the base block first.
 
     Returns:
         the tensions.
     """
-    return _joined(_by_block(every, wrench, order=order), wrench, loss)
+    return _joined(_by_block(components, wrench, order=order), wrench, loss)
 
 
 @partial(jax.jit, static_argnames=("order",))
 def _by_block(
     components: Sequence[Array], wrench: Column, *, order: tuple[int, ...]
 ) -> tuple[list[list[Array]], Array]:
-    # Tensions of the six for each cable beyond them and for the wrench, two by two as complex numbers, which halves
-    # what XLA computes again for each result; and what they are multiplied by, with the scale of their last digits.
+    # Return the tensions of the first six cables for each cable beyond them and for the wrench, in pairs as complex
+    # numbers, which halves what XLA computes again for each result; and their common factor, with the scale of errors.
     template = components[0][0]
     cables = [[component[k] for component in components] for k in order]
     load = [jnp.broadcast_to(x, template.shape) for x in wrench]
@@ -194,22 +195,22 @@ def _joined(tensions: tuple[list[list[Array]], Array], wrench: Column, loss: Arr
 
 @partial(jax.jit, static_argnames=("measure", "is_bounded"))
 def by_null_space(
-    space: NullSpace, asked: TensionLimits, choices: CableSubsets, *, measure: str, is_bounded: bool
+    space: NullSpace, tension_limits: TensionLimits, choices: CableSubsets, *, measure: str, is_bounded: bool
 ) -> Array:
     """Margins of poses by the relations among rows of the null space.
 
     Args:
         space: of `null_space`.
-        asked: limits, the cables in the order of the block.
-        choices: their tables have the cables of each cocircuit alone, in the order of the block.
-        measure: "tensions" or "closure"; known when this is compiled, as what follows.
+        tension_limits: of the cables in the order of the block.
+        choices: its table has only the cables of each cocircuit, in the order of the block.
+        measure: "tensions" or "closure"; known when this is compiled, as `is_bounded` is.
         is_bounded: whether all largest tensions are finite.
 
     Returns:
         (...) lower bound + i upper bound.
     """
     template = space.loss
-    finite = jnp.where(jnp.isinf(asked.high), 0.0, jnp.abs(asked.high)) + jnp.abs(asked.low)
+    finite = jnp.where(jnp.isinf(tension_limits.high), 0.0, jnp.abs(tension_limits.high)) + jnp.abs(tension_limits.low)
     reach = jnp.sum(finite) + space.largest
 
     def pull(row, limits):
@@ -222,5 +223,5 @@ def by_null_space(
         return _pull(entries, low, high, counts, size, space.noise, error), (asking, -asking)
 
     table = choices.table
-    limits = asked.low[table], asked.high[table], choices.counts
-    return _least(pull, table, limits, template, asked, measure=measure, is_bounded=is_bounded)
+    limits = tension_limits.low[table], tension_limits.high[table], choices.counts
+    return _least(pull, table, limits, template, tension_limits, measure=measure, is_bounded=is_bounded)

@@ -17,7 +17,7 @@ from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.maps.grid_map import GridMap
 from cspr_jax.robots.clearance import Scene
 from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.orientation_grids import cone_grid, equal_volume_grid, turn_grid
+from cspr_jax.robots.orientation_grids import cone_grid, equal_volume_grid, planar_grid
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.quantities import TILT_TORSION
@@ -29,11 +29,11 @@ from cspr_jax.workspaces.search import WorkspaceSearch
 from cspr_jax.workspaces.speeds import CableSpeeds, cable_speeds
 
 INTERFERENCE = "interference-free"
-# Limits of poses at rest: others belong to motions.
+# Limits that apply to poses at rest; all others belong to motions.
 TENSIONS = ("tension_min", "tension_max")
 SPEED = "cable_speed_max"
 HELD = (*TENSIONS, "floor", "cable_length_max", SPEED)
-# Sets of orientations divide pi into this many parts where the file does not say.
+# Sets of orientations divide pi into this many parts unless the file says otherwise.
 DIVISIONS = 12
 
 
@@ -41,28 +41,28 @@ class WorkspaceMap(GridMap):
     """The workspace of a robot: of poses, or of places with sets of orientations; see `GridMap`."""
 
     def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
-        """Refuse what the robot cannot be asked."""
+        """Refuse conditions that do not apply to the robot."""
         self._keys, self._file = keys, file
         self._frame, self._z_axis = frame_of(robot_file.base_points, robot_file.z_axis), robot_file.z_axis
-        self._asked = keys.workspace or WorkspaceTable()
+        self._workspace = keys.workspace or WorkspaceTable()
         self._refuse_unused()
         self._limits = build_limits(robot_file, keys.limits, file)
         self._robot = centred(build_robot(robot_file, keys.trajectory, file))[0]
         self._row = PATTERNS[self._robot.pattern]
         if not self._row.is_body:
             for name in ("orientation", "orientations"):
-                if getattr(self._asked, name) is not None:
+                if getattr(self._workspace, name) is not None:
                     raise ConfigError(file, f"workspace.{name}: must be absent: {robot_file.kind} has none")
-        self._turn = self._given_turns([self._asked.orientation], "workspace.orientation")
+        self._quaternion = self._unit_quaternions([self._workspace.orientation], "workspace.orientation")
         self._samples, self._volume = self._orientation_set()
         try:
             check_cables(self._robot)
         except InputError as error:
             raise ConfigError(file, str(error)) from error
         try:
-            names = [name for name in self._asked.conditions if name != INTERFERENCE]
+            names = [name for name in self._workspace.conditions if name != INTERFERENCE]
             searches = {name: self._search(name) for name in names}
-            length = self._asked.capacity_length
+            length = self._workspace.capacity_length
             capacity = None if length is None else self._search(FEASIBLE, length)
         except InputError as error:
             raise ConfigError(file, f"workspace.{error}") from error
@@ -77,18 +77,18 @@ class WorkspaceMap(GridMap):
                 raise ConfigError(
                     self._file, f"limits.{limit.name}: must be absent in this map, whose cells are at rest"
                 )
-            if limit.name in TENSIONS and FEASIBLE not in self._asked.conditions:
+            if limit.name in TENSIONS and FEASIBLE not in self._workspace.conditions:
                 allowed = f'must be absent: "{FEASIBLE}" is not among workspace.conditions'
                 raise ConfigError(self._file, f"limits.{limit.name}: {allowed}")
 
     def _surroundings(self, robot_file: RobotFile) -> Scene | None:
-        workspace, row = self._asked, self._row
+        workspace, row = self._workspace, self._row
         if INTERFERENCE not in workspace.conditions:
             return None
         for name in ("platform_box", "platform_hull"):
             if getattr(workspace, name) is not None and not row.is_body:
                 raise ConfigError(self._file, f"workspace.{name}: must be absent: {robot_file.kind} has no shape")
-        # Shapes are from where the arms of the kernels are: the mass centre, or a joint.
+        # Shapes have the same origin as the arms of the kernels: the mass centre, or a joint.
         centre = None if row.is_jointed else robot_file.centre_of_mass
         try:
             body = workspace.body(centre or (0.0, 0.0, 0.0), robot_file.platform_points or ())
@@ -98,7 +98,7 @@ class WorkspaceMap(GridMap):
         return surroundings(self._robot, self._frame, [table.shape() for table in workspace.obstacle or ()], body)
 
     def _speeds(self, robot_file: RobotFile) -> CableSpeeds | None:
-        workspace, most = self._asked, self._limits.cable_speed_max
+        workspace, most = self._workspace, self._limits.cable_speed_max
         speed_keys = [name for name in ("speed", "angular_speed") if getattr(workspace, name) is not None]
         if not speed_keys:
             if getattr(self._keys.limits, SPEED) is not None:
@@ -111,70 +111,72 @@ class WorkspaceMap(GridMap):
                 raise ConfigError(self._file, f"workspace.{name}: must be absent: {robot_file.kind} {why}")
         if most is None:
             raise ConfigError(self._file, f"workspace.{speed_keys[0]}: must be absent without limits.cable_speed_max")
-        values = {"speed": workspace.speed or 0.0, "angular_speed": workspace.angular_speed or 0.0}
-        return cable_speeds(self._robot, np.asarray(most), **values)
+        speed, angular_speed = workspace.speed or 0.0, workspace.angular_speed or 0.0
+        return cable_speeds(self._robot, np.asarray(most), speed=speed, angular_speed=angular_speed)
 
-    def _given_turns(self, quaternions: Sequence[list[float] | None], key: str) -> np.ndarray:
-        # (k, 4) in the kernels' axes.
-        turns = np.stack([given_quaternion(one, key, self._file) for one in quaternions])
-        if self._row.is_planar and turns[:, [1, 3]].any():
+    def _unit_quaternions(self, quaternions: Sequence[list[float] | None], key: str) -> np.ndarray:
+        # Return quaternions (k, 4) in the kernels' axes.
+        units = np.stack([given_quaternion(one, key, self._file) for one in quaternions])
+        if self._row.is_planar and units[:, [1, 3]].any():
             raise ConfigError(self._file, f"{key}: must turn about y: that of a planar robot")
-        return self._frame.turned_quaternions(turns)
+        return self._frame.turned_quaternions(units)
 
     def _orientation_set(self) -> tuple[np.ndarray | None, np.ndarray]:
-        # (k, 4) orientations and the part of the set that each stands for; None: there is no set.
-        workspace = self._asked
+        # Return orientations (k, 4), None where there is no set, and the part of the set that each stands for.
+        workspace = self._workspace
         if workspace.orientations is None:
             return None, np.ones(1)
         if workspace.quaternions is not None:
-            turns = self._given_turns(workspace.quaternions, "workspace.quaternions")
-            return products(turns, self._turn), np.full(len(turns), 1.0 / len(turns))
+            quaternions = self._unit_quaternions(workspace.quaternions, "workspace.quaternions")
+            return products(quaternions, self._quaternion), np.full(len(quaternions), 1.0 / len(quaternions))
         divisions = workspace.divisions or DIVISIONS
         tilt = math.pi if workspace.tilt_max is None else workspace.tilt_max
         if self._row.is_planar:
             if workspace.torsion_max is not None:
                 raise ConfigError(self._file, "workspace.torsion_max: must be absent for a planar robot")
-            angles, volume = turn_grid(divisions, tilt)
+            angles, volume = planar_grid(divisions, tilt)
         elif workspace.tilt_max is None:
             grid = equal_volume_grid(divisions)
             angles, volume = grid.angles, grid.volume
         else:
             angles, volume = cone_grid(divisions, tilt, workspace.torsion_max or 0.0)
-        return products(self._frame.turned_quaternions(from_tilt_torsion(angles)), self._turn), volume
+        return products(self._frame.turned_quaternions(from_tilt_torsion(angles)), self._quaternion), volume
 
     def _search(self, name: str, capacity_length: float | None = None) -> WorkspaceSearch:
         loads = None
         if name == FEASIBLE:
-            workspace = self._asked
-            shapes = {
-                "points": workspace.wrenches,
-                "box": workspace.wrench_box,
-                "ellipsoid": workspace.wrench_ellipsoid,
-            }
-            loads = required_wrenches(self._robot, self._frame, **shapes, acceleration=workspace.acceleration)
+            workspace = self._workspace
+            loads = required_wrenches(
+                self._robot,
+                self._frame,
+                points=workspace.wrenches,
+                box=workspace.wrench_box,
+                ellipsoid=workspace.wrench_ellipsoid,
+                acceleration=workspace.acceleration,
+            )
         return WorkspaceSearch(self._robot, requirement(self._robot, name, self._limits, loads, capacity_length))
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
         places = self._targets(cells)
         if self._samples is not None:
-            kind: OrientationSet = "total" if self._asked.orientations in ("total", "dextrous") else "inclusion"
+            kind: OrientationSet = "total" if self._workspace.orientations in ("total", "dextrous") else "inclusion"
             set_answers = over_orientations(self._poses, places, self._samples, self._volume, kind)
             return set_answers | {"cell_side": np.zeros(len(places), np.int16)}
-        turns = np.repeat(self._turn, len(places), axis=0)
+        quaternions = np.repeat(self._quaternion, len(places), axis=0)
         if any(name in cells for name in TILT_TORSION):
             angles = np.stack([cells.get(name, np.zeros(len(places))) for name in TILT_TORSION], axis=1)
             if self._row.is_planar:
                 angles[:, 0] = 0.5 * math.pi
-            turns = products(self._frame.turned_quaternions(from_tilt_torsion(angles)), turns)
-        answers = self._poses(places, turns)
+            quaternions = products(self._frame.turned_quaternions(from_tilt_torsion(angles)), quaternions)
+        answers = self._poses(places, quaternions)
         sides = np.zeros(len(places), np.int16)
-        if self._asked.prove:
-            sides = self._poses.sides(places, self._half_sizes(cells), self._turn[0])
+        if self._workspace.prove:
+            sides = self._poses.sides(places, self._half_sizes(cells), self._quaternion[0])
         return answers | {"orientation_fraction": (answers["verdict"] == 0).astype(float), "cell_side": sides}
 
     def _half_sizes(self, cells: dict[str, np.ndarray]) -> np.ndarray:
-        # (n, 3) of the cells: half of the way to the farther neighbour along each axis.
+        # Return half sizes (n, 3) of the cells: half of the distance to the farther neighbour along each axis.
         half_sizes = []
         for name in "xyz":
             points = np.sort(axis_points(getattr(self._keys.axes, name)))
@@ -193,7 +195,7 @@ class WorkspaceMap(GridMap):
             raise ConfigError(self._file, f"axes.{turning[0]}: must be absent: a point mass has no orientation")
         if turning and self._samples is not None:
             raise ConfigError(self._file, f"axes.{turning[0]}: cannot be combined with workspace.orientations")
-        if self._asked.prove and (turning or "radius" in grid.axes):
+        if self._workspace.prove and (turning or "radius" in grid.axes):
             name = turning[0] if turning else "radius"
             raise ConfigError(self._file, f"axes.{name}: cannot be combined with workspace.prove")
         if row.is_planar and turning not in ([], ["tilt"]):

@@ -1,4 +1,4 @@
-"""Margins of poses, cocircuit by cocircuit, between two bounds: what rounding may have decided shows.
+"""Margins of poses, cocircuit by cocircuit, between two bounds that show what rounding may have decided.
 
 Where the bounds lie apart, `workspaces.exact` answers the pose by singular values.
 """
@@ -12,19 +12,19 @@ from jax import Array
 from cspr_jax.arithmetic.lanes import largest
 from cspr_jax.workspaces.cocircuits import Column, product
 
-# Errors that are allowed for, in units of rounding: of a product of unit columns, and of the numbers of a block of six.
-# Estimates, not proofs; margins by singular values lie between the bounds that follow from them wherever tests look.
+# Allowances for errors, in units of rounding: of a product of unit columns, and of the numbers of a block of six
+# cables. They are estimates, not proofs; wherever tests look, margins by singular values lie between the bounds.
 ROUNDING = 64.0
 BLOCK_ROUNDING = 8.0
 
 
 class Wrenches(NamedTuple):
-    """Wrenches that cables must supply: all sums of one of a finite set, one of a box and one of each ellipsoid.
+    """Wrenches that cables must supply: all sums of a wrench of a finite set, one of a box and one of each ellipsoid.
 
     Fields:
-        points: the finite set, of dof components each, () or one a pose, moments over a length, N.
+        points: the finite set, dof components each, () or one a pose, moments over a length, N.
         box: (dof,) half widths of a box about zero, N; None: there is none.
-        ellipsoids: (dof,) semi-axes each of ellipsoids about zero, N.
+        ellipsoids: (dof,) semi-axes of each ellipsoid about zero, N.
     """
 
     points: Sequence[Column]
@@ -33,16 +33,16 @@ class Wrenches(NamedTuple):
 
 
 class CocircuitLimits(NamedTuple):
-    """A cocircuit, with what the limits of its cables are.
+    """A cocircuit with the limits of its cables.
 
     Fields:
         entries: components that need not be zero, of any common length.
         low: smallest tensions of these cables, () each, N.
-        high: largest ones, () each, N; inf where there is none.
-        size: what the margin is over: the sum of the components' sizes for tensions, the length of the normal for the
+        high: largest tensions, () each, N; inf where there is none.
+        size: divisor of the margin: the sum of the components' sizes for tensions, the length of the normal for the
             capacity margin.
         noises: errors of the components.
-        error: error of what the tensions give beyond the wrenches, in units of size times N.
+        error: error of the difference between tensions and wrenches along the cocircuit, in units of size times N.
     """
 
     entries: Sequence[Array]
@@ -105,8 +105,8 @@ def bounded_margin(pull: CocircuitLimits, most: Array, least: Array) -> Bounds:
     """Bounds of the margin of one cocircuit whose cables all have a largest tension.
 
     Args:
-        most: the largest product that a wrench asks for.
-        least: that of the negative.
+        most: the largest product of the cocircuit with a required wrench.
+        least: the largest product of its negative.
 
     Returns:
         lower and upper bound, N.
@@ -120,7 +120,7 @@ def bounded_margin(pull: CocircuitLimits, most: Array, least: Array) -> Bounds:
 
 
 def _between(pull: CocircuitLimits, sure: Array, possible: Array) -> Bounds:
-    # Over a size that has an error as well.
+    # Divide by a size that has an error as well.
     inverse = 1.0 / pull.size
     lower, upper, loss = sure * inverse, possible * inverse, sum(pull.noises[1:], pull.noises[0])
     less, more = (jnp.where(jnp.isinf(x), 0.0, loss * jnp.abs(x)) for x in (lower, upper))
@@ -130,11 +130,11 @@ def _between(pull: CocircuitLimits, sure: Array, possible: Array) -> Bounds:
 def free_margin(pull: CocircuitLimits, most: Array, least: Array) -> Bounds:
     """Bounds of the margin of one cocircuit; any of its cables may have no largest tension.
 
-    A component that rounding may have made of a zero frees the upper bound, and does not free the lower one.
+    A component that may be zero but for rounding frees the upper bound, but not the lower one.
 
     Args:
-        most: the largest product that a wrench asks for.
-        least: that of the negative.
+        most: the largest product of the cocircuit with a required wrench.
+        least: the largest product of its negative.
 
     Returns:
         lower and upper bound, N; inf where a cable without a largest tension frees the cocircuit.
@@ -155,8 +155,8 @@ def closure_margin(pull: CocircuitLimits) -> Bounds:
     """Bounds of the margin of wrench closure of one cocircuit.
 
     Returns:
-        lower and upper bound of its largest component of the rarer sign, over the largest of all, in [-1, 1]; of
-        components of one sign minus the least of them, over the largest.
+        lower and upper bound, in [-1, 1]: of the largest component of the weaker sign over the largest of all; where
+        all components have one sign, minus the least of them over the largest.
     """
     fewest = jnp.minimum(largest(pull.entries), largest([-entry for entry in pull.entries]))
     inverse = 1.0 / largest([jnp.abs(entry) for entry in pull.entries])

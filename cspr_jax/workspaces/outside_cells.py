@@ -1,11 +1,11 @@
-"""Cells whose every position lacks tensions within limits, from the worst cocircuit at the centre; no jax.
+"""Cells in which no tensions within limits suffice at any position, from the worst cocircuit at the centre; no jax.
 
-Let c be normal to the columns S of Z, dof - 1 of them, and move with them: c(x) . Z_S(x) = 0. These cables do nothing
-along it, whatever their tensions, and the wrench is out of reach at x where
+Let c be normal to dof - 1 columns S of Z, and move with them: c(x) . Z_S(x) = 0. These cables do nothing along c,
+whatever their tensions, and the wrench is out of reach at x where
 
     c(x) . w > sum over the others of the largest of low_j y_j and high_j y_j,    y_j = c(x) . Z_j(x) / L_j(x)
 
-(with high_j = inf: y_j <= 0), and no wrench along -c can be given where all y_j are >= 0. With M = [W_S, c0] and
+(with high_j = inf: y_j <= 0); and no wrench along -c can be given where all y_j are >= 0. With M = [W_S, c0] and
 M C^-T = Q of orthonormal columns,
 
     c(x) = Q g(x),    g^T = e^T (I - K)^-1,    K = sum_k x_k K_k,    K_k = Q^T [N_kS / L_S, 0] C^-T,
@@ -16,8 +16,8 @@ e the last unit vector, so that with z_j = Q^T Z_j0 and its change a_j = sum_k x
     |rest_j| <= |e^T K| |K| |v_j| / (1 - |K|).
 
 Inverse lengths are L0 / L = 1 + u . dp / L0 + rest, |rest| <= |dp|^2 L0 / (L0 - |dp|)^3, since the second derivatives
-of 1 / L have norm 2 / L^3. That Q^T Q is not quite I is part of the bounds. A normal that does not move, K = 0, serves
-as well where the others keep away from it; then the products are affine.
+of 1 / L have norm 2 / L^3. The bounds allow for rounding of Q, so that Q^T Q is not quite I. A normal that does not
+move, K = 0, will do where all cables keep away from being normal to it; then the products are affine.
 """
 
 from typing import NamedTuple
@@ -31,10 +31,10 @@ class Products(NamedTuple):
     """Products of c(x) with the columns of Z(x) over their lengths at the centre, and with the wrench, which is last.
 
     Fields:
-        value: (n, n_cables + 1) at the centres.
+        value: (n, n_cables + 1) products at the centres.
         linear: (n, n_cables + 1, 3) coefficients of first order in x.
-        quadratic: (n, n_cables + 1, 3, 3) those of second order.
-        rest: (n, n_cables + 1) bounds of what is left.
+        quadratic: (n, n_cables + 1, 3, 3) coefficients of second order.
+        rest: (n, n_cables + 1) bounds of all higher orders.
     """
 
     value: np.ndarray
@@ -59,18 +59,18 @@ def are_beyond(
 
     Args:
         normals: (n, m) c at the centres.
-        held: (n, m - 1) the cables S; None: none, and c does not move.
-        wrenches: (n, m) what the cables must supply, moments over a length, N.
+        held: (n, m - 1) the cables S; None: there are none, and c does not move.
+        wrenches: (n, m) wrenches that the cables must supply, moments over a length, N.
         low: (n_cables,) smallest tensions, N.
-        high: (n_cables,) largest ones, inf for none, N.
+        high: (n_cables,) largest tensions, inf for none, N.
 
     Returns:
-        (n,) whether it is proved.
+        (n,) whether this is proved.
     """
     with np.errstate(all="ignore"):
         products, others = products_of(cells, normals, held, wrenches), _others(cells, held)
         least, most = (side[:, :-1] for side in products.ends)
-        # Each other cable has a limit that counts at the centre, and a cost if the other limit counts elsewhere.
+        # For each other cable one limit counts at the centre; where the other limit counts, it costs something.
         is_positive = products.value[:, :-1] > 0.0
         is_bounded = np.isfinite(high)
         limits = np.where(others, np.where(is_positive & is_bounded, high, low), 0.0)
@@ -88,10 +88,10 @@ def are_one_sided(cells: Cells, normals: np.ndarray, held: np.ndarray | None) ->
 
     Args:
         normals: (n, m) c at the centres, with which no other cable has a negative product.
-        held: as for `are_beyond`.
+        held: (n, m - 1) as for `are_beyond`.
 
     Returns:
-        (n,) whether it is proved.
+        (n,) whether this is proved.
     """
     with np.errstate(all="ignore"):
         products = products_of(cells, normals, held, np.zeros_like(normals))
@@ -108,15 +108,15 @@ def _others(cells: Cells, held: np.ndarray | None) -> np.ndarray:
 
 
 def products_of(cells: Cells, normals: np.ndarray, held: np.ndarray | None, wrenches: np.ndarray) -> Products:
-    """Products of a normal that moves with the cables that are held.
+    """Products of a normal that moves with the cables S.
 
     Args:
-        normals: as for `are_beyond`, as what follows.
-        held: (n, m - 1).
-        wrenches: (n, m) N.
+        normals: (n, m) as for `are_beyond`.
+        held: (n, m - 1) likewise.
+        wrenches: (n, m) likewise, N.
 
     Returns:
-        the products, c of unit length at the centres; with a cable that is held they are 0 wherever c is known.
+        the products, with c of unit length at the centres.
     """
     normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
     units = np.concatenate([cells.matrices / cells.lengths[:, None], wrenches[..., None]], axis=2)
@@ -131,7 +131,7 @@ def products_of(cells: Cells, normals: np.ndarray, held: np.ndarray | None, wren
 
 
 def _still(normals: np.ndarray, units: np.ndarray, changes: np.ndarray, rounding: np.ndarray) -> Products:
-    # A normal c that does not move has affine products.
+    # Return the products of a normal c that does not move, which are affine.
     value, linear = (normals[:, None] @ units)[:, 0], -(normals[:, None, None] @ changes)[:, :, 0]
     nothing = np.zeros((*value.shape, 3, 3))
     return Products(value, linear.transpose(0, 2, 1), nothing, rounding + ROUNDING * np.abs(linear).sum(1))
@@ -140,21 +140,21 @@ def _still(normals: np.ndarray, units: np.ndarray, changes: np.ndarray, rounding
 def _moving(
     normals: np.ndarray, held: np.ndarray, units: np.ndarray, changes: np.ndarray, rounding: np.ndarray
 ) -> Products:
-    # The normal c moves so that it stays normal to the cables that are held.
+    # Return the products of a normal c that moves so that it stays normal to the cables S.
     frame = np.concatenate([np.take_along_axis(units, held[:, None], axis=2), normals[..., None]], axis=2)
     inverse = inverse_factor(frame.transpose(0, 2, 1) @ frame).transpose(0, 2, 1)  # C^-T
     rows = (frame @ inverse).transpose(0, 2, 1)  # Q^T
     moved = np.take_along_axis(changes, held[:, None, None], axis=3) @ inverse[:, None, :-1]
-    turns = rows[:, None] @ moved  # K_k
+    operators = rows[:, None] @ moved  # K_k
     size, count = np.linalg.norm(inverse, axis=(1, 2)), frame.shape[2]
     lost = np.linalg.norm(rounding[:, :-1], axis=1) + ROUNDING * norm_reach(changes)
     defect = np.linalg.norm(rows @ rows.transpose(0, 2, 1) - np.eye(count), axis=(1, 2)) + np.sqrt(count) * size * lost
     columns, shifts = rows @ units, rows[:, None] @ changes
-    first = turns @ columns[:, None] - shifts  # v_j
-    last = turns[:, :, -1]  # e^T K_k
-    turn = (norm_reach(turns) + defect)[:, None]
-    after, defect, ways = np.where(turn < 1.0, 1.0 / (1.0 - turn), np.inf), defect[:, None], _norms(first)
-    rest = norm_reach(last)[:, None] * turn * after * ways
+    first = operators @ columns[:, None] - shifts  # v_j
+    last = operators[:, :, -1]  # e^T K_k
+    norm = (norm_reach(operators) + defect)[:, None]
+    after, defect, ways = np.where(norm < 1.0, 1.0 / (1.0 - norm), np.inf), defect[:, None], _norms(first)
+    rest = norm_reach(last)[:, None] * norm * after * ways
     rest = rest + after**2 * defect * (np.linalg.norm(columns, axis=1) + _norms(shifts)) + after * rounding
     quadratic = last[:, :, None, None] @ first[:, None]
     return Products(columns[:, -1], first[:, :, -1].transpose(0, 2, 1), np.moveaxis(quadratic[..., 0, :], -1, 1), rest)
@@ -167,11 +167,11 @@ def _norms(vectors: np.ndarray) -> np.ndarray:
 
 
 def least_slacks(cells: Cells, products: Products, limits: np.ndarray) -> np.ndarray:
-    """Lower bounds over cells of what a wrench asks for along c, less what some tensions give.
+    """Lower bounds over cells of the component of a wrench along c, less what some tensions give.
 
     Args:
         products: of `products_of`.
-        limits: (n, n_cables) the tensions, 0 of cables that are held, N.
+        limits: (n, n_cables) the tensions, 0 of the cables S, N.
 
     Returns:
         (n,) N.

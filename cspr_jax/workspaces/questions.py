@@ -1,4 +1,4 @@
-"""Questions about workspaces: a condition, limits of the tensions, and the wrenches that the cables must supply."""
+"""Requirements of workspaces: a condition, limits of the tensions, and the wrenches that the cables must supply."""
 
 import dataclasses
 import math
@@ -18,7 +18,7 @@ from cspr_jax.workspaces.required import RequiredWrenches
 
 STATIC, CLOSURE, FEASIBLE = "static", "wrench-closure", "wrench-feasible"
 CONDITIONS = (STATIC, CLOSURE, FEASIBLE)
-# A choice has dof - 1 cables: with so many choices a pose takes seconds, and as many megabytes.
+# Largest number of choices of dof - 1 cables: with so many a pose takes seconds, and as many megabytes.
 MOST_CHOICES = 100_000
 
 
@@ -29,10 +29,10 @@ class Requirement:
     Fields:
         condition: one of `CONDITIONS`.
         low: (n_cables,) smallest tensions, N.
-        high: (n_cables,) largest ones, inf for none, N.
-        wrenches: what the cables must supply, kernels' axes, N and N m.
-        capacity_length: by which moments are divided, m, where the margin is that of capacity; None: it is that of the
-            tensions.
+        high: (n_cables,) largest tensions, inf for none, N.
+        wrenches: wrenches that the cables must supply, kernels' axes, N and N m.
+        capacity_length: length by which moments are divided, m, for the capacity margin; None: the margin is that of
+            the tensions.
     """
 
     condition: str
@@ -43,10 +43,10 @@ class Requirement:
 
 
 def check_cables(robot: AnyRobot) -> None:
-    """Refuse more cables than workspaces can be computed for: their number grows with a power of it.
+    """Refuse robots with too many cables: the number of choices of cables grows with a power of it.
 
     Raises:
-        InputError: of the robot.
+        InputError: too many cables.
     """
     if math.comb(robot.n_cables, robot.dof - 1) > MOST_CHOICES:
         most = max(n for n in range(robot.n_cables) if math.comb(n, robot.dof - 1) <= MOST_CHOICES)
@@ -61,17 +61,17 @@ def requirement(
     wrenches: RequiredWrenches | None = None,
     capacity_length: float | None = None,
 ) -> Requirement:
-    """A question of a condition.
+    """Requirement of a condition.
 
     Args:
         robot: centred, z down.
         condition: one of `CONDITIONS`.
-        limits: of the tensions; of account for "wrench-feasible" alone, as is what follows.
-        wrenches: of `required_wrenches`; None: what holds the weight still.
+        limits: of the tensions; only "wrench-feasible" takes these, wrenches and a capacity length into account.
+        wrenches: of `required_wrenches`; None: the wrench that holds the robot still.
         capacity_length: as in `Requirement`.
 
     Returns:
-        the question.
+        the requirement.
     """
     if condition != FEASIBLE:
         limits, wrenches, capacity_length = Limits(), None, None
@@ -80,7 +80,7 @@ def requirement(
 
 
 def _weight(robot: AnyRobot) -> RequiredWrenches:
-    # The weight of a body on a joint turns with the body.
+    # Return the wrench that holds the robot still; that of a body on a joint depends on the orientation.
     if PATTERNS[robot.pattern].is_jointed:
         return RequiredWrenches(None)
     return RequiredWrenches(np.asarray(geometry.weights(robot, np.zeros((1, 3)), np.array([IDENTITY]))))
@@ -95,11 +95,11 @@ def required_wrenches(
     ellipsoid: Any = None,
     acceleration: Any = None,
 ) -> RequiredWrenches:
-    """Wrenches that cables must supply, as the kernels take them: all sums of one of each that is given.
+    """Wrenches that cables must supply, as the kernels take them: all sums of one wrench of each given set.
 
     Args:
         robot: centred, z down.
-        points: (k, dof) in the axes of the file, N and N m; None: what holds the weight still.
+        points: (k, dof) in the axes of the file, N and N m; None: the wrench that holds the robot still.
         box: (dof,) half widths of a box, N and N m; None: there is none.
         ellipsoid: (dof,) semi-axes of an ellipsoid, N and N m; None: there is none.
         acceleration: radius of a ball of accelerations of the mass centre, m/s^2; None: there is none.

@@ -1,4 +1,4 @@
-"""Wrenches that cables must supply, as they are asked for; no jax."""
+"""Wrenches that cables must supply; no jax."""
 
 import dataclasses
 import itertools
@@ -10,13 +10,13 @@ NO_POINTS = "the weight of a body on a joint is known at a pose: see about()"
 
 @dataclasses.dataclass(frozen=True)
 class RequiredWrenches:
-    """Wrenches that cables must supply: all sums of one of a finite set, one of a box and one of each ellipsoid.
+    """Wrenches that cables must supply: all sums of a wrench of a finite set, one of a box and one of each ellipsoid.
 
     Fields:
-        points: (k, dof) the finite set, N and N m; or all of them over a length, as the kernels take them. None: the
-            weight of a body on a joint, which turns with it.
+        points: (k, dof) the finite set, N and N m, or with moments over a length, as the kernels take it; None: the
+            weight of a body on a joint, which depends on the orientation.
         box: (dof,) half widths of a box about zero; None: there is none.
-        ellipsoids: (dof,) semi-axes each of ellipsoids about zero.
+        ellipsoids: (dof,) semi-axes of each ellipsoid about zero.
     """
 
     points: np.ndarray | None
@@ -27,7 +27,7 @@ class RequiredWrenches:
         """The same wrenches in other units.
 
         Args:
-            unit: (dof,) by which components are divided.
+            unit: (dof,) divisors of the components.
 
         Returns:
             the wrenches.
@@ -37,10 +37,10 @@ class RequiredWrenches:
         return RequiredWrenches(points, box, tuple(axes / unit for axes in self.ellipsoids))
 
     def about(self, wrench: np.ndarray) -> "RequiredWrenches":
-        """The same box and ellipsoids about one wrench, in place of the finite set.
+        """The same box and ellipsoids about one wrench, which takes the place of the finite set.
 
         Args:
-            wrench: (dof,).
+            wrench: (dof,) in the units of the set.
 
         Returns:
             the wrenches.
@@ -57,7 +57,7 @@ class RequiredWrenches:
         return np.concatenate([self.points + np.array(sign) * half for sign in signs])
 
     def supports(self, normals: np.ndarray) -> np.ndarray:
-        """Largest products of normals with these wrenches.
+        """Largest products of normals with the wrenches.
 
         Args:
             normals: (n, dof).
@@ -77,7 +77,7 @@ class RequiredWrenches:
 
     @property
     def spanning(self) -> list[np.ndarray]:
-        """Wrenches (n, dof) that span all of them."""
+        """Wrenches (n, dof) that span the space of all wrenches of the set."""
         spreads = [axes for axes in (self.box, *self.ellipsoids) if axes is not None]
         return [*([] if self.points is None else [self.points]), *(np.diag(axes) for axes in spreads)]
 
@@ -88,5 +88,5 @@ class RequiredWrenches:
 
     @property
     def size(self) -> float:
-        """Largest number of it; of a weight that is not known 0."""
+        """Largest component in size; 0 for a weight that is not known."""
         return max((float(np.abs(part).max()) for part in self.spanning), default=0.0)

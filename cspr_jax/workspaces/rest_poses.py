@@ -42,11 +42,11 @@ class RestPoses:
 
     Fields:
         robot: centred, z down.
-        searches: by condition, what is asked of the cables.
-        around: what the cables may not meet, each other included; None: nobody asks.
-        limits: floor and largest cable lengths, kernels' axes; tensions are those of the searches.
-        speeds: velocities that the robot must be able to have; None: nobody asks.
-        capacity: for the capacity margin, which decides nothing; None: nobody asks.
+        searches: search of each condition on the cables.
+        around: bodies that the cables may not meet, each other included; None: contacts do not count.
+        limits: floor and largest cable lengths, kernels' axes; limits of tensions are those of the searches.
+        speeds: velocities that the robot must be able to have; None: speeds do not count.
+        capacity: search for the capacity margin, which has no part in the verdict; None: there is none.
     """
 
     robot: AnyRobot
@@ -64,7 +64,7 @@ class RestPoses:
             quaternions: (n, 4) unit quaternions, scalar first.
 
         Returns:
-            (n,) verdict, each of `MARGINS`, NaN where nobody asks, and `NEAREST`.
+            (n,) verdict, each of `MARGINS`, NaN where its condition does not count, and `NEAREST`.
         """
         places, count = mass_centres(self.robot, origins, quaternions), len(origins)
         columns: PoseColumns = {name: np.full(count, np.nan) for name in MARGINS}
@@ -90,8 +90,8 @@ class RestPoses:
     def sides(self, origins: np.ndarray, half: np.ndarray, quaternion: np.ndarray) -> np.ndarray:
         """Tell which cells, at one orientation, are proved to lie wholly on one side of the workspace.
 
-        While a robot moves by a distance without a turn, its heights and the lengths of its cables change by no more
-        than that; distances and speeds of cables change as `workspaces.shifts` says.
+        While a robot moves by a distance without turning, its heights and the lengths of its cables change by no more
+        than this distance; distances and speeds of cables change as `workspaces.shifts` says.
 
         Args:
             origins: (n, 3) of the platform frame at the centres of the cells, kernels' coordinates, m.
@@ -99,26 +99,27 @@ class RestPoses:
             quaternion: (4,) unit quaternion, scalar first.
 
         Returns:
-            (n,) 0: neither is proved; 1: inside; 2: outside, as `schema.meanings.CELL_SIDES` has them.
+            (n,) 0: neither side is proved; 1: inside; 2: outside, as in `schema.meanings.CELL_SIDES`.
         """
-        turns = np.repeat(quaternion[None], len(origins), axis=0)
-        places, reach = mass_centres(self.robot, origins, turns), np.linalg.norm(half, axis=1)
+        quaternions = np.repeat(quaternion[None], len(origins), axis=0)
+        places, reach = mass_centres(self.robot, origins, quaternions), np.linalg.norm(half, axis=1)
         inside, outside = np.ones(len(origins), bool), np.zeros(len(origins), bool)
         for search in self.searches.values():
-            held, lost = WorkspaceCells(self.robot, search.asked)(places, half, quaternion, search(places, turns))
+            cells, answers = WorkspaceCells(self.robot, search.requirement), search(places, quaternions)
+            held, lost = cells(places, half, quaternion, answers)
             inside, outside = inside & held, outside | lost
-        moved = shifts(self.robot, places, turns, reach)
+        moved = shifts(self.robot, places, quaternions, reach)
         if self.robot.pulleys is not None:
-            # A platform within a pulley has no cable there.
+            # An attachment point within a pulley has no free cable.
             inside &= (moved.free > 0.0).all(1)
         slacks = list[tuple[np.ndarray, np.ndarray]]()
         if self.around is not None:
-            distances = at_rest(self.robot, self.around, places, turns)
+            distances = at_rest(self.robot, self.around, places, quaternions)
             slacks += [(getattr(distances, of)[:, None], getattr(moved, of)[:, None]) for of in ("cables", "obstacles")]
             inside &= (distances.platform > moved.near_platform(self.around) + CLOSE) & ~distances.is_open
             outside |= distances.platform < -moved.platform - CLOSE
         changes = {} if self.speeds is None else {"speed_margin": self.speeds.changes(moved)}
-        slacks += [(slack, changes.get(name, reach[:, None])) for name, _, slack in self._limited(origins, turns)]
+        slacks += [(slack, changes.get(name, reach[:, None])) for name, _, slack in self._limited(origins, quaternions)]
         for slack, change in slacks:
             inside &= (slack > change + CLOSE).all(1)
             outside |= (slack < -change - CLOSE).any(1)
@@ -129,7 +130,7 @@ class RestPoses:
         return in_batches(lambda x: geometry.cable_lengths(self.robot, *x), poses, size=BATCH)
 
     def _limited(self, origins: np.ndarray, quaternions: np.ndarray) -> Iterator[tuple[str, Verdict, np.ndarray]]:
-        # Yield for each limit its quantity, its flag, and (n, k) the slack that is left.
+        # Yield the quantity, the flag and the slack (n, k) of each limit.
         places = mass_centres(self.robot, origins, quaternions)
         if self.limits.floor is not None:
             yield "floor_margin", Verdict.BELOW_FLOOR, float(self.limits.floor) - places[:, 2:]
@@ -150,15 +151,16 @@ def over_orientations(
     """Tell whether places belong to the workspace of a set of orientations.
 
     Args:
-        ask: of poses, as `RestPoses` is.
+        ask: gives the columns of poses, as `RestPoses` does.
         origins: (n, 3) m.
         orientations: (k, 4) unit quaternions, scalar first.
-        volume: (k,) part of the set that each stands for.
-        kind: "inclusion": some of the orientations is inside; "total": every one is.
+        volume: (k,) part of the set that each orientation stands for.
+        kind: "inclusion": at least one orientation must be inside; "total": all must.
 
     Returns:
-        (n,) verdict: where it is not 0, the flags of the most orientations that stand in the way; margins of the best
-        orientation, or of the worst, and what is nearest there; orientation_fraction, the part of the set inside.
+        (n,) verdict: where it is not 0, the most frequent flags of orientations that are not inside; margins of the
+        best orientation, or of the worst, and the nearest bodies there; orientation_fraction, the part of the set
+        inside.
     """
     parts, count = list[PoseColumns](), len(orientations)
     step = max(1, AT_ONCE // count)
@@ -170,7 +172,7 @@ def over_orientations(
 
 
 def _of_places(columns: PoseColumns, volume: np.ndarray, kind: OrientationSet) -> PoseColumns:
-    # (n_places, n_orientations) each.
+    # Reduce columns (n_places, n_orientations) to columns (n_places,).
     verdict = columns["verdict"]
     inside = verdict == 0
     is_open = ~inside & ((verdict & ~FLAGS(OPEN.value)) == 0)
@@ -180,7 +182,7 @@ def _of_places(columns: PoseColumns, volume: np.ndarray, kind: OrientationSet) -
     else:
         best, is_met = np.fmin.reduce, inside.all(1)
         may_be = ~is_met & (inside | is_open).all(1)
-    # A set that is refuted is so for the orientations that are refuted, however many others are open.
+    # The reasons of a refuted set are those of the refuted orientations, however many others are open.
     reasons = np.where(is_met, 0, _most_frequent(np.where(is_open == may_be[:, None], verdict, 0)))
     best_values = {name: best(columns[name], axis=1) for name in MARGINS}
     at = (columns["clearance"] == best_values["clearance"][:, None]).argmax(1)

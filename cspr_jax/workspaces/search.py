@@ -1,7 +1,7 @@
 """Workspaces: margins of many poses of a robot on any number of cables. Arrays in, answers out.
 
-A pose goes from the fastest way to the surest, until its answer is beyond rounding: by the null space of six to eight
-cables in space, by the normals to dof - 1 cables, by singular values.
+A pose is answered by the fastest method first, then by surer ones until its answer is beyond rounding: the null space
+of six to eight cables in space, the normals to dof - 1 cables, singular values.
 """
 
 import dataclasses
@@ -26,22 +26,23 @@ from cspr_jax.workspaces.margins import Wrenches
 from cspr_jax.workspaces.questions import CLOSURE, Requirement
 from cspr_jax.workspaces.required import RequiredWrenches
 
-# A margin nearer to zero than this part of the largest limit of the tensions, or of the wrench, is on the boundary.
+# A pose is on the boundary if its margin is nearer to zero than this part of the largest limit of the tensions, or of
+# the wrench.
 BOUNDARY = 1e-9
-# Single precision may leave the bounds of a margin this far apart, likewise over the largest limit.
-TOLD = 1e-3
+# Bounds of a margin in single precision may lie this far apart, as part of the largest limit.
+APART = 1e-3
 PART = 1 << 18
-# Poses of a batch where few are asked about, and of what is only prepared here.
+# Poses of a batch where poses are few, and where a search is prepared.
 BATCH = 1024
 MOST_SHORT = 8  # short batches
-# Bytes of the wrench matrices of a batch where poses are many: the start of a call is then short beside it, and caches
-# hold most.
+# Bytes of the wrench matrices of a batch where poses are many: large beside the start of a call, and small enough for
+# caches to hold most of them.
 BYTES = 6_400_000
-# Poses by which the base block is chosen, and those by which cocircuits that are none are left out.
+# Poses by which the base block is chosen; poses by which choices of cables without a cocircuit are left out.
 TRIALS, FEW_TRIALS = 200, 8
-# Boxes in which they are sought, each twice as wide as the one before: the largest pulleys have 1e6 m.
+# Number of boxes in which such poses are sought, each twice as wide as the one before: the largest pulleys have 1e6 m.
 WIDENINGS = 40
-# So many open poses go to singular values at once: to compile for them would take longer.
+# Up to so many open poses are answered by singular values at once: compiling for them would take longer.
 FEW = 100
 
 
@@ -52,8 +53,8 @@ class WorkspaceAnswers(Columns):
     Fields:
         verdict: (n,) flags of `Verdict`; 0: the pose belongs to the workspace. Singular: the cables do not span a
             wrench that they must supply. Undecided: on the boundary, within 1e-9 of the limits.
-        margin: (n,) N: by how much tensions can keep from their limits, negative outside; inf where nothing bounds it,
-            -inf where the cables do not span the wrench. Of wrench closure a pure number in [-1, 1].
+        margin: (n,) distance that tensions can keep from their limits, N, negative outside; inf where nothing bounds
+            it, -inf where the cables do not span the wrench. For wrench closure a pure number in [-1, 1].
         is_exact: (n,) whether the pose was answered by singular values.
     """
 
@@ -63,57 +64,53 @@ class WorkspaceAnswers(Columns):
 
 
 class Poses(NamedTuple):
-    """Poses, and what the cables must supply at each.
+    """Poses, and wrenches that the cables must supply at each.
 
     Fields:
         positions: (n, 3) m.
         quaternions: (n, 4) unit quaternions, scalar first.
-        wrenches: (n, dof) moments over a length, N; None: what is asked at all of them.
+        wrenches: (n, dof) moments over a length, N; None: those of the requirement.
     """
 
     positions: np.ndarray
     quaternions: np.ndarray
     wrenches: np.ndarray | None
 
-    def some(self, which: Any) -> "Poses":
-        """Some of them.
-
-        Returns:
-            those.
-        """
-        wrenches = None if self.wrenches is None else self.wrenches[which]
-        return Poses(self.positions[which], self.quaternions[which], wrenches)
+    def rows(self, index: Any) -> "Poses":
+        """Poses chosen by indices, a slice or a mask (n,)."""
+        wrenches = None if self.wrenches is None else self.wrenches[index]
+        return Poses(self.positions[index], self.quaternions[index], wrenches)
 
 
 Stage = Callable[[Poses], np.ndarray]
 
 
 class WorkspaceSearch:
-    """A question to poses of one robot; what it needs of the robot alone is found once.
+    """Search for poses of one robot that meet a requirement; all that depends on the robot alone is prepared once.
 
     Fields:
-        asked: the question.
-        unit: (dof,) by what the components of wrenches are divided: moments by a length of the robot, m.
+        requirement: what each pose has to meet.
+        unit: (dof,) divisors of the components of wrenches: for moments a length of the robot, m.
     """
 
-    def __init__(self, robot: AnyRobot, asked: Requirement, *, precision: str = "float64") -> None:
+    def __init__(self, robot: AnyRobot, requirement: Requirement, *, precision: str = "float64") -> None:
         """Prepare the search for a robot, centred, z down.
 
-        With precision "float32" that decides the poses of which it can, and float64 the others; margins of the former
-        are good to 1e-3 of the limits.
+        With precision "float32" single precision decides poses where it can, with margins accurate to 1e-3 of the
+        limits, and float64 the others.
         """
-        self._robot, self.asked, self._precision, self._length = robot, asked, precision, _length(robot)
+        self._robot, self.requirement, self._precision, self._length = robot, requirement, precision, _length(robot)
         self.unit = np.where(geometry.scales(robot), self._length, 1.0)
-        self._wrenches = asked.wrenches.over(self.unit)
-        self._measure = "tensions" if asked.capacity_length is None else "capacity"
-        capacity_length = asked.capacity_length or self._length
+        self._wrenches = requirement.wrenches.over(self.unit)
+        self._measure = "tensions" if requirement.capacity_length is None else "capacity"
+        capacity_length = requirement.capacity_length or self._length
         self._normals_unit = np.where(geometry.scales(robot), capacity_length / self._length, 1.0)
         self._boundary = BOUNDARY
-        if asked.condition == CLOSURE:
+        if requirement.condition == CLOSURE:
             self._measure = "closure"
         else:
-            sizes = asked.wrenches.size, float(robot.mass * robot.gravity)
-            self._boundary *= np.abs([*asked.low, *asked.high[np.isfinite(asked.high)], *sizes]).max()
+            sizes = requirement.wrenches.size, float(robot.mass * robot.gravity)
+            self._boundary *= np.abs([*requirement.low, *requirement.high[np.isfinite(requirement.high)], *sizes]).max()
         matrices = self._trials()
         self._choices = cocircuits.choices_of(matrices[:FEW_TRIALS])
         self._order = tuple[int, ...]()
@@ -129,18 +126,18 @@ class WorkspaceSearch:
         Args:
             positions: (n, 3) of the mass centre, or of the joint, m.
             quaternions: (n, 4) unit quaternions, scalar first; None: no rotation.
-            wrenches: (n, dof) what the cables must supply at each pose in place of the question's finite set, N and
-                N m; None: that.
+            wrenches: (n, dof) wrench of each pose that takes the place of the finite set of the requirement, N and
+                N m; None: the finite set.
 
         Returns:
             the answers.
         """
         if len(positions) == 0:
             return WorkspaceAnswers(np.zeros(0, FLAGS), np.zeros(0), np.zeros(0, bool))
-        turns = np.tile(IDENTITY, (len(positions), 1)) if quaternions is None else quaternions
-        loads = self._weights(positions, turns) if wrenches is None else wrenches / self.unit
-        poses = Poses(positions, turns, loads)
-        parts = in_parts(lambda part: self._part(poses.some(part)), len(positions), PART)
+        quaternions = np.tile(IDENTITY, (len(positions), 1)) if quaternions is None else quaternions
+        loads = self._weights(positions, quaternions) if wrenches is None else wrenches / self.unit
+        poses = Poses(positions, quaternions, loads)
+        parts = in_parts(lambda part: self._part(poses.rows(part)), len(positions), PART)
         margin, is_exact, is_outside = (np.concatenate(x) for x in zip(*parts, strict=True))
         verdict = np.where(margin > 0.0, 0, Verdict.WRENCH_INFEASIBLE)
         verdict = np.where(np.abs(margin) <= self._boundary, Verdict.UNDECIDED, verdict)
@@ -149,21 +146,21 @@ class WorkspaceSearch:
         return WorkspaceAnswers(verdict.astype(FLAGS), margin, is_exact)
 
     def _trials(self) -> np.ndarray:
-        # Wrench matrices of poses among the spools, all finite: no cable ends within its pulley there. Large pulleys
-        # may leave no such pose among the spools, but they do farther out.
+        # Return finite wrench matrices of poses among the spools: no cable ends within its pulley there. Large pulleys
+        # may leave no such pose among the spools, but do farther out.
         rng, base, row = np.random.default_rng(1), np.asarray(self._robot.base_points), PATTERNS[self._robot.pattern]
         low, high = base.min(0), base.max(0)
         middle, half = 0.5 * (low + high), 0.4 * (high - low)
-        # If all spools have one x, components that vanish in their plane vanish nowhere else.
+        # If all spools have the same x, some components vanish only in their plane: leave it.
         moves = np.isin(range(3), row.forces or range(3))
         half = np.where(moves, np.maximum(half, 0.2 * half.max() or 1.0), half)
         regular = np.zeros((0, self._robot.dof, self._robot.n_cables))
         for widening in range(WIDENINGS):
             places = middle + 2.0**widening * half * rng.uniform(-1.0, 1.0, (TRIALS, 3))
-            turns = np.array(IDENTITY) + 0.2 * rng.normal(size=(TRIALS, 4))
+            quaternions = np.array(IDENTITY) + 0.2 * rng.normal(size=(TRIALS, 4))
             if row.is_planar:
-                turns[:, [1, 3]] = 0.0
-            matrices = self._matrices(places, turns / np.linalg.norm(turns, axis=1, keepdims=True))
+                quaternions[:, [1, 3]] = 0.0
+            matrices = self._matrices(places, quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True))
             regular = np.concatenate([regular, matrices[np.isfinite(matrices).all((1, 2))]])
             if len(regular) >= FEW_TRIALS:
                 return regular
@@ -171,7 +168,7 @@ class WorkspaceSearch:
         raise InputError("pulley_radius", None, allowed, fault="none among the spools, nor around them")
 
     def _matrices(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
-        # Wrench matrices, moments over the length.
+        # Return wrench matrices, moments over the length.
         poses = positions, quaternions
         matrices = in_batches(lambda x: geometry.wrench_matrices(self._robot, *x), poses, size=TRIALS)
         return matrices / self.unit[:, None]
@@ -183,7 +180,7 @@ class WorkspaceSearch:
             places = np.flatnonzero(is_open)
             if len(places) == 0 or len(places) < min(FEW, count):
                 break
-            bounds = stage(poses.some(places))
+            bounds = stage(poses.rows(places))
             is_known = accepts(bounds)
             known = bounds[is_known]
             margin[places[is_known]] = 0.5 * (known.real + known.imag)
@@ -191,7 +188,7 @@ class WorkspaceSearch:
         is_open |= np.abs(margin) <= self._boundary
         places = np.flatnonzero(is_open)
         if len(places):
-            margin[places], is_outside[places] = self._exactly(poses.some(places))
+            margin[places], is_outside[places] = self._exactly(poses.rows(places))
         return margin, is_open, is_outside
 
     def _stages(self):
@@ -199,21 +196,21 @@ class WorkspaceSearch:
             with np.errstate(invalid="ignore"):
                 return (bounds.real == bounds.imag) | (bounds.imag - bounds.real <= apart * self._boundary)
 
-        def is_told(bounds):
-            is_clear = (bounds.real > self._boundary) | (bounds.imag < -self._boundary)
-            return is_clear & is_known(bounds, TOLD / BOUNDARY)
+        def is_clear(bounds):
+            is_beyond = (bounds.real > self._boundary) | (bounds.imag < -self._boundary)
+            return is_beyond & is_known(bounds, APART / BOUNDARY)
 
         if not len(self._choices.table):  # whatever the pose, the cables do not span all components
             return
 
         if self._precision == "float32":
-            yield self._stage(np.float32, bool(self._order)), is_told
+            yield self._stage(np.float32, bool(self._order)), is_clear
         if self._order:
             yield self._stage(np.float64, True), is_known
         yield self._stage(np.float64, False), is_known
 
     def batch(self, dtype: type) -> int:
-        """Length of a batch on a CPU where many poses are asked about.
+        """Length of a batch on a CPU where poses are many.
 
         Returns:
             a power of two.
@@ -225,26 +222,26 @@ class WorkspaceSearch:
         """Compiled margins of a batch of poses.
 
         Args:
-            by_null_space: whether by the null space, which only some robots and questions take.
+            by_null_space: whether to use the null space, which suits only some robots and requirements.
 
         Returns:
-            a function of lanes: three arrays (n,) of positions, m; four of quaternions, None of a point mass; dof
-            arrays of wrenches in place of the question's, over `unit`, or None. It gives (n,) lower bound + i upper
-            bound of the margin.
+            a function of lanes: three arrays (n,) of positions, m; four of quaternions, None for a point mass; dof
+            arrays of wrenches over `unit` in place of those of the requirement, or None. It gives (n,) lower bound + i
+            upper bound of the margin.
         """
 
         def cast(tree):
             return jax.tree.map(lambda x: np.asarray(x, dtype), tree)
 
-        options = {"measure": self._measure, "is_bounded": bool(np.isfinite(self.asked.high).all())}
+        options = {"measure": self._measure, "is_bounded": bool(np.isfinite(self.requirement.high).all())}
         robot, ordered = cast(self._robot), list(self._order) if by_null_space else slice(None)
-        limits = leaf(self.asked.low[ordered]), leaf(self.asked.high[ordered]), leaf(self._normals_unit)
+        limits = leaf(self.requirement.low[ordered]), leaf(self.requirement.high[ordered]), leaf(self._normals_unit)
         tension_limits, length, fixed = cast((kernels.TensionLimits(*limits), leaf(self._length), self._fixed))
         choices = self._relations if by_null_space else self._choices
         choices = choices._replace(counts=cast(choices.counts))
 
-        def compiled(place, turn, load):
-            columns, loss = geometry.wrench_columns(robot, place, turn, length)
+        def compiled(place, quaternion, load):
+            columns, loss = geometry.wrench_columns(robot, place, quaternion, length)
             wrenches = fixed if load is None else fixed._replace(points=[load])
             if not by_null_space:
                 return kernels.by_normals(columns, loss, wrenches, tension_limits, choices, **options)
@@ -260,10 +257,10 @@ class WorkspaceSearch:
             return tuple(np.ascontiguousarray(column, dtype) for column in array.T)
 
         def stage(poses):
-            turns = lanes(poses.quaternions) if is_body else None
+            quaternions = lanes(poses.quaternions) if is_body else None
             loads = None if poses.wrenches is None else lanes(poses.wrenches)
-            batch = lanes(poses.positions), turns, loads
-            # Two lengths, since each is compiled.
+            batch = lanes(poses.positions), quaternions, loads
+            # Use two lengths only, since each is compiled.
             size = BATCH if len(poses.positions) <= MOST_SHORT * BATCH else self.batch(dtype)
             return in_batches(lambda x: compiled(*x), batch, size=size)
 
@@ -271,7 +268,7 @@ class WorkspaceSearch:
 
     @property
     def _relations(self) -> cocircuits.CableSubsets:
-        # Cables of each cocircuit alone, in the order of the block.
+        # Return only the cables of each cocircuit, in the order of the block.
         table, counts = self._choices
         places = np.argsort(self._order)[table[:, self._robot.dof - 1 :]].astype(np.int32)
         sorting = np.argsort(places, axis=1)
@@ -300,7 +297,7 @@ class WorkspaceSearch:
 
     @property
     def _fixed(self) -> Wrenches:
-        # The weight of a body on a joint is not among them: it depends on the pose.
+        # Return the required wrenches that do not depend on the pose, as that of a body on a joint does.
         required = self._wrenches
         points = [] if required.points is None else [[leaf(x) for x in point] for point in required.points]
         return Wrenches(
@@ -319,13 +316,14 @@ class WorkspaceSearch:
                 is_outside[i] = exact.cocircuits(columns)[2].shape[1] < len(columns)
             else:
                 required = self._wrenches if poses.wrenches is None else self._wrenches.about(poses.wrenches[i])
-                margins[i] = exact.wrench_margin(columns, required, self.asked.low, self.asked.high, measure)
+                low, high = self.requirement.low, self.requirement.high
+                margins[i] = exact.wrench_margin(columns, required, low, high, measure)
                 is_outside[i] = margins[i] == -np.inf
         return margins, is_outside
 
 
 def _length(robot: AnyRobot) -> float:
-    # By which moments are divided: the size of the platform.
+    # Return the size of the platform, by which moments are divided.
     if not isinstance(robot, PlatformRobot):
         return 1.0
     points = np.asarray(robot.platform_points)

@@ -27,7 +27,7 @@ def _of_point_mass(robot: PointMassRobot, places) -> Sensitivities:
 
 @jax.jit
 def _of_platform(robot: PlatformRobot, poses) -> Sensitivities:
-    return jax.vmap(lambda place, turn: sensitivities(robot, place, matrix(turn)))(*poses)
+    return jax.vmap(lambda place, quaternion: sensitivities(robot, place, matrix(quaternion)))(*poses)
 
 
 @jax.jit
@@ -39,8 +39,8 @@ def _of_pairs(geometry, places) -> Sensitivities:
 class SensitivitySearch:
     """The sensitivities of a robot.
 
-    A platform whose cables are in three parallel pairs stands as its file has it, where they are parallel; another one
-    in its reference orientation.
+    A platform whose cables form three parallel pairs has the orientation of its file, in which they are parallel; any
+    other platform has its reference orientation.
 
     Args:
         robot: centred; a platform in the axes of its file.
@@ -50,7 +50,7 @@ class SensitivitySearch:
     """
 
     def __init__(self, robot: PointMassRobot | PlatformRobot) -> None:
-        """Find how a platform stands."""
+        """Find the orientation of a platform."""
         check_determined(robot)
         self._robot, self._pairs = robot, None
         if isinstance(robot, PlatformRobot):
@@ -62,7 +62,7 @@ class SensitivitySearch:
 
         Args:
             positions: (n, 3) in the kernels' coordinates, m.
-            quaternions: (n, 4) orientations of a platform from how it stands; None: that.
+            quaternions: (n, 4) rotations of a platform from its orientation; None: there are none.
 
         Returns:
             (n,) each.
@@ -75,8 +75,8 @@ class SensitivitySearch:
             first, second = points[pairs.cables[:, 0]], points[pairs.cables[:, 1]]
             geometry = (leaf(pairs.exit_points), leaf(second - first), leaf(np.sqrt((points**2).sum(1).mean())))
             return in_batches(partial(_of_pairs, geometry), positions, size=BATCH)
-        turns = np.tile(IDENTITY, (len(positions), 1)) if quaternions is None else quaternions
-        return in_batches(partial(_of_platform, robot), (positions, turns), size=BATCH)
+        quaternions = np.tile(IDENTITY, (len(positions), 1)) if quaternions is None else quaternions
+        return in_batches(partial(_of_platform, robot), (positions, quaternions), size=BATCH)
 
 
 def _pairs(robot: PlatformRobot) -> ParallelPairs | None:

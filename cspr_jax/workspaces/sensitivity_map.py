@@ -19,7 +19,7 @@ class SensitivityMap(GridMap):
     any_cables = True
 
     def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
-        """Refuse more cables than degrees of freedom, whose lengths are not independent."""
+        """Refuse robots on more cables than degrees of freedom, whose cable lengths are not independent."""
         super().__init__(robot_file, keys, file)
         robot = kernel_robot(robot_file, keys.trajectory, file, any_cables=True)
         if robot.n_cables != robot.dof:

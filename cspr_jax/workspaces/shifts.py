@@ -1,8 +1,8 @@
-"""Bounds of how far cables move, and turn, while a robot moves within a cell without a turn. Arrays in, answers out.
+"""Bounds of how far cables move and turn while a robot moves within a cell without turning. Arrays in, answers out.
 
-A cable is a segment from its exit E to its attachment point A. While the robot moves by at most h, A does too, and E by
-at most D: not at all without a pulley. A point (1 - s) E + s A of the cable moves by at most (1 - s) D + s h; it moves
-from the platform by at most (1 - s) (D + h), and from the point with t of another cable by at most
+A cable is a segment from its exit E to its attachment point A. While the robot moves by at most h, A does too, and E
+moves by at most D, which is 0 without a pulley. A point (1 - s) E + s A of the cable moves by at most (1 - s) D + s h;
+relative to the platform by at most (1 - s) (D + h), and relative to the point at t of another cable by at most
 (1 - s) D + (1 - t) D + |s - t| h. The largest values, at s and t of 0 and 1, bound how distances change:
 
     cable and obstacle       max(D, h)
@@ -10,18 +10,18 @@ from the platform by at most (1 - s) (D + h), and from the point with t of anoth
     two cables               max(2 D, D + h)
     cable and platform       D + h
 
-What is left out of a cable next to its attachment point does not change the last: of a point of the cable at the
-distance r from A, l being the smaller length, the one at the same distance, or the shorter cable's end, is afterwards
-no farther than E moves from the platform.
+The last bound also holds if a length next to A is left out of the cable: for each point of the cable at a distance r
+from A, the point that is at the same distance afterwards, or the end of the cable if that is nearer to A, is no farther
+away than E moves relative to the platform.
 
-Of a cable that is attached to its platform's shape, in it or on it, the signed distance from the shape, which is
-convex, grows along the cable from where it is positive on. If it is positive at the distance r from A where the part
-begins that is not left out, it is the least there, and changes by no more than r times the change of the unit vector.
+If a cable is attached in or on the shape of its platform, which is convex, the signed distance from the shape grows
+along the cable from where it is positive. So if it is positive at the distance r from A, where the part that is not
+left out begins, it is the least there, and changes by no more than r times the change of the unit vector.
 
-On its pulley of radius r, E moves along the cable's own direction by r / f of what A moves across the cable in the
-plane of the pulley, f being the free length, and with the plane, by (2 r) / w at most of what A moves out of it, w
-being the distance of A from the swivel axis (`robots.pulleys`). Wherever A goes, E stays within a band of width 4 r and
-height 2 r.
+On its pulley of radius r, E moves along the cable by r / f of the distance that A moves across the cable in the plane
+of the pulley, where f is the free length; and with this plane by at most 2 r / w of the distance that A moves out of
+it, where w is the distance of A from the swivel axis (`robots.pulleys`). Wherever A goes, E stays within a band of
+width 4 r and height 2 r.
 """
 
 import math
@@ -36,12 +36,12 @@ from cspr_jax.robots.shapes import is_within
 from cspr_jax.workspaces import geometry
 
 BATCH = 4096
-# Diagonal of the band in which exits are, over the radius of the pulley.
+# Diagonal of the band within which exits lie, over the radius of the pulley.
 BAND = math.sqrt(20.0)
 
 
 class Shifts(NamedTuple):
-    """Bounds of what moves while robots move within their cells.
+    """Bounds of movements while robots move within their cells.
 
     Fields:
         robot: (n,) how far the robot moves, m.
@@ -57,21 +57,21 @@ class Shifts(NamedTuple):
 
     @property
     def cables(self) -> np.ndarray:
-        """(n,) how far distances of two cables change, m."""
+        """Change of distances between two cables, (n,) m."""
         return self.exits + np.maximum(self.exits, self.robot)
 
     @property
     def obstacles(self) -> np.ndarray:
-        """(n,) how far distances of cables and platform from obstacles change, m."""
+        """Change of distances of cables and platform from obstacles, (n,) m."""
         return np.maximum(self.exits, self.robot)
 
     @property
     def platform(self) -> np.ndarray:
-        """(n,) how far distances of cables from their own platform change, m."""
+        """Change of distances of cables from their own platform, (n,) m."""
         return self.exits + self.robot
 
     def near_platform(self, around: Scene) -> np.ndarray:
-        """How far positive distances of cables from their own platform fall.
+        """Fall of positive distances of cables from their own platform.
 
         Returns:
             (n,) m.
@@ -83,7 +83,7 @@ class Shifts(NamedTuple):
 
 
 def shifts(robot: AnyRobot, positions: np.ndarray, quaternions: np.ndarray, reach: np.ndarray) -> Shifts:
-    """Bounds of what moves while robots move within their cells.
+    """Bounds of movements while robots move within their cells.
 
     Args:
         robot: centred, z down.
@@ -98,20 +98,20 @@ def shifts(robot: AnyRobot, positions: np.ndarray, quaternions: np.ndarray, reac
     rays, most = targets - np.asarray(robot.base_points), reach[:, None]
     if robot.pulleys is None:
         free = np.linalg.norm(rays, axis=2) - most
-        return Shifts(reach, np.zeros(len(reach)), _turns(most, free), free)
+        return Shifts(reach, np.zeros(len(reach)), _unit_changes(most, free), free)
     radius, axes = np.asarray(robot.pulleys.radius), np.asarray(robot.pulleys.axes)
     high = (rays * axes).sum(2)
     wide = np.linalg.norm(rays - high[..., None] * axes, axis=2)
-    # From the centre of the pulley, which turns with the cable: no farther than the robot this changes.
+    # The distance from the centre of the pulley, which swivels with the cable, changes by no more than the robot moves.
     out = np.hypot(wide - radius, high) - most
     free = np.sqrt(np.maximum(np.square(np.maximum(out, 0.0)) - radius**2, 0.0))
     wide = np.maximum(wide - most, 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         exits = most * np.fmax(radius / free, 2.0 * radius / wide)
     exits = np.where(radius > 0.0, np.fmin(exits, BAND * radius), 0.0)
-    return Shifts(reach, exits.max(1), _turns(most, np.minimum(free, wide)), free)
+    return Shifts(reach, exits.max(1), _unit_changes(most, np.minimum(free, wide)), free)
 
 
-def _turns(reach: np.ndarray, length: np.ndarray) -> np.ndarray:
-    # Unit vectors differ by 2 at most.
+def _unit_changes(reach: np.ndarray, length: np.ndarray) -> np.ndarray:
+    # Bound the change of unit vectors, which is 2 at most.
     return np.where(length > 0.0, np.minimum(reach / np.where(length > 0.0, length, 1.0), 2.0), 2.0)

@@ -1,9 +1,9 @@
 """Speeds of cables that velocities of the effector need, for maps of workspaces. Arrays in, answers out.
 
-A cable of unit vector u, attached at the arm a from the origin of the platform frame, changes its length by
--(u.v + (a x u).w) a second, v being the velocity of that origin and w the angular velocity. Of all v and w with
-|v| <= V and |w| <= W that the robot's pattern allows, the fastest is |u'| V + |(a x u)'| W, the primes standing for the
-parts along which the effector can move and about which it can turn: the rows of the wrench matrix.
+A cable of unit vector u, attached at the arm a from the origin of the platform frame, changes its length at the rate
+-(u.v + (a x u).w), where v is the velocity of the origin and w the angular velocity. Over all v and w with |v| <= V and
+|w| <= W that the robot's pattern allows, the largest rate is |u'| V + |(a x u)'| W, where primes mark the components
+along which the effector can move and about which it can turn: the rows of the wrench matrix.
 """
 
 import dataclasses
@@ -27,7 +27,7 @@ class CableSpeeds:
 
     Fields:
         robot: centred, z down, its arms from the origin of the platform frame; see `cable_speeds`.
-        speed: of that origin, m/s.
+        speed: largest speed of the origin, m/s.
         angular_speed: rad/s.
         most: (n_cables,) largest speeds, m/s.
     """
@@ -38,7 +38,7 @@ class CableSpeeds:
     most: np.ndarray
 
     def margins(self, origins: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
-        """Slack that is left to the largest speeds of the cables.
+        """Slack up to the largest speeds of the cables.
 
         Args:
             origins: (n, 3) of the platform frame, kernels' coordinates, m.
@@ -54,12 +54,12 @@ class CableSpeeds:
         return self.most - (along * self.speed + about * self.angular_speed)
 
     def changes(self, moved: Shifts) -> np.ndarray:
-        """How far `margins` change within cells at most.
+        """Largest change of `margins` within cells.
 
         Returns:
             (n, n_cables) m/s.
         """
-        # The first term does not change for a robot that moves in all directions in which its cables lie.
+        # |u'| is constant for a robot that moves in all directions in which its cables lie.
         speed = self.speed if PATTERNS[self.robot.pattern].forces == (2,) else 0.0
         if not isinstance(self.robot, PlatformRobot):
             return moved.units * speed
@@ -77,7 +77,7 @@ def cable_speeds(robot: AnyRobot, most: np.ndarray, *, speed: float, angular_spe
         angular_speed: rad/s.
 
     Returns:
-        the question.
+        the velocities, as a condition on poses.
     """
     if isinstance(robot, PlatformRobot) and not PATTERNS[robot.pattern].is_jointed and robot.centre_of_mass is not None:
         points = np.asarray(robot.platform_points) + np.asarray(robot.centre_of_mass)

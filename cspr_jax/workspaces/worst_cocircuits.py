@@ -1,4 +1,4 @@
-"""The cocircuit that decides at a pose: the normal to some cables against which the others do the least."""
+"""The cocircuit that decides at a pose: the normal to some cables along which the others do the least."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -13,7 +13,7 @@ from cspr_jax.robots.wrench_sets import normals_to, spanning
 
 # Components of a cocircuit below this part of the largest one do not make it void.
 ZERO = 1e-9
-# A normal to dof - 1 unit columns whose products with all others are smaller than this means nothing.
+# A normal to dof - 1 unit columns means nothing if its products with all other columns are smaller than this.
 SHORT = 1e-9
 
 
@@ -23,10 +23,10 @@ class WorstCocircuits(NamedTuple):
     Fields:
         normal: (n, dof) c.
         subset: (n,) row of `wrench_sets.spanning`: the cables that it is normal to.
-        load: (n,) the wrench that asks for the most along it.
-        inner: (n, dof) sum of all normals that do not void, and that prove the same of the same wrench, each by how
-            much: since what tensions give along c is a convex function of c, it proves so too, and has no cable normal
-            to it.
+        load: (n,) number of the wrench that needs the most along it.
+        inner: (n, dof) sum of all normals along which the same wrench is out of reach, weighted by how far. Since the
+            most that tensions give along c is a convex function of c, the wrench is out of reach along the sum too, and
+            no cable is normal to it.
     """
 
     normal: Array
@@ -45,19 +45,19 @@ def worst_cocircuits(
     condition: str,
     unbounded: Sequence[bool],
 ) -> WorstCocircuits:
-    """Cocircuits that leave the least, times the volume of the columns that they are normal to.
+    """Cocircuits with the least slack, times the volume of the columns that they are normal to.
 
-    By this length those of columns that are nearly dependent, whose normals turn fast from place to place, come last;
-    where a single one is violated it is that one.
+    This weight puts cocircuits of nearly dependent columns last, whose normals turn fast from place to place. Where a
+    single cocircuit is violated, it is that one.
 
     Args:
         matrices: (n, dof, n_cables) unit columns, moments over a length.
-        wrenches: (k, dof) what the cables must supply, N.
-        low: (n_cables,) N.
-        high: (n_cables,) N; of cables without a largest tension any number.
-        condition: "closure": the cocircuit whose other components are the most of one sign, positive; or any other:
-            that along which the wrenches are the farthest beyond what tensions can give.
-        unbounded: which cables have no largest tension.
+        wrenches: (k, dof) wrenches that the cables must supply, N.
+        low: (n_cables,) smallest tensions, N.
+        high: (n_cables,) largest tensions, N; any number for cables without one.
+        condition: "closure": take the cocircuit whose other components are the most of one sign, positive; any other:
+            take the one along which the wrenches are the farthest beyond what tensions can give.
+        unbounded: mask of the cables without a largest tension.
 
     Returns:
         the cocircuits.

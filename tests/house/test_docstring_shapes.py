@@ -24,7 +24,7 @@ from cspr_jax.motions.amplitudes import Amplitude, named
 from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.platforms import oscillating_slerp, platform_segment
-from cspr_jax.platforms.oscillating_slerp import Turn
+from cspr_jax.platforms.oscillating_slerp import Slerp
 from cspr_jax.platforms.platform_segment import PlatformSegment
 from cspr_jax.robots import force_balance, wrench_balance
 from cspr_jax.robots.limits import Limits
@@ -133,7 +133,7 @@ KNOWN = {
     Amplitude,
     Segment,
     PlatformSegment,
-    Turn,
+    Slerp,
     PlatformMotionKind,
     State,
     Bounds,
@@ -169,7 +169,7 @@ def examples(request):
         Amplitude: amplitude,
         Segment: of_point,
         PlatformSegment: of_poses,
-        Turn: of_poses.turn,
+        Slerp: of_poses.slerp,
         PlatformMotionKind: PlatformMotionKind(),
         "pairs": pairs_apart(platform),
         State: State(*[array(3)] * 3, array(3, 3), *[array(3)] * 2, array(4)),

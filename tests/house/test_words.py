@@ -13,7 +13,7 @@ SOURCES = {path.relative_to(PACKAGE).as_posix(): path.read_text("utf-8") for pat
 FUNCTION_WORDS = {"found", "given", "own", "asked", "every", "some", "which", "now", "wanted", "told", "kept"}
 FUNCTION_WORDS |= {"mine", "like"}
 # How many there are still: to be lowered by who removes some, and never to be raised.
-ALLOWED = {"names": 64, "docstrings": 0, "comments": 0}
+ALLOWED = {"names": 7, "docstrings": 0, "comments": 0}
 FRAGMENT = re.compile(r"(Of|What|Where|Whether|Those)\b")
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from cspr_jax.motions.amplitudes import from_polynomial, named
 from cspr_jax.motions.blocks import INSTANTS, Parts, growing, parts_of_arcs
-from cspr_jax.platforms.least_nodes import least_nodes
+from cspr_jax.platforms.work_list import least_nodes
 
 AMPLITUDES = {
     "quintic": named("quintic"),

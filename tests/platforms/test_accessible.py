@@ -15,9 +15,9 @@ from support.platforms import FROM_REST, MSSM, checker_of, ours, place
 from cspr_jax.arithmetic.rotations import from_tilt_torsion
 from cspr_jax.platforms import accessible as scans
 from cspr_jax.platforms.accessible import DEFINITIONS, accessible
-from cspr_jax.platforms.attainable import attainable, attained, turns
+from cspr_jax.platforms.attainable import attainable, attained, rounds
+from cspr_jax.platforms.beta_hat import end_options
 from cspr_jax.platforms.orientation_steps import OrientationSteps
-from cspr_jax.platforms.pose_ends import end_options
 from cspr_jax.robots.orientation_grids import equal_volume_grid, tilt_torsion_grid
 from cspr_jax.robots.symmetries import NONE, alike, folded, symmetries
 
@@ -236,7 +236,7 @@ def test_orientations_that_a_mirror_joins():
 @pytest.mark.parametrize("values", [1, 2, 6, 20])
 def test_turns_try_every_value_once(values):
     """The preferred one first."""
-    each = turns(values)
+    each = rounds(values)
     assert each[0].tolist() == [0]
     assert sorted(np.concatenate(each).tolist()) == list(range(values))
 

@@ -30,17 +30,17 @@ from support.platforms import (
 from cspr_jax.motions.platform_kind import USUAL, PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.plans import choices, planning
-from cspr_jax.platforms.kernels import slacks_at
-from cspr_jax.platforms.place_proof import wires_beside
+from cspr_jax.platforms.checker import slacks_at
+from cspr_jax.platforms.place_proof import cables_beside
 from cspr_jax.platforms.platform_segment import motion
-from cspr_jax.platforms.platform_segment_lanes import instant, state
+from cspr_jax.platforms.platform_segment_lanes import instant_lanes, state
 from cspr_jax.platforms.slack_lanes import moving_slacks, order, still_slacks
 from cspr_jax.platforms.slacks import pose_slacks
 from cspr_jax.robots import interference, interference_lanes
 from cspr_jax.robots.limits import NO_LIMITS
 from cspr_jax.robots.platform import rays as rays_of
 from cspr_jax.robots.state import State
-from cspr_jax.robots.wrench_lanes import cables
+from cspr_jax.robots.wrench_lanes import cable_lanes
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.result import open_result
 
@@ -162,7 +162,7 @@ def test_cables_beside_the_middles_of_blocks():
     off = np.where((middle + off < 0.1) | (middle + off > 0.9), 0.0, off)
     some = [made(package, random_pose(rng), random_pose(rng), Z0, tuple(rng.uniform(-5, 1, 2)), p) for _ in middle]
     items = stacked(some), np.full(INSTANTS, float(p)), middle, off
-    rays, seen = wires_beside(Problem(package, NO_LIMITS, EFFECTIVE), items, kind=USUAL)
+    rays, seen = cables_beside(Problem(package, NO_LIMITS, EFFECTIVE), items, kind=USUAL)
     own = np.asarray(seen) / np.linalg.norm(seen, axis=2, keepdims=True)
     for segment, t, found, along in zip(some, middle + off, np.asarray(rays), own, strict=True):
         pose = states(segment, EFFECTIVE, p, [t])
@@ -174,12 +174,14 @@ def test_cables_beside_the_middles_of_blocks():
 @functools.partial(jax.jit, static_argnames="pairs")
 def as_lanes(problem, batch, p, t, *, pairs):
     """Slacks (n_criteria, n), vectors between cables and directions of cables of motions, by the fast forms."""
-    now = instant(problem.amplitude, batch.sense, p, t)
-    here = state(batch, p, now, USUAL)
-    wires = cables(problem.robot, here.position, here.turn)
-    slacks = moving_slacks(problem, batch, p, now, USUAL) + still_slacks(problem, batch, here, wires)
-    gaps = interference_lanes.gaps(problem.robot.base_points, pairs, wires)
-    return jnp.stack(slacks), *interference_lanes.as_arrays(gaps, interference_lanes.cable_directions(wires, here.turn))
+    instant = instant_lanes(problem.amplitude, batch.sense, p, t)
+    here = state(batch, p, instant, USUAL)
+    cables = cable_lanes(problem.robot, here.position, here.rotation)
+    slacks = moving_slacks(problem, batch, p, instant, USUAL) + still_slacks(problem, batch, here, cables)
+    gaps = interference_lanes.gaps(problem.robot.base_points, pairs, cables)
+    return jnp.stack(slacks), *interference_lanes.as_arrays(
+        gaps, interference_lanes.cable_directions(cables, here.rotation)
+    )
 
 
 @jax.jit

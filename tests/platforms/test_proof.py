@@ -21,13 +21,12 @@ from cspr_jax.motions.platform_kind import USUAL
 from cspr_jax.motions.problem import Problem
 from cspr_jax.platforms import proof, redundant_kernels
 from cspr_jax.platforms.arcs import Candidates, segments_with
-from cspr_jax.platforms.checker import PlatformChecker
+from cspr_jax.platforms.beta_hat import end_options
+from cspr_jax.platforms.checker import PlatformChecker, slacks_at
 from cspr_jax.platforms.crossings import passed_over
-from cspr_jax.platforms.kernels import slacks_at
 from cspr_jax.platforms.motions import Motions
 from cspr_jax.platforms.place_blocks import STEPS
 from cspr_jax.platforms.place_proof import PARTS
-from cspr_jax.platforms.pose_ends import end_options
 from cspr_jax.robots.interference import contacts
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.reference_pose import aligned

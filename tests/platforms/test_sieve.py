@@ -146,9 +146,9 @@ def test_a_tension_is_right_or_unknown():
     columns = -np.concatenate([rays, np.cross(arms, rays)], axis=2).transpose(1, 2, 0)
     is_good = np.linalg.cond(columns) < 100.0
     true = 6.0 * np.linalg.solve(columns, np.concatenate([force, moment], axis=1)[:, :, None])[:, :, 0].min(1)
-    wires = CableLanes(*([tuple(x.T) for x in vectors] for vectors in (arms, rays)))
-    found = balance(wires, tuple(force.T), tuple(moment.T))
-    mine = np.asarray(certain_tension(np.ones(n), np.sign(found.signed), wires, found))
+    cables = CableLanes(*([tuple(x.T) for x in vectors] for vectors in (arms, rays)))
+    found = balance(cables, tuple(force.T), tuple(moment.T))
+    mine = np.asarray(certain_tension(np.ones(n), np.sign(found.signed), cables, found))
     is_known = np.isfinite(mine) & is_good
     assert np.abs(mine - true)[is_known].max() < 1e-7
     assert is_known[is_good & (out > 0.1)].all() and not is_known[out < 1e-4].any()

@@ -441,7 +441,7 @@ def test_planted_errors_in_bounds_are_found(monkeypatch, request, fault):
 
         def less(*given):
             found = whole(*given)
-            return found._replace(omega=0.5 * found.omega, spin=0.5 * found.spin)
+            return found._replace(omega=0.5 * found.omega, angular_acceleration=0.5 * found.angular_acceleration)
 
         monkeypatch.setattr(platform_reach, "reach", less)
         assert (reach_breaks(200, 1, USUAL, ROBOTS["mssm"]) > 1.0).any()

@@ -216,7 +216,7 @@ def expected(robot, body, place, turns, diameters, leave):
     for solid in (ball, rod, block):
         for i in range(n):
             if solid is block:
-                inner = (base[:, i] - block.centre) @ block.turn, rays[:, i] @ block.turn
+                inner = (base[:, i] - block.centre) @ block.rotation, rays[:, i] @ block.rotation
                 apart = oracle.outside_box(*inner, wide(block.half))
             elif solid is ball:
                 apart = oracle.point_to_segment(wide(ball.centre), base[:, i], rays[:, i]) - ball.radius
@@ -288,7 +288,7 @@ def test_a_room_that_is_turned_and_moved():
     other = (
         shapes.sphere(moved(ball.centre), ball.radius),
         shapes.cylinder(moved(rod.end), moved(rod.start), rod.radius),
-        shapes.Box(moved(block.centre), block.half, quarter @ block.turn),
+        shapes.Box(moved(block.centre), block.half, quarter @ block.rotation),
     )
     w, x, y, z = turns.T
     turned = np.stack([w - z, x - y, x + y, w + z], 1) / np.sqrt(2.0)
@@ -396,9 +396,9 @@ def test_tables_of_obstacles():
     np.testing.assert_allclose(ball.centre, [-3.0, 3.0, 3.0])
     np.testing.assert_allclose([rod.start, rod.end], [[-4.0, 5.0, 6.0], [-4.0, 4.0, 3.0]])
     # A corner goes where the point goes.
-    corner = given[3].centre + given[3].turn @ given[3].half
-    np.testing.assert_allclose(frame.inward(corner), block.centre + block.turn @ block.half)
-    np.testing.assert_allclose(given[3].turn[:, 1], [0.0, -0.28, 0.96])
+    corner = given[3].centre + given[3].rotation @ given[3].half
+    np.testing.assert_allclose(frame.inward(corner), block.centre + block.rotation @ block.half)
+    np.testing.assert_allclose(given[3].rotation[:, 1], [0.0, -0.28, 0.96])
     body = file.platform.body([0.0, 0.0, 0.1])
     np.testing.assert_allclose(body.centre, [0.0, 0.0, 0.15])
     np.testing.assert_allclose(shapes.turned(body, frame).centre, [0.0, 0.0, -0.15])

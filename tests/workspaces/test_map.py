@@ -10,7 +10,7 @@ from support.commands import cspr
 
 import cspr_jax
 from cspr_jax.arithmetic.rotations import from_tilt_torsion
-from cspr_jax.robots.orientation_grids import cone_grid, turn_grid
+from cspr_jax.robots.orientation_grids import cone_grid, planar_grid
 from cspr_jax.schema.verdicts import Verdict
 
 SWEEP = """
@@ -81,7 +81,7 @@ def test_sets_of_orientations(tmp_path, kind):
     code, out, error = swept(tmp_path, conditions='["wrench-feasible"]', more=more)
     assert (code, error) == (0, "")
     places, robot = grid(*KNTU), cspr_jax.load_robot("kntu-planar")
-    angles, volume = turn_grid(divisions, tilt)
+    angles, volume = planar_grid(divisions, tilt)
     inside, margins = [], []
     for angle in angles[:, 1]:
         turn = Rotation.from_euler("y", angle + base).as_quat(scalar_first=True)

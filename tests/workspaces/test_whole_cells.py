@@ -54,7 +54,7 @@ class Asked:
 
     @property
     def proofs(self):
-        return CellProofs(self.own, self.question, self.search, self.quaternion)
+        return CellProofs(self.own, self.search, self.quaternion)
 
     def margins(self, inner, half, margin):
         with double_precision():

@@ -28,7 +28,7 @@ def obstacles(result: Result) -> list[np.ndarray]:
 
 def _points(shape: Obstacle) -> np.ndarray:
     if isinstance(shape, Box):
-        return shape.centre + (CORNERS * shape.half) @ shape.turn.T
+        return shape.centre + (CORNERS * shape.half) @ shape.rotation.T
     around, upward = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False), np.linspace(-0.5, 0.5, UPWARD) * np.pi
     azimuth, height = (x.reshape(-1) for x in np.meshgrid(around, upward))
     ball = np.stack([np.cos(azimuth) * np.cos(height), np.sin(azimuth) * np.cos(height), np.sin(height)], axis=1)
