@@ -70,6 +70,6 @@ def _report(options: argparse.Namespace) -> int:
 
 
 COMMANDS = (
-    Command("plot", "draw a result file, or several maps in one picture", add_plot, _plot),
+    Command("plot", "draw a result, or several in one picture", add_plot, _plot),
     Command("report", "write a page to explore a result or a plan in a browser", _add_report, _report),
 )

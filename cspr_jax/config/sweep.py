@@ -71,9 +71,11 @@ class Axes(Table):
         None, description="direction of the targets seen from the vertical through the centroid, from x to y, rad"
     )
     z: Axis = Field(description=_OF_TARGETS.format("z"))
-    tilt_azimuth: Axis | None = Field(None, description="poses: angle phi of tilt and torsion, rad; absent: 0")
-    tilt: Axis | None = Field(None, description="poses: angle theta of tilt and torsion, rad; absent: 0")
-    torsion: Axis | None = Field(None, description="poses: angle sigma of tilt and torsion, rad; absent: 0")
+    tilt_azimuth: Axis | None = Field(
+        None, description="poses, workspace: angle phi of tilt and torsion, rad; absent: 0"
+    )
+    tilt: Axis | None = Field(None, description="poses, workspace: angle theta of tilt and torsion, rad; absent: 0")
+    torsion: Axis | None = Field(None, description="poses, workspace: angle sigma of tilt and torsion, rad; absent: 0")
     z0: Axis | None = Field(None, description="depth of P0 below the centroid of the spools, m; all > 0")
     inclination: Axis | None = Field(None, description="inclination v of transitions, in place of z0; all in ]-1, 1[")
     tau: Axis | None = Field(None, description="instants of transition-envelopes, normalised time in [0, 1]")
@@ -122,7 +124,7 @@ class SweepTrajectory(TrajectoryKeys):
     start: From | None = Field(
         None,
         alias="from",
-        description="start: { position = [x, y, z] } or { rest = true }; or axes from_x, from_y, from_z",
+        description="{ position = [x, y, z] } or { rest = true }; or axes from_x, from_y and from_z",
     )
     beta_hat: BetaHatChoice | None = Field(
         None,

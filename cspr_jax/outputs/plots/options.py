@@ -33,7 +33,7 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="AXIS=VALUE",
-        help="fix an axis of a map at its nearest point; motion: t=VALUE, s",
+        help="fix an axis of a map at the point nearest to VALUE; motion: t=VALUE, s",
     )
     add_motion_plan(parser)
     parser.set_defaults(device=None)
@@ -73,7 +73,11 @@ def add_look(parser: argparse.ArgumentParser) -> None:
     presets = parser.add_mutually_exclusive_group()
     for name, words in (("column", "8.5 cm wide"), ("page", "17.5 cm wide")):
         presets.add_argument(
-            f"--{name}", dest="preset", action="store_const", const=name, help=f"for a {name} of a paper, {words}"
+            f"--{name}",
+            dest="preset",
+            action="store_const",
+            const=name,
+            help=f"make it {words}, for a {name} of a paper",
         )
     parser.add_argument("--no-title", dest="title", action="store_false", help="leave out the title")
     parser.add_argument("--dpi", type=float, metavar="N", help="pixels per inch (default 160)")
