@@ -62,7 +62,7 @@ def _markdown(text: str) -> str:
             parts.append(textwrap.fill(" ".join(block.split()), WIDTH, break_long_words=False))
             continue
         items: list[str] = []
-        for line in inspect.cleandoc(rest).splitlines():
+        for line in textwrap.dedent(rest).splitlines():
             if (line.startswith(" ") and items) or (section[1] in ("Returns", "Yields") and items):
                 items[-1] += " " + line.strip()
             else:

@@ -1,6 +1,6 @@
-"""One check of the arguments of all public functions, by their names: kinds, shapes and ranges, before anything runs.
+"""Checks of the arguments of all public functions, by their names: kinds, shapes and ranges, before anything runs.
 
-What depends on several arguments, on a robot or on a file is checked by the function itself. Arguments of the functions
+Conditions on several arguments, a robot or a file are checked by the function itself. Arguments of the functions
 that jax may trace pass where jax traces them.
 """
 
@@ -23,7 +23,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 LARGEST_LENGTH = 1e6  # m
 LARGEST_POPULATION, LARGEST_DIVISIONS, LARGEST_SAMPLES = 4096, 128, 1_000_000
-MOST = 10**9  # of what functions bound more narrowly by themselves
+MOST = 10**9  # for numbers that functions bound more narrowly by themselves
 NESTED = 4  # lists in a list are searched so deep for what jax traces
 
 
@@ -32,8 +32,8 @@ def checked(function: Function, name: str = "", module: str = "") -> Function:
 
     Args:
         function: each of its parameters has a rule.
-        name: that it has from now on, with the module; "": its own.
-        module: that holds it under this name.
+        name: new name of the function, with the module; "": its present name.
+        module: module that holds the function under this name.
 
     Returns:
         the function; its signature and docstring stay.
@@ -220,7 +220,7 @@ _AMPLITUDE = _kind_of("the name of an amplitude function, or one of amplitude(..
 _ARCS = _integer(1, LARGEST_MAX_ARCS)
 _WORKERS = _integer(-MOST, MOST, none=True)
 
-# By the name of the argument; what is there is checked in all functions that have one of this name.
+# Rules by the names of arguments, for all functions with an argument of this name.
 ARGUMENTS: dict[str, Rule] = {
     "acceleration": _real("a number >= 0, in m/s^2, or None", (), least=0.0, none=True),
     "acceleration_time": _TIME,

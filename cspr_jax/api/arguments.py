@@ -27,10 +27,10 @@ DEPTHS = Numbers(DEPTH_WORDS, ((), (ANY,)), **DEPTH)
 
 
 def check_point_mass(robot: Any) -> None:
-    """Refuse what is no point mass.
+    """Refuse robots that are not point masses.
 
     Raises:
-        InputError: another kind of robot.
+        InputError: the wrong kind of robot.
     """
     if not isinstance(robot, PointMassRobot):
         raise InputError("robot", getattr(robot, "name", robot), "a point mass")
@@ -62,7 +62,7 @@ def starts_and_ends(robot: Any, start, targets) -> tuple[np.ndarray, np.ndarray]
         (n, 3) starts and (n, 3) ends, m.
 
     Raises:
-        InputError: another kind of robot, shapes that do not fit, values that are not finite, or points beside the
+        InputError: the wrong kind of robot, shapes that do not fit, values that are not finite, or points beside the
             plane of a planar robot.
     """
     check_point_mass(robot)
@@ -74,7 +74,7 @@ def starts_and_ends(robot: Any, start, targets) -> tuple[np.ndarray, np.ndarray]
 
 
 def amplitude_of(amplitude: str | Amplitude, *, free_end: bool | None = None) -> Amplitude:
-    """Amplitude function that is given by its name, or itself.
+    """Amplitude function, from its name or as it is.
 
     Args:
         free_end: whether it must meet (1.27) and (1.28), or (2.49); None: neither. What jax is tracing is not checked.
@@ -101,13 +101,13 @@ def amplitude_of(amplitude: str | Amplitude, *, free_end: bool | None = None) ->
 
 
 def warn_of_rest(robot: Any, key: str, place: Any, z0: Any, cure: str) -> None:
-    """Warn of a place that is P0 but for its last digits.
+    """Warn of a place that differs from P0 only in its last digits.
 
     Args:
-        key: the argument that gives it.
+        key: name of the argument.
         place: (3,) in the robot's axes, m.
         z0: () m.
-        cure: what would say that it is at rest.
+        cure: argument that would set the place to rest.
     """
     if np.shape(place) == (3,) and np.shape(z0) == ():
         line = almost_at_rest(key, np.asarray(place, float).tolist(), float(z0), robot, cure)
@@ -127,8 +127,8 @@ def kernel_problem(
 
     Args:
         robot: in its own axes.
-        amplitude: its name, or the function.
-        limits: over those of the robot; None: those.
+        amplitude: name of an amplitude function, or the function.
+        limits: override those of the robot; None: those of the robot.
         free_end: as in `amplitude_of`.
         families: as in `limits_over`.
 
@@ -145,7 +145,7 @@ def kernel_problem(
 
 
 def batched(kind, segments, problem: Problem, answers: Answers, frame: Frame, *more) -> Any:
-    """Motions of answers, as one whose leaves all have a leading dimension, so that `jax.vmap` takes it.
+    """Motions of answers, as one motion whose leaves all have a leading dimension, so that `jax.vmap` takes it.
 
     Args:
         kind: class of the motions.
@@ -171,7 +171,7 @@ def depths(z0, count: int) -> np.ndarray:
         (count,) m.
 
     Raises:
-        InputError: another shape, or not positive.
+        InputError: the wrong shape, or not positive.
     """
     if np.shape(z0) not in ((), (count,)):
         raise InputError("z0", f"shape {np.shape(z0)}", f"a number > 0, or ({count},) of them")
@@ -190,7 +190,7 @@ def quaternions(key: str, orientations, count: int) -> np.ndarray:
         (count, 4).
 
     Raises:
-        InputError: another shape, or not of unit length.
+        InputError: the wrong shape, or not of unit length.
     """
     if orientations is None:
         return np.tile(IDENTITY, (count, 1))
@@ -211,6 +211,6 @@ def points_of(key: str, points) -> np.ndarray:
         (n, 3) m.
 
     Raises:
-        InputError: another shape, not finite, or beyond 1e6 m.
+        InputError: the wrong shape, not finite, or beyond 1e6 m.
     """
     return POINTS.array(key, points)

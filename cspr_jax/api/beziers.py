@@ -31,11 +31,11 @@ class BezierVerdicts(Columns):
     """Verdicts of n Bezier segments, (n,) each.
 
     Fields:
-        verdict: flags of `Verdict`; 0 if proved.
-        margin: smallest pseudotension over its value at rest in P0, or smallest depth below the spools over that of the
-            start, on the whole segment.
-        margin_bound: proved lower bound of it: the margin less its rounding error.
-        limit_margin: smallest slack of the limits that is attained, without a unit; inf without limits.
+        verdict: flags of `Verdict`; 0: proved feasible.
+        margin: smallest pseudotension over its value at rest in P0, or smallest depth below the spools over the depth
+            of the start, whichever is less.
+        margin_bound: proved lower bound of the margin: the margin less its rounding error.
+        limit_margin: smallest slack of the limits on the segment, without a unit; inf without limits.
     """
 
     verdict: np.ndarray
@@ -56,15 +56,15 @@ def bezier(robot: PointMassRobot, start, control_point, end, *, duration) -> Pla
     Args:
         robot: a point mass on any number of cables.
         start: (3,) first control point in the robot's axes, m.
-        control_point: (3,) second one, likewise.
-        end: (3,) third one, likewise.
-        duration: () T, s.
+        control_point: (3,) second control point, m.
+        end: (3,) third control point, m.
+        duration: () duration T, s.
 
     Returns:
         the motion, in the robot's axes.
 
     Raises:
-        InputError: another kind of robot.
+        InputError: the wrong kind of robot.
     """
     check_point_mass(robot)
     prepared_robot, frame = prepared(robot)
@@ -83,16 +83,16 @@ def bezier_verdicts(
     Args:
         robot: a point mass on three cables, or on two in a plane.
         starts: (n, 3) first control points in the robot's axes, m.
-        control_points: (n, 3) second ones, likewise.
-        ends: (n, 3) third ones, likewise.
+        control_points: (n, 3) second control points, m.
+        ends: (n, 3) third control points, m.
         durations: (n,) s, positive.
-        limits: over those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
+        limits: override those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
 
     Returns:
         the verdicts.
 
     Raises:
-        InputError: another kind of robot, limits that contradict each other, shapes that do not fit, values that are
+        InputError: the wrong kind of robot, limits that contradict each other, shapes that do not fit, values that are
             not finite.
     """
     check_point_mass(robot)
@@ -116,17 +116,17 @@ def bezier_durations(
     Args:
         robot: a point mass on three cables, or on two in a plane.
         starts: (n, 3) first control points in the robot's axes, m.
-        ends: (n, 3) third ones, likewise.
-        control_points: (n, 3) second ones, likewise; None: they follow from the accelerations, (15).
-        accelerations: (n, 3) at the starts, in the robot's axes, m/s^2; None: zero.
+        ends: (n, 3) third control points, m.
+        control_points: (n, 3) second control points, m; None: they follow from the accelerations, (15).
+        accelerations: (n, 3) accelerations at the starts, in the robot's axes, m/s^2; None: zero.
 
     Returns:
-        of each segment (n_intervals, 2): both ends of each interval, proved feasible; the last one is inf where any
-        longer duration is feasible; s.
+        for each segment (n_intervals, 2) s: both ends of each interval of durations that are proved feasible; the last
+        end is inf where every longer duration is feasible.
 
     Raises:
-        InputError: another kind of robot, shapes that do not fit, values that are not finite, control points and
-            accelerations both.
+        InputError: the wrong kind of robot, shapes that do not fit, values that are not finite, or both control
+            points and accelerations.
     """
     check_point_mass(robot)
     check_determined(robot)
@@ -161,22 +161,23 @@ def launch_range(
 
     Args:
         robot: a point mass on three cables, or on two in a plane.
-        targets: (n, 3) where the object is to land, in the robot's axes, m.
-        start: (3,) or (n, 3) where the segments start at rest, likewise.
+        targets: (n, 3) landing places in the robot's axes, m.
+        start: (3,) or (n, 3) places where the segments start at rest, in the robot's axes, m.
         release_x: least and largest x of the release, m; None: twice the robot's size to each side of the centroid of
             the spools.
-        release_y: likewise.
-        release_z: likewise; None: from the centroid down to four times the robot's size below it.
-        max_duration: longest segment tried, s; None: 40 times the root of the robot's size over gravity.
-        population: of the search, at least 16; one twice as large takes four times as long.
-        limits: over those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
+        release_y: least and largest y of the release, m; None: as for x.
+        release_z: least and largest z of the release, m; None: from the centroid down to four times the robot's size
+            below it.
+        max_duration: longest duration tried, s; None: 40 times the root of the robot's size over gravity.
+        population: launches that the search improves, at least 16; twice as many take four times as long.
+        limits: override those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
 
     Returns:
-        the launches, in the robot's axes. Those found are proved feasible; that there is no other is not proved.
+        the launches, in the robot's axes. Launches found are proved feasible; that there are no others is not proved.
 
     Raises:
-        InputError: another kind of robot, more cables than degrees of freedom, limits that contradict each other,
-            shapes that do not fit, values that are not finite, bounds that leave no release.
+        InputError: the wrong kind of robot, more cables than degrees of freedom, limits that contradict each other,
+            shapes that do not fit, values that are not finite, or bounds that leave no release.
     """
     starts, ends = starts_and_ends(robot, start, targets)
     ranges = {"release_x": release_x, "release_y": release_y, "release_z": release_z}

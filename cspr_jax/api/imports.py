@@ -24,9 +24,9 @@ class ImportedRobot:
     """Robot that was read from a file of another program.
 
     Fields:
-        robot: for all functions that take one.
-        keys: of its robot file, plain values.
-        warnings: what was left out, and what is probably a mistake, one line each.
+        robot: the robot, as all functions take it.
+        keys: keys of its robot file, as plain values.
+        warnings: items that were left out, and probable mistakes, one line each.
     """
 
     robot: PointMassRobot | PlatformRobot
@@ -35,10 +35,10 @@ class ImportedRobot:
     _imported: Imported
 
     def to_toml(self) -> str:
-        """The robot file.
+        """The robot as the text of a robot file.
 
         Returns:
-            its text.
+            TOML.
         """
         return robot_text(self.keys, self._imported.cable_names)
 
@@ -47,14 +47,14 @@ class ImportedRobot:
         """Write the robot file.
 
         Args:
-            path: its name, which ends in .toml; a file of that name is replaced.
+            path: file to write, .toml; an existing file is replaced.
 
         Returns:
             the path.
 
         Raises:
-            ConfigError: another ending.
-            StoreError: the disk or the folder refuses.
+            ConfigError: the path does not end in .toml.
+            StoreError: the file cannot be written.
         """
         target = Path(path)
         if target.suffix != ".toml":
@@ -65,17 +65,17 @@ class ImportedRobot:
 
 @checked
 def import_robot(path: str | Path, cable_set: str | None = None) -> ImportedRobot:
-    """A robot of CASPR (NAME_cables.xml beside NAME_bodies.xml), cdpyr (.json, .yaml) or WireX (.wcrfx).
+    """Read a robot of CASPR (NAME_cables.xml beside NAME_bodies.xml), cdpyr (.json, .yaml) or WireX (.wcrfx).
 
     Args:
-        path: the file, of CASPR either of both; at most 1 MB.
-        cable_set: of CASPR, which set of cables; None: the file's default.
+        path: the file, for CASPR either of the two; at most 1 MB.
+        cable_set: name of a set of cables of CASPR; None: the file's default.
 
     Returns:
         the robot, z up.
 
     Raises:
-        ConfigError: no such file or set, a mistake in it, or what no robot file can say, such as several links.
+        ConfigError: there is no such file or set, it has a mistake, or no robot file can express it (several links).
     """
     file = Path(path)
     if format_of(file.name) is None:

@@ -26,17 +26,17 @@ def straight_line(
 
     Args:
         robot: a point mass on any number of cables.
-        start: (3,) in the robot's axes, m.
-        end: (3,) likewise.
-        duration: () T, s.
+        start: (3,) start point in the robot's axes, m.
+        end: (3,) end point in the robot's axes, m.
+        duration: () duration T, s.
         law: "s-curve", "quintic" or "cubic".
-        acceleration_time: () p of the S-curve, s; None: half of the duration.
+        acceleration_time: () time of acceleration p of the S-curve, s; None: half of the duration.
 
     Returns:
         the motion, in the robot's axes.
 
     Raises:
-        InputError: another kind of robot, or another law.
+        InputError: the wrong kind of robot, or an unknown law.
     """
     check_point_mass(robot)
     if law not in LAWS:
@@ -57,21 +57,21 @@ def least_time(
     max_acceleration: float | None = None,
     limits: Limits | None = None,
 ) -> LeastTimes:
-    """Least durations of the S-model along straight lines, from rest to rest, and of any motion along them.
+    """Least durations along straight lines from rest to rest: of the S-model, and of any motion.
 
     Args:
         robot: a point mass on any number of cables.
-        targets: (n, 3) in the robot's axes, m.
-        start: (3,) or (n, 3) likewise.
-        max_acceleration: largest size of the acceleration, m/s^2; None: taut cables alone bound it.
-        limits: over those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
+        targets: (n, 3) end points in the robot's axes, m.
+        start: (3,) or (n, 3) start points in the robot's axes, m.
+        max_acceleration: largest magnitude of the acceleration, m/s^2; None: only taut cables bound it.
+        limits: override those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
 
     Returns:
-        the answers. Feasible ones are proved; with limits, or of spools that are not in one plane, the least duration
-        is that of a search.
+        the answers; verdicts of feasible ones are proved. With limits, or with spools that are not in one plane, the
+        least duration is found by a search.
 
     Raises:
-        InputError: another kind of robot, limits that contradict each other, shapes that do not fit, values that are
+        InputError: the wrong kind of robot, limits that contradict each other, shapes that do not fit, values that are
             not finite.
     """
     starts, ends = starts_and_ends(robot, start, targets)

@@ -1,4 +1,4 @@
-"""Files to start from, and what there is, from Python: robots, quantities, examples and new files; without jax."""
+"""Lists of robots, quantities and examples, and new files to start from, from Python; without jax."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -14,16 +14,16 @@ KINDS = ("robot", "sweep", "plan")
 
 @checked
 def list_robots(names: str | Iterable[str | Path] = ()) -> list[dict[str, Any]]:
-    """The robots of the catalogue, or those that are named.
+    """The robots of the catalogue, or the robots that are named.
 
     Args:
-        names: one of the catalogue, or the path of a robot file, or several; none: all of the catalogue.
+        names: a catalogue name or the path of a robot file, or several; empty: the whole catalogue.
 
     Returns:
-        the keys of each one's file, and "fault": why it cannot hang still with every cable taut, or None.
+        for each robot the keys of its file, and "fault": why it cannot rest with every cable taut, or None.
 
     Raises:
-        ConfigError: no such robot, or a mistake in its file.
+        ConfigError: there is no such robot, or its file has a mistake.
     """
     return listings.robots([names] if isinstance(names, str | Path) else names)
 
@@ -32,7 +32,7 @@ def list_quantities() -> list[dict[str, Any]]:
     """The quantities that a result or a motion can hold.
 
     Returns:
-        "group", "name", "units", "long_name" and "description" of each.
+        "group", "name", "units", "long_name" and "description" of each quantity.
     """
     return listings.quantities()
 
@@ -41,29 +41,29 @@ def list_examples() -> dict[str, str]:
     """The sweep and plan files that come with the program.
 
     Returns:
-        for each name what it is for.
+        the purpose of each file, by name.
 
     Raises:
-        StoreError: they cannot be read.
+        StoreError: the files cannot be read.
     """
     return example_files.examples()
 
 
 @checked
 def copy_examples(names: str | Iterable[str], folder: str | Path = ".") -> list[Path]:
-    """Copy examples, to be changed; nothing is overwritten.
+    """Copy example files, to be changed; nothing is overwritten.
 
     Args:
-        names: one of `list_examples`, or several.
-        folder: to copy them to; it is made if absent.
+        names: a name of `list_examples`, or several.
+        folder: folder to copy to; it is made if absent.
 
     Returns:
-        the copies.
+        paths of the copies.
 
     Raises:
-        ConfigError: no such example.
-        RefusedError: a file of that name is there.
-        StoreError: the folder or the disk refuses.
+        ConfigError: there is no such example.
+        RefusedError: a file of that name exists.
+        StoreError: the files cannot be written.
     """
     return example_files.copy([names] if isinstance(names, str) else list(names), Path(folder))
 
@@ -77,22 +77,22 @@ def new_file(
     map: str = "minimum-arcs",
     family: str = "hypocycloid-standard",
 ) -> Path:
-    """Write a file to begin with: an example's values, and every other key as a comment that says what it means.
+    """Write a file to start from: values of an example, and every other key as a comment that explains it.
 
     Args:
         what: "robot", "sweep" or "plan".
-        path: the file, .toml; nothing is overwritten.
-        like: of a robot: the one of the catalogue whose values it has.
-        map: of a sweep: its kind of map.
-        family: of a plan: its trajectory family.
+        path: file to write, .toml; nothing is overwritten.
+        like: for a robot: catalogue robot whose values it takes.
+        map: for a sweep: kind of map.
+        family: for a plan: trajectory family.
 
     Returns:
         the path.
 
     Raises:
-        ConfigError: no such template, or another ending.
-        RefusedError: a file of that name is there.
-        StoreError: the folder or the disk refuses.
+        ConfigError: there is no such template, or the path does not end in .toml.
+        RefusedError: a file of that name exists.
+        StoreError: the file cannot be written.
     """
     from cspr_jax.outputs import templates  # with the schema of files, which lists do not need
 

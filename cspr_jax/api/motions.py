@@ -44,12 +44,12 @@ _MARGIN = jax.jit(motion_slacks.sampled_margin, static_argnames="samples")
 def make_problem(
     robot: AnyRobot, *, amplitude: str | Amplitude = "quintic", limits: Limits | None = None
 ) -> Problem[Any]:
-    """Robot, limits and amplitude function of a question, as searches and margins take them.
+    """Problem for `slacks` and `sampled_margin`: robot, limits and amplitude function.
 
     Args:
-        robot: with as many cables as degrees of freedom.
-        amplitude: its name, or the function.
-        limits: over those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
+        robot: a robot on as many cables as degrees of freedom.
+        amplitude: name of an amplitude function, or the function.
+        limits: override those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
 
     Returns:
         the problem.
@@ -68,19 +68,19 @@ def hypocycloid(
 
     Args:
         robot: a point mass on three cables.
-        start: (3,) in the robot's axes, m; None: at rest in P0. Near P0 the direction from P0 decides the motion, and
-            gradients grow as one over the distance: within 1e-3 m or 1e-3 z0 of P0 and not at rest it gives a warning
-            where jax does not trace it.
-        end: (3,) likewise.
+        start: (3,) start point in the robot's axes, m; None: at rest in P0. Near P0 its direction from P0 decides the
+            motion, and gradients grow as one over the distance: unless jax traces it, a start within 1e-3 m or 1e-3 z0
+            of P0, but not at rest, gives a warning.
+        end: (3,) end point in the robot's axes, m.
         z0: () depth of P0 below the centroid of the spools, m.
         arcs: () number of arcs.
-        amplitude: its name, or the function; it must meet (2.49).
+        amplitude: name of an amplitude function, or the function; it must meet (2.49).
 
     Returns:
         the motion, in the robot's axes.
 
     Raises:
-        InputError: another kind of robot, or an amplitude function that breaks (2.49).
+        InputError: the wrong kind of robot, or an amplitude function that breaks (2.49).
     """
     prepared_robot, frame = _prepared(robot, ("3T",), "a point mass on three cables")
     function, p = amplitude_of(amplitude, free_end=False), jnp.asarray(arcs, float)
@@ -97,16 +97,16 @@ def transition(
 
     Args:
         robot: a point mass on three cables, or on two in a plane.
-        target: (3,) in the robot's axes, m.
+        target: (3,) target in the robot's axes, m.
         z0: () depth of P0 below the centroid of the spools, m.
-        oscillations: () their number n.
-        amplitude: its name, or the function; it must meet (1.27) and (1.28).
+        oscillations: () number n of oscillations.
+        amplitude: name of an amplitude function, or the function; it must meet (1.27) and (1.28).
 
     Returns:
         the motion, in the robot's axes.
 
     Raises:
-        InputError: another kind of robot, or an amplitude function that breaks (1.27) or (1.28).
+        InputError: the wrong kind of robot, or an amplitude function that breaks (1.27) or (1.28).
     """
     prepared_robot, frame = _prepared(robot, ("2T", "3T"), "a point mass")
     function = amplitude_of(amplitude, free_end=True)
@@ -132,20 +132,20 @@ def platform_motion(
 
     Args:
         robot: a platform on six cables or more; jax may trace its spools, but not its platform points.
-        start: (3,) position of the mass centre in the robot's axes, m; None: P0. Near P0: as in `hypocycloid`.
-        end: (3,) likewise.
+        start: (3,) start of the mass centre in the robot's axes, m; None: P0. Near P0: as in `hypocycloid`.
+        end: (3,) end of the mass centre in the robot's axes, m.
         z0: () depth of P0 below the centroid of the spools, m.
         arcs: () number of arcs.
         orientations: (2, 4) unit quaternions at start and end, scalar first, from the reference orientation.
-        beta_hat: (2,) at start and end, (3.81); -1 at rest.
-        amplitude: its name, or the function; it must meet (2.49).
+        beta_hat: (2,) beta-hat at start and end, (3.81); -1 at rest.
+        amplitude: name of an amplitude function, or the function; it must meet (2.49).
         variable: whether the position is a hypocycloid of variable amplitude (3.44), or a standard one.
 
     Returns:
         the motion, in the robot's axes.
 
     Raises:
-        InputError: another kind of robot, or an amplitude function that breaks (2.49).
+        InputError: the wrong kind of robot, or an amplitude function that breaks (2.49).
     """
     prepared_robot, frame = _prepared(robot, ("3R3T",), "a platform on six cables or more", any_cables=True)
     function, p = amplitude_of(amplitude, free_end=False), jnp.asarray(arcs, float)
@@ -159,20 +159,20 @@ def platform_motion(
 
 @checked
 def tensions(robot: AnyRobot, state: State, rule: str = CENTRED) -> Array:
-    """Tensions of the cables in a state.
+    """Tensions of the cables in a state of motion.
 
     Args:
         robot: a platform or a point mass.
-        state: in the robot's axes, as motions give it.
-        rule: that chooses the tensions of more cables than degrees of freedom: "centred", "least-norm",
-            "closed-form", "improved-closed-form" or "p-norm".
+        state: state in the robot's axes, as motions give it.
+        rule: rule that chooses the tensions of redundant cables: "centred", "least-norm", "closed-form",
+            "improved-closed-form" or "p-norm".
 
     Returns:
-        (n_cables,) in cable order, N; negative where a cable would have to push. Of redundant cables those of the rule,
-        by the robot's limits; where it finds none within them, those of least norm.
+        (n_cables,) in cable order, N; negative where a cable would have to push. The rule chooses the tensions of
+        redundant cables by the robot's limits; where it finds none within them, they are those of least norm.
 
     Raises:
-        InputError: an unknown rule, or one that needs a largest tension of every cable, without it.
+        InputError: an unknown rule, or a rule that needs a largest tension of every cable, which the robot lacks.
     """
     prepared_robot, frame = prepared(robot)
     if rule not in TENSION_RULES:
@@ -193,8 +193,8 @@ def slacks(problem: Problem, motion: Motion, tau) -> Array:
     """Slacks of all criteria at one instant of a motion: taut cables, determinant, depth, limits.
 
     Args:
-        problem: of `make_problem`, with the motion's robot.
-        motion: of `hypocycloid`, `transition`, `platform_motion`, a plan or answers.
+        problem: a problem of `make_problem`, with the motion's robot.
+        motion: a motion of `hypocycloid`, `transition`, `platform_motion`, a plan or answers.
         tau: () normalised time in [0, 1].
 
     Returns:
@@ -207,10 +207,10 @@ def slacks(problem: Problem, motion: Motion, tau) -> Array:
 def sampled_margin(problem: Problem, motion: Motion, samples: int = 64) -> Array:
     """Smallest slack at equidistant instants of a motion; it can be differentiated.
 
-    A positive one says that no sample refutes the motion, not that it is feasible: searches prove that, or look closer.
+    If it is positive, no sample refutes the motion, but nothing is proved: searches prove feasibility.
 
     Args:
-        problem: of `make_problem`, with the motion's robot.
+        problem: a problem of `make_problem`, with the motion's robot.
         motion: as in `slacks`.
         samples: number of intervals between instants, ends included.
 

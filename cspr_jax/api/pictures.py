@@ -38,31 +38,31 @@ def plot(  # noqa: PLR0913
     """Draw one result, or several in one picture: maps as lines, workspaces as outlines, motions over time.
 
     Args:
-        results: of `open_result`, or the path of a result, a run directory or a motion file; several maps or motions.
-        quantity: which one of a map; None: "arcs", or the first there is. Of a motion "trajectory", in space;
-            "tensions", with their limits; "summary", on a page; "acceleration", beside all that are feasible at the
-            instant `at` (None: that of the smallest margin); "path_acceleration", over the way along straight lines;
-            or "landing", of throws; None: path and tensions over time.
-        at: fixed values of axes, within their ranges; the nearest point is taken. Of a motion t, s.
-        best: axes of a map of which each cell shows the best point, such as "z0"; see `Result.best`. Its quantity
-            "best_z0" is that point.
+        results: a result of `open_result`, or the path of a result, a run directory or a motion file; or several.
+        quantity: map: a quantity; None: "arcs", or the first there is. Motion: "trajectory", the path in space;
+            "tensions", with their limits; "summary", all on one page; "acceleration", beside all that are feasible at
+            the instant `at` (None: that of the smallest margin); "path_acceleration", over the path, of straight
+            lines; or "landing", of a sample of throws; None: path and tensions over time.
+        at: map: fixed values of axes, within their ranges; the nearest point is taken. Motion: "t", s.
+        best: map: axes of which each cell shows the best point, such as "z0"; see `Result.best`. Quantity "best_z0"
+            is that point.
         lines: axis whose points become lines; None: sections, or one line.
         envelope: whether to draw all orientations of one place, in three dimensions.
         solid: whether to draw the boundary of a workspace over x, y and z, with its robot, in three dimensions.
-        size: width and height, cm, as (16, 10) or "16x10"; None: what suits the picture.
-        dpi: pixels an inch of a file; None: 160.
-        font_size: points; None: 10.
+        size: width and height, cm, as (16, 10) or "16x10"; None: the usual size of the picture.
+        dpi: pixels per inch of a file; None: 160.
+        font_size: size of the font, points; None: 10.
         preset: "column", 8.5 cm wide, or "page", 17.5 cm, of a paper; the height follows. None: neither.
-        title: whether titles are drawn; what is not proved is said in any case.
+        title: whether titles are drawn; a motion that is not proved feasible is marked in any case.
         plan: plan file of motions in CSV, which keep neither robot nor limits; None: none.
-        output: picture to write; its ending is the format. None: nothing is written.
+        output: picture to write; its ending selects the format. None: nothing is written.
 
     Returns:
         the figure of matplotlib.
 
     Raises:
         StoreError: a file cannot be read, or the picture cannot be written.
-        ConfigError: no such quantity or axis, nothing to draw, a size out of bounds, or an unknown picture format.
+        ConfigError: an unknown quantity or axis, nothing to draw, a size out of bounds, or an unknown picture format.
     """
     sources = [results] if isinstance(results, str | Path | Result) else list(results)
     if not sources:
@@ -96,11 +96,11 @@ def names_of(axes: str | Sequence[str]) -> list[str]:
 
 
 def finished(draw: Callable[[], Figure], name: str, style: Style, output: str | Path | None) -> Figure:
-    """A picture in the style of all, written if that is asked for.
+    """A picture in the common style, written if `output` is given.
 
     Args:
-        name: of what is drawn, for errors.
-        output: picture to write; its ending is the format. None: nothing is written.
+        name: name of the result, for errors.
+        output: picture to write; its ending selects the format. None: nothing is written.
 
     Returns:
         the figure of matplotlib.

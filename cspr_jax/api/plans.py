@@ -31,7 +31,7 @@ NAME = Path("plan")
 
 @dataclasses.dataclass(frozen=True)
 class Plan(planning.PlannedMotions):
-    """A planned sequence, and what can be had of it; see `cspr_jax.plans.planning.PlannedMotions` for its fields."""
+    """A planned sequence of motions; see `cspr_jax.plans.planning.PlannedMotions` for its fields."""
 
     @checked
     def rows(self, rate: float | None = None) -> dict[str, np.ndarray]:
@@ -41,8 +41,8 @@ class Plan(planning.PlannedMotions):
             rate: rows per second over the whole plan, Hz, and one at its end; None: `samples` rows per segment.
 
         Returns:
-            "t" (n,) s, and by the names of `schema.quantities.TRAJECTORY` (n, 3), (n, 4) or (n, n_cables) each, in the
-            axes of the robot file.
+            "t" (n,) s, and by the names of `schema.quantities.TRAJECTORY` columns (n, 3), (n, 4) or (n, n_cables), in
+            the axes of the robot file.
 
         Raises:
             ConfigError: a rate that is no number > 0, or too many rows.
@@ -55,7 +55,7 @@ class Plan(planning.PlannedMotions):
         """Write the motion.
 
         Args:
-            path: of a .csv or .h5 file, which is replaced if it is there.
+            path: file to write, .csv or .h5; an existing file is replaced.
             rate: as for `rows`.
             anyway: whether to write a plan that is not feasible, too; the file says so.
 
@@ -63,8 +63,8 @@ class Plan(planning.PlannedMotions):
             the path.
 
         Raises:
-            ConfigError: another ending, a plan that is not feasible, or a rate that gives too many rows.
-            StoreError: the disk or the folder refuses.
+            ConfigError: the wrong ending, a plan that is not feasible, or a rate that gives too many rows.
+            StoreError: a file cannot be written.
         """
         path = Path(path)
         if path.suffix not in (".csv", ".h5"):
@@ -80,17 +80,17 @@ class Plan(planning.PlannedMotions):
         """Write a model of the robot for MuJoCo, and beside it NAME_control.csv, the tensions that play the plan.
 
         Args:
-            path: of the model, NAME.xml; files of both names are replaced if they are there.
+            path: model to write, NAME.xml; existing files of both names are replaced.
             step: the longest step of MuJoCo's integrator, s.
-            anyway: whether to write a plan that is not feasible, too; no cable of the model pushes.
+            anyway: whether to write a plan that is not feasible, too; cables of the model never push.
 
         Returns:
             the path.
 
         Raises:
-            ConfigError: another ending, a plan that is not feasible or has no finite motion, or a step that is no
+            ConfigError: the wrong ending, a plan that is not feasible or has no finite motion, or a step that is no
                 number > 0 or gives too many rows.
-            StoreError: the disk or the folder refuses.
+            StoreError: a file cannot be written.
         """
         path = Path(path)
         if path.suffix != ".xml":
@@ -106,17 +106,17 @@ class Plan(planning.PlannedMotions):
         """Write a film of the motion: the robot in space, its cables coloured by tension, and its tensions.
 
         Args:
-            path: of a .gif, .mp4 or .html file, which is replaced if it is there.
-            speed: times real time.
+            path: file to write, .gif, .mp4 or .html; an existing file is replaced.
+            speed: playback speed relative to real time.
             anyway: whether to show a plan that is not feasible, too; the film says so.
 
         Returns:
             the path.
 
         Raises:
-            ConfigError: another ending, a speed that is no number > 0, a plan that is not feasible or has no finite
+            ConfigError: the wrong ending, a speed that is no number > 0, a plan that is not feasible or has no finite
                 motion, or no encoder for .mp4.
-            StoreError: the disk or the folder refuses.
+            StoreError: a file cannot be written.
         """
         from cspr_jax.outputs.plots.film import RATES, film
         from cspr_jax.outputs.plots.style import Style, in_style
@@ -147,10 +147,10 @@ class Plan(planning.PlannedMotions):
             return plan_report.plan_object(self)
 
     def to_table(self) -> Any:
-        """The plan as `cspr plan` prints it.
+        """The plan as the table that `cspr plan` prints.
 
         Returns:
-            a table of rich.
+            a table of the package rich.
         """
         with double_precision():
             return plan_report.plan_table(self)
@@ -165,10 +165,10 @@ class Plan(planning.PlannedMotions):
         """Scatter of the landings of the object that the plan launches.
 
         Args:
-            errors: of the release and of the cables.
+            errors: errors of the release and of the cables.
 
         Returns:
-            the landings of a sample of throws, with their covariance, and that of small errors by derivatives.
+            the landings of a sample of throws, their covariance, and the covariance for small errors, by derivatives.
 
         Raises:
             ConfigError: a plan that launches nothing.
@@ -203,14 +203,14 @@ def plan(given: str | Path | Mapping[str, Any]) -> Plan:
     """Plan a sequence of poses.
 
     Args:
-        given: path of a plan file, or what it holds: parsed TOML, in which arrays are lists, too. A dictionary's paths
-            are relative to the current folder.
+        given: path of a plan file, or its content as a dictionary: parsed TOML, which may hold arrays in place of
+            lists. Paths in a dictionary are relative to the current folder.
 
     Returns:
         the plan, feasible or not.
 
     Raises:
-        ConfigError: a mistake in it; its `lines` are all that were found.
+        ConfigError: mistakes in the plan; its `lines` name all that were found.
     """
     with double_precision():
         if isinstance(given, Mapping):

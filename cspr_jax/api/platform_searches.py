@@ -54,12 +54,13 @@ def minimum_pose_arcs(  # noqa: PLR0913
 
     Args:
         robot: a platform on six cables.
-        positions: (n, 3) of the mass centre in the robot's axes, m.
-        orientations: (n, 4) unit quaternions in these axes, scalar first, from the reference orientation; None: that.
-        start: position (3,) and quaternion (4,) of the first pose, with the preferred beta-hat; None: at rest in P0.
+        positions: (n, 3) positions of the mass centre in the robot's axes, m.
+        orientations: (n, 4) unit quaternions in the robot's axes, scalar first, from the reference orientation; None:
+            this one.
+        start: position (3,) and quaternion (4,) of the start, which has the preferred beta-hat; None: at rest in P0.
         z0: () or (n,) depth of P0 below the centroid of the spools, m.
-        beta_hat: at the poses: a number, "preferred" (3.91), or None: several are tried, the preferred one first.
-        amplitude: its name, or the function; it must meet (2.49).
+        beta_hat: beta-hat at the poses, or "preferred" (3.91); None: several are tried, the preferred one first.
+        amplitude: name of an amplitude function, or the function; it must meet (2.49).
         limits: as in `minimum_arcs`.
         max_arcs: largest number of arcs tried.
         variable: whether positions are hypocycloids of variable amplitude (3.44), or standard ones.
@@ -107,20 +108,20 @@ def _motions(
 def accessible(
     robot: PlatformRobot, place, *, definition: Literal["grid", "scan", "equal-volume"] = "scan", divisions: int = 32
 ) -> Accessible:
-    """Accessible orientations of a place: those that free ways join with the reference orientation, section 3.11.
+    """Accessible orientations of a place, which free ways join with the reference orientation, section 3.11.
 
     Args:
         robot: a platform on six cables.
-        place: (3,) of the mass centre in the robot's axes, m.
-        definition: of the set, as in [orientations] of a sweep file.
-        divisions: of pi; the step of the angles is pi over it. Even, 4 to 128.
+        place: (3,) place of the mass centre in the robot's axes, m.
+        definition: how the set is sampled, as in [orientations] of a sweep file.
+        divisions: number of steps in pi: the step of the angles is pi / divisions; even, 4 to 128.
 
     Returns:
         `angles` (n, 3) of tilt and torsion in the cylindrical frame of the place, rad; `volume` (n,), the part of SO(3)
-        that each stands for.
+        that each orientation stands for.
 
     Raises:
-        InputError: another kind of robot, a place that is not finite, another definition, or divisions.
+        InputError: the wrong kind of robot, a place that is not finite, or a wrong definition or divisions.
     """
     problem, where = _of_place(robot, place, definition, divisions)
     with double_precision():
@@ -139,15 +140,15 @@ def attainable(
     limits: Limits | None = None,
     max_arcs: int = 30,
 ) -> tuple[Accessible, PlatformMotionAnswers]:
-    """Which accessible orientations of a place a motion from rest attains, section 3.12.3.
+    """Search the accessible orientations of a place that a motion from rest attains, section 3.12.3.
 
     Args:
         robot: a platform on six cables.
-        place: (3,) of the mass centre in the robot's axes, m.
-        z0: depth of P0 below the centroid of the spools, m; None: that of the place.
+        place: (3,) place of the mass centre in the robot's axes, m.
+        z0: depth of P0 below the centroid of the spools, m; None: the depth of the place.
         definition: as in `accessible`.
         divisions: as in `accessible`.
-        amplitude: its name, or the function; it must meet (2.49).
+        amplitude: name of an amplitude function, or the function; it must meet (2.49).
         limits: as in `minimum_arcs`.
         max_arcs: largest number of arcs tried.
 
@@ -155,7 +156,7 @@ def attainable(
         the accessible orientations, and the answers (n,) of the motions to them.
 
     Raises:
-        InputError: as `accessible` and `minimum_arcs` do; nothing is accessible.
+        InputError: as `accessible` and `minimum_arcs` do, or no orientation is accessible.
     """
     problem, where = _of_place(robot, place, definition, divisions, amplitude, limits)
     with double_precision():

@@ -18,7 +18,7 @@ def list_tables() -> dict[str, str]:
     """The published tables that can be computed again.
 
     Returns:
-        title, with its source, by name.
+        title of each table, with its source, by name.
     """
     from cspr_jax.published.tables import TABLES
 
@@ -39,22 +39,22 @@ def table(
     """Compute a published table again.
 
     Args:
-        name: of `list_tables`.
-        definition: of accessible orientations in tables 3.3 and 3.4: "grid", "scan", "equal-volume" or "all"; None: the
-            usual one.
-        amplitude: in these: "quintic", "effective", "effective-c3" or "all"; None: the usual one.
-        fine: in these: whether the step is pi/64 instead of pi/32.
-        max_arcs: in these: largest number of arcs tried; None: 20.
-        values: in these: values of beta-hat tried at each orientation; None: 20.
-        workers: in these: processes on this machine; above 1, a script calls it under `if __name__ == "__main__":`.
-            None: as many as are usual.
+        name: a name of `list_tables`.
+        definition: tables 3.3, 3.4: definition of accessible orientations, "grid", "scan", "equal-volume" or "all";
+            None: the usual one.
+        amplitude: tables 3.3, 3.4: "quintic", "effective", "effective-c3" or "all"; None: the usual one.
+        fine: tables 3.3, 3.4: whether the step is pi/64 instead of pi/32.
+        max_arcs: tables 3.3, 3.4: largest number of arcs tried; None: 20.
+        values: tables 3.3, 3.4: number of values of beta-hat tried at each orientation; None: 20.
+        workers: tables 3.3, 3.4: number of processes on this machine; above 1, a script must call this function under
+            `if __name__ == "__main__":`. None: the usual number.
 
     Returns:
-        its cells, each with `row`, `column`, `computed`, `published`, `variant` and `differs`.
+        the cells of the table, each with `row`, `column`, `computed`, `published`, `variant` and `differs`.
 
     Raises:
-        ConfigError: no such table, or a choice that it does not have.
-        ResourceError: a worker died.
+        ConfigError: there is no such table, or it has no such choice.
+        ResourceError: a worker process died.
     """
     from cspr_jax.published.tables import TABLES, chosen, table_cells
 
@@ -72,16 +72,16 @@ def table(
 
 @checked
 def benchmark(kernels: str | Path | None = None) -> dict[str, Any]:
-    """Measure checks per second, beside a NumPy version of the same check; it takes a minute.
+    """Measure feasibility checks per second, beside a NumPy version of the same check; this takes a minute.
 
     Args:
-        kernels: folder of C++ kernels to measure beside, such as `benchmarks` of a checkout; None: without them.
+        kernels: folder of C++ kernels to measure too, such as `benchmarks` of a checkout; None: no kernels.
 
     Returns:
         what `cspr bench --json` prints.
 
     Raises:
-        ConfigError: there is no compiler, or it refuses a kernel, or that computes something else.
+        ConfigError: there is no compiler, it refuses a kernel, or the kernel gives other numbers.
     """
     from cspr_jax.bench import bench
 

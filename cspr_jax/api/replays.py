@@ -20,7 +20,7 @@ from cspr_jax.outputs.plots.style import style_of
 
 @dataclasses.dataclass(frozen=True)
 class Replay(replays.PlayedPlan):
-    """A plan beside what MuJoCo makes of it; see `cspr_jax.outputs.replay.PlayedPlan` for its fields."""
+    """A plan, and its motion as MuJoCo plays it; see `cspr_jax.outputs.replay.PlayedPlan` for the fields."""
 
     @checked
     def plot(
@@ -36,12 +36,12 @@ class Replay(replays.PlayedPlan):
         """Draw planned and played path, and the deviations of path and tensions over time.
 
         Args:
-            size: width and height, cm, as (16, 10) or "16x10"; None: what suits the picture.
-            dpi: pixels an inch of a file; None: 160.
-            font_size: points; None: 10.
-            preset: "column" or "page" of a paper; None: neither.
+            size: width and height, cm, as (16, 10) or "16x10"; None: the usual size of the picture.
+            dpi: pixels per inch of a file; None: 160.
+            font_size: size of the font, points; None: 10.
+            preset: width of a "column" or a "page" of a paper; None: neither.
             title: whether the title is drawn.
-            output: picture to write; its ending is the format. None: nothing is written.
+            output: picture to write; its ending selects the format. None: nothing is written.
 
         Returns:
             the figure of matplotlib.
@@ -57,19 +57,19 @@ class Replay(replays.PlayedPlan):
 
 @checked
 def replay(given: str | Path | Mapping[str, Any] | Plan, *, step: float = STEP, anyway: bool = False) -> Replay:
-    """Play a plan in MuJoCo: where its tensions take the robot, and which tensions MuJoCo asks for along its path.
+    """Play a plan in MuJoCo: the path that its tensions give, and the tensions that MuJoCo needs along its path.
 
     Args:
-        given: a plan, or what `plan` takes.
+        given: a plan, its file, or a dictionary, as for `plan`.
         step: the longest step of MuJoCo's integrator, RK4, s.
-        anyway: whether to play a plan that is not feasible, too; no cable of MuJoCo's pushes.
+        anyway: whether to play a plan that is not feasible, too; cables in MuJoCo never push.
 
     Returns:
-        path and tensions beside the planned ones, at the ends of the steps.
+        played and planned path and tensions, at the ends of the steps.
 
     Raises:
-        ConfigError: MuJoCo is not installed, a mistake in the plan, one that is not feasible, a step that is no number
-            > 0 or gives too many rows, or a plan without a finite motion.
+        ConfigError: MuJoCo is not installed, the plan has a mistake, is not feasible or has no finite motion, or the
+            step is no number > 0 or gives too many rows.
     """
     replays.need_mujoco()
     planned = given if isinstance(given, Plan) else plan(given)

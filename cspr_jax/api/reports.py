@@ -45,18 +45,18 @@ def report(
 ) -> list[str]:
     """Write a page to explore a map, or a plan, in a browser: one file that needs no network.
 
-    Of a map it shows sections with sliders over the other axes, what each cell holds, and the motions of some cells;
-    of a plan its motion.
+    For a map the page shows sections with sliders over the other axes, the values of each cell, and the motions of
+    chosen cells; for a plan its motion.
 
     Args:
-        given: a result of `cspr run` or its run directory, a motion of `cspr plan -o`, a plan file; or one of these
-            that is loaded.
+        given: path of a result of `cspr run`, of its run directory, of a motion of `cspr plan -o` or of a plan file; or
+            a loaded result or plan.
         output: page to write, .html.
-        trajectories: cells of a map whose motions it computes, besides `cells`: the most informative ones.
-        cells: of these the motions are computed, too: coordinates by axis, the nearest point is taken; axes that are
-            missing are at their first point.
-        quantity: of a map, to show first; None: the one that its kind of map is about.
-        best: axes of a map of which each cell shows the best point, such as "z0", as in `plot`.
+        trajectories: map: number of cells whose motions are included besides `cells`, the most informative ones.
+        cells: map: further cells whose motions are included: coordinates by axis, of which the nearest point is taken;
+            missing axes are at their first point.
+        quantity: map: quantity to show first; None: the main quantity of its kind of map.
+        best: map: axes of which each cell shows the best point, such as "z0", as in `plot`.
         plan: plan file of a motion in CSV, which keeps neither robot nor limits; None: none.
 
     Returns:

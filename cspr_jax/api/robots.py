@@ -1,4 +1,4 @@
-"""Robots from Python: made of numbers, as a robot file has them, or of other robots."""
+"""Robots from Python: from numbers, as in a robot file, or from other robots."""
 
 import numpy as np
 
@@ -34,19 +34,19 @@ def point_mass(
     """A point mass on cables.
 
     Args:
-        base_points: (n_cables, 3) spool points, at least three, two if planar, or one on a guide; m.
-        mass: kg, positive.
-        gravity: m/s^2, positive.
-        z_axis: where z points, "down" or "up".
+        base_points: (n_cables, 3) spool points, m: at least three, two if planar, or one on a guide.
+        mass: mass, kg, positive.
+        gravity: gravity, m/s^2, positive.
+        z_axis: direction of the z axis, "down" or "up".
         planar: whether everything lies in the plane y = 0.
         limits: limits beyond taut cables; None: none.
-        pattern: "1T" along a vertical guide, "2T" or "3T"; None: as planar says.
+        pattern: "1T" along a vertical guide, "2T" in the plane y = 0 or "3T" in space; None: "2T" if planar, else "3T".
 
     Returns:
         the robot.
 
     Raises:
-        InputError: what a robot file with these numbers would be refused for.
+        InputError: a robot file with these numbers would be refused.
     """
     pattern_name = pattern or ("2T" if planar else "3T")
     if planar and pattern_name != "2T":
@@ -71,19 +71,19 @@ def parallel_pair_robot(
     """A platform on six cables in three parallel pairs, Machines 11 (2), 2023, 224, (30) and (31).
 
     Args:
-        spool_radius: R, of the circle through the middles of the pairs' spools, a level equilateral triangle; m.
-        platform_radius: r, of the circle through the points of the platform; m.
-        mass: kg, positive.
-        inertia: (3, 3) about the mass centre, platform axes, kg m^2; None: of a uniform disc of that radius.
-        gravity: m/s^2, positive.
-        z_axis: where z points, "down" or "up".
+        spool_radius: radius R, m, of the circle through the middles of the pairs' spools, a level equilateral triangle.
+        platform_radius: radius r, m, of the circle through the points of the platform.
+        mass: mass, kg, positive.
+        inertia: (3, 3) about the mass centre, platform axes, kg m^2; None: that of a uniform disc of radius r.
+        gravity: gravity, m/s^2, positive.
+        z_axis: direction of the z axis, "down" or "up".
         limits: limits beyond taut cables; None: none.
 
     Returns:
-        the robot; `three_cable_equivalent` is the point mass that it is as long as one winch drives each pair.
+        the robot; while one winch drives each pair, it moves as the point mass of `three_cable_equivalent`.
 
     Raises:
-        InputError: a radius that is not positive, or what a robot file with these numbers would be refused for.
+        InputError: a radius that is not positive, or a robot file with these numbers would be refused.
     """
     places, half = 2.0 * np.pi / 3.0 * np.arange(3.0), 0.5 * platform_radius
     middles = spool_radius * np.stack([np.cos(places), np.sin(places), 0.0 * places], axis=1)
@@ -105,17 +105,17 @@ def parallel_pair_robot(
 
 @checked
 def three_cable_equivalent(robot: PlatformRobot) -> PointMassRobot:
-    """The point mass on three cables that a platform on six in parallel pairs is; see `robots.parallel_pairs`.
+    """Point mass on three cables, equivalent to a platform on six in parallel pairs; see `robots.parallel_pairs`.
 
     Args:
-        robot: its platform axes are parallel to the fixed ones where the cables of its pairs are parallel.
+        robot: a platform whose axes are parallel to the fixed axes where the cables of its pairs are parallel.
 
     Returns:
         the robot, in the same axes; its tensions are those of the pairs, and its limits keep those of all six cables.
 
     Raises:
-        InputError: cables that are no such pairs, a mass centre that is not between the points of a pair, or limits
-            that contradict each other.
+        InputError: cables that do not form such pairs, a mass centre that is not between the points of a pair, or
+            limits that contradict each other.
     """
     if not isinstance(robot, PlatformRobot) or robot.pattern != RIGID or robot.pulleys is not None:
         raise InputError("robot", getattr(robot, "name", robot), "a rigid platform on six cables without pulleys")

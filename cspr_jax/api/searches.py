@@ -1,7 +1,7 @@
 """Searches from Python: arrays of targets in, answers out.
 
-In the axes of the robot, and in float64 whatever jax is set to. They give NumPy arrays, which cannot be differentiated,
-and know the motions that belong to them.
+Searches work in the axes of the robot, and in float64 whatever jax is set to. Answers are NumPy arrays, which cannot be
+differentiated, and can make their motions.
 """
 
 import dataclasses
@@ -35,19 +35,19 @@ from cspr_jax.swings.parities import pick
 
 @dataclasses.dataclass(frozen=True)
 class WithMotions:
-    """Answers that can make the motions that belong to them.
+    """Answers that can make their motions.
 
     Fields:
-        make: motions of the answers; a function of a module, bound to its arguments, so that answers can be pickled
-            and copied.
-        problem: that was searched.
+        make: makes the motions of answers; a function of a module, bound to its arguments, so that answers can be
+            pickled and copied.
+        problem: problem that was searched.
     """
 
     make: Callable[[Any], Placed] = dataclasses.field(kw_only=True, repr=False, compare=False)
     problem: Problem = dataclasses.field(kw_only=True, repr=False, compare=False)
 
     def motions(self) -> Any:
-        """Motions that the answers belong to: of the number of arcs found, else of the one that comes nearest.
+        """Motions of the answers, with the number of arcs found, else with that of the best candidate.
 
         Returns:
             one motion whose leaves have a leading dimension (n,), in the robot's axes: `jax.vmap` takes it apart.
@@ -55,7 +55,7 @@ class WithMotions:
         return self.make(self)
 
     def causes(self: Any) -> list[tuple[Cause, ...]]:
-        """Find what keeps motions from being feasible, in numbers.
+        """Find the causes why motions are not feasible, with needed and allowed values.
 
         Returns:
             the causes for each of the n motions, the worst one first; a feasible motion has none.
@@ -94,20 +94,20 @@ def minimum_arcs(
 
     Args:
         robot: a point mass on three cables.
-        targets: (n, 3) in the robot's axes, m.
-        start: (3,) or (n, 3) in the robot's axes, m; None: at rest in P0. A start within 1e-9 of the robot's size
-            (the largest distance of a spool from the centroid of all) of P0 is at rest there too; of one that
-            is not, but near P0, the direction of so short a way decides the motion.
+        targets: (n, 3) targets in the robot's axes, m.
+        start: (3,) or (n, 3) start points in the robot's axes, m; None: at rest in P0. A start is also at rest in P0 if
+            its distance from P0 is within 1e-9 of the robot's size (the largest distance of a spool from their
+            centroid); for another start near P0 its direction from P0 decides the motion.
         z0: () or (n,) depth of P0 below the centroid of the spools, m.
-        amplitude: its name, or the function; None: the quintic (2.50).
-        limits: over those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
+        amplitude: name of an amplitude function, or the function; None: the quintic (2.50).
+        limits: override those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
         max_arcs: largest number of arcs tried.
 
     Returns:
         the answers, (n,) each, proved.
 
     Raises:
-        InputError: another kind of robot, shapes that do not fit, values that are not finite, z0 not positive,
+        InputError: the wrong kind of robot, shapes that do not fit, values that are not finite, z0 not positive,
             max_arcs below 1, limits that contradict each other, or an amplitude function that breaks (2.49).
     """
     if not isinstance(robot, PointMassRobot) or robot.dof != 3:
@@ -150,14 +150,14 @@ def minimum_oscillations(
 
     Args:
         robot: a point mass on three cables, or on two in a plane.
-        targets: (n, 3) in the robot's axes, m.
+        targets: (n, 3) targets in the robot's axes, m.
         z0: () or (n,) depth of P0 below the centroid of the spools, m.
-        amplitude: its name, or the function; it must meet (1.27) and (1.28).
+        amplitude: name of an amplitude function, or the function; it must meet (1.27) and (1.28).
         limits: as in `minimum_arcs`.
         max_arcs: twice the largest number of oscillations tried.
 
     Returns:
-        the answers, (n,) each; by the envelopes and by the tensions themselves.
+        the answers, (n,) each, with numbers of oscillations by the envelopes and by the tensions themselves.
 
     Raises:
         InputError: as `minimum_arcs` does.

@@ -1,4 +1,4 @@
-"""Sweeps from Python: run into a directory as `cspr run` does it, or computed in memory; runs and results looked at."""
+"""Sweeps from Python: run into a directory as by `cspr run`, or computed in memory; inspection of runs and results."""
 
 import contextlib
 import dataclasses
@@ -38,13 +38,13 @@ open_result = checked(_open_result, "open_result", __name__)
 
 @dataclasses.dataclass(frozen=True)
 class Job:
-    """A sweep, where it goes, and who computes it.
+    """A sweep, its run directory, and its workers.
 
     Fields:
         sweep: the sweep.
-        directory: of the run.
-        options: how it goes on.
-        hooks: what it tells and asks.
+        directory: directory of the run.
+        options: options of the engine.
+        hooks: calls for progress, warnings and stops.
         workers: processes on this machine; None: as many as are usual for its kind of map.
         scheduler: address of a dask.distributed scheduler, whose workers compute instead; None: none.
     """
@@ -57,7 +57,7 @@ class Job:
     scheduler: str | None = None
 
     def __post_init__(self) -> None:
-        """Refuse workers that cannot be."""
+        """Refuse a wrong number of workers."""
         check_count(self.workers)
         if self.scheduler is not None and self.workers not in (1, None):
             raise ConfigError("--workers", f"{self.workers}: cannot be combined with --scheduler")
@@ -67,10 +67,10 @@ class Job:
         return engine.Run(self.sweep, self.directory, self.options, self.hooks)
 
     def finished(self) -> Path | None:
-        """The result, if it is there and whole; jax is not needed.
+        """Path of the result if it exists and is whole; jax is not needed.
 
         Returns:
-            its path, or None.
+            the path, or None.
 
         Raises:
             RefusedError: the directory, or the result in it, belongs to another sweep.
@@ -79,7 +79,7 @@ class Job:
         return self._run.finished()
 
     def go(self, prepare: Callable[[], None] = lambda: None) -> Path:
-        """Compute what is missing.
+        """Compute the missing tiles.
 
         Args:
             prepare: called before jax is imported.
@@ -147,25 +147,26 @@ def run(
     accept_environment_change: bool = False,
     on_tile: Callable[[int, int], None] | None = None,
 ) -> Path:
-    """Compute a sweep into an HDF5 result; what an earlier run has left there is kept, and only the rest computed.
+    """Compute a sweep into an HDF5 result; tiles that an earlier run has finished are kept.
 
     Args:
-        given: path of a sweep file, or what it holds: parsed TOML, in which arrays are lists, too. A dictionary's paths
-            are relative to the current folder, and its result is named sweep.h5.
-        directory: of the run; None: results/<sweep>-<first 12 digits of its identity>.
-        workers: processes on this machine; above 1, a script calls it under `if __name__ == "__main__":`.
+        given: path of a sweep file, or its content as a dictionary: parsed TOML, which may hold arrays in place of
+            lists. Paths in a dictionary are relative to the current folder; its result is named sweep.h5.
+        directory: run directory; None: results/<sweep>-<first 12 digits of its identity>.
+        workers: number of processes on this machine; above 1, a script must call this function under
+            `if __name__ == "__main__":`.
         scheduler: address of a dask.distributed scheduler, whose workers compute instead.
-        prune: whether to remove the shards once the result is complete.
-        accept_environment_change: whether to resume despite another version, machine or library.
-        on_tile: called with cells done and cells in all, after each tile.
+        prune: whether to remove the files of finished tiles once the result is complete.
+        accept_environment_change: whether to resume although version, machine or libraries have changed.
+        on_tile: called after each tile with the numbers of finished and of all cells.
 
     Returns:
-        path of the result.
+        the path of the result.
 
     Raises:
-        ConfigError: a mistake in the sweep, or too little room on the disk.
+        ConfigError: a mistake in the sweep, or too little space on the disk.
         RefusedError: the directory belongs to another sweep, another process writes there, or the environment changed.
-        StoreError: the disk or the folder refuses.
+        StoreError: a file cannot be written.
         ResourceError: memory or workers do not suffice.
         SelfCheckError: the computed numbers contradict each other.
     """
@@ -181,7 +182,7 @@ def run(
 
 @checked
 def compute_sweep(given: str | Path | Mapping[str, Any]) -> "xarray.Dataset":
-    """Compute a small sweep and keep no file; `run` is for those that take long, since it can resume.
+    """Compute a small sweep and keep no file; long sweeps take `run`, which can resume.
 
     Args:
         given: as for `run`.
@@ -200,46 +201,46 @@ def compute_sweep(given: str | Path | Mapping[str, Any]) -> "xarray.Dataset":
 
 @checked
 def status(directory: str | Path) -> dict[str, Any]:
-    """How far a run has come, without touching it.
+    """Progress of a run, without changing it.
 
     Returns:
         what `cspr status --json` prints: "identity", "tiles", "shards", "result" and more.
 
     Raises:
-        StoreError: no run directory.
+        StoreError: the folder is no run directory.
     """
     return inspection.status(Path(directory))
 
 
 @checked
 def verify(path: str | Path) -> dict[str, Any]:
-    """Read again everything of a run, or of a result or motion file, and check it.
+    """Reread and check all files of a run, or a result or motion file.
 
     Args:
         path: a run directory, or a file.
 
     Returns:
-        what `cspr verify --json` prints: counts, and "faults", one line each; none where all is whole.
+        what `cspr verify --json` prints: counts, and "faults", one line each; none if everything is whole.
 
     Raises:
-        StoreError: neither a run directory nor a file.
+        StoreError: the path is neither a run directory nor a file.
     """
     return inspection.verify(Path(path))
 
 
 @checked
 def workspace_volume(result: "Result | xarray.Dataset | str | Path") -> WorkspaceVolume:
-    """Volume of the workspace that a map has found, or its area where the map is a section.
+    """Volume of the workspace of a map, or its area if the map is a section.
 
     Args:
-        result: of a sweep of a map with verdicts: its file, what `open_result` or `compute_sweep` gave.
+        result: result of a map with verdicts: its file, or a value of `open_result` or `compute_sweep`.
 
     Returns:
-        the volume; arrays over the axes that are no coordinates of places, () without any.
+        the volume; its arrays run over the axes that are not coordinates of places, () if there are none.
 
     Raises:
-        InputError: no map, no stored verdicts, or a single place.
-        StoreError: no result file.
+        InputError: the result is no map, has no stored verdicts, or has a single place.
+        StoreError: the file is no result.
     """
     if isinstance(result, Result):
         return volume_of(result)

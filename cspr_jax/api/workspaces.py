@@ -1,4 +1,4 @@
-"""Poses at rest from Python: which ones a robot can hold, how exactly, and which accelerations it has there."""
+"""Poses at rest from Python: which poses a robot can hold, how exactly, and which accelerations it can have there."""
 
 import dataclasses
 import math
@@ -44,35 +44,35 @@ def workspace(  # noqa: PLR0913
     capacity_length: float | None = None,
     precision: str = "float64",
 ) -> WorkspaceAnswers:
-    """Workspace of a robot of any pattern on any number of cables: whether each of n poses belongs to it.
+    """Tell whether each of n poses is in the workspace of a robot, of any pattern on any number of cables.
 
     Args:
-        robot: a point mass or a body on as many cables as degrees of freedom, or more; pulleys count.
-        positions: (n, 3) of the origin of the platform frame, of a robot on a joint of the joint, in the robot's axes,
-            m; n >= 1.
-        orientations: (n, 4) unit quaternions, scalar first, from the orientation of the file; None: that one.
+        robot: a point mass or a body on as many cables as degrees of freedom, or more; pulleys are taken into account.
+        positions: (n, 3) positions of the origin of the platform frame, or of the joint, in the robot's axes, m;
+            n >= 1.
+        orientations: (n, 4) unit quaternions, scalar first, from the orientation of the robot file; None: this one.
         condition: "static": taut cables of any tension hold the weight; "wrench-feasible": tensions within limits
             supply all wrenches; "wrench-closure": cables that are pulled hard enough resist every wrench.
-        tension_min: smallest tension, () or (n_cables,) N, of "wrench-feasible"; None: the robot's, else 0.
-        tension_max: largest tension, likewise, inf allowed; None: the robot's, else none.
-        wrenches: (k, dof) what the cables must supply, of "wrench-feasible": forces, N, then moments about the mass
-            centre, or the joint, N m, in the robot's axes; None: what holds the weight still.
-        wrench_box: (dof,) half widths of a box of wrenches about each of these, N and N m.
-        wrench_ellipsoid: (dof,) semi-axes of an ellipsoid of wrenches about each of these, N and N m.
-        acceleration: radius of a ball of accelerations of the mass centre that the cables must give beside, m/s^2.
-        capacity_length: of "wrench-feasible": by which moments are divided, m (of a point mass any length), for the
-            capacity margin in place of that of the tensions: the distance of the wrenches from the faces of all that
-            the cables can supply, N (Guay et al. 2014; Ruiz et al. 2015).
-        precision: "float64"; "float32": it decides poses where it can, and float64 the others, so that verdicts are the
-            same; margins of the former are good to some 1e-3 of the limits.
+        tension_min: "wrench-feasible": smallest tension, () or (n_cables,) N; None: the robot's, else 0.
+        tension_max: "wrench-feasible": largest tension, () or (n_cables,) N, may be inf; None: the robot's, else none.
+        wrenches: "wrench-feasible": (k, dof) wrenches that the cables must supply, forces, N, then moments about the
+            mass centre, or the joint, N m, in the robot's axes; None: the wrench that holds the weight.
+        wrench_box: (dof,) half widths of a box of wrenches about each of `wrenches`, N and N m.
+        wrench_ellipsoid: (dof,) semi-axes of an ellipsoid of wrenches about each of `wrenches`, N and N m.
+        acceleration: radius of a ball of accelerations of the mass centre that the cables must give too, m/s^2.
+        capacity_length: "wrench-feasible": length that moments are divided by, m (any for a point mass). Margins are
+            then capacity margins: distances of the wrenches from the faces of the set that the cables can supply, N
+            (Guay et al. 2014; Ruiz et al. 2015).
+        precision: "float64", or "float32", which decides the poses that it can and leaves the others to float64, so
+            that verdicts are the same; margins of poses that it decides are good to some 1e-3 of the limits.
 
     Returns:
         verdicts, 0 inside, and margins.
 
     Raises:
-        InputError: another kind of robot, or one on too many cables, an unknown condition, shapes that do not fit,
+        InputError: the wrong kind of robot, or one on too many cables, an unknown condition, shapes that do not fit,
             values that are not finite, quaternions that are not of unit length, orientations of a point mass,
-            moments of a rod, accelerations of a robot on a joint, limits or wrenches where the condition has none,
+            moments of a rod, accelerations of a robot on a joint, limits or wrenches where the condition has none, or
             limits that contradict each other.
     """
     _check_kind(robot)
@@ -129,10 +129,10 @@ class Sensitivity:
     """Sensitivities of a robot to errors of its cable lengths at n places, Machines 11 (2), 2023, 224, (7).
 
     Fields:
-        positions: (n, 3) of the mass centre, in the robot's axes, m.
+        positions: (n, 3) positions of the mass centre, in the robot's axes, m.
         sigma_p: (n,) largest displacement over the largest error of a cable length, m/m; infinite at a singular place.
-        sigma_r: (n,) largest turn of a platform over that error, rad/m, all six errors independent; NaN for a point
-            mass.
+        sigma_r: (n,) largest rotation of a platform over the largest error, rad/m, with six independent errors; NaN for
+            a point mass.
     """
 
     positions: np.ndarray
@@ -147,10 +147,10 @@ class Sensitivity:
             cable_error: () or (n,) largest error of the length of a cable, m.
 
         Returns:
-            (n,) displacement, m, and (n,) turn, rad.
+            (n,) displacement, m, and (n,) rotation, rad.
 
         Raises:
-            InputError: another shape, not finite, or negative.
+            InputError: the wrong shape, not finite, or negative.
         """
         error = np.asarray(cable_error, float)
         if error.shape not in ((), self.sigma_p.shape):
@@ -164,9 +164,10 @@ def sensitivity(robot: PointMassRobot | PlatformRobot, positions, orientations=N
 
     Args:
         robot: a point mass on three cables, or two in a plane, or a platform on six.
-        positions: (n, 3) of the mass centre, in the robot's axes, m.
-        orientations: (n, 4) unit quaternions of a platform in these axes, scalar first, from the reference orientation,
-            or from that of its file if its cables are parallel in three pairs there; None: that.
+        positions: (n, 3) positions of the mass centre, in the robot's axes, m.
+        orientations: (n, 4) unit quaternions of a platform in the robot's axes, scalar first, from the reference
+            orientation, or from that of the robot file if the cables are parallel in three pairs there; None: no
+            rotation.
 
     Returns:
         the sensitivities.
@@ -194,11 +195,11 @@ def encoder_error(drum_radius: float, pulses: float) -> float:
     """Error of a cable's length from the resolution of its winch's encoder, 2 pi r / pulses.
 
     Args:
-        drum_radius: of the drum or pulley that the cable is wound on, m.
-        pulses: of the encoder, a turn of the drum.
+        drum_radius: radius of the drum or pulley that the cable is wound on, m.
+        pulses: pulses of the encoder per turn of the drum.
 
     Returns:
-        m.
+        the error, m.
 
     Raises:
         InputError: a number that is not positive.
@@ -214,8 +215,8 @@ class AvailableAccelerations:
 
     Fields:
         positions: (n, 3) in the robot's axes, m.
-        normals: (n, n_faces, 3) unit normals that point inside, in the robot's axes; 0 of a face that bounds nothing.
-        offsets: (n, n_faces) m/s^2; -inf of a face that bounds nothing.
+        normals: (n, n_faces, 3) unit normals that point inside, in the robot's axes; 0 for a face that bounds nothing.
+        offsets: (n, n_faces) m/s^2; -inf for a face that bounds nothing.
         cables: (n_faces, dof - 1) numbers of the cables that are parallel to the face, from 0 on.
         of_largest: (n, n_faces) whether a cable has its largest tension on the face.
     """
@@ -234,14 +235,14 @@ class AvailableAccelerations:
         """Distance of accelerations from the nearest face.
 
         Args:
-            accelerations: (3,) one for all places, or (n, 3) one a place, in the robot's axes, m/s^2.
+            accelerations: (3,) for all places, or (n, 3), one per place, in the robot's axes, m/s^2.
 
         Returns:
-            (n,) m/s^2: positive where they are feasible, inf where nothing bounds them; negative where they are not,
-            and then no smaller than the distance from those that are.
+            (n,) m/s^2: positive where the acceleration is feasible, inf where nothing bounds it; negative where it is
+            not, and then at least minus its distance from the feasible ones.
 
         Raises:
-            InputError: another shape, or not finite.
+            InputError: the wrong shape, or not finite.
         """
         return self._judged(accelerations)[0]
 
@@ -256,7 +257,7 @@ class AvailableAccelerations:
             (n,) flags of `Verdict`; 0 is feasible. A margin within 1e-9 of gravity, or of its rounding, is undecided.
 
         Raises:
-            InputError: another shape, or not finite.
+            InputError: the wrong shape, or not finite.
         """
         return self._judged(accelerations)[1].astype(FLAGS)
 
@@ -280,16 +281,16 @@ def available_accelerations(
 
     Args:
         robot: a point mass in space or in a plane.
-        positions: (n, 3) in the robot's axes, m.
+        positions: (n, 3) places in the robot's axes, m.
         tension_min: smallest tension, () or (n_cables,) N; None: the robot's, else 0.
-        tension_max: largest tension, likewise; None: the robot's, else none.
+        tension_max: largest tension, () or (n_cables,) N; None: the robot's, else none.
 
     Returns:
-        the set at each place.
+        the set of feasible accelerations at each place.
 
     Raises:
-        InputError: another kind of robot, shapes that do not fit, values that are not finite, tensions that contradict
-            each other.
+        InputError: the wrong kind of robot, shapes that do not fit, values that are not finite, tensions that
+            contradict each other.
     """
     check_point_mass(robot)
     places = points_of("positions", positions)

@@ -48,10 +48,10 @@ class LaunchErrors:
     Fields:
         release: standard deviation of the instant of release, s.
         cable_length: standard deviation of the length of each cable at the release, m.
-        cable_speed: standard deviation of the rate of that length, m/s.
-        encoder: largest error of each length due to the resolution of its encoder, m; uniform.
-        throws: size of the sample.
-        seed: of the sample.
+        cable_speed: standard deviation of the rate of each cable's length, m/s.
+        encoder: largest error of each length due to the resolution of its encoder, m; uniformly distributed.
+        throws: number of throws in the sample.
+        seed: seed of the random sample.
     """
 
     release: float = 0.0

@@ -60,7 +60,7 @@ def _of_cables(robot_file: RobotFile) -> dict[str, Any]:
 
 
 def load_robot(reference: str | Path) -> PointMassRobot | PlatformRobot:
-    """A robot of the catalogue, or of a file, with its axes and its limits.
+    """Load a robot of the catalogue, or of a file, with its axes and its limits.
 
     Args:
         reference: a catalogue name, or the path of a robot file.
@@ -69,7 +69,7 @@ def load_robot(reference: str | Path) -> PointMassRobot | PlatformRobot:
         the robot: a point mass or a platform.
 
     Raises:
-        ConfigError: no such robot, or a mistake in its file.
+        ConfigError: there is no such robot, or its file has a mistake.
     """
     robot_file = resolve_robot(str(reference), reference, Path.cwd())
     return build_robot(robot_file, TrajectoryKeys(), reference)

@@ -19,7 +19,7 @@ from cspr_jax.sweep.signals import Prompt, prompt_end
 
 EPILOGUE = (
     "exit codes: 0 done; 1 answered, not all feasible; 2 bad input; 3 refused; 4 I/O error or damaged file; "
-    "5 numerical self-check failed; 70 internal error; 130, 143 stopped, run it again to go on"
+    "5 numerical self-check failed; 70 internal error; 130, 143 stopped, run the command again to resume"
 )
 
 # Set only in a process that is ours: Python's passes over the many objects of jax take a tenth of a command's time.
@@ -28,7 +28,7 @@ FEWER_COLLECTIONS = (200_000, 20, 50)
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        """One line for a mistake, instead of the usage."""
+        """Print one line for a mistake, instead of the usage."""
         self.exit(ExitCode.BAD_INPUT, f"{printable(f'{self.prog}: {message} (see {self.prog} --help)')}\n")
 
     def _print_message(self, message: str, file: Any = None) -> None:
@@ -165,7 +165,7 @@ def _complete_files(parser: argparse.ArgumentParser, files: dict[str, Any]) -> N
 # Commands come in the order of the help. A new command is a row of one of these modules.
 COMMANDS = (
     *(*sweeps.COMMANDS, *plans.COMMANDS, *pictures.COMMANDS, *published.COMMANDS, *listings.COMMANDS),
-    Command("completion", "print a script for a shell that completes commands", _add_completion, _completion),
+    Command("completion", "print a script with which a shell completes commands", _add_completion, _completion),
 )
 
 

@@ -1,4 +1,4 @@
-"""A command as a row, and what commands have in common: JSON, tables, warnings, options, the way to jax."""
+"""A command as a row, and what commands share: JSON, tables, warnings, options, the start of jax."""
 
 import argparse
 import contextlib
@@ -17,9 +17,9 @@ class Command(NamedTuple):
 
     Fields:
         name: the word after `cspr`.
-        text: what it does, for `--help`.
-        add_arguments: its arguments, to its parser.
-        run: does it; returns the exit code.
+        text: what the command does, for `--help`.
+        add_arguments: adds its arguments to its parser.
+        run: runs the command and returns the exit code.
     """
 
     name: str
@@ -29,26 +29,26 @@ class Command(NamedTuple):
 
 
 def add_json(parser: argparse.ArgumentParser, what: str = "object") -> None:
-    """Option for programs that read the answer.
+    """Add the option for programs that read the answer.
 
     Args:
-        what: JSON value that it prints.
+        what: JSON value that the command prints.
     """
     parser.add_argument("--json", action="store_true", help=f"print one JSON {what} and nothing else")
 
 
 def add_device(parser: argparse.ArgumentParser, *, quick: bool = False) -> None:
-    """Option of where to compute.
+    """Add the option of the device.
 
     Args:
-        quick: whether it computes little; see `xla.prepare`.
+        quick: whether the command computes little; see `xla.prepare`.
     """
     usual = "cpu" if quick else "a GPU if jax finds one"
     parser.add_argument("--device", choices=("cpu", "gpu"), help=f"where to compute (default: {usual})")
 
 
 def add_all_errors(parser: argparse.ArgumentParser) -> None:
-    """Option for every mistake at once.
+    """Add the option to print all mistakes of a file.
 
     Args:
         parser: of a command that reads a file of keys.
@@ -57,7 +57,7 @@ def add_all_errors(parser: argparse.ArgumentParser) -> None:
 
 
 def add_output(parser: argparse.ArgumentParser, text: str, **settings: Any) -> None:
-    """Option of where the output goes.
+    """Add the option of the file or folder to write.
 
     Args:
         text: for `--help`.
@@ -67,14 +67,14 @@ def add_output(parser: argparse.ArgumentParser, text: str, **settings: Any) -> N
 
 
 def prepare_jax(options: argparse.Namespace, *, quick: bool = False) -> None:
-    """Set up jax as the options want it; from here on it says when it compiles.
+    """Set up jax by the options; from here on a line says when it compiles.
 
     Args:
         quick: whether little is computed; see `xla.prepare`.
 
     Raises:
-        ConfigError: no such device, or settings of jax that cannot be used.
-        ResourceError: its threads could not be started.
+        ConfigError: there is no such device, or settings of jax cannot be used.
+        ResourceError: the threads of jax could not be started.
     """
     from cspr_jax.runtime import surroundings, xla
 
@@ -87,10 +87,10 @@ def prepare_jax(options: argparse.Namespace, *, quick: bool = False) -> None:
 
 @contextlib.contextmanager
 def printing() -> Iterator[None]:
-    """Name standard output where it takes nothing more.
+    """Name standard output in the error if it takes nothing more.
 
     Yields:
-        nothing; it is written to inside.
+        nothing; the block writes to it.
 
     Raises:
         StoreError: it is full.
@@ -147,6 +147,6 @@ def print_path(path: Path | str) -> None:
 
 
 def warn(line: object) -> None:
-    """Say something on standard error; where that takes nothing more, there is nobody to be told."""
+    """Write a warning to standard error; if that takes nothing more, drop the warning."""
     with contextlib.suppress(OSError, ValueError):
         sys.stderr.write(f"cspr: {printable(line)}\n")

@@ -8,9 +8,11 @@ from cspr_jax.errors import ConfigError, ExitCode
 
 
 def _add_import(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", type=Path, help="NAME_cables.xml, beside NAME_bodies.xml, or .json, .yaml, .wcrfx")
+    parser.add_argument(
+        "file", type=Path, help="NAME_cables.xml (with NAME_bodies.xml beside it), .json, .yaml or .wcrfx"
+    )
     add_output(parser, "write FILE.toml (default: print it)", metavar="FILE")
-    parser.add_argument("--set", metavar="NAME", help="set of cables of a model of CASPR (default: its own choice)")
+    parser.add_argument("--set", metavar="NAME", help="CASPR: set of cables (default: the one that the file names)")
 
 
 def _import(options: argparse.Namespace) -> int:
@@ -34,7 +36,10 @@ def _add_list(parser: argparse.ArgumentParser) -> None:
 
 def _add_robots(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "names", nargs="*", metavar="NAME", help="show all about these, of the catalogue or robot files (default: list)"
+        "names",
+        nargs="*",
+        metavar="NAME",
+        help="describe these robots, by catalogue name or robot file (default: list)",
     )
     add_json(parser, "array")
 
@@ -66,9 +71,9 @@ def _quantities(options: argparse.Namespace) -> int:
 
 
 def _add_examples(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("name", nargs="*", help="those to copy (default: list them)")
-    parser.add_argument("--all", action="store_true", help="copy all of them")
-    add_output(parser, "to this folder (default .)", default=Path(), metavar="DIR")
+    parser.add_argument("name", nargs="*", help="examples to copy (default: list them)")
+    parser.add_argument("--all", action="store_true", help="copy all examples")
+    add_output(parser, "folder to copy to (default .)", default=Path(), metavar="DIR")
     add_json(parser)
 
 
@@ -88,10 +93,13 @@ def _examples(options: argparse.Namespace) -> int:
 
 
 def _add_new(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("what", choices=("robot", "sweep", "plan"))
+    parser.add_argument("what", choices=("robot", "sweep", "plan"), help="kind of file")
     parser.add_argument("path", type=Path, help="file to write, .toml; nothing is overwritten")
     parser.add_argument(
-        "--like", default="prototype", metavar="ROBOT", help="robot: values of this one (`cspr robots`)"
+        "--like",
+        default="prototype",
+        metavar="ROBOT",
+        help="robot: catalogue robot whose values to take (`cspr robots`)",
     )
     parser.add_argument("--map", default="minimum-arcs", metavar="KIND", help="sweep: kind of map")
     parser.add_argument("--family", default="hypocycloid-standard", metavar="NAME", help="plan: trajectory family")
@@ -105,9 +113,9 @@ def _new(options: argparse.Namespace) -> int:
 
 
 COMMANDS = (
-    Command("new", "write a robot, sweep or plan file to begin with, every key explained", _add_new, _new),
-    Command("import", "read a robot of CASPR, cdpyr or WireX as a robot file", _add_import, _import),
-    Command("robots", "list the catalogue of robots, or show all about some", _add_robots, _robots),
+    Command("new", "write a robot, sweep or plan file to start from, with every key explained", _add_new, _new),
+    Command("import", "convert a robot of CASPR, cdpyr or WireX into a robot file", _add_import, _import),
+    Command("robots", "list the robots of the catalogue, or describe robots in full", _add_robots, _robots),
     Command("quantities", "list the quantities that a result can hold", _add_list, _quantities),
     Command("examples", "list sweep and plan files to start from, or copy them", _add_examples, _examples),
 )

@@ -29,18 +29,22 @@ def _plot(options: argparse.Namespace) -> int:
 
 def _add_report(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("result", type=Path, help="result or run directory, motion of `cspr plan -o`, or plan file")
-    add_output(parser, "page: .html (default: beside)", metavar="FILE")
-    parser.add_argument("--quantity", help="quantity of a map to show first")
+    add_output(parser, "page: .html (default: beside the result)", metavar="FILE")
+    parser.add_argument("--quantity", help="map: quantity that the page shows first")
     add_best(parser)
     parser.add_argument(
         "--trajectories",
         type=int,
         default=50,
         metavar="K",
-        help="number of cells whose motions are included, the most informative ones (default 50)",
+        help="map: include the motions of the K most informative cells (default 50)",
     )
     parser.add_argument(
-        "--cell", action="append", default=[], metavar="AXIS=VALUE,...", help="also include the motion of this cell"
+        "--cell",
+        action="append",
+        default=[],
+        metavar="AXIS=VALUE,...",
+        help="map: also include the motion of this cell",
     )
     add_motion_plan(parser)
     add_all_errors(parser)
@@ -66,6 +70,6 @@ def _report(options: argparse.Namespace) -> int:
 
 
 COMMANDS = (
-    Command("plot", "draw a result file, or several maps in one picture", add_plot, _plot),
+    Command("plot", "draw a result, or several in one picture", add_plot, _plot),
     Command("report", "write a page to explore a result or a plan in a browser", _add_report, _report),
 )

@@ -20,22 +20,24 @@ from cspr_jax.errors import ConfigError, ExitCode
 from cspr_jax.outputs.plots.options import add_look
 from cspr_jax.runtime.progress import waiting
 
-_STEP = "longest step of MuJoCo (default 0.0005)"
+_STEP = "longest step of MuJoCo, s (default 0.0005)"
 
 
 def _add_plan(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("plan", type=Path, help="plan file (TOML)")
     add_json(parser)
     add_output(parser, "write the motion to FILE.csv or FILE.h5", metavar="FILE")
-    parser.add_argument("--anyway", action="store_true", help="write the best candidate's motion if it is not feasible")
     parser.add_argument(
-        "--rate", type=float, metavar="HZ", help="rows per second (default: `samples` rows per segment)"
+        "--anyway", action="store_true", help="write the best candidate's motion even if it is not feasible"
+    )
+    parser.add_argument(
+        "--rate", type=float, metavar="HZ", help="rows of -o per second (default: `samples` rows per segment)"
     )
     parser.add_argument(
         "--mjcf",
         type=Path,
         metavar="FILE.xml",
-        help="write a model for MuJoCo, and beside it FILE_control.csv, the tensions that play the plan in it",
+        help="write a model for MuJoCo, and beside it FILE_control.csv, the tensions that move it along the plan",
     )
     parser.add_argument("--step", type=float, metavar="S", help=f"--mjcf: {_STEP}")
     parser.add_argument("--animate", type=Path, metavar="FILE", help="write a film: .gif, .mp4 or .html")
@@ -120,7 +122,9 @@ def _add_replay(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("plan", type=Path, help="plan file (TOML)")
     add_json(parser)
     add_output(parser, "draw both paths and the deviations: .png, .pdf, .svg", metavar="FILE")
-    parser.add_argument("--anyway", action="store_true", help="play the best candidate's motion if it is not feasible")
+    parser.add_argument(
+        "--anyway", action="store_true", help="play the best candidate's motion even if it is not feasible"
+    )
     parser.add_argument("--step", type=float, metavar="S", help=_STEP)
     add_look(parser)
     add_all_errors(parser)
@@ -156,10 +160,10 @@ def _replay(options: argparse.Namespace) -> int:
 
 
 COMMANDS = (
-    Command("plan", "plan a sequence of poses", _add_plan, _plan),
+    Command("plan", "plan motions through a sequence of poses", _add_plan, _plan),
     Command(
         "replay",
-        "play a plan in MuJoCo, and say how far path and tensions are from the planned ones",
+        "play a plan in MuJoCo, and say how far path and tensions deviate from the planned ones",
         _add_replay,
         _replay,
     ),

@@ -9,18 +9,27 @@ from cspr_jax.runtime.progress import waiting
 
 
 def _add_table(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("name", nargs="?", help="such as 2.1")
+    parser.add_argument("name", nargs="?", help="name of a table, such as 2.1")
     parser.add_argument("--list", action="store_true", help="list the tables")
     add_json(parser)
     parser.add_argument(
-        "--definition", choices=("grid", "scan", "equal-volume", "all"), help="3.3, 3.4: accessible set"
+        "--definition",
+        choices=("grid", "scan", "equal-volume", "all"),
+        help="3.3, 3.4: definition of the accessible orientations",
     )
-    parser.add_argument("--amplitude", choices=("quintic", "effective", "effective-c3", "all"), help="3.3, 3.4")
+    parser.add_argument(
+        "--amplitude", choices=("quintic", "effective", "effective-c3", "all"), help="3.3, 3.4: function"
+    )
     parser.add_argument("--fine", action="store_true", help="3.3, 3.4: step pi/64 instead of pi/32")
     parser.add_argument("--max-arcs", type=int, metavar="P", help="3.3, 3.4: largest number of arcs tried (default 20)")
-    parser.add_argument("--values", type=int, metavar="N", help="3.3, 3.4: values of beta-hat tried (default 20)")
     parser.add_argument(
-        "--workers", type=int, metavar="N", help="3.3, 3.4: processes (default 1; for 3.4 one a core, at most 8)"
+        "--values", type=int, metavar="N", help="3.3, 3.4: number of values of beta-hat tried (default 20)"
+    )
+    parser.add_argument(
+        "--workers",
+        type=int,
+        metavar="N",
+        help="3.3, 3.4: number of processes (default 1; for 3.4 one per core, at most 8)",
     )
     add_device(parser)
 
@@ -71,5 +80,7 @@ def _bench(options: argparse.Namespace) -> int:
 
 COMMANDS = (
     Command("table", "recompute a published table and compare it with the printed numbers", _add_table, _table),
-    Command("bench", "measure checks per second beside a NumPy version of the same check", _add_bench, _bench),
+    Command(
+        "bench", "measure feasibility checks per second, beside a NumPy version of the same check", _add_bench, _bench
+    ),
 )

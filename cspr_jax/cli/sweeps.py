@@ -33,13 +33,19 @@ def _add_run(parser: argparse.ArgumentParser) -> None:
         "--workers",
         type=int,
         metavar="N",
-        help="processes on this machine (default 1; for maps of platforms' poses one a core, at most 8)",
+        help="number of processes on this machine (default 1; for maps of platforms' poses one per core, at most 8)",
     )
-    parser.add_argument("--scheduler", metavar="ADDRESS", help="dask.distributed scheduler, such as tcp://host:8786")
     parser.add_argument(
-        "--accept-environment-change", action="store_true", help="resume despite another version, machine or library"
+        "--scheduler", metavar="ADDRESS", help="address of a dask.distributed scheduler, such as tcp://host:8786"
     )
-    parser.add_argument("--prune", action="store_true", help="remove the shards once the result is complete")
+    parser.add_argument(
+        "--accept-environment-change",
+        action="store_true",
+        help="resume although version, machine or libraries have changed",
+    )
+    parser.add_argument(
+        "--prune", action="store_true", help="remove the files of finished tiles once the result is complete"
+    )
     add_all_errors(parser)
     add_device(parser)
 
@@ -148,12 +154,12 @@ def _volume(options: argparse.Namespace) -> int:
 
 
 COMMANDS = (
-    Command("run", "compute a sweep file into an HDF5 result; its path is the last line printed", _add_run, _run),
-    Command("status", "say how far a run has come, without touching it", _add_status, _status),
-    Command("verify", "reread and check a run, or a result or motion file", _add_verify, _verify),
+    Command("run", "compute a sweep file into an HDF5 result, whose path is the last line printed", _add_run, _run),
+    Command("status", "say how far a run has come, without changing it", _add_status, _status),
+    Command("verify", "reread and check all files of a run, or a result or motion file", _add_verify, _verify),
     Command(
         "volume",
-        "print the size of a map's workspace, and its error due to the grid",
+        "print the volume of a map's workspace, and the error due to the grid",
         _add_volume,
         _volume,
     ),

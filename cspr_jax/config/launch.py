@@ -18,31 +18,34 @@ class ErrorTable(Table):
     release: Size = Field(0.0, description="standard deviation of the instant of release, s")
     cable_length: Size = Field(0.0, description="standard deviation of the length of each cable at the release, m")
     cable_speed: Size = Field(0.0, description="standard deviation of the rate of each cable's length, m/s")
-    encoder: Size = Field(0.0, description="largest error of each length by the resolution of its encoder, m")
-    throws: Annotated[int, Field(ge=2, le=1_000_000)] = Field(10_000, description="number of throws of the sample")
-    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = Field(0, description="seed of the sample")
+    encoder: Size = Field(
+        0.0, description="largest error of each cable's length due to the resolution of its encoder, m"
+    )
+    throws: Annotated[int, Field(ge=2, le=1_000_000)] = Field(10_000, description="number of throws in the sample")
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = Field(0, description="seed of the random sample")
 
 
 class LaunchTable(Table):
     """Launch of an object."""
 
     segment: Annotated[int, Field(ge=0)] = Field(
-        description="number of the pose at which the segment of the release starts; the next pose has no position, "
-        "since it follows from the launch"
+        description="number, from 0 on, of the pose at which the segment of the release starts; the next pose has no "
+        "position, since the launch determines it"
     )
     target: Point = Field(description="where the object is to arrive, [x, y, z], m")
-    point: Point | None = Field(None, description="place of the release, [x, y, z], m; absent: follows from velocity")
+    point: Point | None = Field(None, description="place of the release, [x, y, z], m; absent: velocity determines it")
     velocity: Point | None = Field(
-        None, description="velocity at the target, [x, y, z], m/s; absent: follows from point and the flight's time"
+        None,
+        description="velocity at the target, [x, y, z], m/s; absent: point and the time of the flight determine it",
     )
-    time: Seconds | None = Field(None, description="time of the flight, s; absent: see choose")
+    time: Seconds | None = Field(None, description="time of the flight, s; absent: `choose` finds it")
     choose: Literal["energy", "time"] | None = Field(
         None,
         description='in place of time: "energy", the least kinetic energy at the release, or "time", the earliest '
         "landing, by search",
     )
     release: Seconds | None = Field(
-        None, description="when the object is released, after the start of the segment, s; absent: chosen by search"
+        None, description="time of the release after the start of the segment, s; absent: chosen by search"
     )
 
     errors: ErrorTable | None = Field(None, description="[launch.errors], errors whose scatter is computed")
@@ -71,15 +74,17 @@ class LaunchSearch(Table):
     """Bounds within which maps of launches look for a release."""
 
     release_x: Interval | None = Field(None, description=_OF_RELEASES.format("x", _ASIDE))
-    release_y: Interval | None = Field(None, description=_OF_RELEASES.format("y", "likewise"))
+    release_y: Interval | None = Field(None, description=_OF_RELEASES.format("y", _ASIDE))
     release_z: Interval | None = Field(
         None, description=_OF_RELEASES.format("z", "from the centroid down to four times the robot's size below it")
     )
     max_duration: Positive | None = Field(
-        None, description="longest segment tried, s; absent: 40 times the root of the robot's size over gravity"
+        None,
+        description="longest duration of a segment that is tried, s; absent: 40 times the root of the robot's size "
+        "over gravity",
     )
     population: Annotated[int, Field(ge=16, le=512)] = Field(
-        64, description="launches that the search of a cell improves; one twice as large takes four times as long"
+        64, description="number of launches that the search of a cell improves; twice as many take four times as long"
     )
 
     @field_validator("release_x", "release_y", "release_z")

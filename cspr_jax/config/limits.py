@@ -85,7 +85,7 @@ _Cables: Any = create_model("_Cables", __base__=Table, **_limit_keys(per_cable=T
 
 
 class LimitKeys(_Cables):
-    """Limits beyond taut cables; a plan's or a sweep's stand over those of the robot file."""
+    """Limits beyond taut cables; those of a plan or a sweep override those of the robot file."""
 
 
 def _uncertainty_keys() -> dict[str, Any]:
@@ -103,7 +103,7 @@ _Heights: Any = create_model("_Heights", __base__=LimitKeys, **_limit_keys(per_c
 
 
 class UncertaintyTable(_Uncertainties):
-    """Uncertainty of the robot, for all of which motions are to be feasible."""
+    """Uncertainty of the robot: motions must be feasible for every robot within it."""
 
     @model_validator(mode="after")
     def _beyond_least(self) -> "UncertaintyTable":
@@ -117,7 +117,8 @@ class LimitTable(_Heights):
 
     uncertainty: UncertaintyTable | None = Field(
         None,
-        description="hypocycloids and transitions: feasible means feasible for every robot within this uncertainty",
+        description="hypocycloids and transitions: feasible then means feasible for every robot within this "
+        "uncertainty",
     )
 
     if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Obstacles, tables of sweep files, and keys of the platform's own shape; without jax."""
+"""Tables of obstacles in sweep files, and keys of the platform's shape; without jax."""
 
 from collections.abc import Sequence
 from typing import Annotated, Literal
@@ -52,7 +52,8 @@ class ObstacleTable(Table):
     )
     corners: Corners | None = Field(
         None,
-        description="box along the axes: [[x, y, z], [x, y, z]], least and largest, m; in place of centre and size",
+        description="box along the axes: [[x, y, z], [x, y, z]], least and largest corner, m; in place of centre and "
+        "size",
     )
 
     @model_validator(mode="after")
@@ -101,17 +102,17 @@ Obstacles = Annotated[list[ObstacleTable], Field(max_length=MOST_OBSTACLES)]
 
 
 class PlatformShapeKeys(Table):
-    """The platform's own shape, which its cables are kept clear of."""
+    """The platform's own shape, which its cables must not meet."""
 
     platform_box: Corners | None = Field(
         None,
         description="interference-free: the platform's box, [[x, y, z], [x, y, z]], least and largest, platform axes, "
-        "m; cables keep clear of it, and it of obstacles; absent, without platform_hull: its shape is not looked at",
+        "m; cables must not meet it, nor it obstacles; if platform_hull is absent too, the shape is ignored",
     )
     platform_hull: HullOf | None = Field(
         None,
         description="in place of platform_box: points whose convex hull is the platform's shape, platform axes, m; "
-        "true: those where the cables are attached",
+        "true: the points where the cables are attached",
     )
 
     @model_validator(mode="after")

@@ -21,7 +21,7 @@ class DepthRule(Table):
     """Rule that chooses z0."""
 
     choose: Literal["mean", "conservative", "fastest"] = Field(
-        description='"mean" height of the targets, "conservative" (2.58), or "fastest" by search'
+        description='"mean" height of the targets, "conservative" (2.58), or "fastest", found by search'
     )
 
 
@@ -51,16 +51,19 @@ class Pose(Table):
         None, description="platform: orientation [w, x, y, z], a unit quaternion, in place of tilt_torsion"
     )
     beta_hat: BetaHat | None = Field(
-        None, description="platform: fixes the angular acceleration at this pose, thesis (3.81); absent: searched for"
+        None,
+        description="platform: beta-hat at this pose, which fixes its angular acceleration, thesis (3.81); absent: "
+        "found by search",
     )
     arcs: Annotated[int, Field(ge=1, le=LARGEST_MAX_ARCS)] | None = Field(
-        None, description="fixes the number of arcs of the segment that ends here; 2 n for n oscillations"
+        None,
+        description="number of arcs of the segment that ends here; 2 n for n oscillations; absent: found by search",
     )
     duration: Duration | None = Field(
         None, description='bezier: duration of the segment that ends here, s, or "least", the default'
     )
     family: FamilyName | None = Field(
-        None, description="family of the segment that ends here, in place of the plan's; not of the first pose"
+        None, description="family of the segment that ends here, in place of the plan's; not at the first pose"
     )
 
 
@@ -81,20 +84,22 @@ class PlanFile(TrajectoryKeys, LimitTable):
     )
     least: Literal["each", "total"] | None = Field(
         None,
-        description='bezier: what durations "least" minimise: "each", the default, each segment\'s own, given the '
-        'segments before it; "total" their sum, by search',
+        description='bezier: what the durations "least" minimise: "each", the default, the duration of each segment, '
+        'given the segments before it; "total", their sum, by search',
     )
     tensions: Annotated[str, name_of(lambda: TENSION_RULES)] | None = Field(
         None,
-        description="more cables than degrees of freedom: rule that chooses the tensions of motion files; "
+        description="more cables than degrees of freedom: rule that chooses the tensions in motion files: "
         + "; ".join(f'"{name}", {row.sentence}' for name, row in TENSION_RULES.items())
         + f' (here 4, about the middles of their ranges); absent: "{CENTRED}"',
     )
-    samples: Annotated[int, Field(ge=2, le=1_000_000)] = Field(400, description="rows of trajectory output per segment")
+    samples: Annotated[int, Field(ge=2, le=1_000_000)] = Field(
+        400, description="number of rows per segment in motion files"
+    )
     limits: LimitTable | None = Field(
         None, description="[limits], as in a sweep: the same keys as here; give each key in only one of the two places"
     )
-    launch: LaunchTable | None = Field(None, description="bezier: [launch], an object that is released on the way")
+    launch: LaunchTable | None = Field(None, description="bezier: [launch] of an object that is released on a segment")
     pose: Annotated[list[Pose], Field(min_length=2, max_length=10_000)] = Field(
         description="the poses in their order, at least two [[pose]] tables"
     )

@@ -36,35 +36,35 @@ LEVEL = 1e-9
 
 
 class RobotFile(LimitKeys):
-    """A robot of one effector: a point mass on cables, or a platform; `pattern` says how it moves where it must."""
+    """A robot of one effector: a point mass on cables, or a platform; other kinds of effectors need `pattern`."""
 
     name: str = Field(description="name of the robot, at most 200 characters", min_length=1, max_length=200)
     base_points: Annotated[list[Point], Field(max_length=MOST_CABLES)] = Field(
-        description="where the cables leave their spools, or enter their pulleys: points [x, y, z] in cable order, m; "
+        description="points where the cables leave their spools, or enter their pulleys, [x, y, z] in cable order, m; "
         "as many as degrees of freedom, or more; with y = 0 if planar"
     )
     platform_points: Annotated[list[Point], Field(max_length=MOST_CABLES)] | None = Field(
-        None, description="platform: where the cables are attached, as many points in platform axes, m"
+        None, description="platform: points where the cables are attached, one per cable, platform axes, m"
     )
     inertia: Annotated[list[Row], Field(min_length=3, max_length=3)] | None = Field(
         None,
-        description="platform: inertia tensor about the mass centre, platform axes, kg m^2, parts up to 1e18",
+        description="platform: inertia tensor about the mass centre, platform axes, kg m^2, components up to 1e18",
     )
     centre_of_mass: Point | None = Field(
         None, description="platform: mass centre in platform axes, m (default [0, 0, 0])"
     )
-    planar: bool = Field(False, description="true: a point mass, everything in the plane y = 0")
+    planar: bool = Field(False, description="true: a point mass, with everything in the plane y = 0")
     pattern: Literal["1T", "2T", "3T", "1R2T", "2R3T", "3R3T", "3R"] | None = Field(
         None,
-        description="motions of the effector, R rotations and T translations (default: as the other keys say, "
+        description="motions of the effector, R rotations and T translations (default by the other keys: "
         '"2T" if planar, "3T" of a point mass, "3R3T" of a platform): "1T" along a vertical guide; "1R2T" of a '
         'platform in the plane y = 0; "2R3T" of a rod, platform_points on one line; "3R" of a platform that turns '
         "about a fixed joint, the origin of its axes",
     )
     translation_only: bool | None = Field(
         None,
-        description="rigid platform on six cables in three parallel pairs, each with one winch: true: it only "
-        "translates, and is planned and swept as the equivalent point mass on three cables",
+        description="rigid platform on six cables in three parallel pairs, each pair on one winch: true if it only "
+        "translates; plans and sweeps then take the equivalent point mass on three cables",
     )
     mass: Positive = Field(description="mass of the effector, kg, at most 1e9")
     gravity: Positive | None = Field(None, description="gravity, m/s^2 (default 9.81)")
@@ -73,7 +73,7 @@ class RobotFile(LimitKeys):
     # If this is a point mass on three cables that stand for pairs of six: the robot to which it is equivalent.
     _platform: "RobotFile | None" = PrivateAttr(None)
     cable_diameter: Annotated[float, Field(ge=0, le=LARGEST_LENGTH)] | None = Field(
-        None, description="diameter of the cables, for their distances, m (default 0)"
+        None, description="diameter of the cables, for distances between bodies, m (default 0)"
     )
     pulley_radius: NotNegativePerCable | None = Field(
         None,
@@ -89,12 +89,12 @@ class RobotFile(LimitKeys):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Items that were left out of a file of another program, one line each."""
+        """Items of a file of another program that were left out, one line each."""
         return self._notes
 
     @property
     def file(self) -> Path | None:
-        """The file that it was read from; None for a table of another file."""
+        """The file that the robot was read from; None for a table in another file."""
         return self._file
 
     @property

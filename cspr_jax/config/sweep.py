@@ -54,7 +54,7 @@ def axis_points(axis: AxisRange | list[float]) -> np.ndarray:
 
 
 _OF_TARGETS = "{} of the targets, m: {{ start, stop, count }} or a list"
-_OF_STARTS = "{} of the start points, m, in place of that in trajectory.from"
+_OF_STARTS = "{} of the start points, m, in place of trajectory.from"
 
 
 class Axes(Table):
@@ -63,18 +63,24 @@ class Axes(Table):
     x: Axis | None = Field(None, description=_OF_TARGETS.format("x"))
     y: Axis | None = Field(None, description=_OF_TARGETS.format("y"))
     radius: Axis | None = Field(
-        None, description="distance of the targets from the vertical through the centroid, m; with azimuth, for x and y"
+        None,
+        description="distance of the targets from the vertical through the centroid, m; with azimuth, in place of x "
+        "and y",
     )
-    azimuth: Axis | None = Field(None, description="direction of the targets from that vertical, from x to y, rad")
+    azimuth: Axis | None = Field(
+        None, description="direction of the targets seen from the vertical through the centroid, from x to y, rad"
+    )
     z: Axis = Field(description=_OF_TARGETS.format("z"))
-    tilt_azimuth: Axis | None = Field(None, description="poses: phi of the tilt and torsion of the targets, rad; or 0")
-    tilt: Axis | None = Field(None, description="poses: theta, rad; or 0")
-    torsion: Axis | None = Field(None, description="poses: sigma, rad; or 0")
+    tilt_azimuth: Axis | None = Field(
+        None, description="poses, workspace: angle phi of tilt and torsion, rad; absent: 0"
+    )
+    tilt: Axis | None = Field(None, description="poses, workspace: angle theta of tilt and torsion, rad; absent: 0")
+    torsion: Axis | None = Field(None, description="poses, workspace: angle sigma of tilt and torsion, rad; absent: 0")
     z0: Axis | None = Field(None, description="depth of P0 below the centroid of the spools, m; all > 0")
     inclination: Axis | None = Field(None, description="inclination v of transitions, in place of z0; all in ]-1, 1[")
     tau: Axis | None = Field(None, description="instants of transition-envelopes, normalised time in [0, 1]")
     cable: Axis | None = Field(
-        None, description="cables of transition-envelopes, from 1 on; absent: the worst of them at each instant"
+        None, description="cables of transition-envelopes, from 1 on; absent: the worst cable at each instant"
     )
     from_x: Axis | None = Field(None, description=_OF_STARTS.format("x"))
     from_y: Axis | None = Field(None, description=_OF_STARTS.format("y"))
@@ -92,9 +98,9 @@ class From(Table):
 
     position: Point | None = Field(None, description="start point [x, y, z], m")
     rest: bool = Field(False, description="true: at rest in P0")
-    tilt_torsion: TiltTorsion | None = Field(None, description="poses: orientation there, as in a plan")
-    quaternion: Quaternion | None = Field(None, description="poses: orientation there, in place of tilt_torsion")
-    beta_hat: BetaHat | None = Field(None, description="poses: beta-hat there; absent: the preferred one (3.91)")
+    tilt_torsion: TiltTorsion | None = Field(None, description="poses: orientation at the start, as in a plan")
+    quaternion: Quaternion | None = Field(None, description="poses: orientation at the start, in place of tilt_torsion")
+    beta_hat: BetaHat | None = Field(None, description="poses: beta-hat at the start; absent: the preferred one (3.91)")
 
     @property
     def is_pose(self) -> bool:
@@ -116,7 +122,9 @@ class SweepTrajectory(TrajectoryKeys):
     """The trajectory of every cell."""
 
     start: From | None = Field(
-        None, alias="from", description="{ position = [x, y, z] } or { rest = true }; or axes from_x, from_y and from_z"
+        None,
+        alias="from",
+        description="{ position = [x, y, z] } or { rest = true }; or axes from_x, from_y and from_z",
     )
     beta_hat: BetaHatChoice | None = Field(
         None,
@@ -130,14 +138,17 @@ class Orientations(Table):
 
     definition: Literal["grid", "scan", "equal-volume"] | None = Field(
         None,
-        description='accessible set: "grid" of tilt and torsion, "scan" (Bonev, as in the thesis), or "equal-volume"; '
-        'absent: "scan", but "grid" in map = "orientations", which has no other',
+        description='how the accessible set is sampled: "grid" of tilt and torsion, "scan" (Bonev, as in the '
+        'thesis), or "equal-volume"; absent: "scan", except in map = "orientations", which has only "grid"',
     )
     divisions: Annotated[int, Field(ge=4, le=128, multiple_of=2)] = Field(
-        32, description="of pi: the step is pi / divisions; even, since errors are estimated with twice the step"
+        32,
+        description="number of steps in pi: the step is pi / divisions; even, since errors are estimated with twice "
+        "the step",
     )
     values: Annotated[int, Field(ge=1, le=100)] | None = Field(
-        None, description="orientations, attainability: values of beta-hat tried at each orientation; absent: 20"
+        None,
+        description="orientations, attainability: number of values of beta-hat tried at each orientation; absent: 20",
     )
 
 
@@ -148,7 +159,7 @@ class RunTable(Table):
         "float64", description="type of stored numbers and of the sieve; verdicts use float64 either way"
     )
     tile: Annotated[list[Annotated[int, Field(ge=1, le=LARGEST_TILE)]], Field(min_length=1, fail_fast=True)] | None = (
-        Field(None, description="shape of the block computed at a time, one number an axis")
+        Field(None, description="shape of a tile, the block of cells computed at a time, one number per axis")
     )
     store: Annotated[list[Annotated[str, name_of(lambda: QUANTITIES)]], Field(min_length=1, fail_fast=True)] | None = (
         Field(None, description="quantities to store; see `cspr quantities`")
@@ -173,18 +184,19 @@ class SweepFile(Table):
     )
     trajectory: SweepTrajectory = Field(
         default_factory=SweepTrajectory,
-        description="[trajectory] with family, amplitude, max_arcs and from; not of maps whose cells are places",
+        description="[trajectory] with family, amplitude, max_arcs and from; not for maps whose cells are places",
     )
     orientations: Orientations | None = Field(
         None,
-        description="[orientations] of orientations, orientation-workspace and attainability: definition, divisions, "
-        "values",
+        description="[orientations] of maps of orientations, orientation-workspace and attainability: definition, "
+        "divisions, values",
     )
     launch: LaunchSearch | None = Field(
-        None, description="[launch] of launch-range: where a release is looked for, and how thoroughly"
+        None,
+        description="[launch] of launch-range: bounds within which releases are searched, and effort of the search",
     )
     workspace: WorkspaceTable | None = Field(
-        None, description="[workspace] of workspace: conditions, orientation, wrenches"
+        None, description='[workspace] of map = "workspace": conditions, orientation, wrenches'
     )
-    limits: LimitTable = Field(default_factory=LimitTable, description="[limits]")
+    limits: LimitTable = Field(default_factory=LimitTable, description="[limits] of all motions of the file")
     run: RunTable = Field(default_factory=RunTable, description="[run] dtype, tile, store")

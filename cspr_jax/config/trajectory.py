@@ -74,31 +74,32 @@ class TrajectoryKeys(Table):
     )
     amplitude: AmplitudeKey = Field(
         "quintic",
-        description='"quintic" (A2), { name = "effective" or "effective-c3", epsilon = ... }, { polynomial = [...] }; '
-        'must meet (2.49), which A1 and A3 do not; for transitions (1.27) and (1.28), which they do; "ideal" (A = tau) '
-        "serves for bounds in maps of transitions",
+        description='amplitude function: "quintic" (A2), "A1", "A3", { name = "effective" or "effective-c3", '
+        "epsilon = ... }, { polynomial = [...] }; it must meet (2.49), which A1 and A3 do not, or, for transitions, "
+        '(1.27) and (1.28), which they do; "ideal" (A = tau) serves for bounds in maps of transitions',
     )
     beat: Beat | None = Field(
         None,
-        description='platforms: time function of the rotation: "beta_ff" (3.93), the default, a beta-hat of its own at '
-        'each end; "beta_f" (3.68), that of the target at both, on the way to rest that of the start; "beta_0" '
-        '(3.67), no angular acceleration at the ends; "beta_1" (3.66), a cosine',
+        description='platforms: time function of the rotation: "beta_ff" (3.93), the default, with a beta-hat for '
+        'each end; "beta_f" (3.68), with the beta-hat of the target at both ends, or of the start on the way to rest; '
+        '"beta_0" (3.67), without angular acceleration at the ends; "beta_1" (3.66), a cosine',
     )
     inclination: Inclination | None = Field(
         None, description='transitions: inclination v, a number in ]-1, 1[, or "best"; in place of z0'
     )
     max_arcs: Annotated[int, Field(ge=1, le=LARGEST_MAX_ARCS)] = Field(
-        30, description="largest number of arcs tried; two arcs are an oscillation"
+        30, description="largest number of arcs that is tried; two arcs are one oscillation"
     )
     max_acceleration: Positive | None = Field(
-        None, description="straight lines: largest size of the acceleration, m/s^2; absent: taut cables alone bound it"
+        None,
+        description="straight lines: largest magnitude of the acceleration, m/s^2; absent: only taut cables bound it",
     )
     rule: Literal["optimum", "thesis"] | None = Field(
         None,
-        description='s-curve: how p and T are found: "optimum", the default, is the least T; "thesis" is the rule of '
-        "Boralugoda's text, Q3 and Q7 on their lines",
+        description='s-curve: rule that finds the time of acceleration p and the duration T: "optimum", the default, '
+        'the least T; "thesis", the rule of Boralugoda\'s text, with Q3 and Q7 on their lines',
     )
-    gravity: Positive | None = Field(None, description="gravity, m/s^2; overrides the robot file's (default 9.81)")
+    gravity: Positive | None = Field(None, description="gravity, m/s^2, in place of the robot file's (default 9.81)")
 
     @property
     def families(self) -> tuple[str, ...]:

@@ -23,29 +23,29 @@ class PoseConditions(Table):
         ["wrench-feasible"],
         description='"static": taut cables hold the weight; "wrench-feasible": tensions within their limits supply '
         'all wrenches; "wrench-closure": cables that are pulled hard enough resist every wrench; "interference-free": '
-        "no two cables meet, nor a cable or the platform what obstacle, platform_box and platform_hull say",
+        "no two cables meet, nor a cable or the platform the bodies of obstacle, platform_box and platform_hull",
     )
     orientation: Quaternion | None = Field(
-        None, description="orientation of a platform, a unit quaternion, scalar first; absent: that of its file"
+        None, description="orientation of a platform, a unit quaternion, scalar first; absent: that of the robot file"
     )
     orientations: Literal["inclusion", "total", "maximum", "dextrous"] | None = Field(
         None,
-        description='places at which a platform can have some ("inclusion") or every one ("total") orientation of a '
-        'set, that of tilt_max and torsion_max or of quaternions; "maximum", "dextrous": likewise of all orientations; '
-        "absent: one orientation, or those of the axes",
+        description='map the places at which a platform can have some orientation ("inclusion") or every one ("total") '
+        'of the set of tilt_max and torsion_max or of quaternions; some ("maximum") or every one ("dextrous") of all '
+        "orientations; absent: one orientation, or those of the axes",
     )
     tilt_max: Annotated[float, Field(ge=0.0, le=math.pi)] | None = Field(
         None,
-        description="inclusion, total: largest tilt from orientation, of a planar platform largest turn, rad",
+        description="inclusion, total: largest tilt from orientation, or largest rotation of a planar platform, rad",
     )
     torsion_max: Annotated[float, Field(ge=0.0, le=math.pi)] | None = Field(
-        None, description="with tilt_max: largest torsion of either sign, rad; absent: 0"
+        None, description="with tilt_max: largest absolute torsion, rad; absent: 0"
     )
     quaternions: Annotated[list[Quaternion], Field(min_length=1, max_length=100_000)] | None = Field(
-        None, description="inclusion, total: the orientations one by one, in place of tilt_max"
+        None, description="inclusion, total: list of the orientations, in place of tilt_max"
     )
     divisions: Annotated[int, Field(ge=2, le=128)] | None = Field(
-        None, description="of sets of orientations: the step is pi / divisions; absent: 12"
+        None, description="sets of orientations: their step is pi / divisions; absent: 12"
     )
     prove: bool | None = Field(
         None,
@@ -54,25 +54,27 @@ class PoseConditions(Table):
     )
     wrenches: Annotated[list[list[Component]], Field(min_length=1, max_length=64)] | None = Field(
         None,
-        description="wrench-feasible: what the cables must supply, forces, N, then moments about the mass centre, or "
-        "the joint, N m; as many numbers each as degrees of freedom; absent: what holds the weight still",
+        description="wrench-feasible: wrenches that the cables must supply, forces, N, then moments about the mass "
+        "centre, or the joint, N m; as many numbers each as degrees of freedom; absent: the wrench that holds the "
+        "weight",
     )
 
     wrench_box: Sizes | None = Field(
-        None, description="wrench-feasible: half widths of a box of wrenches about each of these, N and N m"
+        None, description="wrench-feasible: half widths of a box of wrenches about each of `wrenches`, N and N m"
     )
     wrench_ellipsoid: Sizes | None = Field(
-        None, description="wrench-feasible: semi-axes of an ellipsoid of wrenches about each of these, N and N m"
+        None, description="wrench-feasible: semi-axes of an ellipsoid of wrenches about each of `wrenches`, N and N m"
     )
     acceleration: Annotated[float, Field(ge=0.0, le=1e6)] | None = Field(
         None,
         description="wrench-feasible: radius of a ball of accelerations of the mass centre that the cables must give "
-        "beside, m/s^2",
+        "in addition, m/s^2",
     )
 
     capacity_length: Annotated[float, Field(gt=0.0, le=1e6)] | None = Field(
         None,
-        description="wrench-feasible: store capacity margins, too, moments over this length, m (of a point mass any)",
+        description="wrench-feasible: also store capacity margins, with moments divided by this length, m (any for "
+        "point masses)",
     )
 
     @field_validator("conditions")

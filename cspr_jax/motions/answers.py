@@ -17,7 +17,7 @@ class Answers(Columns):
     Fields:
         arcs: (n,) smallest number of arcs proved feasible, on more than six cables feasible at samples; 0: none.
         tried_arcs: (n,) number of arcs of the motion that duration and margins belong to: `arcs`; if that is 0, the
-            candidate that a single limit refuses; if there is none, the candidate with the largest margin.
+            candidate that one limit alone refuses; if there is none, the candidate with the largest margin.
         verdict: (n,) `Verdict` flags; 0 is feasible.
         duration: (n,) s.
         margin: (n,) smallest normalised pseudotension, or depth below the spools over z0.

@@ -30,16 +30,16 @@ class Demands:
     """Demands of n motions on the robot, refined between samples; (n,) each.
 
     Fields:
-        tension_min: N.
-        tension_max: N.
+        tension_min: smallest tension of any cable, N.
+        tension_max: largest tension of any cable, N.
         mu_min: smallest tension per mass and length, 1/s^2.
         depth_min: smallest depth of the mass centre below the spool plane, along the vertical, m.
         lowest: largest z, z down, m.
-        length_max: of a cable, m.
-        speed_max: of a cable, m/s.
-        acceleration_max: of a cable, m/s^2.
+        length_max: largest length of a cable, m.
+        speed_max: largest speed of a cable, m/s.
+        acceleration_max: largest acceleration of a cable, m/s^2.
         are_found: whether the rule of redundant cables found tensions within their limits at all instants; 1 or 0.
-        samples: number of instants looked at.
+        samples: number of instants at which the motion was sampled.
     """
 
     tension_min: np.ndarray
@@ -98,8 +98,8 @@ def demands(
         robot: centred.
         motions: n of them, from the centroid of the spools, z down.
         samples: for each motion, the number of equidistant instants from 0 to 1 to begin with.
-        limits: from which the tensions of redundant cables keep away.
-        rule: that chooses the tensions of redundant cables, a name of `robots.tension_rule_table`.
+        limits: limits that the rule for redundant cables takes into account.
+        rule: rule that chooses the tensions of redundant cables, a name of `robots.tension_rule_table`.
 
     Returns:
         the demands.

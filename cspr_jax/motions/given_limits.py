@@ -26,16 +26,16 @@ def limits_of(
 
     Args:
         robot: has base_points and z_axis of its file.
-        limits: by name, one number or one for each cable; None: as in `defaults`.
-        defaults: limits of the robot, likewise; None: no limit.
-        at: prefix of keys in errors.
+        limits: by name, one number or one for each cable; None: the one of `defaults`.
+        defaults: limits of the robot by name; None: no limit.
+        at: prefix of the keys in errors.
         n_cables: number of cables that have the limits; None: as the robot has.
 
     Returns:
         the limits, the floor as a depth; some of the largest tensions may be infinite.
 
     Raises:
-        InputError: numbers of another count, or no limits at all: not finite, a length or speed that is not positive,
+        InputError: a wrong count of numbers, or impossible limits: not finite, a length or speed that is not positive,
             a smallest tension that is not below the largest.
     """
     n_cables, values = n_cables or len(robot.base_points), dict[str, Any]()
@@ -71,7 +71,7 @@ def check_bounded(limits: Limits) -> None:
         limits: of a trajectory or a search.
 
     Raises:
-        InputError: the tensions.
+        InputError: a largest tension is infinite.
     """
     high = limits.tension_max
     if high is not None and not np.isfinite(high).all():
@@ -89,11 +89,11 @@ def check_certain(
 
     Args:
         limits: with an uncertainty, or without.
-        families: names of the trajectories; none: no motion of a family.
-        in_pairs: whether its cables stand for pairs of cables.
+        families: names of the trajectory families; empty: no motion of a family.
+        in_pairs: whether the cables of the robot stand for pairs of cables.
 
     Raises:
-        InputError: the uncertainty, and why it must be absent.
+        InputError: an uncertainty that must be absent, and why.
     """
     uncertainty = limits.uncertainty
     if uncertainty is None:
@@ -132,7 +132,7 @@ def pair_limits(limits: Limits, pairs: ParallelPairs) -> Limits:
         the limits, (3,) each.
 
     Raises:
-        InputError: of some pair no tension is within the limits of both cables.
+        InputError: no tension of a pair is within the limits of both of its cables.
     """
     values: dict[str, Any] = {
         row.name: leaf(pairs.bound(value, is_tension=row.quantity == "tension", is_least=row.sense == "least"))
@@ -169,7 +169,7 @@ def limits_over(
         the limits.
 
     Raises:
-        InputError: numbers of another count, or no limits at all: not finite, a length or speed that is not positive,
+        InputError: a wrong count of numbers, or impossible limits: not finite, a length or speed that is not positive,
             a smallest tension that is not below the largest.
     """
     merged = limits_of(robot, vars(limits or NO_LIMITS), vars(robot.limits), "limits.")

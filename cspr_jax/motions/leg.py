@@ -18,9 +18,9 @@ class JoinedLeg:
     """Segments of one family, joined.
 
     Fields:
-        family: its name.
-        answers: of its n segments.
-        motions: n, from the centroid of the spools, z down.
+        family: name of the family.
+        answers: answers of the n segments.
+        motions: n motions, from the centroid of the spools, z down.
     """
 
     family: str
@@ -57,7 +57,8 @@ class Leg(abc.ABC):
             z0: depth of P0 below the centroid of the spools, m.
 
         Returns:
-            answers of the n segments, and their motions: of the number of arcs found, else of the best candidate.
+            answers of the n segments, and their motions, with the number of arcs found, else that of
+            the best candidate.
         """
 
     def answers(self, problem: Problem, depths: np.ndarray) -> Answers:
@@ -72,14 +73,14 @@ class Leg(abc.ABC):
         return joined([self.join(problem, float(z0))[0] for z0 in depths])
 
     def outcome(self, problem: Problem, joined: JoinedLeg, tension_min: np.ndarray, start: float) -> LegOutcome | None:
-        """LegOutcome of the joined leg beyond its motion; a plan asks once.
+        """Outcome of the joined leg beyond its motion; a plan calls this once.
 
         Args:
             tension_min: (n,) smallest tension of any cable on each segment, N.
-            start: since the start of the plan, s.
+            start: start of the leg, since the start of the plan, s.
 
         Returns:
-            the outcome; None of a leg that has none.
+            the outcome; None if the leg has none.
         """
         return None
 
@@ -97,7 +98,7 @@ def each(leaves, count: int) -> list:
 
     Args:
         leaves: (count, ...) each.
-        count: how many.
+        count: number of the parts.
 
     Returns:
         one pytree each, with NumPy leaves.

@@ -33,9 +33,9 @@ class Need(NamedTuple):
         criterion: flag that says that the criterion is broken.
         cables: numbers from 0 on: of one cable, of two that touch, or none.
         tau: the instant, normalised time.
-        needed: what the motion has there, in `unit`.
-        allowed: the most, or the least, that it may have.
-        unit: of both.
+        needed: value that the motion has there, in `unit`.
+        allowed: largest, or smallest, value that is allowed.
+        unit: unit of both values.
         slack: without a unit, below zero where the criterion is broken.
     """
 
@@ -57,7 +57,7 @@ class _Criterion(NamedTuple):
 
 
 def needs(problem: Problem, motion: Motion, samples: int) -> list[Need]:
-    """Needs of a motion, one for each criterion; of tensions only where the motion determines them.
+    """Needs of a motion, one for each criterion; criteria of tensions only where the motion determines the tensions.
 
     Args:
         motion: from the centroid of the spools, z down; one without a finite duration is taken to rest everywhere.

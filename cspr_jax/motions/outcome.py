@@ -1,4 +1,4 @@
-"""LegOutcome of a leg: what comes of its motion beyond the motion itself, such as the flight of a released object."""
+"""Outcome of a leg beyond its motion, such as the flight of a released object."""
 
 import abc
 from typing import Any, ClassVar
@@ -7,10 +7,10 @@ import numpy as np
 
 
 class LegOutcome(abc.ABC):
-    """LegOutcome of a leg, in the axes of the robot file; computed once, with the plan.
+    """Outcome of a leg beyond its motion, in the axes of the robot file; computed once, with the plan.
 
     Fields:
-        key: its name in a plan's JSON.
+        key: name of the outcome in a plan's JSON.
     """
 
     key: ClassVar[str]
@@ -25,7 +25,7 @@ class LegOutcome(abc.ABC):
 
     @abc.abstractmethod
     def lines(self) -> list[str]:
-        """The outcome for people.
+        """The outcome as text.
 
         Returns:
             lines below the table of a plan.
@@ -36,5 +36,5 @@ class LegOutcome(abc.ABC):
         """Datasets that the outcome adds to a motion file.
 
         Returns:
-            by the names of `schema.quantities.FLIGHT`.
+            arrays by the names of `schema.quantities.FLIGHT`.
         """

@@ -55,7 +55,7 @@ class _Open:
         return _Open(self.blocks.part(rows), self.known.part(rows), self.influence.part(rows), worst, requirements)
 
     def middles(self) -> "_Open":
-        """The same, as if blocks had no length."""
+        """Middles of the blocks, as if blocks had no length."""
         return dataclasses.replace(self, known=self.known.middle(self.influence.mu))
 
     def fail(self, multiple: np.ndarray) -> np.ndarray:
@@ -73,7 +73,7 @@ def tolerated(
     *,
     whole: bool = True,
 ) -> Tolerated:
-    """Multiples of an uncertainty that motions tolerate, and that they do not.
+    """Multiples of an uncertainty that motions are proved to tolerate, and that are refuted.
 
     Args:
         blocks: of n whole motions, each feasible as planned.

@@ -19,11 +19,11 @@ class Waypoints:
     Fields:
         robot_file: the robot.
         keys: the plan.
-        path: of the plan, named in errors.
-        frame: of the robot.
+        path: path of the plan, named in errors.
+        frame: frame of the robot.
         family: name of the family that joins them.
-        first: number of their first pose among those of the plan.
-        last: number of their last pose.
+        first: number, in the plan, of the first pose.
+        last: number, in the plan, of the last pose.
     """
 
     robot_file: RobotFile
@@ -57,10 +57,10 @@ class Waypoints:
         """Name of a pose in messages.
 
         Args:
-            i: number of the pose among these.
+            i: number of the pose among the way-points.
 
         Returns:
-            as in "pose[3]".
+            the name in the plan, such as "pose[3]".
         """
         return f"pose[{self.first + i}]"
 

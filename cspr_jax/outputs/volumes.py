@@ -19,13 +19,13 @@ class WorkspaceVolume:
     """Volume of a workspace, or area, or length, for each value of the other axes of its map.
 
     Fields:
-        axes: the other axes, in the order of the dimensions of what follows.
-        units: of volumes, "m3", "m2" or "m".
-        volume: (...) of the cells that are inside, between the first and the last points, m^3, m^2 or m.
-        error: (...) what the grid leaves open, likewise, if the boundary passes at most once between two points: half
-            of the way between each two on different sides, a quarter of their cells.
-        least: (...) of the cells that are proved inside as a whole; 0 where nothing was proved.
-        most: (...) of all cells but those proved outside as a whole.
+        axes: the other axes, in the order of the dimensions (...) below.
+        units: units of volumes, "m3", "m2" or "m".
+        volume: (...) volume of the cells that are inside, between the first and the last points, m^3, m^2 or m.
+        error: (...) error due to the grid if the boundary passes at most once between two points, m^3, m^2 or m: half
+            of the way between each two points on different sides, a quarter of their cells.
+        least: (...) volume of the cells that are proved inside as a whole; 0 where nothing was proved.
+        most: (...) volume of all cells except those proved outside as a whole.
         proved_fraction: (...) part of the grid whose side is proved.
         undecided_fraction: (...) part of the grid whose points are undecided.
     """
@@ -52,7 +52,7 @@ class WorkspaceVolume:
         }
 
     def lines(self) -> list[str]:
-        """The volume for people.
+        """The volume as lines of text.
 
         Returns:
             a line for each value of the other axes.

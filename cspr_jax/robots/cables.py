@@ -31,15 +31,15 @@ def with_cables(robot: RobotKind, *, cable_diameter=None, pulley_radius=None, pu
     """A robot with thick cables, or pulleys.
 
     Args:
-        cable_diameter: m; None: 0.
-        pulley_radius: () or (n_cables,) m; None: no pulleys.
+        cable_diameter: diameter of the cables, m; None: 0.
+        pulley_radius: () or (n_cables,) radii of the pulleys, m; None: no pulleys.
         pulley_axes: (3,) or (n_cables, 3) swivel axes, in the direction in which the cables enter; None: straight up.
 
     Returns:
         the robot.
 
     Raises:
-        InputError: an invalid diameter, or invalid pulleys.
+        InputError: an impossible diameter, or impossible pulleys.
     """
     changes: dict[str, Any] = {}
     if cable_diameter is not None:

@@ -9,12 +9,12 @@ from jax import Array
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class Uncertainty:
-    """Uncertainty of a robot: a motion must be feasible for all robots within it.
+    """Uncertainty of a robot: a motion must be feasible for every robot within it.
 
     Fields:
-        spool_positions: () radius of the ball in which each spool lies, m.
-        mass_centre: () radius of the ball in which the mass centre lies, platform axes, m; 0 for a point mass.
-        mass_factor: () from 1 on; the mass, and with it the inertia, is between 1 / factor and factor times its value.
+        spool_positions: () largest distance of each spool from its place, m.
+        mass_centre: () largest distance of the mass centre from its place, platform axes, m; 0 for a point mass.
+        mass_factor: () at least 1; mass and inertia lie between 1 / factor and factor times their values.
     """
 
     spool_positions: Array | float = 0.0
@@ -25,16 +25,16 @@ class Uncertainty:
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class Limits:
-    """Limits beyond taut cables; None for limits that are not set.
+    """Limits beyond taut cables; None: no such limit.
 
     Fields:
-        tension_min: (n_cables,) N.
-        tension_max: (n_cables,) N.
+        tension_min: (n_cables,) smallest tensions, N.
+        tension_max: (n_cables,) largest tensions, N.
         floor: () z of the floor, z down, m.
-        cable_length_max: (n_cables,) m.
-        cable_speed_max: (n_cables,) m/s, both for paying out and for winding in.
-        cable_acceleration_max: (n_cables,) m/s^2, of either sign.
-        uncertainty: robots for all of which limits must be met and cables be taut.
+        cable_length_max: (n_cables,) largest lengths, m.
+        cable_speed_max: (n_cables,) largest speeds of paying out and of winding in, m/s.
+        cable_acceleration_max: (n_cables,) largest accelerations of either sign, m/s^2.
+        uncertainty: uncertainty within which every robot must meet the limits with taut cables.
     """
 
     tension_min: Array | None = None

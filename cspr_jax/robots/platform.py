@@ -129,25 +129,25 @@ def platform_robot(  # noqa: PLR0913
     """A platform on cables, its geometry and inertia checked.
 
     Args:
-        base_points: (n_cables, 3) spool points, as many as degrees of freedom or more, m; y = 0 for a planar platform.
-        platform_points: (n_cables, 3) attachment points in platform axes, m; y = 0 for a planar platform, on one line
-            with the mass centre for a rod, from the joint for a robot on a joint.
+        base_points: (n_cables, 3) spool points, m, at least as many as degrees of freedom; y = 0 if planar.
+        platform_points: (n_cables, 3) attachment points in platform axes, m; y = 0 if planar, on one line with the mass
+            centre for a rod, from the joint for a robot on a joint.
         mass: kg, positive.
         inertia: (3, 3) about the mass centre, platform axes, kg m^2; symmetric, positive definite, of a real body.
-        centre_of_mass: (3,) in platform axes, m; None: their origin.
-        gravity: m/s^2, positive.
-        z_axis: where z points, "down" or "up".
+        centre_of_mass: (3,) mass centre in platform axes, m; None: their origin.
+        gravity: gravity, m/s^2, positive.
+        z_axis: direction of the z axis, "down" or "up".
         limits: limits beyond taut cables; None: none.
-        pattern: "3R3T"; "1R2T" in the plane y = 0; "2R3T" of a rod, platform_points on one line; "3R" about a fixed
-            joint, the origin of the platform axes.
+        pattern: "3R3T" in space; "1R2T" in the plane y = 0; "2R3T" for a rod, with platform_points on one line; "3R"
+            about a fixed joint, the origin of the platform axes.
 
     Returns:
         the robot, float64 NumPy leaves.
 
     Raises:
-        InputError: wrong shape, fewer points, other numbers of both, not finite, points on a line, or not on one, or
-            not in the plane, two cables between the same two points, an inertia tensor that no body has, mass or
-            gravity not positive, another z_axis, a pattern of no body.
+        InputError: wrong shape, too few points, different numbers of both, not finite, points that the pattern rules
+            out, two cables between the same two points, an inertia tensor that no body has, mass or gravity not
+            positive, an unknown z_axis or pattern.
     """
     row = PATTERNS.get(pattern)
     if row is None or not row.is_body:

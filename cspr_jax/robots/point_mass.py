@@ -103,12 +103,12 @@ def point_mass_robot(
     limits: Limits | None = None,
     pattern: str = "3T",
 ) -> PointMassRobot:
-    """A point-mass robot, its geometry checked.
+    """A point mass on cables, with its geometry checked.
 
     Args:
-        base_points: (n_cables, 3) spool points, one a row, m. In space three or more, anywhere, as long as their plane
-            (of more than three: that of least squares) is not vertical; in the plane y = 0 two or more, not on a
-            vertical line, if they are two on a level one; of a guide one or more.
+        base_points: (n_cables, 3) spool points, m. In space three or more, whose plane (for more than three that of
+            least squares) is not vertical; in the plane y = 0 two or more, not on a vertical line, and if two, level;
+            on a guide one or more.
         mass: kg, positive.
         gravity: m/s^2, positive.
         z_axis: where z points, "down" or "up".
@@ -119,8 +119,8 @@ def point_mass_robot(
         the robot, float64 NumPy leaves.
 
     Raises:
-        InputError: wrong shape, not finite, spools that lie otherwise, mass or gravity not positive, another z_axis,
-            another pattern.
+        InputError: wrong shape, not finite, spools that lie otherwise, mass or gravity not positive, an unknown z_axis
+            or pattern.
     """
     row = PATTERNS.get(pattern)
     if row is None or row.is_body:

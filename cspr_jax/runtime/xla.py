@@ -94,14 +94,13 @@ def prepare(device: str | None = None, warn: Callable[[str], None] = lambda line
 def keep_compiled_code(folder: str | Path | None = None) -> Path | None:
     """Keep compiled code from one Python process to the next, as the command line does.
 
-    Call it once, before or after jax was imported; code compiled before is not kept. Settings that jax has already win.
+    Call it once, before or after jax is imported; code compiled before is not kept. Earlier settings of jax prevail.
 
     Args:
-        folder: where; None: `CSPR_CACHE_DIR`, or ~/.cache/cspr_jax.
+        folder: folder of the compiled code; None: `CSPR_CACHE_DIR`, or ~/.cache/cspr_jax.
 
     Returns:
-        where the entries of this process are; None where jax keeps its own already, CSPR_CACHE_DIR is empty, or nothing
-        can be written.
+        the folder of this process; None if jax has a cache already, CSPR_CACHE_DIR is empty, or nothing can be written.
     """
     place = _folder(folder, _warn_of_python)
     loaded = sys.modules.get("jax")

@@ -19,7 +19,7 @@ class Quantity:
     """A dataset of a result file, or a coordinate of its axes.
 
     Fields:
-        name: of the dataset.
+        name: name of the dataset.
         units: as in UDUNITS; "1" for a pure number.
         long_name: a short phrase for labels.
         description: one sentence.
@@ -54,23 +54,38 @@ AXES = {
     for q in (
         Quantity("x", "m", "x of the target", "Horizontal coordinate of the target."),
         Quantity("y", "m", "y of the target", "Horizontal coordinate of the target."),
-        Quantity("radius", "m", "distance from the central vertical", "From the vertical through the centroid."),
-        Quantity("azimuth", "rad", "azimuth", "Direction of the target from the central vertical, from x to y."),
+        Quantity(
+            "radius",
+            "m",
+            "distance from the central vertical",
+            "Distance of the target from the vertical through the centroid.",
+        ),
+        Quantity(
+            "azimuth",
+            "rad",
+            "azimuth",
+            "Direction of the target seen from the vertical through the centroid, from x to y.",
+        ),
         Quantity("z", "m", "z of the target", "Vertical coordinate of the target; see z_axis."),
         Quantity(
             "tilt_azimuth",
             "rad",
             "azimuth phi of the tilt",
-            "From the direction of the target, in workspaces from x; tilt and torsion.",
+            "Angle phi of tilt and torsion, from the direction of the target; in maps of workspaces, from x.",
         ),
         Quantity("tilt", "rad", "tilt theta", "Angle between the platform's normal and the vertical."),
-        Quantity("torsion", "rad", "torsion sigma", "Of tilt and torsion, Z_phi X_theta Z_(sigma - phi)."),
-        Quantity("z0", "m", "depth of P0 below the centroid", "The point P0 about which the effector swings."),
+        Quantity("torsion", "rad", "torsion sigma", "Angle sigma of tilt and torsion, Z_phi X_theta Z_(sigma - phi)."),
+        Quantity(
+            "z0",
+            "m",
+            "depth of P0 below the centroid",
+            "Depth below the centroid of P0, about which the effector swings.",
+        ),
         Quantity(
             "inclination",
             "1",
             "inclination",
-            "How much deeper below the spools the target is than P0, over z0: v of thesis (1.31).",
+            "Depth of the target below the spools less that of P0, over z0: v of thesis (1.31).",
         ),
         Quantity("tau", "1", "normalised time", "Time since the start of the segment over its duration."),
         Quantity("cable", "1", "cable", "Number of a cable, in cable order from 1 on."),
@@ -102,8 +117,8 @@ BEST = {
             best_name(axis.name),
             axis.units,
             f"best {axis.long_name}",
-            f"With `--best {axis.name}`: the point of this axis that the other quantities of the cell belong to; NaN "
-            "where none will do.",
+            f"With `--best {axis.name}`: the best point of this axis, at which the cell's other quantities hold; "
+            "NaN where no point is feasible.",
         )
         for axis in AXES.values()
         if axis.name not in _NO_CHOICES
@@ -111,11 +126,11 @@ BEST = {
 }
 
 # These texts say what verdicts rest on, and what the margin is.
-HOW = ", proved, but sampled for platforms on more than six cables"
+HOW = " (proved; for platforms on more than six cables, sampled)"
 MARGIN = (
     "Smallest pseudotension over its value at rest in P0 (platforms: that of six equal ones), "
-    "or depth below the spools over z0; platforms on more cables: how far all tensions can keep from their limits, "
-    "divided by the weight per cable."
+    "or smallest depth below the spools over z0, whichever is less; platforms on more cables: distance that all "
+    "tensions can keep from their limits, over the weight per cable."
 )
 TRAJECTORY = {
     q.name: q
@@ -126,29 +141,34 @@ TRAJECTORY = {
         Quantity("acceleration", "m s-2", "acceleration", "Acceleration of the effector (x, y, z)."),
         Quantity("quaternion", "1", "orientation", "Unit quaternion of the platform (w, x, y, z)."),
         Quantity("omega", "rad s-1", "angular velocity", "Angular velocity of the platform, fixed axes (x, y, z)."),
-        Quantity("omega_dot", "rad s-2", "angular acceleration", "Its derivative in time, fixed axes (x, y, z)."),
+        Quantity(
+            "omega_dot",
+            "rad s-2",
+            "angular acceleration",
+            "Angular acceleration of the platform, fixed axes (x, y, z).",
+        ),
         Quantity("length", "m", "cable length", "Length of each cable, in cable order."),
         Quantity("rate", "m s-1", "cable rate", "Rate of each cable's length; positive pays out."),
         Quantity(
             "tension",
             "N",
             "cable tension",
-            "Tension of each cable, in cable order; of redundant cables those of the rule of the plan, `tensions`; "
-            "where it finds none within their limits, those of least norm.",
+            "Tension of each cable, in cable order. The plan's rule `tensions` chooses those of redundant cables; "
+            "where it finds none within the limits, they are those of least norm.",
         ),
         Quantity(
             "tension_residual",
             "1",
             "residual of the tensions",
-            "Of redundant cables: |W t - w| / (1 N + |w|), with W t the wrench that the tensions give and w the one "
-            "that the motion requires; moments divided by the platform's size.",
+            "Redundant cables: |W t - w| / (1 N + |w|), where the tensions give the wrench W t and the motion "
+            "requires w; moments are divided by the platform's size.",
         ),
         Quantity(
             "tension_each",
             "N",
             "tension of each of six cables",
-            "Of a platform that only translates, in cable order: the shares of `tension`, which is then, as `length` "
-            "and `rate`, that of each pair with its winch, in the order of the first cable of each.",
+            "Platforms that only translate: tension of each of the six cables, in cable order. `tension`, `length` and "
+            "`rate` are then those of the three pairs, in the order of each pair's first cable.",
         ),
         Quantity(
             "tension_couple",
@@ -160,8 +180,8 @@ TRAJECTORY = {
             "path_acceleration",
             "m s-2",
             "acceleration along the line",
-            "Along a straight line: the least feasible one at that place, that of the motion, and the largest feasible "
-            "one; infinite where nothing bounds it.",
+            "Acceleration along a straight line: the least that is feasible at that place, that of the motion, and the "
+            "largest that is feasible; infinite where nothing bounds it.",
         ),
     )
 }
@@ -170,33 +190,35 @@ SEGMENTS = {
     q.name: q
     for q in (
         Quantity("segment", "1", "segment", "Number of a segment, in the order of the plan from 1 on.", "int16"),
-        Quantity("segment_start", "s", "start of the segment", "Time since the start of the plan."),
-        Quantity("segment_end", "s", "end of the segment", "Time since the start of the plan."),
+        Quantity("segment_start", "s", "start of the segment", "Start of the segment, since the start of the plan."),
+        Quantity("segment_end", "s", "end of the segment", "End of the segment, since the start of the plan."),
         Quantity(
             "segment_arcs",
             "1",
             "smallest number of arcs",
-            f"Smallest number of feasible arcs, or the plan's own if feasible{HOW}; 0: none.",
+            f"Smallest feasible number of arcs, or the plan's own number if feasible{HOW}; 0: none.",
             "int16",
         ),
         Quantity(
             "segment_tried_arcs",
             "1",
             "number of arcs of the motion",
-            "Equal to `segment_arcs` where it is positive, else that of the motion that comes nearest.",
+            "`segment_arcs` where that is positive, else the number of arcs of the best candidate.",
             "int16",
         ),
-        Quantity("segment_verdict", "1", "verdict", f"Bit flags{HOW}; 0 is feasible.", "uint32"),
+        Quantity("segment_verdict", "1", "verdict", f"Bit flags of the verdict{HOW}; 0: feasible.", "uint32"),
         Quantity("segment_margin", "1", "margin", MARGIN),
-        Quantity("segment_cause", "1", "cause", "Flag of the worst of what stands in the way; 0: nothing.", "uint32"),
+        Quantity("segment_cause", "1", "cause", "Verdict flag of the worst cause; 0: no cause.", "uint32"),
         Quantity(
-            "segment_cause_cable", "1", "cable of the cause", "In cable order from 1 on; 0: no single cable.", "int16"
+            "segment_cause_cable",
+            "1",
+            "cable of the cause",
+            "Number of the cable, from 1 on; 0: no single cable.",
+            "int16",
         ),
-        Quantity(
-            "segment_cause_time", "s", "time of the cause", "Since the start of the segment; NaN where it is not known."
-        ),
-        Quantity("segment_needed", "1", "needed", "What the segment has there: N, m, m/s or m/s^2, by its cause."),
-        Quantity("segment_allowed", "1", "allowed", "The most, or the least, that is allowed, in the same unit."),
+        Quantity("segment_cause_time", "s", "time of the cause", "Time since the start of the segment; NaN: unknown."),
+        Quantity("segment_needed", "1", "needed", "Value that the motion has at the cause: N, m, m/s or m/s^2."),
+        Quantity("segment_allowed", "1", "allowed", "Largest, or smallest, value that is allowed, in the same unit."),
     )
 }
 # A motion file holds these for an object that the plan releases; the dimensions of each follow.
@@ -205,13 +227,13 @@ FLIGHT = {
     for q in (
         Quantity("flight_t", "s", "time of the flight", "Time since the start of the plan, from the release on."),
         Quantity("flight_position", "m", "position of the object", "Position of the released object (x, y, z)."),
-        Quantity("throw", "1", "throw", "Number of a throw of the sample of errors, from 1 on."),
+        Quantity("throw", "1", "throw", "Number of a throw in the sample, from 1 on."),
         Quantity(
             "landing",
             "m",
             "landing",
-            "Place (x, y) at the height of the target of each throw of the sample, over that of the target; NaN where "
-            "the object never comes there.",
+            "Landing (x, y) of each throw of the sample at the height of the target, relative to the target; NaN where "
+            "the object never comes to that height.",
         ),
     )
 }
@@ -243,7 +265,7 @@ POSE_VERDICT = Quantity(
     "verdict",
     "1",
     "verdict of the pose",
-    "Bit flags of what keeps the robot from resting there under all conditions; 0: nothing does.",
+    "Bit flags of the reasons why the robot cannot rest there under all conditions; 0: it can.",
     "uint32",
     unflagged="inside",
 )
@@ -268,16 +290,18 @@ QUANTITIES = {
             "arcs",
             "1",
             "smallest number of arcs",
-            f"Smallest number of feasible arcs{HOW}; 0: none.",
+            f"Smallest feasible number of arcs{HOW}; 0: none.",
             "int16",
             better="smaller",
         ),
-        Quantity("verdict", "1", "verdict", f"Bit flags{HOW}; 0 is feasible.", "uint32", unflagged="feasible"),
+        Quantity(
+            "verdict", "1", "verdict", f"Bit flags of the verdict{HOW}; 0: feasible.", "uint32", unflagged="feasible"
+        ),
         Quantity(
             "duration",
             "s",
             "duration",
-            "Duration with `arcs` arcs, or with `tried_arcs` where arcs is 0.",
+            "Duration with `arcs` arcs, or with `tried_arcs` where `arcs` is 0.",
             better="smaller",
         ),
         Quantity("margin", "1", "smallest normalised pseudotension", MARGIN, better="larger"),
@@ -285,7 +309,7 @@ QUANTITIES = {
             "margin_bound",
             "1",
             "proved lower bound of the margin",
-            "No instant of the segment has a smaller margin: proved; absent on more than six cables.",
+            "Proved: no instant of the segment has a smaller margin. Absent on more than six cables.",
         ),
         Quantity(
             "feasible_at_infinity",
@@ -297,16 +321,16 @@ QUANTITIES = {
             "tried_arcs",
             "1",
             "number of arcs of the motion",
-            "Equal to `arcs` where it is positive, else the smallest number that a single limit refuses; "
-            "if there is none, that with the largest margin.",
+            "`arcs` where that is positive, else the smallest number that one limit alone refuses; "
+            "if there is none, the number with the largest margin.",
             "int16",
         ),
         Quantity(
             "limit_margin",
             "1",
             "smallest slack of the limits",
-            "Smallest dimensionless slack of the limits given; infinite where none is. Point masses and platforms have "
-            "formulas of their own (docs/theory.md), equal in sign alone.",
+            "Smallest dimensionless slack of the limits; infinite without limits. The formulas of point masses and of "
+            "platforms differ (docs/theory.md): only the signs compare.",
         ),
         Quantity(
             "tolerated",
@@ -335,8 +359,8 @@ QUANTITIES = {
             "tried_oscillations",
             "1",
             "number of oscillations of the motion",
-            "Equal to `oscillations` where it is positive, else the smallest number that a single limit refuses, or, "
-            "where there is none, that with the largest margin.",
+            "`oscillations` where that is positive, else the smallest number that one limit alone refuses; "
+            "if there is none, the number with the largest margin.",
             "int16",
         ),
         Quantity(
@@ -350,26 +374,28 @@ QUANTITIES = {
             "least_oscillations",
             "1",
             "number of oscillations n, a real number",
-            "Number that the envelopes require, (1.48) and (1.94); NaN where no number will do (|v A| reaches 1).",
+            "Oscillations that the envelopes require, (1.48) and (1.94); NaN where no number is enough (|v A| "
+            "reaches 1).",
             contoured=True,
         ),
         Quantity(
             "inclination_gain",
             "1",
             "oscillations saved by the inclination",
-            "Real number of oscillations of the horizontal transition less that at this inclination.",
+            "`least_oscillations` of the horizontal transition less that at this inclination.",
         ),
         Quantity(
             "squared_oscillations",
             "1",
             "squared oscillations N of the instant",
-            "N of (1.44) of the cable, or the largest over the cables; at least A''(1) / (4 pi^2), so maybe negative.",
+            "N of (1.44) for the cable, or the largest over the cables; at least A''(1) / (4 pi^2), which may be "
+            "negative.",
         ),
         Quantity(
             "lower_envelope",
             "1",
             "lower envelope of the normalised pseudotension",
-            "(1.39) of the cable, or the lowest over the cables, with the real number `least_oscillations`.",
+            "Envelope (1.39) of the cable, or the lowest over the cables, with `least_oscillations` oscillations.",
             better="larger",
         ),
         Quantity("used_inclination", "1", "inclination v", "Inclination of the transition, v of (1.31).", signed=True),
@@ -383,15 +409,15 @@ QUANTITIES = {
             "cable_distance",
             "m",
             "smallest distance between cables",
-            "Between cables that share neither spool nor platform point.",
+            "Smallest distance between cables that share neither spool nor platform point.",
         ),
         Quantity(
             "refuted_at",
             "s",
             "time of refutation",
-            "Of the motion of `tried_arcs`, by its tensions, else by limits or contacts; NaN where it is not refuted.",
+            "Instant at which tensions, else limits or contacts, refute the motion of `tried_arcs`; NaN: not refuted.",
         ),
-        Quantity("beta_hat", "1", "beta-hat at the target", "Of the motion that the other quantities belong to."),
+        Quantity("beta_hat", "1", "beta-hat at the target", "Beta-hat at the target, of the motion of the cell."),
         Quantity(
             "accessible",
             "1",
@@ -402,40 +428,68 @@ QUANTITIES = {
             "accessible_points",
             "1",
             "accessible part of the grid points",
-            "Of all orientations of the grid; NaN for a scan, which has no grid.",
+            "Accessible part of all orientations of the grid; NaN for a scan, which has no grid.",
         ),
-        Quantity("accessible_volume", "1", "accessible part of SO(3)", "By volume (Haar measure).", better="larger"),
         Quantity(
-            "accessible_error", "1", "its error", "Difference of the accessible volume from that with twice the step."
+            "accessible_volume",
+            "1",
+            "accessible part of SO(3)",
+            "Accessible part of SO(3), by volume (Haar measure).",
+            better="larger",
         ),
-        Quantity("largest_tilt", "rad", "largest accessible tilt", "Over all accessible orientations."),
         Quantity(
-            "attainable", "1", "attainable orientations", "Number that a horizontal transition from rest attains."
+            "accessible_error",
+            "1",
+            "its error",
+            "Difference of `accessible_volume` from its value with twice the step.",
+        ),
+        Quantity("largest_tilt", "rad", "largest accessible tilt", "Largest tilt of all accessible orientations."),
+        Quantity(
+            "attainable",
+            "1",
+            "attainable orientations",
+            "Number of orientations that a horizontal transition from rest attains.",
         ),
         Quantity(
             "attainable_fraction",
             "1",
             "attainable part of the accessible orientations",
-            "By number; NaN for none.",
+            "Attainable part of the accessible orientations, by number; NaN if none is accessible.",
             better="larger",
         ),
-        Quantity("attainable_volume", "1", "attainable part of the accessible volume", "By volume; NaN for none."),
         Quantity(
-            "attainable_error", "1", "its error", "Difference of the attainable fraction from that with twice the step."
+            "attainable_volume",
+            "1",
+            "attainable part of the accessible volume",
+            "Attainable part of the accessible volume; NaN if none is accessible.",
         ),
-        Quantity("mean_arcs", "1", "mean smallest number of arcs", "Over the attainable orientations."),
-        Quantity("undecided_fraction", "1", "undecided part", "Of the accessible orientations."),
+        Quantity(
+            "attainable_error",
+            "1",
+            "its error",
+            "Difference of `attainable_fraction` from its value with twice the step.",
+        ),
+        Quantity(
+            "mean_arcs",
+            "1",
+            "mean smallest number of arcs",
+            "Mean of the smallest numbers of arcs to the attainable orientations.",
+        ),
+        Quantity("undecided_fraction", "1", "undecided part", "Undecided part of the accessible orientations."),
         Quantity(
             "main_reason",
             "1",
             "main reason",
-            "Why most of the accessible orientations that are not attained are not: a verdict's flag; 0: all are.",
+            "Flag of the most frequent reason why accessible orientations are not attained; 0: all are attained.",
             "uint32",
             unflagged="all attained",
         ),
         *(
             Quantity(
-                name, "1", f"refused: {flag.text.replace('_', ' ')}", f"Part of the accessible orientations: {words}"
+                name,
+                "1",
+                f"refused: {flag.text.replace('_', ' ')}",
+                f"Part of the accessible orientations for which {words}",
             )
             for (name, flag), words in zip(REFUSALS.items(), _REFUSED, strict=True)
         ),
@@ -443,8 +497,8 @@ QUANTITIES = {
             "acceleration_margin",
             "m s-2",
             "margin of rest",
-            "Distance of rest from the nearest face of the feasible accelerations: positive inside the wrench-feasible "
-            "workspace, that is with the limits of the tensions.",
+            "Distance of zero acceleration from the nearest face of the feasible accelerations, within the limits of "
+            "the tensions: positive inside the wrench-feasible workspace.",
             signed=True,
             better="larger",
         ),
@@ -452,15 +506,15 @@ QUANTITIES = {
             "static_margin",
             "m s-2",
             "margin of rest without limits of tensions",
-            "As `acceleration_margin` without limits of the tensions: positive inside the static workspace.",
+            "As `acceleration_margin`, without limits of the tensions: positive inside the static workspace.",
             signed=True,
         ),
         Quantity(
             "closure_margin",
             "1",
             "margin of wrench closure",
-            "Positive inside the wrench-closure workspace, where the cables can resist every force; -1 where they do "
-            "not even span the space. Never positive of suspended robots.",
+            "Positive inside the wrench-closure workspace, where the cables can resist every wrench; -1 where they do "
+            "not span the wrenches. Never positive for suspended robots.",
             signed=True,
             better="larger",
         ),
@@ -478,17 +532,17 @@ QUANTITIES = {
             "capacity_margin",
             "N",
             "capacity margin",
-            "Distance of the wrenches that must be supplied from the faces of all that the cables can supply, moments "
-            "over `workspace.capacity_length`; negative outside of the workspace, -inf where the cables do not span "
-            "the wrenches.",
+            "Distance of the required wrenches from the faces of the set that the cables can supply, moments divided "
+            "by `workspace.capacity_length`; negative outside of the workspace, -inf where the cables do not span the "
+            "wrenches.",
             signed=True,
         ),
         Quantity(
             "clearance",
             "m",
             "clearance",
-            "Smallest distance of all checked pairs: of cables without a common point, and of cables and platform "
-            "from obstacles and of cables from the platform where the sweep has these; less the cables' thickness.",
+            "Smallest distance of all checked pairs, less the cables' thickness: between cables without a common point "
+            "and, where the sweep has them, from cables and platform to obstacles and from cables to the platform.",
             signed=True,
             better="larger",
         ),
@@ -503,24 +557,24 @@ QUANTITIES = {
             "clearance_obstacles",
             "m",
             "clearance of cables and platform from obstacles",
-            "Smallest distance of a cable's surface or the platform from an obstacle; of a platform and a box the "
-            "largest gap between their shadows on a line, which is never more.",
+            "Smallest distance from a cable's surface or the platform to an obstacle; from the platform to a box a "
+            "lower bound, the largest gap between their projections on a line.",
             signed=True,
         ),
         Quantity(
             "clearance_platform",
             "m",
             "clearance of the cables from the platform",
-            "Smallest distance of a cable's surface from the platform; ten diameters of each cable next to its "
-            "attachment point, or a hundredth of the platform if that is more, are left out, so that it is at most so "
-            "large.",
+            "Smallest distance from a cable's surface to the platform. Ten diameters of each cable next to its "
+            "attachment point, or a hundredth of the platform if that is more, are left out: the clearance cannot "
+            "exceed this length.",
             signed=True,
         ),
         Quantity(
             "nearest_bodies",
             "1",
             "what is nearest",
-            "Which pair `clearance` belongs to: 1: two cables; 2: a cable and an obstacle; 3: a cable and the "
+            "Pair that `clearance` belongs to. 1: two cables; 2: a cable and an obstacle; 3: a cable and the "
             "platform; 4: the platform and an obstacle; 0: nothing can meet, or not requested.",
             "int16",
             meanings="nearest-bodies",
@@ -537,14 +591,14 @@ QUANTITIES = {
             "length_margin",
             "m",
             "margin of the cable lengths",
-            "Smallest of the largest lengths less the lengths of the cables.",
+            "Largest length of a cable less its length, the smallest over all cables.",
             signed=True,
         ),
         Quantity(
             "speed_margin",
             "m s-1",
             "margin of the cable speeds",
-            "Smallest of the largest speeds less the greatest speeds of the cables that the velocities asked for need.",
+            "Largest speed of a cable less the speed that the required velocities need, the smallest over all cables.",
             signed=True,
         ),
         Quantity(
@@ -560,7 +614,7 @@ QUANTITIES = {
             "orientation_fraction",
             "1",
             "part of the orientations",
-            "Part of a set of orientations, by volume, that is inside the workspace at a place; of one pose 0 or 1.",
+            "Part of a set of orientations, by volume, that is inside the workspace at a place; 0 or 1 for one pose.",
             better="larger",
         ),
         Quantity(
@@ -573,43 +627,43 @@ QUANTITIES = {
             "level_acceleration_max",
             "m s-2",
             "largest level acceleration",
-            "In the best direction; 0 where no level acceleration is feasible, infinite where nothing bounds it.",
+            "Largest in the best direction; 0 where none is feasible, infinite where nothing bounds it.",
         ),
         Quantity(
             "upward_acceleration",
             "m s-2",
             "largest upward acceleration",
-            "Infinite where nothing bounds it, 0 where rest is not feasible.",
+            "Largest upward acceleration; infinite where nothing bounds it, 0 where rest is not feasible.",
         ),
         Quantity(
             "downward_acceleration",
             "m s-2",
             "largest downward acceleration",
-            "Of free fall, where no smallest tension is given; 0 where rest is not feasible.",
+            "Largest downward acceleration, free fall without a smallest tension; 0 where rest is not feasible.",
         ),
         Quantity(
-            "acceleration_time", "s", "time of acceleration p", "Part of the duration of the S-model before it brakes."
+            "acceleration_time", "s", "time of acceleration p", "Time that the S-model accelerates, before it brakes."
         ),
         Quantity(
             "least_duration",
             "s",
             "least duration of any motion",
-            "Of all motions along the line: it accelerates at the bound, then brakes at it. No law is faster.",
+            "Duration of the fastest motion along the line, which accelerates at the bound, then brakes at the bound.",
         ),
-        Quantity("duration_ratio", "1", "duration over the least one", "Of the law, over that of any motion."),
+        Quantity("duration_ratio", "1", "duration over the least one", "Duration of the law over `least_duration`."),
         Quantity(
             "rest_margin",
             "m s-2",
             "margin of rest at both ends",
-            "Distance of rest from the nearest face of the feasible accelerations, at the worse of both ends.",
+            "Distance of zero acceleration from the nearest face of the feasible accelerations, at the worse end.",
             signed=True,
         ),
         Quantity(
             "active_up",
             "1",
             "bound that holds back the acceleration",
-            "Number of the choice of cables that spans it, from 1 on, in the order of their numbers: of four cables "
-            "1 2, 1 3, 1 4, 2 3, 2 4, 3 4; the next number: the largest acceleration; 0: none.",
+            "Number of the set of cables that spans the bound, from 1 on, in the order 1 2, 1 3, 1 4, 2 3, 2 4, 3 4 "
+            "(four cables); then `max_acceleration`, then the limits of the motion; 0: none.",
             "int16",
             meanings="line-bounds",
         ),
@@ -617,7 +671,7 @@ QUANTITIES = {
             "active_down",
             "1",
             "bound that holds back the braking",
-            "As `active_up`, while it brakes.",
+            "As `active_up`, while the motion brakes.",
             "int16",
             meanings="line-bounds",
         ),
@@ -625,8 +679,8 @@ QUANTITIES = {
             "largest_margin",
             "1",
             "largest margin of the segments tried",
-            "Largest margin (smallest slack of taut cables, depth and limits) that a launch to the cell was found to "
-            "have; below 0 no launch was found, which is no proof that there is none.",
+            "Largest margin (smallest slack of taut cables, depth and limits) of all launches to the cell that were "
+            "tried; below 0 no feasible launch was found, which is no proof that there is none.",
             signed=True,
             better="larger",
         ),
@@ -634,16 +688,24 @@ QUANTITIES = {
             "release_speed",
             "m s-1",
             "least speed at the release",
-            "Of the feasible launches found; NaN where none was.",
+            "Least release speed of the feasible launches found; NaN where none was found.",
             better="smaller",
         ),
         Quantity(
-            "release_time", "s", "time of the release", "After the start of the segment, of the launch of least speed."
+            "release_time",
+            "s",
+            "time of the release",
+            "Time after the start of the segment, for the launch of least speed.",
         ),
-        Quantity("flight_time", "s", "time of the flight", "From the release to the landing, at the least speed."),
+        Quantity(
+            "flight_time",
+            "s",
+            "time of the flight",
+            "Time from the release to the landing, for the launch of least speed.",
+        ),
         *(
             Quantity(
-                f"release_{name}", "m", f"{name} of the release", "Place of the release of the launch of least speed."
+                f"release_{name}", "m", f"{name} of the release", "Place of the release, for the launch of least speed."
             )
             for name in "xyz"
         ),
@@ -659,8 +721,8 @@ QUANTITIES = {
             "sigma_r",
             "rad m-1",
             "sensitivity of the orientation",
-            "Largest turn over the largest error of a cable length, errors of all cables independent; NaN for point "
-            "masses.",
+            "Largest rotation over the largest error of a cable length, with independent errors of all cables; NaN for "
+            "point masses.",
         ),
         Quantity("used_z0", "m", "depth of P0 below the centroid", "Depth of P0 that the inclination requires."),
     )

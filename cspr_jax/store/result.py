@@ -138,16 +138,16 @@ class Result:
 def open_result(path: Path) -> Result:
     """Read a result of `cspr run` or a motion of `cspr plan -o`.
 
-    A motion that ends in .csv has neither robot nor plan nor segments; it is named after its file.
+    A motion in a .csv file has neither robot nor plan nor segments; it is named after its file.
 
-    An HDF5 file may come from anybody: another process reads it, within limits of memory and time, and what it finds
-    is checked like a sweep file.
+    An HDF5 file may come from anybody: another process reads it, within limits of memory and time, and its content is
+    checked like a sweep file.
 
     Returns:
         the result.
 
     Raises:
-        StoreError: no such file, not HDF5, damaged, or not written by this program.
+        StoreError: the file is missing, not HDF5, damaged, or not written by this program.
     """
     try:
         is_table = Path(path).suffix.lower() == ".csv"

@@ -11,21 +11,29 @@ TRAJECTORY, TENSIONS, SUMMARY = "trajectory", "tensions", "summary"
 def add_plot(parser: argparse.ArgumentParser) -> None:
     """Arguments of the command that draws results."""
     parser.add_argument("result", type=Path, nargs="+", help="result or run directory, or motion of `cspr plan -o`")
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="picture: .png, .pdf, .svg (default: beside)")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="FILE", help="picture: .png, .pdf, .svg (default: beside the result)"
+    )
     parser.add_argument(
         "--quantity",
-        help="quantity of a map (default arcs or oscillations; see `cspr quantities`); of a motion trajectory, in "
-        "space; tensions, with their limits; summary, on a page; acceleration, beside all that are feasible at an "
-        "instant; path_acceleration, over the way; or landing",
+        help="map: a quantity (default arcs or oscillations; see `cspr quantities`); motion: trajectory, the path in "
+        "space; tensions, with their limits; summary, all on one page; acceleration, beside all that are feasible at "
+        "an instant; path_acceleration, over the path, between its bounds; or landing, of a sample of throws",
     )
     add_best(parser)
     parser.add_argument("--lines", metavar="AXIS", help="draw a map as lines, one for each point of this axis")
-    parser.add_argument("--envelope", action="store_true", help='outlines of a place of map = "orientations"')
+    parser.add_argument("--envelope", action="store_true", help='draw the outlines of a place of map = "orientations"')
     parser.add_argument(
-        "--solid", action="store_true", help='boundary of a map = "workspace" over x, y and z, with the robot in it'
+        "--solid",
+        action="store_true",
+        help='draw the boundary of a map = "workspace" over x, y and z, with the robot in it',
     )
     parser.add_argument(
-        "--at", action="append", default=[], metavar="AXIS=VALUE", help="fix an axis: nearest point; t of a motion"
+        "--at",
+        action="append",
+        default=[],
+        metavar="AXIS=VALUE",
+        help="fix an axis of a map at the point nearest to VALUE; motion: t=VALUE, s",
     )
     add_motion_plan(parser)
     parser.set_defaults(device=None)
@@ -43,8 +51,8 @@ def add_best(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="AXIS",
-        help="of a map, such as z0: each cell at the best point of this axis, that with the fewest arcs if any is "
-        "feasible; --quantity best_AXIS: which one",
+        help="map: show each cell at its best point of this axis, such as z0: feasible if any is, with the fewest "
+        "arcs; --quantity best_AXIS draws that point itself",
     )
 
 
@@ -61,12 +69,18 @@ def add_look(parser: argparse.ArgumentParser) -> None:
     Args:
         parser: of a command that draws.
     """
-    parser.add_argument("--size", metavar="WIDTHxHEIGHT", help="of the picture, cm, such as 16x10")
+    parser.add_argument("--size", metavar="WIDTHxHEIGHT", help="size of the picture, cm, such as 16x10")
     presets = parser.add_mutually_exclusive_group()
     for name, words in (("column", "8.5 cm wide"), ("page", "17.5 cm wide")):
         presets.add_argument(
-            f"--{name}", dest="preset", action="store_const", const=name, help=f"for a {name} of a paper, {words}"
+            f"--{name}",
+            dest="preset",
+            action="store_const",
+            const=name,
+            help=f"make it {words}, for a {name} of a paper",
         )
     parser.add_argument("--no-title", dest="title", action="store_false", help="leave out the title")
-    parser.add_argument("--dpi", type=float, metavar="N", help="pixels an inch (default 160)")
-    parser.add_argument("--font-size", type=float, metavar="PT", help="points (default 10; --column 8, --page 9)")
+    parser.add_argument("--dpi", type=float, metavar="N", help="pixels per inch (default 160)")
+    parser.add_argument(
+        "--font-size", type=float, metavar="PT", help="size of the font, points (default 10; --column 8, --page 9)"
+    )
