@@ -7,7 +7,7 @@ read `__init__.pyi`.
 import importlib
 from typing import Any
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 # The module below the package that holds each public name.
 _MODULES = {

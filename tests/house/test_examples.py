@@ -1,7 +1,9 @@
 """Sweep and plan files that come with the program, and what the command line says of itself."""
 
 import json
+import re
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -43,3 +45,13 @@ def test_version_and_platforms(capsys, monkeypatch):
     monkeypatch.setattr(sys, "platform", "win32")
     assert main(["robots"]) == 2
     assert capsys.readouterr().err.startswith("cspr: Linux and macOS are supported")
+
+
+def test_versions_agree():
+    """The package, its metadata, the citation and the newest dated section of the changelog name one version."""
+    root = Path(__file__).parents[2]
+    files = {name: (root / name).read_text("utf-8") for name in ("pyproject.toml", "CITATION.cff", "CHANGELOG.md")}
+    assert f'version = "{__version__}"' in files["pyproject.toml"]
+    version, date = re.search(r"^version: (.*)\ndate-released: \"(.*)\"$", files["CITATION.cff"], re.M).groups()
+    dated = re.findall(r"^## (\d\S*) - (\d{4}-\d\d-\d\d)$", files["CHANGELOG.md"], re.M)
+    assert (version, date) == dated[0] and version == __version__
