@@ -89,12 +89,16 @@ def shared(robot: AnyRobot, state: State, limits: Limits, rule: str) -> Distribu
         the tensions (n_cables,) N, () residual, moments over the size of the platform, () whether they keep the limits.
     """
     low, high = tension_range(robot, limits)
-    unit = _units(robot)
+    unit = wrench_units(robot)
     return by_rule(rule, robot.wrench_matrix(state) / unit[:, None], robot.inertial_wrench(state) / unit, low, high)
 
 
-def _units(robot: AnyRobot) -> Array:
-    # Return the divisors (dof,) of the components of wrenches: for moments the size of the platform.
+def wrench_units(robot: AnyRobot) -> Array:
+    """Numbers by which components of wrenches are divided to compare them: 1 of forces, of moments the platform's size.
+
+    Returns:
+        (dof,) 1, or m.
+    """
     forces = np.ones(len(PATTERNS[robot.pattern].forces))
     if not isinstance(robot, PlatformRobot):
         return jnp.asarray(forces)

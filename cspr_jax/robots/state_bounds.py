@@ -1,0 +1,142 @@
+"""Bounds of states over a block of time, and of what follows from them: lengths of cables, their rates, the balance.
+
+Formulas are those of `robots.force_balance`, `robots.wrench_balance` and `robots.platform`, in affine bounds.
+"""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax.arithmetic.affine_bounds import (
+    AffineBounds,
+    cross,
+    dot,
+    joined,
+    norm_squared,
+    reciprocal_root,
+    squared,
+    turned,
+)
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.robots.platform import PlatformRobot, across_line
+
+
+class StateBounds(NamedTuple):
+    """Bounds of the states of one block; see `robots.state.State`.
+
+    Fields:
+        position: (3,) of the mass centre, m.
+        velocity: (3,) m/s.
+        acceleration: (3,) m/s^2.
+        rotation: (3, 3) from platform to fixed axes; None for a point mass.
+        angular_velocity: (3,) fixed axes, rad/s; None for a point mass.
+        angular_acceleration: (3,) fixed axes, rad/s^2; None for a point mass.
+    """
+
+    position: AffineBounds
+    velocity: AffineBounds
+    acceleration: AffineBounds
+    # As of states.
+    rotation: AffineBounds = None  # type: ignore[assignment]
+    angular_velocity: AffineBounds = None  # type: ignore[assignment]
+    angular_acceleration: AffineBounds = None  # type: ignore[assignment]
+
+
+class CableBounds(NamedTuple):
+    """Bounds of the cables of one block.
+
+    Fields:
+        direction: (n_cables, 3) unit vectors from the effector to the spools.
+        arm: (n_cables, 3) attachment points from the mass centre, fixed axes, m; None for a point mass.
+        length: (n_cables,) m.
+        rate: (n_cables,) m/s.
+        acceleration: (n_cables,) m/s^2.
+    """
+
+    direction: AffineBounds
+    arm: AffineBounds | None
+    length: AffineBounds
+    rate: AffineBounds
+    acceleration: AffineBounds
+
+
+def cable_bounds(robot: AnyRobot, state: StateBounds) -> CableBounds:
+    """Bounds of the cables.
+
+    Args:
+        robot: without pulleys.
+
+    Returns:
+        the bounds, leaves (n_cables, ...); radii are NaN where a cable may have no length.
+    """
+    arm = None
+    target, velocity, pull = (_rows(bounds) for bounds in state[:3])
+    if isinstance(robot, PlatformRobot):
+        arm = turned(state.rotation.each(lambda x: x[None]), robot.platform_points)
+        swing = cross(_rows(state.angular_velocity), arm)
+        target, velocity = target + arm, velocity + swing
+        pull = pull + cross(_rows(state.angular_acceleration), arm) + cross(_rows(state.angular_velocity), swing)
+    ray = target + -robot.base_points
+    square = norm_squared(ray)
+    inverse = reciprocal_root(square)
+    rate = dot(ray, velocity) * inverse
+    acceleration = (norm_squared(velocity) + dot(ray, pull) - squared(rate)) * inverse
+    direction = -(ray * inverse.each(lambda x: x[:, None]))
+    return CableBounds(direction, arm, square * inverse, rate, acceleration)
+
+
+def balance_bounds(robot: AnyRobot, state: StateBounds, cables: CableBounds) -> tuple[AffineBounds, AffineBounds]:
+    """Bounds of the wrench balance: wrenches of unit tensions, and what the cables must supply.
+
+    Args:
+        cables: of the same block.
+
+    Returns:
+        (dof, n_cables) and (dof,), as `robots.robot.Robot.wrench_matrix` and `inertial_wrench`.
+    """
+    force = (state.acceleration + jnp.asarray([0.0, 0.0, -1.0]) * robot.gravity) * robot.mass
+    row = PATTERNS[robot.pattern]
+    forces = cables.direction.each(jnp.transpose)
+    if not isinstance(robot, PlatformRobot) or cables.arm is None:
+        axes = np.array(row.forces)
+        return forces.each(lambda x: x[axes]), force.each(lambda x: x[axes])
+    moments = cross(cables.arm, cables.direction).each(jnp.transpose)
+    moment = _spin_moment(robot, state)
+    if row.is_jointed and robot.centre_of_mass is not None:
+        moment = moment + cross(turned(state.rotation, robot.centre_of_mass), force)
+    matrix = _balanced(robot, state.rotation, forces, moments)
+    wrench = _balanced(robot, state.rotation, *(bounds.each(lambda x: x[:, None]) for bounds in (force, moment)))
+    return matrix, wrench.each(lambda x: x[:, 0])
+
+
+def _rows(bounds: AffineBounds) -> AffineBounds:
+    return bounds.each(lambda x: x[None])
+
+
+def _spin_moment(robot: PlatformRobot, state: StateBounds) -> AffineBounds:
+    # Rate of the angular momentum, in platform axes, where the inertia is constant, and turned back.
+    inertia = robot.inertia
+    if PATTERNS[robot.pattern].is_jointed and robot.centre_of_mass is not None:
+        arm = jnp.asarray(robot.centre_of_mass)
+        inertia = inertia + robot.mass * (jnp.dot(arm, arm) * jnp.eye(3) - jnp.outer(arm, arm))
+    back = state.rotation.each(jnp.transpose)
+    velocity, acceleration = turned(back, state.angular_velocity), turned(back, state.angular_acceleration)
+    return turned(state.rotation, turned(inertia, acceleration) + cross(velocity, turned(inertia, velocity)))
+
+
+def _balanced(robot: PlatformRobot, rotation: AffineBounds, force: AffineBounds, moment: AffineBounds) -> AffineBounds:
+    # Keep the components that the cables balance, of (3, n) forces and moments.
+    row = PATTERNS[robot.pattern]
+    if row.along_line:
+        across = turned(rotation.each(lambda x: x[None]), across_line(robot).T)
+        turning = _products(across, moment)
+    else:
+        turning = moment.each(lambda x: x[np.array(row.moments)])
+    return joined([force.each(lambda x: x[np.array(row.forces, int)]), turning], axis=0)
+
+
+def _products(rows: AffineBounds, columns: AffineBounds) -> AffineBounds:
+    # (m, 3) times (3, n).
+    return dot(rows.each(lambda x: x[:, None]), columns.each(lambda x: x.T[None]))

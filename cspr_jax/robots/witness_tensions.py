@@ -1,0 +1,107 @@
+"""Witness tensions: tensions that balance a motion throughout a block of time, and bounds of how central they can be.
+
+In the middle of a block tensions f are chosen, and their slope f' by the derivative of the balance, so that f + s f'
+leaves a residual r(s) of second order. For any B with A(s) B = 1 + E(s), the correction B (1 + E)^-1 r balances
+exactly, and where the rows of |E| sum to less than 1 it is bounded. Where the bounds keep the limits, there are
+tensions within them at every instant: a proof. On as many cables as components these are the only ones, and A is
+nowhere singular.
+
+For more cables, a face of the set of wrenches refutes. With y(s) normal to the d - 1 columns that span it (found in the
+same way, as a solution of a balance), tensions that are r from their limits give at most y w >= sum of y A_i times the
+limit on the other side, and r sum |y A_i|: that bounds r from above.
+"""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.arithmetic.affine_bounds import AffineBounds, constant, dot, turned
+from cspr_jax.arithmetic.elementary import solved
+from cspr_jax.robots.tension_distribution import centred
+from cspr_jax.robots.wrench_sets import FLAT, spanning, wrench_faces
+
+
+class WitnessTensions(NamedTuple):
+    """Tensions of one block.
+
+    Fields:
+        tension: (n_cables,) bounds of tensions that balance throughout, N; radii are NaN where nothing is known.
+        margin_low: () lower bound of the largest distance of tensions from their limits, at every instant, N; -inf
+            where nothing is known.
+        margin_high: () upper bound of the same, at every instant, N; inf where nothing is known.
+        is_regular: () whether the matrix is proved to have full rank throughout.
+    """
+
+    tension: AffineBounds
+    margin_low: Array
+    margin_high: Array
+    is_regular: Array
+
+
+def witness_tensions(matrix: AffineBounds, wrench: AffineBounds, low: Array, high: Array) -> WitnessTensions:
+    """Tensions that balance a motion throughout a block.
+
+    Args:
+        matrix: (dof, n_cables) wrenches of unit tensions, moments over a length.
+        wrench: (dof,) what the cables must supply, N.
+        low: (n_cables,) smallest tensions, N.
+        high: (n_cables,) largest tensions, N, inf for none.
+
+    Returns:
+        the tensions.
+    """
+    dof, count = matrix.middle.shape
+    start = jnp.zeros(count) if count == dof else centred(matrix.middle, wrench.middle, low, high)[0].tensions
+    tension, is_regular = _solution(matrix, wrench, start)
+    margin_low = jnp.min(jnp.minimum(tension.low() - low, high - tension.high()))
+    if count == dof:
+        margin_high = jnp.min(jnp.minimum(tension.high() - low, high - tension.low()))
+        margin_high = jnp.where(is_regular, margin_high, jnp.inf)
+    else:
+        margin_high = _face_margin(matrix, wrench, low, high)
+    return WitnessTensions(tension, jnp.where(is_regular, margin_low, -jnp.inf), margin_high, is_regular)
+
+
+def _solution(matrix: AffineBounds, right: AffineBounds, start: Array) -> tuple[AffineBounds, Array]:
+    # Bound a solution of M(s) x(s) = b(s), with M (m, n) and n >= m, near a line through `start`, (n,); say whether M
+    # is proved to have rank m throughout.
+    m, n = matrix.middle.shape
+    inverse = solved(matrix.middle if m == n else matrix.middle @ matrix.middle.T, jnp.eye(m))[0]
+    inverse = inverse if m == n else matrix.middle.T @ inverse
+    middle = start + inverse @ (right.middle - matrix.middle @ start)
+    slope = inverse @ (right.slope - matrix.slope @ middle)
+    line = AffineBounds(middle, slope, jnp.zeros(n))
+    residual = (right - turned(matrix, line)).size()
+    # Sums of rows of |M B - 1|; that of the middle is rounding.
+    rows = jnp.abs(matrix.middle @ inverse - jnp.eye(m)) + jnp.abs(matrix.slope @ inverse)
+    rows = jnp.sum(rows + matrix.radius @ jnp.abs(inverse), axis=1)
+    share = jnp.max(rows)
+    radius = jnp.abs(inverse) @ (residual + rows * jnp.max(residual) / (1.0 - share))
+    is_known = (share < 1.0) & jnp.isfinite(middle).all() & jnp.isfinite(slope).all() & jnp.isfinite(radius).all()
+    return line._replace(radius=jnp.where(is_known, radius, jnp.nan)), is_known
+
+
+def _face_margin(matrix: AffineBounds, wrench: AffineBounds, low: Array, high: Array) -> Array:
+    # Bound the largest distance from the limits by the face that is nearest in the middle.
+    dof, count = matrix.middle.shape
+    faces = wrench_faces(matrix.middle, low, high)
+    sizes = jnp.sum(jnp.abs(faces.normals @ matrix.middle), axis=1)
+    is_face = jnp.isfinite(faces.offsets) & (sizes > 0.0)
+    nearest = jnp.argmin(jnp.where(is_face, faces.slacks(wrench.middle) / jnp.where(is_face, sizes, 1.0), jnp.inf))
+    columns = jnp.asarray(spanning(count, dof))[nearest % (is_face.size // 2)]
+    across = matrix.each(lambda x: x[:, columns].T)
+    normal, is_normal = _solution(across, constant(jnp.zeros(dof - 1)), faces.normals[nearest])
+    is_spanning = (jnp.arange(count)[:, None] == columns[None]).any(1)
+    along = turned(matrix.each(jnp.transpose), normal).each(lambda x: jnp.where(is_spanning, 0.0, x))
+    # Each cable at the limit that gives the least; the other one counts as far as its product may change sign.
+    is_inward = along.middle > 0.0
+    limit = jnp.where(is_spanning, 0.0, jnp.where(is_inward, low, high))
+    is_bounded = jnp.isfinite(limit) | (along.size() == 0.0)
+    over = jnp.where(is_inward, -along.low(), along.high())
+    other = jnp.where(over > FLAT * jnp.abs(along.middle), over * (high - low), 0.0)
+    slack = (dot(normal, wrench) - dot(along, jnp.where(is_bounded, limit, 0.0))).high() + jnp.sum(other)
+    smallest = jnp.maximum(along.size() - 2.0 * along.reach(), 0.0)
+    size = jnp.sum(jnp.where(slack < 0.0, along.size(), smallest))
+    is_known = is_face[nearest] & is_normal & is_bounded.all() & (size > 0.0) & jnp.isfinite(slack)
+    return jnp.minimum(jnp.where(is_known, slack / size, jnp.inf), 0.5 * jnp.min(high - low))

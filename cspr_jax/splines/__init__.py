@@ -1,0 +1,14 @@
+"""Splines: motions that a user brings, as piecewise polynomials in time.
+
+What controllers play is a table of samples or way-points and an interpolation between them: polynomials, piece by
+piece. Over a block of time each lies within a narrow band around a straight line, found from its Bernstein
+coefficients, whether the block holds a part of a piece or hundreds of pieces. From such bands follow bounds of cables,
+of the balance and of tensions (`robots.state_bounds`, `robots.witness_tensions`), and so verdicts between the samples.
+
+Orientations are quaternions that are interpolated as they are and normalised afterwards.
+
+Files, each importing only from those above it:
+
+    motion              positions and rotations over time
+    blocks              bounds of states over blocks of time
+"""

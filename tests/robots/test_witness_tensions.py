@@ -1,0 +1,117 @@
+"""Bounds of cables, balances and tensions over blocks against instants, and against linear programs by HiGHS."""
+
+import jax
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+from support.splines import random_spline
+
+import cspr_jax
+from cspr_jax.robots import cables
+from cspr_jax.robots.kernel_axes import centred
+from cspr_jax.robots.state_bounds import balance_bounds, cable_bounds
+from cspr_jax.robots.witness_tensions import witness_tensions
+from cspr_jax.splines.blocks import spline_bounds
+
+S = np.linspace(-1.0, 1.0, 9)
+# Of each robot a place and how far motions go from there, m, and the tilt.
+ROBOTS = {
+    "transition-planar": ((0.0, 0.0, 2.0), 0.3, 0.0),
+    "prototype": ((0.0, 0.0, 1.0), 0.1, 0.0),
+    "boralugoda-rectangle": ((0.0, 0.0, 2.0), 0.4, 0.0),
+    "laval-mssm": ((0.0, 0.0, 1.7), 0.2, 0.05),
+    "cogiro": ((0.0, 0.0, 4.0), 1.0, 0.05),
+}
+
+
+@pytest.fixture(autouse=True)
+def float64():
+    with jax.enable_x64(True):
+        yield
+
+
+def judged(name: str, seed: int, count: int, low: float, high: float):
+    """Exact balances at instants of random blocks, and the bounds of these blocks."""
+    robot = centred(cspr_jax.load_robot(name))[0]
+    middle, size, tilt = ROBOTS[name]
+    spline, table = random_spline(seed, middle=middle, size=size, tilt=tilt)
+    edges = np.linspace(0.0, table.x[-1], count + 1)
+    times = 0.5 * (edges[:-1] + edges[1:])[:, None] + 0.5 * np.diff(edges)[:, None] * S
+    unit = np.asarray(cables.wrench_units(robot))
+
+    def exact(t):
+        state = spline.state(t)
+        balance = robot.wrench_matrix(state) / unit[:, None], robot.inertial_wrench(state) / unit
+        return *cables.cable_motion(robot, state), *balance
+
+    def bounds(state):
+        known = cable_bounds(robot, state)
+        matrix, wrench = balance_bounds(robot, state, known)
+        matrix, wrench = matrix * (1.0 / unit)[:, None], wrench * (1.0 / unit)
+        limits = np.full(robot.n_cables, low), np.full(robot.n_cables, high)
+        return known.length, known.rate, known.acceleration, matrix, wrench, witness_tensions(matrix, wrench, *limits)
+
+    instants = jax.jit(jax.vmap(jax.vmap(exact)))(times / table.x[-1])
+    found = jax.jit(jax.vmap(bounds))(spline_bounds(spline, edges[:-1], edges[1:]))
+    return [np.asarray(x) for x in instants], jax.tree.map(np.asarray, found)
+
+
+def largest_distance(matrix, wrench, low: float, high: float) -> float:
+    """Largest r such that tensions r from their limits balance, by a linear program."""
+    count = matrix.shape[1]
+    above = np.concatenate([-np.eye(count), np.ones((count, 1))], axis=1)
+    rows, sides = [above], [np.full(count, -low)]
+    if np.isfinite(high):
+        rows.append(np.concatenate([np.eye(count), np.ones((count, 1))], axis=1))
+        sides.append(np.full(count, high))
+    answer = linprog(
+        np.append(np.zeros(count), -1.0),
+        np.concatenate(rows),
+        np.concatenate(sides),
+        np.concatenate([matrix, np.zeros((len(matrix), 1))], axis=1),
+        wrench,
+        bounds=[(None, None)] * (count + 1),
+    )
+    return {0: lambda: answer.x[-1], 2: lambda: -np.inf, 3: lambda: np.inf}[answer.status]()
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_bounds_of_cables_and_balances(name):
+    for seed in range(3):
+        for count in (10, 80):
+            instants, found = judged(name, seed, count, 0.0, np.inf)
+            for values, band in zip(instants, found[:5], strict=True):
+                s = S.reshape(1, -1, *(1,) * (values.ndim - 2))
+                over = np.abs(values - band.middle[:, None] - band.slope[:, None] * s) - band.radius[:, None]
+                assert np.nanmax(over) < 1e-11 * np.abs(values).max()
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("high", [np.inf, 60.0])
+def test_margins_of_tensions_against_highs(name, high):
+    scale = 30.0 if name == "cogiro" else 1.0
+    proved = 0
+    for seed in range(2):
+        low, top = 1.0 * scale, high * scale
+        instants, found = judged(name, seed, 40, low, top)
+        matrices, wrenches, tensions = *instants[3:], found[5]
+        for i in range(0, 40, 3):
+            exact = [largest_distance(matrices[i, j], wrenches[i, j], low, top) for j in (0, 4, 8)]
+            allowance = 1e-6 * (1.0 + np.abs(wrenches[i]).max())
+            assert min(exact) >= tensions.margin_low[i] - allowance
+            assert max(exact) <= tensions.margin_high[i] + allowance
+            proved += tensions.margin_low[i] > 0.0 or tensions.margin_high[i] < 0.0
+    # Most blocks are decided at once.
+    assert proved >= 14
+
+
+@pytest.mark.parametrize("name", ["prototype", "laval-mssm"])
+def test_the_only_tensions(name):
+    """On as many cables as components the bounds hold the tensions themselves."""
+    instants, found = judged(name, 4, 80, 0.0, np.inf)
+    matrices, wrenches, tensions = *instants[3:], found[5]
+    exact = np.linalg.solve(matrices, wrenches[..., None])[..., 0]
+    over = np.abs(exact - tensions.tension.middle[:, None] - tensions.tension.slope[:, None] * S[:, None])
+    known = tensions.is_regular
+    assert known.mean() > 0.9
+    assert (over <= tensions.tension.radius[:, None] + 1e-9 * np.abs(exact).max())[known].all()
