@@ -18,7 +18,7 @@ from jax import Array
 
 from cspr_jax.arithmetic.affine_bounds import AffineBounds, constant, dot, turned
 from cspr_jax.arithmetic.elementary import solved
-from cspr_jax.robots.tension_distribution import centred
+from cspr_jax.robots.tension_distribution import most_central
 from cspr_jax.robots.wrench_sets import FLAT, spanning, wrench_faces
 
 
@@ -52,7 +52,7 @@ def witness_tensions(matrix: AffineBounds, wrench: AffineBounds, low: Array, hig
         the tensions.
     """
     dof, count = matrix.middle.shape
-    start = jnp.zeros(count) if count == dof else centred(matrix.middle, wrench.middle, low, high)[0].tensions
+    start = jnp.zeros(count) if count == dof else most_central(matrix.middle, wrench.middle, low, high)
     tension, is_regular = _solution(matrix, wrench, start)
     margin_low = jnp.min(jnp.minimum(tension.low() - low, high - tension.high()))
     if count == dof:
