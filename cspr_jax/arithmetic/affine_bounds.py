@@ -80,14 +80,14 @@ class AffineBounds(NamedTuple):
         """
         return _rounded(self.each(lambda x: jnp.sum(x, axis=axis)), jnp.sum(self.size(), axis=axis))
 
-    def __add__(self, other: Any) -> "AffineBounds":  # type: ignore[override]
+    def __add__(self, other: Any) -> "AffineBounds":
         """Bounds of f + g, or of f plus constants."""
         if not isinstance(other, AffineBounds):
             return _rounded(self._replace(middle=self.middle + other), jnp.abs(other))
         moved = AffineBounds(self.middle + other.middle, self.slope + other.slope, self.radius + other.radius)
         return _rounded(moved, self.size())
 
-    def __mul__(self, other: Any) -> "AffineBounds":  # type: ignore[override]
+    def __mul__(self, other: Any) -> "AffineBounds":
         """Bounds of f g, or of f times constants."""
         if not isinstance(other, AffineBounds):
             return _rounded(self.each(lambda x: x * other)._replace(radius=self.radius * jnp.abs(other)))
@@ -98,7 +98,13 @@ class AffineBounds(NamedTuple):
         slope = self.middle * other.slope + self.slope * other.middle
         return _rounded(AffineBounds(self.middle * other.middle + half, slope, radius), sizes[0] * sizes[1])
 
-    __radd__, __rmul__ = __add__, __mul__  # type: ignore[assignment]
+    def __radd__(self, other: Any) -> "AffineBounds":
+        """Bounds of constants plus f."""
+        return self + other
+
+    def __rmul__(self, other: Any) -> "AffineBounds":
+        """Bounds of constants times f."""
+        return self * other
 
     def __neg__(self) -> "AffineBounds":
         """Bounds of -f."""
@@ -236,9 +242,10 @@ def turned(matrix: AffineBounds | Array, f: AffineBounds | Array) -> AffineBound
     Returns:
         (..., m).
     """
-    across = f.each(lambda x: x[..., None, :]) if isinstance(f, AffineBounds) else f[..., None, :]
+    across: Any = f.each(lambda x: x[..., None, :]) if isinstance(f, AffineBounds) else f[..., None, :]
     # Constants go to the right.
-    return (matrix * across if isinstance(matrix, AffineBounds) else across * matrix).total()
+    product: AffineBounds = matrix * across if isinstance(matrix, AffineBounds) else across * matrix
+    return product.total()
 
 
 def stacked(bounds: "list[AffineBounds]", axis: int = -1) -> AffineBounds:

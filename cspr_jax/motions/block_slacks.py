@@ -30,7 +30,7 @@ BATCH = 64
 
 
 class Criterion(NamedTuple):
-    """What a slack belongs to.
+    """Criterion of a slack.
 
     Fields:
         flag: the verdict where it is broken; of the tensions of redundant cables `WRENCH_INFEASIBLE`.
@@ -111,7 +111,7 @@ def _of_limits(limits: Limits, state: StateBounds, cables: CableBounds) -> list[
 
 
 def _both(limit: Array, value: AffineBounds) -> tuple[AffineBounds, AffineBounds]:
-    return limit - value, limit + value
+    return -value + limit, value + limit
 
 
 def block_slacks(

@@ -21,7 +21,7 @@ MOST, NARROWING = 100_000, 4_000
 
 @dataclasses.dataclass(frozen=True)
 class TimeProof:
-    """What is proved of n_criteria over a motion.
+    """Bounds of n_criteria over a motion, and where it breaks them.
 
     Fields:
         low: (n_criteria,) lower bound of each slack over the whole motion.
@@ -57,13 +57,13 @@ def time_proof(
     leaves: list[tuple[np.ndarray, ...]] = []
     total = 0
     while len(start):
-        found = slacks(start, end)
+        bounds = slacks(start, end)
         total += len(start)
-        undecided = ~((found.low > 0.0) | (found.high < 0.0)).all(1)
+        undecided = ~((bounds.low > 0.0) | (bounds.high < 0.0)).all(1)
         halve = undecided & (end - start > resolution)
         if total + 2 * halve.sum() > MOST:
             halve[:] = False
-        leaves.append((start[~halve], end[~halve], found.low[~halve], found.high[~halve]))
+        leaves.append((start[~halve], end[~halve], bounds.low[~halve], bounds.high[~halve]))
         middle = 0.5 * (start + end)[halve]
         start, end = np.concatenate([start[halve], middle]), np.concatenate([middle, end[halve]])
     starts, ends, low, high = (np.concatenate(parts) for parts in zip(*leaves, strict=True))
@@ -91,13 +91,13 @@ def _narrowed(slacks, starts, ends, low, high):
             break
         middle = 0.5 * (starts + ends)[chosen]
         parts = np.concatenate([starts[chosen], middle]), np.concatenate([middle, ends[chosen]])
-        found = slacks(*parts)
+        bounds = slacks(*parts)
         more += len(parts[0])
         # A part has no looser bounds than the whole.
-        lows, highs = (np.tile(bounds[chosen], (2, 1)) for bounds in (low, high))
+        lows, highs = (np.tile(side[chosen], (2, 1)) for side in (low, high))
         starts, ends = (np.concatenate([x[~chosen], part]) for x, part in zip((starts, ends), parts, strict=True))
-        low = np.concatenate([low[~chosen], np.maximum(found.low, lows)])
-        high = np.concatenate([high[~chosen], np.minimum(found.high, highs)])
+        low = np.concatenate([low[~chosen], np.maximum(bounds.low, lows)])
+        high = np.concatenate([high[~chosen], np.minimum(bounds.high, highs)])
     order = np.argsort(starts)
     return starts[order], ends[order], low[order], high[order], more
 
