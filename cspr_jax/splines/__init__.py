@@ -10,5 +10,6 @@ Orientations are quaternions that are interpolated as they are and normalised af
 Files, each importing only from those above it:
 
     motion              positions and rotations over time
+    interpolation       cubic, quintic and Hermite curves through samples
     blocks              bounds of states over blocks of time
 """
