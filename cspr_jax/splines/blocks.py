@@ -39,10 +39,10 @@ def spline_bounds(spline: Spline, start: np.ndarray, end: np.ndarray) -> StateBo
     """
     parts = _overlaps(np.asarray(spline.knots), start, end)
     width = np.diff(np.asarray(spline.knots))[parts.piece, None, None]
-    position = _bands(np.asarray(spline.position), parts, width, len(start))
+    position = _bands(np.asarray(spline.position), parts, width)
     if spline.quaternion is None:
         return StateBounds(*position)
-    turning = _bands(np.asarray(spline.quaternion), parts, width, len(start))
+    turning = _bands(np.asarray(spline.quaternion), parts, width)
     return StateBounds(*position, *in_batches(_rotations, turning, size=BATCH))
 
 
@@ -63,12 +63,12 @@ def _overlaps(knots: np.ndarray, start: np.ndarray, end: np.ndarray) -> _Parts:
     return _Parts(block, piece, of_piece, of_block)
 
 
-def _bands(table: np.ndarray, parts: _Parts, width: np.ndarray, count: int) -> list[AffineBounds]:
+def _bands(table: np.ndarray, parts: _Parts, width: np.ndarray) -> list[AffineBounds]:
     # Bands of value, first and second derivative of Bernstein coefficients (m, degree + 1, n).
     coefficients, bands = table[parts.piece], []
     for order in range(3):
         degree = coefficients.shape[1] - 1
-        bands.append(_band(_between(coefficients, *parts.of_piece), parts, count))
+        bands.append(_band(_between(coefficients, *parts.of_piece), parts))
         if order < 2:
             coefficients = np.diff(coefficients, axis=1) * (degree / width) if degree else 0.0 * coefficients
     return bands
@@ -92,7 +92,7 @@ def _split(coefficients: np.ndarray, share: np.ndarray) -> np.ndarray:
     return np.concatenate(ends, axis=1)
 
 
-def _band(coefficients: np.ndarray, parts: _Parts, count: int) -> AffineBounds:
+def _band(coefficients: np.ndarray, parts: _Parts) -> AffineBounds:
     degree = coefficients.shape[1] - 1
     starts = np.flatnonzero(np.diff(parts.block, prepend=-1))
     ends = np.append(starts[1:], len(parts.block)) - 1

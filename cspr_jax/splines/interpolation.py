@@ -6,7 +6,7 @@ afterwards; where positions are Hermite pieces, quaternions are a spline of the 
 """
 
 import numpy as np
-from scipy.interpolate import BPoly, CubicSpline, PPoly, make_interp_spline
+from scipy.interpolate import BPoly, BSpline, CubicSpline, PPoly, make_interp_spline
 
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.errors import InputError
@@ -14,7 +14,7 @@ from cspr_jax.splines.motion import Spline, bernstein_of_powers
 
 INTERPOLATIONS = ("cubic", "quintic", "hermite")
 ENDS = ("rest", "natural", "periodic")
-# The ends of a periodic motion differ by no more than this part of its extent.
+# The ends of a periodic motion differ by no more than this part of its largest number.
 PERIODIC = 1e-9
 
 
@@ -104,23 +104,44 @@ def _check(times: np.ndarray, positions, quaternions, interpolation: str, ends: 
         if name == "quaternions" and not (np.linalg.norm(array, axis=1) > 0.0).all():
             i = int(np.argmin(np.linalg.norm(array, axis=1)))
             raise InputError(f"quaternions[{i}]", array[i].tolist(), "a quaternion of length above 0")
-        extent = np.ptp(array, axis=0).max()
-        if ends == "periodic" and name == "positions" and np.abs(array[-1] - array[0]).max() > PERIODIC * extent:
-            raise InputError("ends", ends, "another one where the last position is not the first")
+    if ends == "periodic" and interpolation != "hermite":
+        _check_closed(np.asarray(positions, float), "position")
+        if quaternions is not None:
+            units = continuous(np.asarray(quaternions, float))
+            _check_closed(units * np.where(units @ units[0] < 0.0, -1.0, 1.0)[:, None], "orientation")
+    if (interpolation, ends, len(times)) == ("quintic", "natural", 2):
+        raise InputError("ends", ends, '"rest" or "periodic" with two samples of a quintic')
+
+
+def _check_closed(values: np.ndarray, name: str) -> None:
+    if np.abs(values[-1] - values[0]).max() > PERIODIC * np.abs(values).max():
+        raise InputError("ends", "periodic", f"another one where the last {name} is not the first")
 
 
 def _spline(times: np.ndarray, values: np.ndarray, degree: int, ends: str) -> np.ndarray:
     # Bernstein coefficients of each piece, (n - 1, degree + 1, width).
     if ends == "periodic":
-        # To the last bit; quaternions may come back with the other sign, which is the same orientation.
-        values = np.concatenate([values[:-1], values[:1] * np.sign(np.sum(values[:1] * values[-1:]) or 1.0)])
+        return _periodic(times, values, degree)
     if degree == 3:
-        return _pieces(CubicSpline(times, values, bc_type="clamped" if ends == "rest" else ends))
-    orders = {"rest": (1, 2), "natural": (3, 4)}.get(ends, ())
-    zeros = [(order, np.zeros(values.shape[1])) for order in orders]
-    spline = make_interp_spline(times, values, degree, bc_type=(zeros, zeros) if orders else "periodic")
-    derivatives = [spline.derivative(order)(times) if order else spline(times) for order in range(3)]
-    return _hermite(times, derivatives)
+        return _pieces(CubicSpline(times, values, bc_type="clamped" if ends == "rest" else "natural"))
+    still = [(order, np.zeros(values.shape[1])) for order in ((1, 2) if ends == "rest" else (3, 4))]
+    return _quintic(times, make_interp_spline(times, values, degree, bc_type=(still, still)))
+
+
+def _periodic(times: np.ndarray, values: np.ndarray, degree: int) -> np.ndarray:
+    # A quaternion that comes back with the other sign, after a whole turn, does so twice in two periods.
+    sign = 1.0 if np.sum(values[0] * values[-1]) >= 0.0 else -1.0
+    times = np.concatenate([times, times[1:] + times[-1]])
+    values = np.concatenate([values[:-1], sign * values[:-1], values[:1]])
+    if degree == 3:
+        pieces = _pieces(CubicSpline(times, values, bc_type="periodic"))
+    else:
+        pieces = _quintic(times, make_interp_spline(times, values, degree, bc_type="periodic"))
+    return pieces[: len(pieces) // 2]
+
+
+def _quintic(times: np.ndarray, spline: BSpline) -> np.ndarray:
+    return _hermite(times, [spline(times, order) for order in range(3)])
 
 
 def _hermite(times: np.ndarray, derivatives: list) -> np.ndarray:

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.arithmetic import rotations
 from cspr_jax.robots.state import State
 
 
@@ -56,7 +57,7 @@ def _values(coefficients: Array, share: Array, width: Array) -> tuple[Array, Arr
     degree = coefficients.shape[0] - 1
     first = jnp.diff(coefficients, axis=0) * (degree / width)
     second = jnp.diff(first, axis=0) * (max(degree - 1, 0) / width)
-    return tuple(_bernstein(table, share) for table in (coefficients, first, second))  # type: ignore[return-value]
+    return _bernstein(coefficients, share), _bernstein(first, share), _bernstein(second, share)
 
 
 def _bernstein(coefficients: Array, share: Array) -> Array:
@@ -69,20 +70,16 @@ def _bernstein(coefficients: Array, share: Array) -> Array:
 def _turning(quaternion: Array, first: Array, second: Array) -> tuple[Array, Array, Array, Array]:
     # Rotation, angular velocity and acceleration, and unit quaternion; as in `arithmetic.rotation_bounds`.
     square = jnp.dot(quaternion, quaternion)
-    w, x, y, z = quaternion
-    rows = [
-        [w * w + x * x - y * y - z * z, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), w * w - x * x + y * y - z * z, 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z],
-    ]
-    rotation = jnp.stack([jnp.stack(row) for row in rows]) / square
+    unit = quaternion / jnp.sqrt(square)
+    rotation = rotations.matrix(unit)
 
     def across(f: Array) -> Array:
-        return 2.0 * (f[1:] * w - f[0] * quaternion[1:] - jnp.cross(f[1:], quaternion[1:])) / square
+        turning = f[1:] * quaternion[0] - f[0] * quaternion[1:] - jnp.cross(f[1:], quaternion[1:])
+        return 2.0 * turning / square
 
     angular_velocity = across(first)
     angular_acceleration = across(second) - angular_velocity * (2.0 * jnp.dot(quaternion, first) / square)
-    return rotation, angular_velocity, angular_acceleration, quaternion / jnp.sqrt(square)
+    return rotation, angular_velocity, angular_acceleration, unit
 
 
 def bernstein_of_powers(coefficients: np.ndarray) -> np.ndarray:

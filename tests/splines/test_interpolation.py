@@ -56,6 +56,21 @@ def test_periodic(kind):
         interpolated(TIMES, PLACES, interpolation=kind, ends="periodic")
 
 
+@pytest.mark.parametrize("kind", ["cubic", "quintic"])
+def test_a_whole_turn_is_periodic(kind):
+    """Its quaternion comes back with the other sign; speeds are those of the start."""
+    times, angles = np.linspace(0.0, 4.0, 13), np.linspace(0.0, 2.0 * np.pi, 13)
+    none = np.zeros_like(angles)
+    turn = np.stack([np.cos(0.5 * angles), none, none, np.sin(0.5 * angles)], axis=1)
+    spline = interpolated(times, np.zeros((13, 3)), turn, interpolation=kind, ends="periodic")
+    found = jax.jit(jax.vmap(spline.state))(np.array([0.0, 0.5, 1.0]))
+    np.testing.assert_allclose(found.rotation[0], found.rotation[2], atol=1e-9)
+    np.testing.assert_allclose(found.angular_velocity, [[0.0, 0.0, 0.5 * np.pi]] * 3, atol=1e-2)
+    np.testing.assert_allclose(found.angular_velocity[0], found.angular_velocity[2], atol=1e-9)
+    with pytest.raises(InputError, match="orientation"):
+        interpolated(times, np.zeros((13, 3)), turn[:, [0, 1, 2, 3]] + 0.1 * angles[:, None], ends="periodic")
+
+
 def test_hermite_takes_the_derivatives_as_they_are():
     rates, bends = np.random.default_rng(4).normal(size=(2, 6, 3))
     for more in ({}, {"accelerations": bends}):
@@ -87,6 +102,7 @@ def test_signs_of_quaternions_do_not_matter():
         ({"positions": np.where(np.arange(6)[:, None] == 4, np.nan, PLACES)}, "positions[4]"),
         ({"quaternions": np.eye(6, 4)}, "quaternions[4]"),
         ({"interpolation": "linear"}, '"cubic" or "quintic" or "hermite"'),
+        ({"times": TIMES[:2], "positions": PLACES[:2], "interpolation": "quintic", "ends": "natural"}, "ends"),
         ({"ends": "open"}, '"rest" or "natural" or "periodic"'),
         ({"velocities": PLACES}, "velocities"),
         ({"interpolation": "hermite"}, "velocities"),
