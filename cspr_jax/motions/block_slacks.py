@@ -34,13 +34,15 @@ class Criterion(NamedTuple):
 
     Fields:
         flag: the verdict where it is broken; of the tensions of redundant cables `WRENCH_INFEASIBLE`.
-        cable: number of the cable from 0 on; None: no single one.
+        cables: numbers from 0 on: of one cable, of two that meet, or none.
         unit: of the slack.
+        obstacle: number of the obstacle from 0 on; None: no obstacle is concerned.
     """
 
     flag: Verdict
-    cable: int | None
+    cables: tuple[int, ...]
     unit: str
+    obstacle: int | None = None
 
 
 class BlockSlacks(NamedTuple):
@@ -63,13 +65,15 @@ def criteria(robot: AnyRobot, limits: Limits) -> list[Criterion]:
     """
     cables = range(robot.n_cables)
     if robot.n_cables > robot.dof:
-        rows = [Criterion(Verdict.WRENCH_INFEASIBLE, None, "N")]
+        rows = [Criterion(Verdict.WRENCH_INFEASIBLE, (), "N")]
     else:
-        rows = [Criterion(Verdict.SLACK_CABLE, k, "N") for k in cables]
-        rows += [Criterion(Verdict.OVER_TENSION, k, "N") for k in cables if limits.tension_max is not None]
+        rows = [Criterion(Verdict.SLACK_CABLE, (k,), "N") for k in cables]
+        rows += [Criterion(Verdict.OVER_TENSION, (k,), "N") for k in cables if limits.tension_max is not None]
     for row in limits_set(limits):
         if row.quantity != "tension":
-            rows += [Criterion(row.flag, k, row.unit) for k in (cables if row.per_cable else (None,))]
+            rows += [
+                Criterion(row.flag, each, row.unit) for each in ([(k,) for k in cables] if row.per_cable else [()])
+            ]
     return rows
 
 

@@ -10,11 +10,13 @@ from typing import Any, Generic, Protocol, TypeVar
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.robots import state as states
 from cspr_jax.robots.state import State
+from cspr_jax.robots.state_bounds import StateBounds
 
 jax.tree_util.register_dataclass(Frame, ["signs", "origin", "rest"], [])
 
@@ -50,6 +52,22 @@ class Motion(Protocol):
 
         Returns:
             (n,) tau in ]0, 1[, increasing.
+        """
+        ...
+
+
+class BoundedMotion(Motion, Protocol):
+    """Motion with bounds of its states over blocks of time, so that verdicts on it can be proved between samples."""
+
+    def bounds(self, start: np.ndarray, end: np.ndarray) -> StateBounds:
+        """Bounds of the states over blocks of time.
+
+        Args:
+            start: (k,) s, increasing or not.
+            end: (k,) s, later than `start`.
+
+        Returns:
+            the bounds, leaves (k, ...).
         """
         ...
 

@@ -9,7 +9,7 @@ Orientations are quaternions that are interpolated as they are and normalised af
 
 Files, each importing only from those above it:
 
+    blocks              bounds of states over blocks of time
     motion              positions and rotations over time
     interpolation       cubic, quintic and Hermite curves through samples
-    blocks              bounds of states over blocks of time
 """

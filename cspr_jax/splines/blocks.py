@@ -13,7 +13,6 @@ from cspr_jax.arithmetic.affine_bounds import ROUNDING, AffineBounds
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.rotation_bounds import rotation_bounds
 from cspr_jax.robots.state_bounds import StateBounds
-from cspr_jax.splines.motion import Spline
 
 BATCH = 1024
 
@@ -26,24 +25,28 @@ class _Parts(NamedTuple):
     of_block: np.ndarray
 
 
-def spline_bounds(spline: Spline, start: np.ndarray, end: np.ndarray) -> StateBounds:
+def spline_bounds(
+    knots: np.ndarray, position: np.ndarray, quaternion: np.ndarray | None, start: np.ndarray, end: np.ndarray
+) -> StateBounds:
     """Bounds of the states over blocks of time.
 
     Args:
-        spline: NumPy leaves.
+        knots: (m + 1,) s.
+        position: (m, degree + 1, 3) Bernstein coefficients, m.
+        quaternion: (m, degree + 1, 4) likewise; None for a point mass.
         start: (k,) s, increasing or not.
         end: (k,) s, later than `start`.
 
     Returns:
         the bounds, leaves (k, ...).
     """
-    parts = _overlaps(np.asarray(spline.knots), start, end)
-    width = np.diff(np.asarray(spline.knots))[parts.piece, None, None]
-    position = _bands(np.asarray(spline.position), parts, width)
-    if spline.quaternion is None:
-        return StateBounds(*position)
-    turning = _bands(np.asarray(spline.quaternion), parts, width)
-    return StateBounds(*position, *in_batches(_rotations, turning, size=BATCH))
+    parts = _overlaps(knots, start, end)
+    width = np.diff(knots)[parts.piece, None, None]
+    translation = _bands(position, parts, width)
+    if quaternion is None:
+        return StateBounds(*translation)
+    turning = _bands(quaternion, parts, width)
+    return StateBounds(*translation, *in_batches(_rotations, turning, size=BATCH))
 
 
 @jax.jit

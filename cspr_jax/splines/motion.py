@@ -10,6 +10,8 @@ from jax import Array
 
 from cspr_jax.arithmetic import rotations
 from cspr_jax.robots.state import State
+from cspr_jax.robots.state_bounds import StateBounds
+from cspr_jax.splines.blocks import spline_bounds
 
 
 @jax.tree_util.register_dataclass
@@ -50,6 +52,11 @@ class Spline:
     def breaks(self) -> Array:
         """Breaks; see `Motion.breaks`."""
         return self.knots[1:-1] / self.knots[-1]
+
+    def bounds(self, start: np.ndarray, end: np.ndarray) -> StateBounds:
+        """Bounds of the states; see `BoundedMotion.bounds`."""
+        quaternion = None if self.quaternion is None else np.asarray(self.quaternion)
+        return spline_bounds(np.asarray(self.knots), np.asarray(self.position), quaternion, start, end)
 
 
 def _values(coefficients: Array, share: Array, width: Array) -> tuple[Array, Array, Array]:

@@ -16,7 +16,6 @@ from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.tension_distribution import centred as most_central
 from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.splines.blocks import spline_bounds
 
 # Robots, where they move and how far, m, their tilt, and limits that some motions break.
 CASES = {
@@ -80,7 +79,7 @@ def test_proofs_agree_with_samples(name):
     failures = 0
     for seed in range(3):
         robot, limits, spline, duration = case(name, seed)
-        proof = time_proof(partial(block_slacks, robot, limits, partial(spline_bounds, spline)), duration)
+        proof = time_proof(partial(block_slacks, robot, limits, spline.bounds), duration)
         slacks, times = sampled(robot, limits, spline), np.linspace(0.0, duration, SAMPLES)
         rows = criteria(robot, limits)
         assert slacks.shape[1] == len(rows) == len(proof.low)
@@ -126,5 +125,9 @@ def test_what_stays_open_is_told():
 def test_criteria_name_cables():
     robot, limits, _, _ = case("prototype", 0)
     rows = criteria(robot, limits)
-    assert [row.flag for row in rows[:3]] == [Verdict.SLACK_CABLE] * 3 and [row.cable for row in rows[:3]] == [0, 1, 2]
-    assert (rows[6].flag, rows[6].cable, rows[6].unit) == (Verdict.BELOW_FLOOR, None, "m")
+    assert [row.flag for row in rows[:3]] == [Verdict.SLACK_CABLE] * 3 and [row.cables for row in rows[:3]] == [
+        (0,),
+        (1,),
+        (2,),
+    ]
+    assert (rows[6].flag, rows[6].cables, rows[6].unit) == (Verdict.BELOW_FLOOR, (), "m")

@@ -11,7 +11,6 @@ from cspr_jax.robots import cables
 from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.state_bounds import balance_bounds, cable_bounds
 from cspr_jax.robots.witness_tensions import witness_tensions
-from cspr_jax.splines.blocks import spline_bounds
 
 S = np.linspace(-1.0, 1.0, 9)
 # Of each robot a place and how far motions go from there, m, and the tilt.
@@ -52,7 +51,7 @@ def judged(name: str, seed: int, count: int, low: float, high: float):
         return known.length, known.rate, known.acceleration, matrix, wrench, witness_tensions(matrix, wrench, *limits)
 
     instants = jax.jit(jax.vmap(jax.vmap(exact)))(times / table.x[-1])
-    found = jax.jit(jax.vmap(bounds))(spline_bounds(spline, edges[:-1], edges[1:]))
+    found = jax.jit(jax.vmap(bounds))(spline.bounds(edges[:-1], edges[1:]))
     return [np.asarray(x) for x in instants], jax.tree.map(np.asarray, found)
 
 

@@ -6,7 +6,6 @@ import pytest
 from support.splines import random_spline
 
 from cspr_jax.splines import blocks
-from cspr_jax.splines.blocks import spline_bounds
 
 S = np.linspace(-1.0, 1.0, 33)
 NAMES = ("position", "velocity", "acceleration", "rotation", "angular_velocity", "angular_acceleration")
@@ -24,7 +23,7 @@ def excess(seed: int, degree: int, count: int) -> dict[str, tuple[float, float]]
     edges = np.linspace(0.0, table.x[-1], count + 1)
     times = 0.5 * (edges[:-1] + edges[1:])[:, None] + 0.5 * np.diff(edges)[:, None] * S
     states = jax.jit(jax.vmap(jax.vmap(lambda t: spline.state(t))))(times / table.x[-1])
-    bounds, result = spline_bounds(spline, edges[:-1], edges[1:]), {}
+    bounds, result = spline.bounds(edges[:-1], edges[1:]), {}
     for name in NAMES:
         values, band = np.asarray(getattr(states, name)), jax.tree.map(np.asarray, getattr(bounds, name))
         s = S.reshape(1, -1, *(1,) * (values.ndim - 2))
