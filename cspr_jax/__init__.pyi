@@ -4,6 +4,7 @@ from cspr_jax.api.beziers import bezier as bezier
 from cspr_jax.api.beziers import bezier_durations as bezier_durations
 from cspr_jax.api.beziers import bezier_verdicts as bezier_verdicts
 from cspr_jax.api.beziers import launch_range as launch_range
+from cspr_jax.api.checks import check as check
 from cspr_jax.api.imports import ImportedRobot as ImportedRobot
 from cspr_jax.api.imports import import_robot as import_robot
 from cspr_jax.api.lines import least_time as least_time
@@ -13,12 +14,14 @@ from cspr_jax.api.listings import list_examples as list_examples
 from cspr_jax.api.listings import list_quantities as list_quantities
 from cspr_jax.api.listings import list_robots as list_robots
 from cspr_jax.api.listings import new_file as new_file
+from cspr_jax.api.many_checks import check_many as check_many
 from cspr_jax.api.motions import amplitude as amplitude
 from cspr_jax.api.motions import hypocycloid as hypocycloid
 from cspr_jax.api.motions import make_problem as make_problem
 from cspr_jax.api.motions import platform_motion as platform_motion
 from cspr_jax.api.motions import sampled_margin as sampled_margin
 from cspr_jax.api.motions import slacks as slacks
+from cspr_jax.api.motions import spline as spline
 from cspr_jax.api.motions import tensions as tensions
 from cspr_jax.api.motions import transition as transition
 from cspr_jax.api.pictures import plot as plot

@@ -15,7 +15,7 @@ from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude
 from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.errors import ExitCode
 from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind
-from cspr_jax.schema.plan_fields import LAUNCH, SCATTER, SEGMENT, WHOLE
+from cspr_jax.schema.plan_fields import CHECK, LAUNCH, SCATTER, SEGMENT, WHOLE
 from cspr_jax.schema.quantities import (
     ACROSS,
     AXES,
@@ -188,6 +188,7 @@ def plan_text() -> str:
         "Each of `segments`:\n\n": SEGMENT,
         "`launch`:\n\n": LAUNCH,
         "Its `scatter`:\n\n": SCATTER,
+        "The object of `cspr check --json`:\n\n": CHECK,
     }
     texts = []
     for head, fields in tables.items():

@@ -182,6 +182,17 @@ def _names(key: str, value: Any) -> None:
         _many(_kind_of("a string", str), "a name, or several")(key, value)
 
 
+def _limits_or_keys(key: str, value: Any) -> None:
+    if not isinstance(value, Mapping):
+        _limits(key, value)
+
+
+def _instants(key: str, value: Any) -> None:
+    # Instants of samples, or what has a motion in itself: a file, a spline, a function.
+    if not (isinstance(value, str | os.PathLike) or callable(value) or hasattr(value, "state")):
+        _real("instants (n,) in s, a path, a spline of SciPy, or a motion", (ANY,))(key, value)
+
+
 _NUMBER = _real("a number", (), infinite=True, nan=True)
 _NUMBER_OR_NONE = _real("a number, or None", (), none=True, infinite=True, nan=True)
 _TEXT = _kind_of("a string", str)
@@ -195,6 +206,8 @@ _ROBOT = _kind_of(
     "a point mass or a platform, as load_robot, point_mass or platform gives it",
     has=("base_points", "n_cables", "limits", "pattern"),
 )
+_ROBOT_OR_NAME = _kind_of("a robot, the name of one, or its file", str, os.PathLike, has=("base_points", "limits"))
+_MANY_POINTS = _real("None, or finite numbers of shape (k, n, 3)", (ANY, ANY, 3), none=True)
 _PLAN = ("answers", "points", "robot_file")  # attributes of a plan
 _MOTION = ("state", "duration")
 _POSITIVE = _real("a finite number > 0", (), least=0.0, above=True)
@@ -263,6 +276,7 @@ ARGUMENTS: dict[str, Rule] = {
     "given": _FILE,
     "gravity": _POSITIVE,
     "inertia": _real("three rows of three finite numbers, kg m^2", (3, 3), traced=True),
+    "interpolation": _TEXT_OR_NONE,
     "kernels": _PATH_OR_NONE,
     "law": _TEXT,
     "like": _TEXT,
@@ -291,6 +305,7 @@ ARGUMENTS: dict[str, Rule] = {
     "positions": _POINTS,
     "precision": _TEXT,
     "preset": _TEXT_OR_NONE,
+    "quaternions": _QUATERNIONS,
     "problem": _kind_of("a problem, as make_problem gives it", has=("robot", "limits", "amplitude")),
     "prune": _FLAG,
     "pulley_axes": _real("a vector [x, y, z], or one a cable, or None", (3,), (ANY, 3), none=True),
@@ -309,6 +324,7 @@ ARGUMENTS: dict[str, Rule] = {
     "samples": _integer(1, LARGEST_SAMPLES),
     "scheduler": _TEXT_OR_NONE,
     "size": _size,
+    "smooth": _POSITIVE_OR_NONE,
     "solid": _FLAG,
     "speed": _NUMBER,
     "spool_radius": _POSITIVE,
@@ -321,9 +337,11 @@ ARGUMENTS: dict[str, Rule] = {
     "tau": _real("a number from 0 to 1", (), least=0.0, largest=1.0, traced=True),
     "tension_max": _TENSIONS,
     "tension_min": _TENSIONS,
+    "times": _instants,
     "title": _FLAG,
     "trajectories": _integer(-MOST, MOST),
     "values": _integer(1, MOST, none=True),
+    "velocities": _POINTS_OR_NONE,
     "variable": _FLAG,
     "what": _TEXT,
     "workers": _WORKERS,
@@ -340,6 +358,19 @@ OF_FUNCTIONS: dict[str, Rule] = {
     "AvailableAccelerations.verdict.accelerations": _real("finite numbers of shape (3,) or (n, 3)", (3,), (ANY, 3)),
     "attainable.z0": _real(f"{DEPTH_WORDS}, or None", (), none=True, **DEPTH),
     "bezier.start": _POINT,
+    "check.duration": _POSITIVE_OR_NONE,
+    "check.ends": _TEXT_OR_NONE,
+    "check.limits": _limits_or_keys,
+    "check.positions": _POINTS_OR_NONE,
+    "check.robot": _ROBOT_OR_NAME,
+    "check_many.accelerations": _MANY_POINTS,
+    "check_many.ends": _TEXT_OR_NONE,
+    "check_many.limits": _limits_or_keys,
+    "check_many.positions": _real("finite numbers of shape (k, n, 3), at most 1e6 m", (ANY, ANY, 3), **LENGTHS),
+    "check_many.quaternions": _real("None, or quaternions of shape (k, n, 4)", (ANY, ANY, 4), none=True),
+    "check_many.robot": _ROBOT_OR_NAME,
+    "check_many.times": _real("instants (n,) or (k, n), s", (ANY,), (ANY, ANY)),
+    "check_many.velocities": _MANY_POINTS,
     "hypocycloid.z0": _ONE_DEPTH,
     "keep_compiled_code.folder": _PATH_OR_NONE,
     "launch_range.start": _STARTS,
@@ -358,6 +389,8 @@ OF_FUNCTIONS: dict[str, Rule] = {
     "report.given": _kind_of("a result, a plan, or the path of one", str, os.PathLike, has=("to_xarray",)),
     "report.output": _PATH,
     "status.directory": _PATH,
+    "spline.ends": _TEXT_OR_NONE,
+    "spline.positions": _POINTS_OR_NONE,
     "straight_line.start": _POINT,
     "table.amplitude": _TEXT_OR_NONE,
     "table.definition": _TEXT_OR_NONE,

@@ -25,12 +25,14 @@ from cspr_jax.platforms.end_acceleration import AT_REST
 from cspr_jax.platforms.platform_segment import PlatformMotion, pose_segment
 from cspr_jax.robots import cables
 from cspr_jax.robots.cables import AnyRobot
-from cspr_jax.robots.kernel_axes import prepared
+from cspr_jax.robots.kernel_axes import centred, prepared
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PointMassRobot, rest_point
 from cspr_jax.robots.state import State
 from cspr_jax.robots.tension_rule_table import CENTRED, TENSION_RULES
+from cspr_jax.splines.files import placed_inward, reference_of, samples_of, source_spline
+from cspr_jax.splines.motion import Spline
 from cspr_jax.swings import transition as transitions
 from cspr_jax.swings.hypocycloid import Hypocycloid, segment
 
@@ -155,6 +157,44 @@ def platform_motion(
     first, last = zip(places, quaternions, strict=True)
     geometry = pose_segment(prepared_robot, first, last, jnp.asarray(z0, float), beta_hats, odd=jnp.mod(p, 2.0) == 1.0)
     return Placed(PlatformMotion(geometry, function, p, PlatformMotionKind(variable=variable)), frame)
+
+
+@checked
+def spline(
+    robot: AnyRobot,
+    times,
+    positions,
+    quaternions=None,
+    *,
+    velocities=None,
+    accelerations=None,
+    interpolation: str | None = None,
+    ends: str | None = None,
+) -> Placed[Spline]:
+    """Motion through samples, as a piecewise polynomial in time.
+
+    Args:
+        robot: a robot of any pattern, on any number of cables.
+        times: (n,) increasing, s.
+        positions: (n, 3) of the mass centre, in the robot's axes, m.
+        quaternions: (n, 4) orientations of the platform, scalar first; None: its own axes.
+        velocities: (n, 3) m/s, for Hermite pieces.
+        accelerations: (n, 3) m/s^2, likewise.
+        interpolation: "cubic", "quintic" or "hermite"; None: "hermite" with velocities, "cubic" without.
+        ends: "rest", "natural" or "periodic"; None: "rest".
+
+    Returns:
+        the motion, in the robot's axes; orientations of its states count from the reference orientation.
+
+    Raises:
+        InputError: samples that make no motion.
+    """
+    samples = samples_of(times, positions, quaternions, velocities, accelerations)
+    is_platform = isinstance(robot, PlatformRobot)
+    axis = robot.z_axis
+    curve = source_spline(samples, z_axis=axis, is_platform=is_platform, interpolation=interpolation, ends=ends)
+    frame = centred(robot)[1]
+    return Placed(placed_inward(curve, frame, reference_of(robot)), frame)
 
 
 @checked

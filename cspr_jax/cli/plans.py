@@ -26,13 +26,21 @@ _STEP = "longest step of MuJoCo, s (default 0.0005)"
 def _add_plan(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("plan", type=Path, help="plan file (TOML)")
     add_json(parser)
+    add_files(parser, "`samples` rows per segment", "write the best candidate's motion even if it is not feasible")
+    add_all_errors(parser)
+    add_device(parser, quick=True)
+
+
+def add_files(parser: argparse.ArgumentParser, usual_rows: str, anyway: str) -> None:
+    """Add the options of files of a motion: rows, a model for MuJoCo, a film.
+
+    Args:
+        usual_rows: number of rows without --rate, in words.
+        anyway: help of the option that writes what is not feasible.
+    """
     add_output(parser, "write the motion to FILE.csv or FILE.h5", metavar="FILE")
-    parser.add_argument(
-        "--anyway", action="store_true", help="write the best candidate's motion even if it is not feasible"
-    )
-    parser.add_argument(
-        "--rate", type=float, metavar="HZ", help="rows of -o per second (default: `samples` rows per segment)"
-    )
+    parser.add_argument("--anyway", action="store_true", help=anyway)
+    parser.add_argument("--rate", type=float, metavar="HZ", help=f"rows of -o per second (default: {usual_rows})")
     parser.add_argument(
         "--mjcf",
         type=Path,
@@ -44,11 +52,14 @@ def _add_plan(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--speed", type=float, metavar="X", help="--animate: playback speed relative to real time (default 1)"
     )
-    add_all_errors(parser)
-    add_device(parser, quick=True)
 
 
-def _check_plan(options: argparse.Namespace) -> None:
+def check_files(options: argparse.Namespace) -> None:
+    """Refuse impossible options of files, before what takes long.
+
+    Raises:
+        ConfigError: an ending, a number or a combination that is not allowed.
+    """
     if options.output is not None and options.output.suffix not in (".csv", ".h5"):
         raise ConfigError("-o", f"{options.output}: must end in .csv or .h5")
     if options.rate is not None and not 0.0 < options.rate < float("inf"):
@@ -90,17 +101,22 @@ def _planned(options: argparse.Namespace) -> Any:
 
 
 def _plan(options: argparse.Namespace) -> int:
-    _check_plan(options)
+    check_files(options)
     plan = _planned(options)
     # Files are what took long: no table that cannot be printed stands before them.
     try:
-        _write(plan, options)
+        write_files(plan, options)
     finally:
         print_json(plan.to_dict()) if options.json else print_table(plan.to_table())
     return ExitCode.DONE if plan.feasible else ExitCode.NOT_FEASIBLE
 
 
-def _write(plan: Any, options: argparse.Namespace) -> None:
+def write_files(plan: Any, options: argparse.Namespace) -> None:
+    """Write the files that options name; a motion that is not feasible only with --anyway.
+
+    Args:
+        plan: `api.plans.Plan`.
+    """
     of_mjcf = {} if options.step is None else {"step": options.step}
     for path, save in (
         (options.output, lambda path: plan.save(path, options.rate, anyway=True)),

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, PrivateAttr, Tag, model_validator
 
 from cspr_jax.config.kinds import refuse_other_kinds
 from cspr_jax.config.launch import LaunchTable, Seconds
@@ -31,6 +31,8 @@ Depth = Annotated[
 ]
 
 
+LARGEST_TIME = 1e9
+Vector = Annotated[list[Annotated[float, Field(ge=-1e9, le=1e9)]], Field(min_length=3, max_length=3)]
 Duration = Annotated[
     Annotated[Seconds, Tag("~number")] | Annotated[Literal["least"], Tag("~least")],
     Discriminator(lambda value: "~least" if isinstance(value, str) else "~number"),
@@ -65,6 +67,22 @@ class Pose(Table):
     family: FamilyName | None = Field(
         None, description="family of the segment that ends here, in place of the plan's; not at the first pose"
     )
+    time: Annotated[float, Field(ge=-LARGEST_TIME, le=LARGEST_TIME)] | None = Field(
+        None,
+        description="spline: instant of this pose, s; of a leg's first pose 0 where it is absent. Only differences "
+        "between poses count",
+    )
+    velocity: Vector | None = Field(
+        None,
+        description='spline: velocity at this pose, m/s; of inner poses with interpolation = "hermite" alone; absent: '
+        "as `ends` says",
+    )
+    acceleration: Vector | None = Field(None, description="spline: acceleration at this pose, m/s^2, likewise")
+    motion: str | None = Field(
+        None,
+        min_length=1,
+        description="spline: file of the motion that ends at this pose, in place of poses with times",
+    )
 
 
 class PlanFile(TrajectoryKeys, LimitTable):
@@ -96,13 +114,59 @@ class PlanFile(TrajectoryKeys, LimitTable):
     samples: Annotated[int, Field(ge=2, le=1_000_000)] = Field(
         400, description="number of rows per segment in motion files"
     )
+    motion: str | None = Field(
+        None, min_length=1, description="spline: file of the whole motion, in place of the poses"
+    )
+    interpolation: Literal["cubic", "quintic", "hermite"] | None = Field(
+        None,
+        description='spline: curve through the samples: "cubic" (C2, the default), "quintic" (C4), or "hermite", '
+        "pieces from the velocities, and accelerations, of all samples",
+    )
+    ends: Literal["rest", "natural", "periodic"] | None = Field(
+        None,
+        description='spline: ends of the curve: "rest", the default (velocity 0, of quintics acceleration 0 too), '
+        '"natural" or "periodic"',
+    )
+    smooth: Positive | None = Field(
+        None,
+        description="spline: standard deviation of the noise of a file's positions, m, which a smoothing spline takes "
+        "off",
+    )
     limits: LimitTable | None = Field(
         None, description="[limits], as in a sweep: the same keys as here; give each key in only one of the two places"
     )
     launch: LaunchTable | None = Field(None, description="bezier: [launch] of an object that is released on a segment")
-    pose: Annotated[list[Pose], Field(min_length=2, max_length=10_000)] = Field(
-        description="the poses in their order, at least two [[pose]] tables"
+    stretch: Annotated[float, Field(ge=1e-6, le=1e9)] | None = Field(
+        None, description="spline: factor by which all durations grow (default 1)"
     )
+    pose: Annotated[list[Pose], Field(min_length=2, max_length=10_000)] = Field(
+        description="the poses in their order, at least two [[pose]] tables; absent with `motion`"
+    )
+
+    # Samples and splines by the names of `motion`, in place of files.
+    _sources: dict[str, Any] = PrivateAttr(default_factory=dict)
+
+    def with_source(self, name: str, source: Any) -> "PlanFile":
+        """The plan, with a motion in place of a file.
+
+        Args:
+            name: of the file in the plan.
+            source: samples, as files of motions give them, or a spline.
+
+        Returns:
+            the plan.
+        """
+        plan = self.model_copy()
+        plan._sources = self._sources | {name: source}
+        return plan
+
+    def source(self, name: str) -> Any:
+        """A motion that stands in place of a file.
+
+        Returns:
+            the motion; None: the file is to be read.
+        """
+        return self._sources.get(name)
 
     def family_of(self, segment: int) -> str:
         """Family of a segment.
@@ -122,8 +186,12 @@ class PlanFile(TrajectoryKeys, LimitTable):
 
     @property
     def resulting_poses(self) -> tuple[int, ...]:
-        """Numbers of the poses whose places follow from what else the plan asks: the end of a launch's segment."""
-        return () if self.launch is None else (self.launch.segment + 1,)
+        """Numbers of the poses whose places follow from what else the plan asks: a launch, or files."""
+        launched = () if self.launch is None else (self.launch.segment + 1,)
+        ends = [i for i, pose in enumerate(self.pose) if pose.motion is not None]
+        # The first pose of a leg that begins with a file lies where the file begins.
+        starts = [i - 1 for i in ends if i == 1 or self.family_of(i - 2) != self.family_of(i - 1)]
+        return tuple(sorted({*launched, *ends, *starts}))
 
     @property
     def vectors(self) -> dict[str, list[float] | None]:
@@ -137,6 +205,16 @@ class PlanFile(TrajectoryKeys, LimitTable):
     def tension_rule(self) -> str:
         """Rule that chooses the tensions of redundant cables."""
         return self.tensions or CENTRED
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_one_file(cls, data: Any) -> Any:
+        # A plan of one file is a plan of two poses, which the file decides.
+        if not isinstance(data, dict) or data.get("motion") is None:
+            return data
+        if "pose" in data:
+            raise fault("motion", shown(data["motion"]), "absent beside [[pose]] tables: its file has the whole motion")
+        return data | {"pose": [{}, {"motion": data["motion"]}]}
 
     @model_validator(mode="after")
     def _first_family(self) -> "PlanFile":

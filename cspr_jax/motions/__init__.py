@@ -17,12 +17,15 @@ Files, each importing only from those above it:
     needs               what a motion needs at its worst instants, and what is allowed
     demands             extremes of tensions, heights, lengths and speeds along a motion
     acceleration_sets   feasible accelerations of a point mass
+    cause               a criterion that stands between a motion and feasible
     answers             the record that every family returns
     fewest_limits       the limit that alone refuses a motion
     proved_verdicts     verdicts that rest on a proof
     sampled             answers of motions that are only sampled
     block_slacks        slacks of any motion over blocks of time, from bounds of its states
     time_proof          proof of criteria over the whole time of a motion
+    proved_answers      answers of motions that give bounds of their states
+    stretching          the least uniform stretching of time that is feasible
     blocks              parts of arcs, halved while they are undecided
     enclosures          bounds of a robot's state over a block of time
     cable_rates         speeds and accelerations of cables over blocks

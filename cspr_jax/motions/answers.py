@@ -5,6 +5,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.motions.cause import Cause
 from cspr_jax.schema.columns import Columns
 
 AnyAnswers = TypeVar("AnyAnswers", bound="Answers")
@@ -54,6 +56,18 @@ class Answers(Columns):
             plain values.
         """
         return {}
+
+    def proved_causes(self, i: int, frame: Frame) -> tuple[Cause, ...] | None:
+        """Causes why a segment is not feasible, where the family knows them itself.
+
+        Args:
+            i: number of the segment.
+            frame: of the robot file, in whose axes causes are.
+
+        Returns:
+            the causes, the worst one first; None: they are to be sought along its motion.
+        """
+        return None
 
 
 def joined(parts: list[AnyAnswers]) -> AnyAnswers:

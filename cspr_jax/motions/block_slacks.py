@@ -9,7 +9,7 @@ In natural units (N, m, m/s, m/s^2), in this order, with n cables:
 
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -37,12 +37,27 @@ class Criterion(NamedTuple):
         cables: numbers from 0 on: of one cable, of two that meet, or none.
         unit: of the slack.
         obstacle: number of the obstacle from 0 on; None: no obstacle is concerned.
+        allowed: the least, or the most, that the quantity may be.
+        sense: whether it must be at least or at most so large.
     """
 
     flag: Verdict
     cables: tuple[int, ...]
     unit: str
     obstacle: int | None = None
+    allowed: float = 0.0
+    sense: Literal["least", "most"] = "least"
+
+    def value(self, slack: float) -> float:
+        """Value of the quantity that is bounded.
+
+        Args:
+            slack: (), in `unit`.
+
+        Returns:
+            () likewise.
+        """
+        return self.allowed + slack if self.sense == "least" else self.allowed - slack
 
 
 class BlockSlacks(NamedTuple):
@@ -63,17 +78,24 @@ def criteria(robot: AnyRobot, limits: Limits) -> list[Criterion]:
     Returns:
         n_criteria of them.
     """
-    cables = range(robot.n_cables)
+    numbers = range(robot.n_cables)
     if robot.n_cables > robot.dof:
         rows = [Criterion(Verdict.WRENCH_INFEASIBLE, (), "N")]
     else:
-        rows = [Criterion(Verdict.SLACK_CABLE, (k,), "N") for k in cables]
-        rows += [Criterion(Verdict.OVER_TENSION, (k,), "N") for k in cables if limits.tension_max is not None]
+        low, high = (np.broadcast_to(side, robot.n_cables).tolist() for side in tension_range(robot, limits))
+        rows = [Criterion(Verdict.SLACK_CABLE, (k,), "N", allowed=low[k]) for k in numbers]
+        if limits.tension_max is not None:
+            rows += [Criterion(Verdict.OVER_TENSION, (k,), "N", allowed=high[k], sense="most") for k in numbers]
     for row in limits_set(limits):
-        if row.quantity != "tension":
-            rows += [
-                Criterion(row.flag, each, row.unit) for each in ([(k,) for k in cables] if row.per_cable else [()])
-            ]
+        if row.quantity == "tension":
+            continue
+        values = np.atleast_1d(np.asarray(getattr(limits, row.name), float))
+        values = np.broadcast_to(values, robot.n_cables if row.per_cable else 1).tolist()
+        cables = [(k,) if row.per_cable else () for k in range(len(values))]
+        rows += [
+            Criterion(row.flag, each, row.unit, allowed=value, sense=row.sense)
+            for each, value in zip(cables, values, strict=True)
+        ]
     return rows
 
 

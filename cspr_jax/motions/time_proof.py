@@ -26,6 +26,7 @@ class TimeProof:
     Fields:
         low: (n_criteria,) lower bound of each slack over the whole motion.
         high: (n_criteria,) upper bound of the smallest slack.
+        when: (n_criteria,) an instant within the block in which that bound was found, s.
         failing: for each criterion (m, 2) intervals of time in which it fails throughout, s; as wide as is proved.
         open: for each criterion (m, 2) intervals, none longer than the resolution unless blocks ran out, that are
             undecided.
@@ -34,6 +35,7 @@ class TimeProof:
 
     low: np.ndarray
     high: np.ndarray
+    when: np.ndarray
     failing: list[np.ndarray]
     open: list[np.ndarray]
     blocks: int
@@ -68,13 +70,14 @@ def time_proof(
         start, end = np.concatenate([start[halve], middle]), np.concatenate([middle, end[halve]])
     starts, ends, low, high = (np.concatenate(parts) for parts in zip(*leaves, strict=True))
     starts, ends, low, high, more = _narrowed(slacks, starts, ends, low, high)
-    failing = [_merged(starts, ends, column < 0.0) for column in high.T]
+    failing = [merged(starts, ends, column < 0.0) for column in high.T]
     is_open = ~((low > 0.0) | (high < 0.0))
     return TimeProof(
         low=low.min(0),
         high=high.min(0),
+        when=0.5 * (starts + ends)[high.argmin(0)],
         failing=failing,
-        open=[_merged(starts, ends, column) for column in is_open.T],
+        open=[merged(starts, ends, column) for column in is_open.T],
         blocks=total + more,
     )
 
@@ -102,7 +105,16 @@ def _narrowed(slacks, starts, ends, low, high):
     return starts[order], ends[order], low[order], high[order], more
 
 
-def _merged(starts: np.ndarray, ends: np.ndarray, flags: np.ndarray) -> np.ndarray:
-    # Join neighbouring blocks to intervals.
+def merged(starts: np.ndarray, ends: np.ndarray, flags: np.ndarray) -> np.ndarray:
+    """Join neighbouring blocks to intervals.
+
+    Args:
+        starts: (n,) s, increasing.
+        ends: (n,) s.
+        flags: (n,) whether a block counts.
+
+    Returns:
+        (m, 2) s.
+    """
     edges = np.diff(np.concatenate([[0], flags.astype(int), [0]]))
     return np.stack([starts[edges[:-1] == 1], ends[np.flatnonzero(edges == -1) - 1]], axis=1)

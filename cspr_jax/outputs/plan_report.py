@@ -33,7 +33,7 @@ def plan_object(plan: PlannedMotions) -> dict[str, Any]:
         "total_duration": float(plan.answers.duration.sum()),
         "feasible": plan.feasible,
     }
-    return _finite(fields | {outcome.key: outcome.to_dict() for outcome in plan.outcomes})
+    return finite(fields | {outcome.key: outcome.to_dict() for outcome in plan.outcomes})
 
 
 def verdict_text(verdict: int, feasible: bool) -> str:
@@ -65,6 +65,8 @@ _OF_SOME = (
     "least_duration",
     "control_points",
     "taut_durations",
+    "margin_unit",
+    "failing",
 )
 
 
@@ -102,18 +104,25 @@ def _segment_object(plan: PlannedMotions, i: int) -> dict[str, Any]:
 
 
 def _tension_margin(plan: PlannedMotions, i: int) -> float | None:
-    # The margin of a platform on redundant cables is a multiple of the weight per cable; this one is in N.
+    # The margin of redundant cables is in N, or a multiple of the weight per cable; this one is in N.
     robot = plan.problem.robot
-    if not plan.robot_file.is_platform or robot.n_cables == robot.dof:
+    if not plan.is_redundant:
         return None
+    if plan.details(i).get("margin_unit") == "N":
+        return float(plan.answers.margin[i])
     return float(plan.answers.margin[i] * robot.mass * robot.gravity / robot.n_cables)
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any) -> Any:
+    """Plain values for JSON.
+
+    Returns:
+        the values, with None for numbers that are not finite.
+    """
     if isinstance(value, dict):
-        return {key: _finite(inner) for key, inner in value.items()}
+        return {key: finite(inner) for key, inner in value.items()}
     if isinstance(value, list):
-        return [_finite(inner) for inner in value]
+        return [finite(inner) for inner in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
@@ -158,10 +167,13 @@ def _numbers(segments: list[dict[str, Any]]) -> dict[str, Column]:
     lines = all(segment["active"] is not None for segment in segments)
     beziers = all(segment["control_points"] is not None for segment in segments)
     swings = all(segment["inclination"] is not None for segment in segments)
-    columns = _times() if lines else _durations() if beziers else _counts(swings)
+    proved = all(segment["margin_unit"] == "N" for segment in segments)
+    columns = _times() if lines else _durations() if beziers else _proved() if proved else _counts(swings)
     columns["tension (N)"] = lambda segment: " .. ".join(
         _number(segment[name], ".3f") for name in ("tension_min", "tension_max")
     )
+    if proved:
+        return columns
     if all(segment["tension_margin"] is not None for segment in segments):
         columns["margin (N)"] = _of("tension_margin", ".1f")
     if lines:
@@ -192,6 +204,14 @@ def _durations() -> dict[str, Column]:
         return ", ".join(f"{low} .. {high}" for low, high in ends) or "none"
 
     return {"T (s)": _of("duration", ".4f"), "taut for T (s)": taut, "margin": _two_digits("margin")}
+
+
+def _proved() -> dict[str, Column]:
+    return {
+        "T (s)": _of("duration", ".4f"),
+        "margin (N)": _two_digits("margin"),
+        "proved (N)": _two_digits("margin_bound"),
+    }
 
 
 def _counts(swings: bool) -> dict[str, Column]:

@@ -1,85 +1,20 @@
 """Why segments of a plan are not feasible, in numbers: what each needs, and what is allowed."""
 
-import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.motions.answers import Answers
+from cspr_jax.motions.cause import UNITS, Cause
 from cspr_jax.motions.motion import Motion
 from cspr_jax.motions.needs import Need, needs
 from cspr_jax.motions.problem import Problem
-from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import NO_REASON, Verdict
 
-# Digits that a number has at least, and at most where fewer do not tell it from another one.
-DIGITS, MOST_DIGITS = 3, 12
 # A criterion with a larger slack, without a unit, is met: numbers would not say why.
 MET = 1e-6
-# By flag: what the motion does, in words; {cable} is "cable 1", or "cables 1 and 3".
-_WORDS = {
-    Verdict.SLACK_CABLE: "{cable} has {needed} {unit}{when}, at least {allowed} needed",
-    Verdict.ABOVE_SPOOLS: "{missed} {unit} above the plane of the spools{when}",
-    Verdict.BELOW_FLOOR: "z = {needed} {unit}{when}, the floor is at {allowed}",
-    Verdict.SINGULAR: "the cables cannot carry every wrench{when}",
-    Verdict.CABLE_CABLE: "{cable} touch{when}",
-    Verdict.CABLE_PLATFORM: "a cable touches the platform{when}",
-    Verdict.WRENCH_INFEASIBLE: "the tensions miss their limits by {missed} {unit}{when}",
-    Verdict.UNCERTAINTY: "it stands {allowed} of the uncertainty, {needed} needed",
-}
-UNITS = {row.flag: row.unit for row in LIMITS} | {Verdict.UNCERTAINTY: "1", Verdict.WRENCH_INFEASIBLE: "N"}
-_USUAL = "{cable} needs {needed} {unit}{when}, {allowed} allowed"
-
-
-@dataclasses.dataclass(frozen=True)
-class Cause:
-    """A criterion that stands between a segment and feasible.
-
-    Fields:
-        criterion: name of its flag, as verdicts have it.
-        cables: numbers from 0 on: of one cable, of two that touch, or none.
-        t: when it is broken by most, since the start of the segment, s; NaN where that is not known.
-        needed: what the segment has there, in the axes of the robot file; NaN likewise.
-        allowed: the most, or the least, that it may have.
-        unit: of both; "" where there are none.
-    """
-
-    criterion: str
-    cables: tuple[int, ...] = ()
-    t: float = math.nan
-    needed: float = math.nan
-    allowed: float = math.nan
-    unit: str = ""
-
-    def to_dict(self) -> dict[str, Any]:
-        """The cause as a plan's JSON has it.
-
-        Returns:
-            plain values.
-        """
-        table: dict[str, Any] = {"criterion": self.criterion, "cable": self.cables[0] if self.cables else None}
-        if len(self.cables) > 1:
-            table["cables"] = list(self.cables)
-        return table | {"t": self.t, "needed": self.needed, "allowed": self.allowed, "unit": self.unit or None}
-
-    @property
-    def text(self) -> str:
-        """The cause in words, such as "cable 1 needs 3.07 m/s at t = 0.75 s, 2.5 allowed"."""
-        flag, numbers = Verdict[self.criterion.upper()], " and ".join(str(k + 1) for k in self.cables)
-        if not math.isfinite(self.needed) and flag not in (Verdict.SINGULAR, Verdict.CABLE_PLATFORM):
-            return flag.text.replace("_", " ")
-        needed, allowed = _told_apart(self.needed, self.allowed)
-        return _WORDS.get(flag, _USUAL).format(
-            cable=f"cable{'s' if len(self.cables) > 1 else ''} {numbers}",
-            needed=needed,
-            allowed=allowed,
-            missed=f"{-self.needed:.{DIGITS}g}",
-            unit=self.unit.replace("^2", "²"),
-            when=f" at t = {self.t:.2f} s" if math.isfinite(self.t) else "",
-        )
 
 
 def cause_columns(each: Sequence[tuple[Cause, ...]]) -> dict[str, np.ndarray]:
@@ -119,15 +54,6 @@ def cause_text(columns: Mapping[str, np.ndarray], i: int) -> str:
     return Cause(flag.text, (cable - 1,) if cable else (), t, needed, allowed, UNITS.get(flag, "m")).text
 
 
-def _told_apart(first: float, second: float) -> tuple[str, str]:
-    # Write two numbers with so many digits that they differ.
-    for digits in range(DIGITS, MOST_DIGITS + 1):
-        texts = tuple(f"{value:.{digits}g}" for value in (first, second))
-        if texts[0] != texts[1]:
-            break
-    return texts[0], texts[1]
-
-
 def causes(problem: Problem, frame: Frame, answers: Answers, motions: list[Motion], samples: np.ndarray) -> list:
     """Causes of segments of one family.
 
@@ -141,8 +67,8 @@ def causes(problem: Problem, frame: Frame, answers: Answers, motions: list[Motio
     each = []
     for i, motion in enumerate(motions):
         flags = Verdict(int(answers.verdict[i])) & ~NO_REASON
-        is_known = bool(answers.feasible[i]) or not flags
-        each.append(() if is_known else _of_segment(problem, frame, flags, answers, i, motion, int(samples[i])))
+        known = () if bool(answers.feasible[i]) or not flags else answers.proved_causes(i, frame)
+        each.append(_of_segment(problem, frame, flags, answers, i, motion, int(samples[i])) if known is None else known)
     return each
 
 

@@ -100,6 +100,11 @@ class PlannedMotions:
         return [Placed(motion, self.frame) for leg in self.legs for motion in leg.motions]
 
     @property
+    def is_redundant(self) -> bool:
+        """Tell whether the robot has more cables than degrees of freedom."""
+        return self.problem.robot.n_cables > self.problem.robot.dof
+
+    @property
     def outcome_columns(self) -> dict[str, np.ndarray]:
         """Datasets that the outcomes of the legs add to a motion file."""
         return {name: values for outcome in self.outcomes for name, values in outcome.columns().items()}
@@ -182,7 +187,9 @@ def _points(sequence: PlanLegs, legs: tuple[JoinedLeg, ...], z0: float) -> np.nd
     points = np.array(stops.frame.outward(stops.points(z0)))
     motions = [motion for leg in legs for motion in leg.motions]
     for i in stops.keys.resulting_poses:
-        points[i] = stops.frame.outward(np.asarray(motions[i - 1].state(jnp.asarray(1.0)).position))
+        # The place of the first pose is where the motion begins.
+        segment, end = (i - 1, 1.0) if i else (0, 0.0)
+        points[i] = stops.frame.outward(np.asarray(motions[segment].state(jnp.asarray(end)).position))
     return points
 
 

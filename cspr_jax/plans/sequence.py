@@ -90,9 +90,7 @@ def _check_poses(robot_file: RobotFile, keys: PlanFile, path: Path) -> None:
     if keys.beat is not None and not robot_file.is_platform:
         raise ConfigError(path, f'beat = "{keys.beat}": must be absent for {robot_file.kind}')
     for i, pose in enumerate(keys.pose):
-        timed = [name for name, row in FAMILIES.items() if row.takes_durations]
-        if pose.duration is not None and (i == 0 or keys.family_of(i - 1) not in timed):
-            raise ConfigError(path, f"pose[{i}].duration: must be absent unless family = {either(timed)} leads there")
+        _check_pose_keys(keys, i, path)
         if pose.position is None and not pose.rest and i not in keys.resulting_poses:
             raise ConfigError(path, f"pose[{i}].position is missing: [x, y, z] in m, or rest = true")
         for key in () if robot_file.is_platform else ("tilt_torsion", "quaternion", "beta_hat"):
@@ -100,6 +98,18 @@ def _check_poses(robot_file: RobotFile, keys: PlanFile, path: Path) -> None:
                 raise ConfigError(path, f"pose[{i}].{key}: must be absent for {robot_file.kind}")
         if robot_file.is_planar and pose.position is not None and pose.position[1] != 0.0:
             raise ConfigError(path, f"pose[{i}].position = {shown(pose.position)}: must have y = 0: a planar robot")
+
+
+def _check_pose_keys(keys: PlanFile, i: int, path: Path) -> None:
+    before, after = ({keys.family_of(k)} if 0 <= k < len(keys.pose) - 1 else set() for k in (i - 1, i))
+    for attribute, near, where in (
+        ("pose_keys", before, "leads there"),
+        ("end_keys", before | after, "leads to it or from it"),
+    ):
+        for key in dict.fromkeys(key for row in FAMILIES.values() for key in getattr(row, attribute)):
+            families = [name for name, row in FAMILIES.items() if key in getattr(row, attribute)]
+            if getattr(keys.pose[i], key) is not None and not near & set(families):
+                raise ConfigError(path, f"pose[{i}].{key}: must be absent unless family = {either(families)} {where}")
 
 
 def _check_plane(robot_file: RobotFile, keys: PlanFile, path: Path) -> None:

@@ -59,7 +59,8 @@ def aligned(robot: PlatformRobot) -> tuple[PlatformRobot, np.ndarray]:
     """A robot whose platform axes are parallel to the fixed ones in the reference orientation.
 
     On more cables than degrees of freedom a platform hangs still in many orientations. Its reference orientation is
-    then the one in which its axes are parallel to those of the robot file.
+    then the one in which its axes are parallel to those of the robot file, and so is that of a platform that does not
+    turn about all axes.
 
     Args:
         robot: centred, in any platform axes; jax may be tracing its spools, but not its platform points.
@@ -67,7 +68,7 @@ def aligned(robot: PlatformRobot) -> tuple[PlatformRobot, np.ndarray]:
     Returns:
         the robot, and the rotation (3, 3) from its former axes to the new ones.
     """
-    if robot.n_cables > robot.dof:
+    if robot.n_cables > robot.dof or robot.pattern != "3R3T":
         return robot, np.eye(3)
     if isinstance(robot.base_points, jax.core.Tracer):
         rotation = _traced(robot)

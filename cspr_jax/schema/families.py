@@ -25,7 +25,8 @@ class Family:
         any_cables: patterns of the robots that may have more cables than degrees of freedom.
         is_line: whether its motions are straight lines, in the least time of their law.
         keys: keys of a plan that only this family takes, and others that name them too.
-        takes_durations: whether a pose may give the duration of the segment that ends there.
+        pose_keys: keys of a pose that only this family takes, and others that name them too, if it leads to the pose.
+        end_keys: likewise, if it leads to the pose or from it.
         knows_uncertainty: whether its verdicts take all of an uncertainty into account.
     """
 
@@ -37,7 +38,8 @@ class Family:
     any_cables: tuple[str, ...] = ()
     is_line: bool = False
     keys: tuple[str, ...] = ()
-    takes_durations: bool = False
+    pose_keys: tuple[str, ...] = ()
+    end_keys: tuple[str, ...] = ()
     knows_uncertainty: bool = False
 
     def leg(self, pattern: str) -> Any:
@@ -55,6 +57,8 @@ class Family:
 
 # Time functions of a platform's rotation that take no beta-hat.
 WITHOUT_BETA_HAT = ("beta_0", "beta_1")
+# All rows of `robots.patterns`.
+ANY_PATTERN = ("1T", "2T", "3T", "1R2T", "2R3T", "3R3T", "3R")
 _ROWS = (
     Family(
         "hypocycloid-standard",
@@ -99,7 +103,17 @@ _ROWS = (
         dict.fromkeys(("2T", "3T"), "cspr_jax.beziers.leg:Beziers"),
         rests_anywhere=True,
         keys=("first_control_point", "least"),
-        takes_durations=True,
+        pose_keys=("duration",),
+    ),
+    Family(
+        "spline",
+        "splines through poses at their times, or a file of samples",
+        dict.fromkeys(ANY_PATTERN, "cspr_jax.splines.leg:Splines"),
+        rests_anywhere=True,
+        any_cables=ANY_PATTERN,
+        keys=("motion", "interpolation", "ends", "smooth", "stretch"),
+        pose_keys=("motion",),
+        end_keys=("time", "velocity", "acceleration"),
     ),
 )
 FAMILIES: dict[str, Family] = {row.name: row for row in _ROWS}

@@ -26,7 +26,7 @@ SEGMENT = {
     ),
     "tension_max": ("N", "Largest tension of any cable on the way."),
     "mu_min": ("s-2", "Smallest tension over mass and cable length."),
-    "margin": ("1", "Smallest margin, as `segment_margin` of a motion file; for straight lines in m/s^2."),
+    "margin": ("1", "Smallest margin, as `segment_margin` of a motion file; for straight lines in m/s^2, for splines in N."),
     "margin_bound": ("1", "Proved lower bound of `margin`; null where nothing is proved."),
     "limit_margin": ("1", "Smallest slack of the limits; null without limits."),
     "tolerated": (
@@ -72,6 +72,8 @@ SEGMENT = {
     ),
     "control_points": ("m", "Bezier segments: the three control points."),
     "taut_durations": ("s", "Bezier segments: intervals of durations with all cables taut; null: without end."),
+    "margin_unit": ("", 'Unit of `margin` and `margin_bound` where it is not "1": "N" of splines; null elsewhere.'),
+    "failing": ("s", "Splines: intervals of time in which the segment fails, since its start; null elsewhere."),
 }
 LAUNCH = {
     "segment": ("1", "Number of the segment on which the object is released, from 0 on."),
@@ -91,4 +93,38 @@ SCATTER = {
     "mean_error": ("m", "Mean distance from the target."),
     "standard_deviation": ("m", "Standard deviation of the distance from the target."),
     "largest_error": ("m", "Largest distance from the target."),
+}
+# Of the object that `cspr check --json` prints.
+CHECK = {
+    "schema": ("1", "Version of these fields."),
+    "robot": ("", "Name of the robot."),
+    "verdict": ("", '"feasible" (proved), "undecided", or names of flags joined by "+" (verdicts, below).'),
+    "feasible": ("", "Whether the motion is proved feasible."),
+    "duration": ("s", "Duration."),
+    "margin": ("N", "Smallest distance of a tension from its limits; of redundant cables the largest that all can keep."),
+    "margin_unit": ("", '"N".'),
+    "margin_bound": ("N", "Proved lower bound of `margin`; null where nothing is proved."),
+    "limit_margin": ("1", "Smallest slack of the other limits, over the limit; null without limits."),
+    "cause": ("", "As of a segment of a plan; empty where the motion is feasible."),
+    "failing": ("s", "All intervals of time in which the motion fails, to 1e-6 s; of a function from sample to sample."),
+    "tension_min": ("N", "Smallest tension of any cable, as of a segment of a plan."),
+    "tension_max": ("N", "Largest tension of any cable, likewise."),
+    "tension_margin": ("N", "Redundant cables: `margin`; else null."),
+    "cable_length_max": ("m", "Largest length of any cable."),
+    "cable_speed_max": ("m s-1", "Largest speed of any cable."),
+    "cable_acceleration_max": ("m s-2", "Largest acceleration of any cable."),
+    "z_lowest": ("m", "z of the lowest place."),
+    "demands": (
+        "",
+        "By limit or condition: `value` of the worst cable, `bound` that is proved for all, what is `allowed`, `unit`, "
+        "`cable` (from 0 on; null: none) and `t`, s.",
+    ),
+    "interpolation": ("", '"cubic", "quintic", "hermite", "pieces" (polynomials), or "function" (sampled).'),
+    "ends": ("", '"rest", "natural" or "periodic"; null where the motion has its own ends.'),
+    "blocks": ("1", "Number of blocks of time that were looked at."),
+    "slower": (
+        "",
+        "With --slower: `factor` by which time is stretched (null: none is feasible), `static` (whether the robot can "
+        "stand still at every place), `check` of the stretched motion.",
+    ),
 }

@@ -12,4 +12,7 @@ Files, each importing only from those above it:
     blocks              bounds of states over blocks of time
     motion              positions and rotations over time
     interpolation       cubic, quintic and Hermite curves through samples
+    files               motions of files and arrays, in the axes of the kernels
+    functions           motions that are functions of time
+    leg                 poses at their times, and files, as a leg of plans
 """

@@ -5,6 +5,8 @@ quintic from accelerations too. Quaternions are made continuous in sign, interpo
 afterwards; where positions are Hermite pieces, quaternions are a spline of the same degree.
 """
 
+import dataclasses
+
 import numpy as np
 from scipy.interpolate import BPoly, BSpline, CubicSpline, PPoly, make_interp_spline
 
@@ -27,7 +29,8 @@ def interpolated(
     accelerations: np.ndarray | None = None,
     interpolation: str = "cubic",
     ends: str = "rest",
-    z0: float = 1.0,
+    end_velocities: np.ndarray | None = None,
+    end_accelerations: np.ndarray | None = None,
 ) -> Spline:
     """Motion through samples.
 
@@ -40,7 +43,8 @@ def interpolated(
         interpolation: one of `INTERPOLATIONS`.
         ends: of splines, one of `ENDS`: "rest" (velocity 0 of cubics, acceleration too of quintics), "natural" (the
             derivatives that the degree leaves over are 0) or "periodic".
-        z0: depth at which slacks are normalised, m.
+        end_velocities: (2, 3) at the first and the last sample, m/s, NaN where `ends` decides; of splines alone.
+        end_accelerations: (2, 3) likewise, m/s^2; of quintics alone, and only where there are velocities.
 
     Returns:
         the motion.
@@ -58,12 +62,14 @@ def interpolated(
     since = times - times[0]
     if velocities is None:
         degree = 3 if interpolation == "cubic" else 5
-        table = _spline(since, np.asarray(positions, float), degree, ends)
+        prescribed = [np.full((2, 3), np.nan) if x is None else x for x in (end_velocities, end_accelerations)]
+        table = _spline(since, np.asarray(positions, float), degree, ends, np.stack(prescribed, axis=1))
     else:
         degree = 3 if accelerations is None else 5
         table = _hermite(since, [positions, velocities] + ([] if accelerations is None else [accelerations]))
     turning = None if quaternions is None else _spline(since, continuous(np.asarray(quaternions, float)), degree, ends)
-    return Spline(leaf(since), leaf(table), None if turning is None else leaf(turning), leaf(z0))
+    curve = Spline(leaf(since), leaf(table), None if turning is None else leaf(turning))
+    return dataclasses.replace(curve, interpolation=interpolation, ends="" if interpolation == "hermite" else ends)
 
 
 def continuous(quaternions: np.ndarray) -> np.ndarray:
@@ -118,14 +124,32 @@ def _check_closed(values: np.ndarray, name: str) -> None:
         raise InputError("ends", "periodic", f"another one where the last {name} is not the first")
 
 
-def _spline(times: np.ndarray, values: np.ndarray, degree: int, ends: str) -> np.ndarray:
-    # Bernstein coefficients of each piece, (n - 1, degree + 1, width).
+def _spline(
+    times: np.ndarray, values: np.ndarray, degree: int, ends: str, derivatives: np.ndarray | None = None
+) -> np.ndarray:
+    # Bernstein coefficients of each piece, (n - 1, degree + 1, width); derivatives (2, 2, width) of first and second
+    # order at both ends, NaN where `ends` decides.
     if ends == "periodic":
         return _periodic(times, values, degree)
+    if derivatives is None:
+        derivatives = np.full((2, 2, values.shape[1]), np.nan)
+    still = np.zeros(values.shape[1])
+    free = [(2, still)] if degree == 3 else [(3, still), (4, still)]
+    conditions = []
+    for end in derivatives:
+        known = [(order, value) for order, value in zip((1, 2), end, strict=True) if not np.isnan(value).any()]
+        rest = [(order, still) for order in (1, 2)]
+        usual = rest if ends == "rest" else free
+        # The highest orders that are free fill what is not known.
+        conditions.append((known + [row for row in usual if row[0] not in dict(known)])[: degree // 2])
     if degree == 3:
-        return _pieces(CubicSpline(times, values, bc_type="clamped" if ends == "rest" else "natural"))
-    still = [(order, np.zeros(values.shape[1])) for order in ((1, 2) if ends == "rest" else (3, 4))]
-    return _quintic(times, make_interp_spline(times, values, degree, bc_type=(still, still)))
+        return _pieces(CubicSpline(times, values, bc_type=(conditions[0][0], conditions[1][0])))
+    return _quintic(
+        times,
+        make_interp_spline(
+            times, values, degree, bc_type=tuple(sorted(rows, key=lambda row: row[0]) for rows in conditions)
+        ),
+    )
 
 
 def _periodic(times: np.ndarray, values: np.ndarray, degree: int) -> np.ndarray:

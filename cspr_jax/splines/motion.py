@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -9,12 +10,12 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic import rotations
+from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.robots.state import State
 from cspr_jax.robots.state_bounds import StateBounds
 from cspr_jax.splines.blocks import spline_bounds
 
 
-@jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class Spline:
     """Piecewise polynomial motion; see `motions.motion.Motion`.
@@ -25,12 +26,16 @@ class Spline:
         quaternion: (m, degree + 1, 4) likewise, scalar first, continuous; their length is of no account, but not zero;
             None for a point mass.
         z0: () depth at which slacks are normalised, m.
+        interpolation: how its samples were joined, one of `splines.interpolation.INTERPOLATIONS`, or "pieces".
+        ends: of the same, or "".
     """
 
     knots: Array
     position: Array
     quaternion: Array | None
-    z0: Array
+    z0: Any = dataclasses.field(default_factory=lambda: leaf(1.0))
+    interpolation: str = "pieces"
+    ends: str = ""
 
     def duration(self) -> Array:
         """Duration; see `Motion.duration`."""
@@ -46,8 +51,19 @@ class Spline:
         position, velocity, acceleration = _values(jnp.asarray(self.position)[piece], share, width)
         if self.quaternion is None:
             return State(position, velocity, acceleration)
-        turning = _turning(*_values(jnp.asarray(self.quaternion)[piece], share, width))
+        turning = turning_of(*_values(jnp.asarray(self.quaternion)[piece], share, width))
         return State(position, velocity, acceleration, *turning)
+
+    def stretched(self, factor: float) -> "Spline":
+        """The motion run more slowly, or faster.
+
+        Args:
+            factor: by which its duration grows.
+
+        Returns:
+            the motion; NumPy leaves.
+        """
+        return dataclasses.replace(self, knots=leaf(np.asarray(self.knots) * factor))
 
     def breaks(self) -> Array:
         """Breaks; see `Motion.breaks`."""
@@ -57,6 +73,29 @@ class Spline:
         """Bounds of the states; see `BoundedMotion.bounds`."""
         quaternion = None if self.quaternion is None else np.asarray(self.quaternion)
         return spline_bounds(np.asarray(self.knots), np.asarray(self.position), quaternion, start, end)
+
+
+jax.tree_util.register_dataclass(
+    Spline, ["knots", "position", "quaternion", "z0"], [], drop_fields=["interpolation", "ends"]
+)
+
+
+def part(spline: Spline, first: int, last: int) -> Spline:
+    """Consecutive pieces of a spline, as a motion of its own.
+
+    Args:
+        spline: NumPy leaves.
+        first: number of the first piece.
+        last: number behind the last piece.
+
+    Returns:
+        the motion.
+    """
+    knots = spline.knots[first : last + 1]
+    turning = None if spline.quaternion is None else spline.quaternion[first:last]
+    return dataclasses.replace(
+        spline, knots=leaf(knots - knots[0]), position=spline.position[first:last], quaternion=turning
+    )
 
 
 def _values(coefficients: Array, share: Array, width: Array) -> tuple[Array, Array, Array]:
@@ -74,8 +113,17 @@ def _bernstein(coefficients: Array, share: Array) -> Array:
     return coefficients.sum(0)
 
 
-def _turning(quaternion: Array, first: Array, second: Array) -> tuple[Array, Array, Array, Array]:
-    # Rotation, angular velocity and acceleration, and unit quaternion; as in `arithmetic.rotation_bounds`.
+def turning_of(quaternion: Array, first: Array, second: Array) -> tuple[Array, Array, Array, Array]:
+    """Rotation of a quaternion that is normalised afterwards; as in `arithmetic.rotation_bounds`.
+
+    Args:
+        quaternion: (4,) scalar first, of any length but zero.
+        first: (4,) its derivative, 1/s.
+        second: (4,) the second one, 1/s^2.
+
+    Returns:
+        rotation (3, 3), angular velocity (3,) rad/s, angular acceleration (3,) rad/s^2, unit quaternion (4,).
+    """
     square = jnp.dot(quaternion, quaternion)
     unit = quaternion / jnp.sqrt(square)
     rotation = rotations.matrix(unit)

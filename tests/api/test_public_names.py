@@ -26,6 +26,7 @@ FUNCTIONS = {
     "verify": ("verify",),
     "volume": ("workspace_volume",),
     "plan": ("plan",),
+    "check": ("check",),
     "replay": ("replay",),
     "plot": ("plot", "open_result"),
     "report": ("report",),
@@ -53,13 +54,15 @@ def test_every_command_has_its_function():
     for name in FUNCTIONS:
         parser = commands()[name]
         functions = [getattr(cspr_jax, function) for function in FUNCTIONS[name]]
-        functions += [plans.Plan.save, plans.Plan.save_mjcf, plans.Plan.animate] if name == "plan" else []
+        files = [plans.Plan.save, plans.Plan.save_mjcf, plans.Plan.animate]
+        functions += files if name in ("plan", "check") else []
         functions += [cspr_jax.Replay.plot] if name == "replay" else []
         functions += [cspr_jax.ImportedRobot.save] if name == "import" else []
         known = {parameter for function in functions for parameter in inspect.signature(function).parameters}
         own = NAMES | {
             "run": {"output": "directory"},
             "plan": {"output": "path", "mjcf": "path", "animate": "path"},
+            "check": {"output": "path", "mjcf": "path", "animate": "path", "motion": "times", "slower": "slower"},
         }.get(name, {})
         own |= {"name": "names", "output": "folder"} if name == "examples" else {}
         own |= {"names": "names"} if name == "robots" else {}
@@ -67,6 +70,7 @@ def test_every_command_has_its_function():
         own |= {"result": "given", "cell": "cells"} if name == "report" else {}
         own |= {"plan": "plan"} if name in ("plot", "report") else {}
         own |= {"file": "path", "set": "cable_set", "output": "path"} if name == "import" else {}
+        known |= {"slower"} if name == "check" else set()  # a method of what is checked
         options = {action.dest for action in parser._actions} - PRINTING
         assert {own.get(option, option) for option in options} <= known, name
 

@@ -73,3 +73,12 @@ def test_everything_that_a_plan_writes_is_in_the_reference(tmp_path, reference, 
     if "launch" in whole:
         assert set(whole["launch"]) == fields_of(text, "`launch`:")
         assert set(whole["launch"]["scatter"]) == fields_of(text, "Its `scatter`:")
+
+
+def test_everything_that_a_check_writes_is_in_the_reference(reference):
+    """Of a motion that fails, slowed down."""
+    places = [[0.0, 0.0, 1.0], [0.1, 0.05, 0.9], [0.0, 0.0, 1.0]]
+    check = cspr_jax.check("prototype", [0.0, 2.0, 4.0], places, limits={"cable_speed_max": 0.06})
+    known = fields_of(reference, "The object of `cspr check --json`:")
+    assert set(check.to_dict()) == known - {"slower"}
+    assert set(check.slower().to_dict()) == {"factor", "static", "check"}

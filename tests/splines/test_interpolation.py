@@ -113,3 +113,23 @@ def test_samples_that_are_none(change, words):
     with pytest.raises(InputError) as error:
         interpolated(**{"times": TIMES, "positions": PLACES} | change)
     assert words in str(error.value) and "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("ends", ["rest", "natural"])
+def test_derivatives_at_ends(ends):
+    """Those that are prescribed hold at their end alone; `ends` decides about what is left."""
+    velocity, acceleration = np.array([0.3, -1.0, 2.0]), np.array([1.0, 4.0, -2.0])
+    nothing = np.full(3, np.nan)
+    cubic = interpolated(TIMES, PLACES, ends=ends, end_velocities=np.stack([velocity, nothing]))
+    condition = (1, np.zeros(3)) if ends == "rest" else (2, np.zeros(3))
+    check_same(cubic, CubicSpline(TIMES, PLACES, bc_type=((1, velocity), condition)))
+    quintic = interpolated(
+        TIMES,
+        PLACES,
+        interpolation="quintic",
+        ends=ends,
+        end_velocities=np.stack([nothing, velocity]),
+        end_accelerations=np.stack([nothing, acceleration]),
+    )
+    others = [(order, np.zeros(3)) for order in ((1, 2) if ends == "rest" else (3, 4))]
+    check_same(quintic, make_interp_spline(TIMES, PLACES, 5, bc_type=(others, [(1, velocity), (2, acceleration)])))

@@ -1,0 +1,255 @@
+"""Checks of motions from Python: is a motion within the limits of a robot, at every instant, and if not, where?"""
+
+import dataclasses
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+
+from cspr_jax.api.argument_checks import checked
+from cspr_jax.api.check_keys import NAME, check_keys
+from cspr_jax.api.plans import Plan
+from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.arithmetic.frames import frame_of
+from cspr_jax.build.robots import build_robot
+from cspr_jax.config.plan import PlanFile, plan_keys
+from cspr_jax.config.robot import resolve_robot
+from cspr_jax.errors import InputError
+from cspr_jax.motions.motion import Placed
+from cspr_jax.motions.proved_answers import MotionProof, proof_of
+from cspr_jax.motions.stretching import least_stretching
+from cspr_jax.outputs import check_report
+from cspr_jax.plans import planning
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.limits import Limits
+from cspr_jax.splines.files import reference_of, samples_of
+from cspr_jax.splines.functions import FunctionMotion, function_motion
+from cspr_jax.splines.motion import Spline
+
+
+@dataclasses.dataclass(frozen=True)
+class Check:
+    """A motion that was checked.
+
+    Fields:
+        plan: the motion as a plan of one segment, from which files, films and models of it are written.
+    """
+
+    plan: Plan
+
+    @cached_property
+    def _object(self) -> dict[str, Any]:
+        with double_precision():
+            return check_report.check_object(self.plan)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The check as plain values, for JSON.
+
+        Returns:
+            what `cspr check --json` prints.
+        """
+        return self._object
+
+    def to_table(self) -> Any:
+        """The check as the table that `cspr check` prints.
+
+        Returns:
+            a table of the package rich.
+        """
+        return check_report.check_table(self.plan)
+
+    def lines(self) -> list[str]:
+        """The verdict as text.
+
+        Returns:
+            the lines that `cspr check` prints above its table.
+        """
+        return check_report.check_lines(self.plan)
+
+    @property
+    def verdict(self) -> str:
+        """Verdict: "feasible" (proved), "undecided", or names of flags joined by "+"."""
+        return self._object["verdict"]
+
+    @property
+    def feasible(self) -> bool:
+        """Tell whether the motion is proved feasible."""
+        return self.plan.feasible
+
+    @property
+    def duration(self) -> float:
+        """Duration, s."""
+        return float(self.plan.answers.duration[0])
+
+    @property
+    def margin(self) -> float:
+        """Smallest distance of a tension from its limits, N; of redundant cables the largest that all can keep."""
+        return float(self.plan.answers.margin[0])
+
+    @property
+    def margin_bound(self) -> float:
+        """Proved lower bound of `margin`, N."""
+        return float(self.plan.answers.margin_bound[0])
+
+    @property
+    def cause(self) -> list[dict[str, Any]]:
+        """Causes why the motion is not feasible, the worst one first."""
+        return self._object["cause"]
+
+    @property
+    def failing(self) -> np.ndarray:
+        """Intervals of time in which the motion fails, (m, 2) s."""
+        return self._proof.failing
+
+    @property
+    def demands(self) -> dict[str, dict[str, Any]]:
+        """Largest demand on each limit: value, proved bound, what is allowed, cable and instant."""
+        return self._object["demands"]
+
+    @property
+    def _proof(self) -> MotionProof:
+        return check_report.shown_proof(self.plan)
+
+    def slower(self) -> "Stretched":
+        """Find the least uniform stretching of time with which the motion is feasible.
+
+        Returns:
+            the factor, and the check of the motion that it stretches.
+        """
+        with double_precision():
+            motion = cast(Spline, self.plan.legs[0].motions[0])
+            if not hasattr(motion, "stretched") or not hasattr(motion, "bounds"):
+                raise InputError("motion", type(motion).__name__, "a spline or a file: of others nothing is proved")
+            least = least_stretching(lambda factor: proof_of(self.plan.problem, motion.stretched(factor)))
+            if not np.isfinite(least.factor):
+                return Stretched(np.nan, least.is_static, None)
+            factor = least.factor * (self.plan.keys.stretch or 1.0)
+            return Stretched(
+                least.factor, least.is_static, _check_of(self.plan.keys.model_copy(update={"stretch": factor}))
+            )
+
+
+class Stretched(NamedTuple):
+    """Motion that was slowed down uniformly.
+
+    Fields:
+        factor: by which its duration grew; 1: it was feasible; NaN: no stretching is feasible.
+        is_static: whether the robot can stand still at every place of the motion, so that some stretching is feasible.
+        check: check of the stretched motion, or None.
+    """
+
+    factor: float
+    is_static: bool
+    check: Check | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """The stretching as plain values, for JSON.
+
+        Returns:
+            "factor", null if no stretching is feasible, "static" and the "check" of the stretched motion, or null.
+        """
+        factor = self.factor if np.isfinite(self.factor) else None
+        return {"factor": factor, "static": self.is_static, "check": self.check and self.check.to_dict()}
+
+    def lines(self) -> list[str]:
+        """The stretching as text.
+
+        Returns:
+            the lines that `cspr check --slower` prints.
+        """
+        if self.check is None:
+            why = "" if self.is_static else ", since the robot cannot stand still at every place of it"
+            return [f"no uniform stretching of time makes it feasible{why}"]
+        return [
+            f"{self.factor:.7g} times slower, in {self.check.duration:.7g} s, it is feasible, proved; "
+            "one part in a million faster it is not proved"
+        ]
+
+
+@checked
+def check(  # noqa: PLR0913
+    robot: AnyRobot | str | Path,
+    times,
+    positions=None,
+    quaternions=None,
+    *,
+    velocities=None,
+    accelerations=None,
+    interpolation: str | None = None,
+    ends: str | None = None,
+    smooth: float | None = None,
+    duration: float | None = None,
+    limits: Limits | Mapping[str, Any] | None = None,
+) -> Check:
+    """Check a motion against the limits of a robot, at every instant, with a proof.
+
+    Args:
+        robot: a robot, the name of one of the catalogue, or the path of a robot file.
+        times: (n,) increasing, s; or, in place of times and positions, the path of a file, a spline of SciPy or a
+            function of jax whose values are positions (3,), of a platform also with quaternions behind them (7,), or a
+            motion of this package. Functions are only sampled: they are refuted, or undecided.
+        positions: (n, 3) of the mass centre, in the axes of the robot, m.
+        quaternions: (n, 4) orientations of the platform, scalar first; None: its own axes.
+        velocities: (n, 3) m/s, for Hermite pieces.
+        accelerations: (n, 3) m/s^2, likewise.
+        interpolation: "cubic", "quintic" or "hermite"; None: as the file says, else "hermite" with velocities, "cubic"
+            without.
+        ends: "rest", "natural" or "periodic"; None: as the file says, else "rest".
+        smooth: standard deviation of the noise of positions, m, which a smoothing spline takes off; None: 0.
+        duration: of a function, s; None: anything else.
+        limits: override those of the robot, one by one; a dictionary may hold all keys of [limits] of a plan.
+
+    Returns:
+        the check, feasible or not.
+
+    Raises:
+        ConfigError: a mistake in a file.
+        InputError: samples that make no motion, or an impossible argument.
+    """
+    keys = check_keys(robot, limits, interpolation=interpolation, ends=ends, smooth=smooth)
+    with double_precision():
+        if isinstance(times, str | Path):
+            return _check_of(plan_keys(keys | {"motion": str(times)}, NAME))
+        plan = plan_keys(keys, NAME)
+        if positions is not None:
+            source: Any = samples_of(times, positions, quaternions, velocities, accelerations)
+        elif hasattr(times, "state") or hasattr(times, "x") or hasattr(times, "t"):
+            source = times
+        else:
+            source = _function(times, duration, plan)
+        return _check_of(plan.with_source(str(NAME), source))
+
+
+def check_file(motion: Path, keys: Mapping[str, Any]) -> Check:
+    """Check the motion of a file.
+
+    Args:
+        keys: of a plan: its robot, and what else it has but the motion.
+
+    Returns:
+        the check, feasible or not.
+
+    Raises:
+        ConfigError: a mistake in a file.
+    """
+    with double_precision():
+        return _check_of(plan_keys({"schema": 1, "family": "spline", "motion": str(motion), **keys}, motion))
+
+
+def _check_of(keys: PlanFile) -> Check:
+    planned = planning.plan_of(keys, NAME)
+    fields = {field.name: getattr(planned, field.name) for field in dataclasses.fields(planned)}
+    return Check(Plan(**fields))
+
+
+def _function(function: Any, duration: float | None, keys: PlanFile) -> Placed[FunctionMotion]:
+    if not callable(function):
+        raise InputError("positions", None, "needed with instants: (n, 3) m")
+    if duration is None:
+        raise InputError("duration", None, "needed with a function: s")
+    file = resolve_robot(keys.robot, NAME, Path())
+    frame, reference = frame_of(file.base_points, file.z_axis), reference_of(build_robot(file, keys, NAME))
+    motion = function_motion(function, duration, frame=frame, reference=reference, is_platform=file.is_platform)
+    return Placed(motion, frame)

@@ -1,0 +1,111 @@
+"""Checks of many motions of one robot from Python."""
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cspr_jax.api.argument_checks import checked
+from cspr_jax.api.check_keys import NAME, check_keys
+from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.arithmetic.frames import frame_of
+from cspr_jax.build.problems import build_problem
+from cspr_jax.build.robots import build_robot
+from cspr_jax.config.equivalents import as_moved
+from cspr_jax.config.plan import plan_keys
+from cspr_jax.config.robot import resolve_robot
+from cspr_jax.errors import InputError
+from cspr_jax.motions.cause import Cause
+from cspr_jax.motions.proved_answers import proved_answers
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.limits import Limits
+from cspr_jax.schema.columns import Columns
+from cspr_jax.schema.families import FAMILIES
+from cspr_jax.splines.files import placed_inward, reference_of, samples_of, source_spline
+
+
+@dataclasses.dataclass(frozen=True)
+class ManyChecks(Columns):
+    """Checks of n motions of one robot.
+
+    Fields:
+        verdict: (n,) `Verdict` flags; 0 is feasible, proved.
+        duration: (n,) s.
+        margin: (n,) smallest distance of a tension from its limits, N, as of `Check`.
+        margin_bound: (n,) proved lower bound of the margin, N.
+        limit_margin: (n,) smallest slack of other limits, over the limit; inf without any.
+        failing: n arrays (m, 2) of intervals of time in which each fails, s.
+        causes: for each motion why it is not feasible, the worst cause first.
+    """
+
+    verdict: np.ndarray
+    duration: np.ndarray
+    margin: np.ndarray
+    margin_bound: np.ndarray
+    limit_margin: np.ndarray
+    failing: list[np.ndarray]
+    causes: list[tuple[Cause, ...]]
+
+    @property
+    def feasible(self) -> np.ndarray:
+        """Tell whether each motion is feasible, (n,): proved."""
+        return self.verdict == 0
+
+
+@checked
+def check_many(
+    robot: AnyRobot | str | Path,
+    times,
+    positions,
+    quaternions=None,
+    *,
+    velocities=None,
+    accelerations=None,
+    interpolation: str | None = None,
+    ends: str | None = None,
+    limits: Limits | Mapping[str, Any] | None = None,
+) -> ManyChecks:
+    """Check many motions of one robot; see `check`.
+
+    Args:
+        robot: a robot, the name of one of the catalogue, or the path of a robot file.
+        times: (n,) of all motions, or (k, n) increasing, s.
+        positions: (k, n, 3) of the mass centre, in the axes of the robot, m.
+        quaternions: (k, n, 4) orientations of the platform, scalar first; None: its own axes.
+        velocities: (k, n, 3) m/s, for Hermite pieces.
+        accelerations: (k, n, 3) m/s^2, likewise.
+        interpolation: "cubic", "quintic" or "hermite"; None: "hermite" with velocities, "cubic" without.
+        ends: "rest", "natural" or "periodic"; None: "rest".
+        limits: override those of the robot, as for `check`.
+
+    Returns:
+        the checks.
+
+    Raises:
+        InputError: samples that make no motion, or an impossible argument.
+    """
+    keys = plan_keys(check_keys(robot, limits, interpolation=interpolation, ends=ends), NAME)
+    columns = (positions, quaternions, velocities, accelerations)
+    count = len(np.asarray(positions))
+    instants = np.broadcast_to(np.asarray(times, float), (count, np.shape(times)[-1]))
+    with double_precision():
+        file = as_moved(resolve_robot(keys.robot, NAME, Path()), [FAMILIES["spline"].legs])
+        problem = build_problem(file, keys, keys, NAME, any_cables=True)
+        axes = frame_of(file.base_points, file.z_axis)
+        reference = reference_of(build_robot(file, keys, NAME))
+        settings: dict[str, Any] = {"z_axis": file.z_axis, "is_platform": file.is_platform}
+        settings |= {"interpolation": interpolation, "ends": ends}
+        motions = []
+        for i in range(count):
+            samples = samples_of(instants[i], *(None if column is None else column[i] for column in columns))
+            try:
+                motions.append(placed_inward(source_spline(samples, **settings), axes, reference))
+            except InputError as error:
+                raise InputError(f"motion {i}, {error.key}", error.value, error.allowed, fault=error.fault) from error
+        answers = proved_answers(problem, motions)
+    names = ("verdict", "duration", "margin", "margin_bound", "limit_margin")
+    arrays = {name: getattr(answers, name) for name in names}
+    causes = [() if answers.feasible[i] else answers.proved_causes(i, axes) for i in range(count)]
+    return ManyChecks(**arrays, failing=[proof.failing for proof in answers.proof], causes=causes)

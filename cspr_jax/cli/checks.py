@@ -1,0 +1,103 @@
+"""Command about a motion of the user's own: check."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from cspr_jax.cli.command import (
+    Command,
+    add_all_errors,
+    add_device,
+    add_json,
+    prepare_jax,
+    print_json,
+    print_line,
+    print_table,
+    warn,
+)
+from cspr_jax.cli.plans import add_files, check_files, write_files
+from cspr_jax.errors import ConfigError, ExitCode
+from cspr_jax.runtime.progress import waiting
+
+
+def _add_check(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("motion", type=Path, help="motion: samples (CSV, HDF5), or trajectories of CASPR (XML)")
+    parser.add_argument("--robot", required=True, help="a catalogue name, or the path of a robot file")
+    parser.add_argument(
+        "--limits", type=Path, metavar="FILE", help="limits (TOML), with the keys of [limits] of a plan"
+    )
+    parser.add_argument(
+        "--interpolation",
+        choices=("cubic", "quintic", "hermite"),
+        help="curve through the samples (default: as the file says, else hermite with velocities, cubic without)",
+    )
+    parser.add_argument(
+        "--ends",
+        choices=("rest", "natural", "periodic"),
+        help="ends of the curve (default: as the file says, else rest)",
+    )
+    parser.add_argument(
+        "--smooth", type=float, metavar="SD", help="take off noise of the positions of this standard deviation, m"
+    )
+    parser.add_argument(
+        "--slower",
+        action="store_true",
+        help="find the least uniform stretching of time that is feasible, and check what it stretches",
+    )
+    add_json(parser)
+    add_files(parser, "400 rows", "write the motion even if it is not feasible")
+    add_all_errors(parser)
+    add_device(parser, quick=True)
+
+
+def _keys(options: argparse.Namespace) -> dict[str, Any]:
+    from cspr_jax.config.limits import LimitTable
+    from cspr_jax.config.reading import checked, read_toml
+
+    if options.smooth is not None and not 0.0 < options.smooth < float("inf"):
+        raise ConfigError("--smooth", f"{options.smooth}: must be a number > 0, in m")
+    keys = {name: getattr(options, name) for name in ("interpolation", "ends", "smooth")}
+    keys = {name: value for name, value in keys.items() if value is not None} | {"robot": options.robot}
+    if options.limits is not None:
+        limits = read_toml(options.limits)
+        checked(LimitTable, limits, options.limits)
+        keys["limits"] = limits
+    return keys
+
+
+def _check(options: argparse.Namespace) -> int:
+    check_files(options)
+    keys = _keys(options)
+    with waiting():
+        prepare_jax(options, quick=True)
+        from cspr_jax.api import checks
+
+        check = checks.check_file(options.motion, keys)
+        slower = check.slower() if options.slower and not check.feasible else None
+    for line in check.plan.warnings:
+        warn(line)
+    shown = check if slower is None or slower.check is None else slower.check
+    try:
+        write_files(shown.plan, options)
+    finally:
+        _print(options, check, slower)
+    return ExitCode.DONE if shown.feasible else ExitCode.NOT_FEASIBLE
+
+
+def _print(options: argparse.Namespace, check: Any, slower: Any) -> None:
+    if options.json:
+        print_json(check.to_dict() if slower is None else check.to_dict() | {"slower": slower.to_dict()})
+        return
+    for line in check.lines():
+        print_line(line)
+    print_table(check.to_table())
+    if slower is not None:
+        for line in slower.lines():
+            print_line(line)
+        if slower.check is not None:
+            print_table(slower.check.to_table())
+
+
+COMMANDS = (
+    Command("check", "check a motion of your own against the limits of a robot, with a proof", _add_check, _check),
+)

@@ -1,0 +1,89 @@
+"""Cause: a criterion that stands between a motion and feasible, in numbers."""
+
+import dataclasses
+import math
+from typing import Any
+
+from cspr_jax.schema.limits import LIMITS
+from cspr_jax.schema.verdicts import Verdict
+
+# Digits that a number has at least, and at most where fewer do not tell it from another one.
+DIGITS, MOST_DIGITS = 3, 12
+# By flag: what the motion does, in words; {cable} is "cable 1", or "cables 1 and 3".
+_WORDS = {
+    Verdict.SLACK_CABLE: "{cable} has {needed} {unit}{when}, at least {allowed} needed",
+    Verdict.ABOVE_SPOOLS: "{missed} {unit} above the plane of the spools{when}",
+    Verdict.BELOW_FLOOR: "z = {needed} {unit}{when}, the floor is at {allowed}",
+    Verdict.SINGULAR: "the cables cannot carry every wrench{when}",
+    Verdict.CABLE_CABLE: "{cable} touch{when}",
+    Verdict.OBSTACLE: "{body} is {needed} {unit} from {obstacle}{when}, at least {allowed} needed",
+    Verdict.CABLE_PLATFORM: "a cable touches the platform{when}",
+    Verdict.WRENCH_INFEASIBLE: "the tensions miss their limits by {missed} {unit}{when}",
+    Verdict.UNDECIDED: "neither proved nor refuted{when}: {needed} {unit}, and {allowed} {unit} is the limit",
+    Verdict.UNCERTAINTY: "it stands {allowed} of the uncertainty, {needed} needed",
+}
+UNITS = {row.flag: row.unit for row in LIMITS} | {Verdict.UNCERTAINTY: "1", Verdict.WRENCH_INFEASIBLE: "N"}
+_USUAL = "{cable} needs {needed} {unit}{when}, {allowed} allowed"
+
+
+@dataclasses.dataclass(frozen=True)
+class Cause:
+    """A criterion that stands between a segment and feasible.
+
+    Fields:
+        criterion: name of its flag, as verdicts have it.
+        cables: numbers from 0 on: of one cable, of two that touch, or none.
+        t: when it is broken by most, since the start of the segment, s; NaN where that is not known.
+        needed: what the segment has there, in the axes of the robot file; NaN likewise.
+        allowed: the most, or the least, that it may have.
+        unit: of both; "" where there are none.
+        obstacle: name of the obstacle that is touched; "" where none is.
+    """
+
+    criterion: str
+    cables: tuple[int, ...] = ()
+    t: float = math.nan
+    needed: float = math.nan
+    allowed: float = math.nan
+    unit: str = ""
+    obstacle: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The cause as a plan's JSON has it.
+
+        Returns:
+            plain values.
+        """
+        table: dict[str, Any] = {"criterion": self.criterion, "cable": self.cables[0] if self.cables else None}
+        if len(self.cables) > 1:
+            table["cables"] = list(self.cables)
+        if self.obstacle:
+            table["obstacle"] = self.obstacle
+        return table | {"t": self.t, "needed": self.needed, "allowed": self.allowed, "unit": self.unit or None}
+
+    @property
+    def text(self) -> str:
+        """The cause in words, such as "cable 1 needs 3.07 m/s at t = 0.75 s, 2.5 allowed"."""
+        flag, numbers = Verdict[self.criterion.upper()], " and ".join(str(k + 1) for k in self.cables)
+        if not math.isfinite(self.needed) and flag not in (Verdict.SINGULAR, Verdict.CABLE_PLATFORM):
+            return flag.text.replace("_", " ")
+        needed, allowed = _told_apart(self.needed, self.allowed)
+        return _WORDS.get(flag, _USUAL).format(
+            cable=f"cable{'s' if len(self.cables) > 1 else ''} {numbers}",
+            needed=needed,
+            allowed=allowed,
+            missed=f"{-self.needed:.{DIGITS}g}",
+            body=f"cable {numbers}" if numbers else "the platform",
+            obstacle=self.obstacle or "an obstacle",
+            unit=self.unit.replace("^2", "²"),
+            when=f" at t = {self.t:.2f} s" if math.isfinite(self.t) else "",
+        )
+
+
+def _told_apart(first: float, second: float) -> tuple[str, str]:
+    # Write two numbers with so many digits that they differ.
+    for digits in range(DIGITS, MOST_DIGITS + 1):
+        texts = tuple(f"{value:.{digits}g}" for value in (first, second))
+        if texts[0] != texts[1]:
+            break
+    return texts[0], texts[1]

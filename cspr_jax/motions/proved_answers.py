@@ -1,0 +1,236 @@
+"""Answers of motions that give bounds of their states: proved or refuted over their whole time, in natural units."""
+
+import dataclasses
+from collections.abc import Sequence
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from cspr_jax.arithmetic.affine_bounds import constant
+from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.motions.answers import Answers
+from cspr_jax.motions.block_slacks import Criterion, block_slacks, criteria
+from cspr_jax.motions.cause import Cause
+from cspr_jax.motions.motion import BoundedMotion, Motion
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.time_proof import TimeProof, merged, time_proof
+from cspr_jax.robots.point_mass import spool_radius
+from cspr_jax.robots.state_bounds import StateBounds
+from cspr_jax.schema.verdicts import FLAGS, Verdict
+
+# Intervals between instants of a motion that is only sampled.
+SAMPLES = 2000
+TENSIONS = Verdict.SLACK_CABLE | Verdict.OVER_TENSION | Verdict.WRENCH_INFEASIBLE
+
+
+class MotionProof(NamedTuple):
+    """Proof of one motion.
+
+    Fields:
+        criteria: of a robot within its limits.
+        proof: of the same criteria.
+        scales: (n_criteria,) sizes by which slacks of several criteria are compared, in their units.
+        obstacles: their names.
+    """
+
+    criteria: tuple[Criterion, ...]
+    proof: TimeProof
+    scales: np.ndarray
+    obstacles: tuple[str, ...] = ()
+
+    @property
+    def broken(self) -> np.ndarray:
+        """Mask (n_criteria,) of the criteria that fail at some instant."""
+        return (self.proof.high < 0.0) | np.array([len(intervals) > 0 for intervals in self.proof.failing])
+
+    @property
+    def verdict(self) -> Verdict:
+        """Flags of the criteria that fail; without any, feasible or undecided."""
+        flags = Verdict.FEASIBLE
+        for row, is_broken in zip(self.criteria, self.broken, strict=True):
+            flags |= row.flag if is_broken else Verdict.FEASIBLE
+        if flags or bool((self.proof.low > 0.0).all()):
+            return flags
+        return Verdict.UNDECIDED
+
+    def least(self, side: np.ndarray, flags: Verdict, *, others: bool = False) -> float:
+        """Smallest of the bounds of some criteria.
+
+        Args:
+            side: (n_criteria,) bounds, in the units of their slacks.
+            flags: of the criteria that count.
+            others: whether those of all other flags count instead, over their scales.
+
+        Returns:
+            () inf without such criteria.
+        """
+        chosen = np.array([bool(row.flag & flags) != others for row in self.criteria])
+        return float(np.min((side / self.scales if others else side)[chosen], initial=np.inf))
+
+    @property
+    def failing(self) -> np.ndarray:
+        """Intervals in which at least one criterion fails, (m, 2) s, in their order and apart from each other."""
+        return united(np.concatenate([np.empty((0, 2)), *self.proof.failing]))
+
+
+def united(intervals: np.ndarray) -> np.ndarray:
+    """Intervals of which none overlaps or touches another one.
+
+    Args:
+        intervals: (n, 2) in any order.
+
+    Returns:
+        (m, 2) with the same points, increasing.
+    """
+    merged: list[list[float]] = []
+    for start, end in sorted(intervals.tolist()):
+        if merged and start <= merged[-1][1]:
+            merged[-1][1] = max(merged[-1][1], end)
+        else:
+            merged.append([start, end])
+    return np.array(merged).reshape(-1, 2)
+
+
+@dataclasses.dataclass(frozen=True)
+class ProvedAnswers(Answers):
+    """Answers of motions that are proved or refuted over their whole time; margins are those of the tensions, in N.
+
+    Fields:
+        proof: (n,) `MotionProof` of each.
+    """
+
+    proof: np.ndarray
+
+    @property
+    def feasible(self) -> np.ndarray:
+        """Tell whether each motion is feasible, (n,): proved."""
+        return self.verdict == 0
+
+    def details(self, i: int) -> dict[str, Any]:
+        """Intervals of failure and the unit of the margin; see `Answers.details`."""
+        return {"margin_unit": "N", "failing": self.proof[i].failing.tolist()}
+
+    def proved_causes(self, i: int, frame: Frame) -> tuple[Cause, ...]:
+        """The worst cable of each criterion that fails, else the nearest to it; see `Answers.proved_causes`."""
+        case: MotionProof = self.proof[i]
+        order = np.argsort(case.proof.high / case.scales).tolist()
+        if not case.broken.any():
+            nearest = _cause(case, order[0], frame)
+            return (dataclasses.replace(nearest, criterion=Verdict.UNDECIDED.text),)
+        order = [k for k in order if case.broken[k]]
+        flags = [case.criteria[k].flag for k in order]
+        return tuple(_cause(case, k, frame) for j, k in enumerate(order) if flags.index(flags[j]) == j)
+
+
+def _cause(case: MotionProof, k: int, frame: Frame) -> Cause:
+    row, proof = case.criteria[k], case.proof
+    needed, allowed = row.value(float(proof.high[k])), row.allowed
+    if row.flag == Verdict.BELOW_FLOOR:
+        needed, allowed = (float(frame.height(depth)) for depth in (needed, allowed))
+    obstacle = "" if row.obstacle is None else case.obstacles[row.obstacle]
+    return Cause(row.flag.text, row.cables, float(proof.when[k]), needed, allowed, row.unit, obstacle)
+
+
+def proved_answers(problem: Problem, motions: Sequence[Any]) -> ProvedAnswers:
+    """Answers of motions, by bounds of their states; a motion that gives none is sampled.
+
+    Args:
+        motions: n of them, from the centroid of the spools, z down.
+
+    Returns:
+        the answers: no numbers of arcs.
+    """
+    proofs = [
+        proof_of(problem, motion) if hasattr(motion, "bounds") else sampled_proof(problem, motion) for motion in motions
+    ]
+    return answers_of(proofs, np.array([float(motion.duration()) for motion in motions]))
+
+
+def proof_of(problem: Problem, motion: BoundedMotion) -> MotionProof:
+    """Proof of one motion.
+
+    Args:
+        motion: from the centroid of the spools, z down.
+
+    Returns:
+        the proof.
+    """
+    rows = tuple(criteria(problem.robot, problem.limits))
+    slacks = partial(block_slacks, problem.robot, problem.limits, motion.bounds)
+    return MotionProof(rows, time_proof(slacks, float(motion.duration())), _scales(problem, rows))
+
+
+def answers_of(proofs: Sequence[MotionProof], duration: np.ndarray) -> ProvedAnswers:
+    """Answers of proofs.
+
+    Args:
+        proofs: n of them.
+        duration: (n,) s.
+
+    Returns:
+        the answers.
+    """
+    count = len(proofs)
+    none, nothing = np.zeros(count, int), np.full(count, np.nan)
+    each = np.empty(count, object)
+    each[:] = proofs
+    return ProvedAnswers(
+        arcs=none,
+        tried_arcs=none,
+        verdict=np.array([proof.verdict.value for proof in proofs], FLAGS),
+        duration=duration,
+        margin=np.array([row.least(row.proof.high, TENSIONS) for row in proofs]),
+        margin_bound=np.array([row.least(row.proof.low, TENSIONS) for row in proofs]),
+        limit_margin=np.array([row.least(row.proof.high, TENSIONS, others=True) for row in proofs]),
+        feasible_at_infinity=nothing,
+        tolerated=nothing,
+        not_tolerated=nothing,
+        proof=each,
+    )
+
+
+@partial(jax.jit, static_argnums=0)
+def _instants(structure, leaves, tau):
+    states = jax.vmap(jax.tree.unflatten(structure, leaves).state)(tau)
+    names = [name for name in StateBounds._fields if getattr(states, name) is not None]
+    return StateBounds(**{name: constant(getattr(states, name)) for name in names})
+
+
+def sampled_proof(problem: Problem, motion: Motion, samples: int = SAMPLES) -> MotionProof:
+    """Refute a motion that has no bounds by its samples, or leave it undecided.
+
+    Args:
+        motion: from the centroid of the spools, z down.
+        samples: intervals between equidistant instants.
+
+    Returns:
+        a proof that bounds no slack from below; intervals of failure reach from instant to instant.
+    """
+    rows = tuple(criteria(problem.robot, problem.limits))
+    leaves, structure = jax.tree.flatten(motion)
+    tau = np.linspace(0.0, 1.0, samples + 1)
+    # A block without a length has the slacks of its instant.
+    states = _instants(structure, leaves, tau)
+    high = block_slacks(problem.robot, problem.limits, lambda start, end: states, tau, tau).high
+    times = tau * float(motion.duration())
+    failing = [merged(times, times, column < 0.0) for column in high.T]
+    whole = np.array([[0.0, times[-1]]])
+    proof = TimeProof(
+        low=np.full(len(rows), -np.inf),
+        high=high.min(0),
+        when=times[high.argmin(0)],
+        failing=failing,
+        open=[whole] * len(rows),
+        blocks=len(tau),
+    )
+    return MotionProof(rows, proof, _scales(problem, rows))
+
+
+def _scales(problem: Problem, rows: Sequence[Criterion]) -> np.ndarray:
+    # Tensions compare with the weight a cable, lengths with the robot, and others with what is allowed.
+    robot = problem.robot
+    weight, size = float(robot.mass * robot.gravity) / robot.n_cables, float(spool_radius(robot))
+    of_unit = {"N": weight, "m": size, "1": 1.0}
+    return np.array([of_unit.get(row.unit, row.allowed) for row in rows])

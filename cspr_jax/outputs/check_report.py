@@ -1,0 +1,181 @@
+"""The check of a motion as JSON and as text for people."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from cspr_jax.motions.block_slacks import Criterion
+from cspr_jax.motions.proved_answers import MotionProof, ProvedAnswers
+from cspr_jax.outputs.plan_report import finite, verdict_text
+from cspr_jax.plans.planning import PlannedMotions
+from cspr_jax.runtime.terminal import cell
+from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.splines.motion import Spline
+
+SCHEMA = 1
+# Intervals of failure that the text names; the JSON has all of them.
+MOST_INTERVALS = 12
+# By flag: the quantity that a criterion bounds, in JSON and in words.
+QUANTITIES = {
+    Verdict.SLACK_CABLE: ("tension_min", "smallest tension"),
+    Verdict.OVER_TENSION: ("tension_max", "largest tension"),
+    Verdict.WRENCH_INFEASIBLE: ("tension_margin", "distance of tensions from their limits"),
+    Verdict.SINGULAR: ("determinant", "determinant"),
+    Verdict.ABOVE_SPOOLS: ("depth", "depth below the spools"),
+    Verdict.BELOW_FLOOR: ("floor", "lowest z"),
+    Verdict.CABLE_TOO_LONG: ("cable_length_max", "largest cable length"),
+    Verdict.CABLE_TOO_FAST: ("cable_speed_max", "largest cable speed"),
+    Verdict.CABLE_OVER_ACCELERATION: ("cable_acceleration_max", "largest cable acceleration"),
+    Verdict.CABLE_CABLE: ("cable_distance", "distance between cables"),
+    Verdict.CABLE_PLATFORM: ("platform_distance", "distance of cables from the platform"),
+    Verdict.OBSTACLE: ("obstacle_distance", "distance from obstacles"),
+}
+
+
+def check_object(plan: PlannedMotions) -> dict[str, Any]:
+    """The object that `cspr check --json` prints.
+
+    Args:
+        plan: of a single motion.
+
+    Returns:
+        plain values; what does not apply, or is not finite, is None.
+    """
+    answers, demands = plan.answers, plan.demands
+    case = shown_proof(plan)
+    fields = {
+        "schema": SCHEMA,
+        "robot": plan.robot_file.name,
+        "verdict": verdict_text(answers.verdict[0], plan.feasible),
+        "feasible": plan.feasible,
+        "duration": float(answers.duration[0]),
+        "margin": float(answers.margin[0]),
+        "margin_unit": "N",
+        "margin_bound": float(answers.margin_bound[0]),
+        "limit_margin": float(answers.limit_margin[0]),
+        "cause": [] if plan.feasible else [cause.to_dict() for cause in plan.causes[0]],
+        "failing": case.failing.tolist(),
+        "tension_min": float(demands.tension_min[0]),
+        "tension_max": float(demands.tension_max[0]),
+        "tension_margin": float(answers.margin[0]) if plan.is_redundant else None,
+        "cable_length_max": float(demands.length_max[0]),
+        "cable_speed_max": float(demands.speed_max[0]),
+        "cable_acceleration_max": float(demands.acceleration_max[0]),
+        "z_lowest": float(demands.lowest[0]),
+        "demands": {QUANTITIES[flag][0]: row for flag, row in _demands(plan, case).items()},
+        "interpolation": getattr(plan.legs[0].motions[0], "interpolation", "function"),
+        "ends": getattr(plan.legs[0].motions[0], "ends", "") or None,
+        "blocks": case.proof.blocks,
+    }
+    return finite(fields)
+
+
+def shown_proof(plan: PlannedMotions) -> MotionProof:
+    """The proof of a plan of a single motion.
+
+    Returns:
+        the proof.
+
+    Raises:
+        TypeError: the family of the plan has no such proofs.
+    """
+    answers = plan.legs[0].answers
+    if not isinstance(answers, ProvedAnswers):
+        raise TypeError("a check is a plan of one spline")
+    return answers.proof[0]
+
+
+def _demands(plan: PlannedMotions, case: MotionProof) -> dict[Verdict, dict[str, Any]]:
+    # The worst cable of each limit, with a bound that no instant exceeds.
+    rows, worst = case.criteria, dict[Verdict, int]()
+    for k in np.argsort(case.proof.high / case.scales).tolist():
+        worst.setdefault(rows[k].flag, k)
+    table = {}
+    for flag in (flag for flag in QUANTITIES if flag in worst):
+        k = worst[flag]
+        allowed, value = rows[k].allowed, rows[k].value(float(case.proof.high[k]))
+        # The bound is that of all cables.
+        bound = min((_bound(case, j) for j in range(len(rows)) if rows[j].flag == flag), key=lambda pair: pair[0])[1]
+        if flag == Verdict.BELOW_FLOOR:
+            value, bound, allowed = (float(plan.frame.height(depth)) for depth in (value, bound, allowed))
+        table[flag] = {
+            "value": value,
+            "bound": bound,
+            "allowed": allowed,
+            "unit": rows[k].unit,
+            "cable": rows[k].cables[0] if rows[k].cables else None,
+            "t": float(case.proof.when[k]),
+        }
+    return table
+
+
+def _bound(case: MotionProof, k: int) -> tuple[float, float]:
+    row, slack = case.criteria[k], float(case.proof.low[k])
+    return slack / float(case.scales[k]), row.value(slack)
+
+
+def check_lines(plan: PlannedMotions) -> list[str]:
+    """The verdict of a check as text.
+
+    Returns:
+        lines above its table.
+    """
+    answers, case = plan.answers, shown_proof(plan)
+    duration = float(answers.duration[0])
+    lines = [f"{plan.robot_file.name}: motion of {duration:.6g} s, {_taken_as(plan)}; z {plan.robot_file.z_axis}"]
+    if plan.feasible:
+        return [*lines, "feasible: every criterion is proved to hold at every instant"]
+    word = "undecided" if answers.verdict[0] == Verdict.UNDECIDED else "not feasible"
+    lines += [f"{word}: {cause.text}" for cause in plan.causes[0]]
+    intervals = case.failing
+    named = ", ".join(f"{start:.6f} to {end:.6f} s" for start, end in intervals[:MOST_INTERVALS])
+    more = f", and {len(intervals) - MOST_INTERVALS} more" if len(intervals) > MOST_INTERVALS else ""
+    return [*lines, f"it fails from {named}{more}"] if len(intervals) else lines
+
+
+def _taken_as(plan: PlannedMotions) -> str:
+    motion = plan.legs[0].motions[0]
+    if not isinstance(motion, Spline):
+        proved = (
+            "with bounds of its states" if hasattr(motion, "bounds") else "sampled: nothing between instants is proved"
+        )
+        return f"{type(motion).__name__}, {proved}"
+    count = len(motion.knots) - 1
+    if motion.interpolation == "pieces":
+        return f"{count} polynomial pieces of degree {motion.position.shape[1] - 1}"
+    if motion.interpolation == "hermite":
+        return f"taken as {count} Hermite pieces of degree {motion.position.shape[1] - 1} between samples"
+    kinds = {"cubic": "a cubic spline (C2)", "quintic": "a quintic spline (C4)"}
+    ends = {"rest": "at rest at both ends", "natural": "with natural ends", "periodic": "periodic"}
+    return f"taken as {kinds[motion.interpolation]} through {count + 1} samples, {ends[motion.ends]}"
+
+
+def check_table(plan: PlannedMotions):
+    """Demands of a motion, and their limits, as a table for a terminal.
+
+    Returns:
+        a rich table.
+    """
+    from rich.table import Table  # only a terminal needs it
+
+    case = shown_proof(plan)
+    table = Table()
+    heads = ("", "worst", "proved", "allowed", "unit", "cable", "at t (s)")
+    for head in heads:
+        table.add_column(cell(head), justify="left" if head in ("", "unit") else "right")
+    for flag, row in _demands(plan, case).items():
+        sign = "≥" if _row(case, flag).sense == "least" else "≤"
+        cable = "-" if row["cable"] is None else str(row["cable"] + 1)
+        numbers = [_digits(row["value"]), f"{sign} {_digits(row['bound'])}", f"{sign} {_digits(row['allowed'])}"]
+        unit = row["unit"].replace("^2", "²")
+        table.add_row(*(cell(text) for text in (QUANTITIES[flag][1], *numbers, unit, cable, f"{row['t']:.4f}")))
+    return table
+
+
+def _row(case: MotionProof, flag: Verdict) -> Criterion:
+    return next(row for row in case.criteria if row.flag == flag)
+
+
+def _digits(value: float) -> str:
+    return f"{value:.5g}" if math.isfinite(value) else "-"

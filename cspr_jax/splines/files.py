@@ -1,0 +1,158 @@
+"""Motions of files and tables, as splines in the axes of the kernels."""
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import BarycentricInterpolator
+
+from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.arithmetic.frames import IDENTITY, Frame
+from cspr_jax.arithmetic.rotations import products
+from cspr_jax.config.motions.table import MotionPieces, MotionTable
+from cspr_jax.config.motions.text import read
+from cspr_jax.errors import InputError
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.kernel_axes import centred
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.reference_pose import aligned
+from cspr_jax.splines.interpolation import interpolated
+from cspr_jax.splines.motion import Spline
+
+# Samples of a motion, not way-points, are at least so many; the part of the largest speed that counts as moving.
+MANY, MOVING = 30, 0.2
+BACK = np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def samples_of(times, positions, quaternions=None, velocities=None, accelerations=None) -> MotionTable:
+    """Samples of a motion from arrays.
+
+    Args:
+        times: (n,) s.
+        positions: (n, 3) m.
+        quaternions: (n, 4) or None.
+        velocities: (n, 3) m/s, or None.
+        accelerations: (n, 3) m/s^2, or None.
+
+    Returns:
+        the samples.
+    """
+    times, positions = np.asarray(times, float), np.asarray(positions, float)
+    others = {"quaternions": quaternions, "velocities": velocities, "accelerations": accelerations}
+    arrays: dict[str, Any] = {name: np.asarray(rows, float) for name, rows in others.items() if rows is not None}
+    return MotionTable(times, positions, **arrays)
+
+
+def read_motion(path: Path) -> MotionTable | MotionPieces:
+    """A motion of a file.
+
+    Returns:
+        samples, or polynomial pieces.
+
+    Raises:
+        ConfigError: a mistake in the file.
+    """
+    return read(path)
+
+
+def source_spline(
+    source: Any, *, z_axis: str, is_platform: bool, interpolation: str | None = None, ends: str | None = None
+) -> Spline:
+    """A motion as a spline, in the axes of a robot file.
+
+    Args:
+        source: samples, polynomial pieces, or a spline in these axes.
+        z_axis: direction of their z, "up" or "down".
+        is_platform: whether the robot has orientations; where the motion has none, it keeps its own axes.
+        interpolation: of samples; None: as they say, else "hermite" with velocities, "cubic" without.
+        ends: of samples; None: as they say, else "rest".
+
+    Returns:
+        the spline.
+
+    Raises:
+        InputError: samples that make no motion of this robot.
+    """
+    if isinstance(source, Spline):
+        return source
+    placed = source.in_axes(z_axis)
+    if isinstance(placed, MotionPieces):
+        turning = None if placed.quaternion is None else leaf(placed.quaternion)
+        spline = Spline(leaf(placed.knots - placed.knots[0]), leaf(placed.position), turning)
+    else:
+        known = interpolation or placed.interpolation or ("cubic" if placed.velocities is None else "hermite")
+        rates = {"velocities": placed.velocities, "accelerations": placed.accelerations} if known == "hermite" else {}
+        usual = ends or placed.ends or "rest"
+        spline = interpolated(
+            placed.times, placed.positions, placed.quaternions, interpolation=known, ends=usual, **rates
+        )
+    if is_platform and spline.quaternion is None:
+        turning = np.zeros((len(spline.knots) - 1, 1, 4)) + np.eye(4)[0]
+        return dataclasses.replace(spline, quaternion=leaf(turning))
+    if not is_platform and spline.quaternion is not None:
+        raise InputError("quaternions", None, "must be absent for a point mass", fault="orientations")
+    return spline
+
+
+def moving_ends(source: Any, ends: str | None) -> list[str]:
+    """Hints of samples that move at an end where the curve is taken to be at rest.
+
+    Args:
+        source: samples, or anything else.
+        ends: that the user asked for; None: none.
+
+    Returns:
+        one line for each end.
+    """
+    if not isinstance(source, MotionTable) or source.velocities is not None or (ends or source.ends) is not None:
+        return []
+    lines, times, positions = [], source.times, source.positions
+    if len(times) < MANY:
+        return []
+    largest = float(np.max(np.linalg.norm(np.diff(positions, axis=0), axis=1) / np.diff(times)))
+    for word, rows in (("begin", slice(None, 4)), ("end", slice(-4, None))):
+        place = times[rows][0 if word == "begin" else -1]
+        curve = BarycentricInterpolator(times[rows] - place, positions[rows])
+        speed = float(np.linalg.norm(curve.derivative(0.0)))
+        if speed > MOVING * largest:
+            lines.append(
+                f"hint: its samples {word} at {speed:.3g} m/s, where the curve is taken to be at rest: ends natural or "
+                "periodic, or velocities in the file, would keep that"
+            )
+    return lines
+
+
+def placed_inward(spline: Spline, frame: Frame, reference: np.ndarray) -> Spline:
+    """A spline in the axes of a robot file, in those of the kernels.
+
+    Args:
+        spline: orientations are those of the platform's axes in the file; NumPy leaves.
+        frame: of the file.
+        reference: (4,) of `reference_of`.
+
+    Returns:
+        the spline, from the centroid of the spools, z down, orientations from the reference one.
+    """
+    turning = spline.quaternion
+    if turning is not None:
+        rows = frame.turned_quaternions(np.asarray(turning)).reshape(-1, 4)
+        # A product is linear in the quaternion, and so in its coefficients.
+        turning = leaf(products(rows, (reference * BACK)[None]).reshape(turning.shape))
+    return dataclasses.replace(spline, position=leaf(frame.inward(spline.position)), quaternion=turning)
+
+
+def reference_of(robot: AnyRobot) -> np.ndarray:
+    """Rotation from the axes of a platform in its file to those of the kernels.
+
+    Args:
+        robot: in its own axes.
+
+    Returns:
+        (4,) unit quaternion; of a point mass no rotation.
+    """
+    if not isinstance(robot, PlatformRobot):
+        return np.array(IDENTITY)
+    from scipy.spatial.transform import Rotation
+
+    return np.roll(Rotation.from_matrix(aligned(centred(robot)[0])[1]).as_quat(), 1)

@@ -1,0 +1,171 @@
+"""Leg of splines: poses at their times, joined by piecewise polynomials, or motions of files."""
+
+from typing import Any
+
+import numpy as np
+
+from cspr_jax.build.orientations import given_quaternion, orientations
+from cspr_jax.build.robots import build_robot
+from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.motions.answers import Answers
+from cspr_jax.motions.leg import Leg
+from cspr_jax.motions.motion import Motion, Placed
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.proved_answers import proved_answers
+from cspr_jax.motions.waypoints import Waypoints
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.splines.files import moving_ends, placed_inward, read_motion, reference_of, source_spline
+from cspr_jax.splines.interpolation import interpolated
+from cspr_jax.splines.motion import Spline, part
+
+# Keys of poses that other families take, and a spline does not.
+_OTHERS = ("arcs", "beta_hat")
+
+
+class Splines(Leg):
+    """Poses at their times, and files of samples, joined by piecewise polynomials; see `Leg`."""
+
+    def __init__(self, stops: Waypoints) -> None:
+        """Refuse poses without times, and keys of other families."""
+        super().__init__(stops)
+        self._notes: list[str] = []
+        for i, pose in enumerate(stops.poses):
+            for key in _OTHERS if i else ():
+                if getattr(pose, key) is not None:
+                    raise ConfigError(stops.path, f'{stops.name(i)}.{key}: must be absent with family = "spline"')
+            if pose.motion is not None and i:
+                self._check_file(i)
+        for first, last in self._runs:
+            if not self._is_file(first):
+                self._check_times(first, last)
+                self._check_rates(first, last)
+
+    def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
+        """Join the poses; see `Leg.join`."""
+        motions: list[Any] = []
+        for first, last in self._runs:
+            if self._is_file(first):
+                motions.append(self._of_file(first + 1))
+            else:
+                curve = self._curve(problem, z0, first, last)
+                motions += [part(curve, i, i + 1) for i in range(last - first)]
+        if self.stops.keys.stretch is not None:
+            motions = [motion.stretched(self.stops.keys.stretch) for motion in motions]
+        return proved_answers(problem, motions), list(motions)
+
+    def warnings(self, problem: Problem) -> list[str]:
+        """Notes of files, and hints at what their samples make likely; see `Leg.warnings`."""
+        return self._notes
+
+    @property
+    def _runs(self) -> list[tuple[int, int]]:
+        # Numbers of the first and the last pose of each curve: a file, or poses up to one whose velocity is known.
+        poses, ends = self.stops.poses, []
+        for i in range(1, len(self) + 1):
+            stops_here = poses[i].rest or (poses[i].velocity is not None and not self._is_hermite)
+            if stops_here or i == len(self) or self._is_file(i - 1) or self._is_file(i):
+                ends.append(i)
+        return list(zip([0, *ends[:-1]], ends, strict=True))
+
+    @property
+    def _is_hermite(self) -> bool:
+        return self.stops.keys.interpolation == "hermite"
+
+    def _is_file(self, segment: int) -> bool:
+        return self.stops.poses[segment + 1].motion is not None
+
+    def _of_file(self, i: int) -> Any:
+        stops = self.stops
+        name = stops.poses[i].motion or ""
+        source = stops.keys.source(name)
+        if source is None:
+            source = read_motion(stops.path.parent / name)
+        if isinstance(source, Placed):
+            return source.motion
+        self._notes += [f"{name}: {line}" for line in (*source.notes, *moving_ends(source, stops.keys.ends))]
+        try:
+            curve = source_spline(
+                source,
+                z_axis=stops.robot_file.z_axis,
+                is_platform=stops.robot_file.is_platform,
+                interpolation=stops.keys.interpolation,
+                ends=stops.keys.ends,
+            )
+        except InputError as error:
+            raise ConfigError(name, str(error)) from error
+        robot = build_robot(stops.robot_file, stops.keys, stops.path)
+        return placed_inward(curve, stops.frame, reference_of(robot))
+
+    def _check_file(self, i: int) -> None:
+        pose = self.stops.poses[i]
+        for key in ("position", "quaternion", "tilt_torsion", "time"):
+            if getattr(pose, key) is not None:
+                name = f"{self.stops.name(i)}.{key}"
+                raise ConfigError(self.stops.path, f"{name}: must be absent where a file leads to the pose")
+
+    def _check_times(self, first: int, last: int) -> None:
+        stops, previous = self.stops, None
+        for i in range(first, last + 1):
+            time = stops.poses[i].time
+            if time is None and (i > first or first > 0):
+                raise ConfigError(stops.path, f"{stops.name(i)}.time is missing: instant of the pose, s")
+            time = 0.0 if time is None else time
+            if previous is not None and not time > previous:
+                raise ConfigError(
+                    stops.path,
+                    f"{stops.name(i)}.time = {time:g}: must be above that of {stops.name(i - 1)}, {previous:g}",
+                )
+            previous = time
+
+    def _check_rates(self, first: int, last: int) -> None:
+        poses = self.stops.poses[first : last + 1]
+        needed = ["velocity"] + ["acceleration"] * any(pose.acceleration is not None for pose in poses)
+        for key in needed if self._is_hermite else ():
+            for i, pose in enumerate(poses, start=first):
+                if getattr(pose, key) is None and not pose.rest:
+                    unit = "m/s" if key == "velocity" else "m/s^2"
+                    raise ConfigError(
+                        self.stops.path,
+                        f'{self.stops.name(i)}.{key} is missing: [x, y, z] in {unit}, for interpolation = "hermite"',
+                    )
+
+    def _curve(self, problem: Problem, z0: float, first: int, last: int) -> Spline:
+        stops, keys = self.stops, self.stops.keys
+        chosen, frame = slice(first, last + 1), stops.frame
+        poses, points = stops.poses[chosen], stops.points(z0)
+        interpolation = keys.interpolation or "cubic"
+        rates = {name: np.array([self._rate(pose, name) for pose in poses]) for name in ("velocity", "acceleration")}
+        velocities, accelerations = (frame.turned(values) for values in rates.values())
+        if self._is_hermite:
+            derivatives = {"velocities": velocities}
+            derivatives |= {} if np.isnan(accelerations).all() else {"accelerations": accelerations}
+        else:
+            derivatives = {"end_velocities": velocities[[0, -1]], "end_accelerations": accelerations[[0, -1]]}
+        try:
+            return interpolated(
+                np.array([pose.time or 0.0 for pose in poses]),
+                points[chosen],
+                self._quaternions(points)[chosen] if isinstance(problem.robot, PlatformRobot) else None,
+                interpolation=interpolation,
+                ends=keys.ends or "rest",
+                **derivatives,
+            )
+        except InputError as error:
+            raise ConfigError(stops.path, f"{stops.name(first)} to {stops.name(last)}: {error}") from error
+
+    def _rate(self, pose, name: str) -> list[float]:
+        # A pose at rest has neither velocity nor acceleration.
+        value = getattr(pose, name)
+        return value if value is not None else [0.0 if pose.rest else np.nan] * 3
+
+    def _quaternions(self, points: np.ndarray) -> np.ndarray:
+        # Orientations (n_poses, 4) from the reference one, in the kernels' axes.
+        stops, frame = self.stops, self.stops.frame
+        units = [
+            given_quaternion(p.quaternion, f"{stops.name(i)}.quaternion", stops.path) for i, p in enumerate(stops.poses)
+        ]
+        angles = np.array([pose.tilt_torsion or [0.0] * 3 for pose in stops.poses])
+        is_tilted = np.array([pose.tilt_torsion is not None for pose in stops.poses])
+        return np.where(
+            is_tilted[:, None], orientations(frame, points, angles), frame.turned_quaternions(np.array(units))
+        )

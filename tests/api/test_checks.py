@@ -1,0 +1,136 @@
+"""Checks of motions from Python: one motion by every way in, causes and intervals, slower motions."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+import cspr_jax
+from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.schema.verdicts import Verdict
+
+TIMES = np.linspace(0.0, 6.0, 7)
+PLACES = np.array([0.0, 0.0, 1.0]) + 0.1 * np.random.default_rng(1).uniform(-1.0, 1.0, (7, 3))
+FAST = {"cable_speed_max": 0.09}
+
+
+def test_a_motion_by_every_way_in(tmp_path):
+    """Arrays, a file, a plan, a robot by its name and as an object: one answer."""
+    expected = cspr_jax.check("prototype", TIMES, PLACES, limits=FAST)
+    assert expected.verdict == "cable_too_fast" and not expected.feasible and len(expected.failing)
+    robot = cspr_jax.load_robot("prototype")
+    path = tmp_path / "own.csv"
+    np.savetxt(path, np.column_stack([TIMES, PLACES]), fmt="%.17g", delimiter=",", header="t,x,y,z", comments="")
+    others = [
+        cspr_jax.check(robot, TIMES, PLACES, limits=cspr_jax.Limits(cable_speed_max=0.09)),
+        cspr_jax.check("prototype", path, limits=FAST),
+        cspr_jax.check("prototype", str(path), limits=FAST, interpolation="cubic", ends="rest"),
+    ]
+    for other in others:
+        assert {**other.to_dict(), "robot": ""} == {**expected.to_dict(), "robot": ""}
+    many = cspr_jax.check_many("prototype", TIMES, PLACES[None], limits=FAST)
+    assert many.verdict[0] == Verdict.CABLE_TOO_FAST and many.margin[0] == expected.margin
+    np.testing.assert_array_equal(many.failing[0], expected.failing)
+    assert [cause.to_dict() for cause in many.causes[0]] == expected.cause
+    keys = {"schema": 1, "robot": "prototype", "family": "spline", "motion": str(path), **FAST}
+    (segment,) = cspr_jax.plan(keys).to_dict()["segments"]
+    assert segment["failing"] == expected.failing.tolist() and segment["cause"] == expected.cause
+
+
+def test_intervals_of_failure_are_those_of_the_curve():
+    """Speeds of cables of the curve by SciPy, at dense instants and at the ends of the intervals."""
+    check = cspr_jax.check("prototype", TIMES, PLACES, limits=FAST)
+    curve, spools = (
+        CubicSpline(TIMES, PLACES, bc_type="clamped"),
+        np.asarray(cspr_jax.load_robot("prototype").base_points),
+    )
+
+    def speed(t):
+        away = curve(t)[:, None] - spools
+        return np.abs(np.sum(away * curve(t, 1)[:, None], axis=2) / np.linalg.norm(away, axis=2)).max(1)
+
+    times = np.linspace(0.0, 6.0, 20001)
+    inside = np.logical_or.reduce([(start <= times) & (times <= end) for start, end in check.failing])
+    np.testing.assert_array_equal(inside, speed(times) > 0.09)
+    for edge in check.failing.ravel():
+        assert edge in (0.0, 6.0) or np.ptp(np.sign(speed(np.array([edge - 1e-6, edge + 1e-6])) - 0.09)) == 2.0
+    (cause,) = check.cause
+    assert cause["needed"] == pytest.approx(speed(times).max(), rel=5e-3)
+    assert abs(cause["t"] - times[speed(times).argmax()]) < 0.02
+    assert check.demands["cable_speed_max"]["bound"] >= speed(times).max()
+
+
+def test_slower():
+    """At the least stretching the largest speed is the allowed one."""
+    check = cspr_jax.check("prototype", TIMES, PLACES, limits=FAST)
+    slower = check.slower()
+    assert slower.is_static and slower.check.feasible
+    assert slower.factor == pytest.approx(check.demands["cable_speed_max"]["value"] / 0.09, rel=2e-3)
+    assert slower.check.duration == pytest.approx(6.0 * slower.factor)
+    assert not cspr_jax.check("prototype", TIMES * slower.factor * 0.9999, PLACES, limits=FAST).feasible
+    beyond = cspr_jax.check("prototype", TIMES, PLACES, limits={"cable_length_max": 0.9}).slower()
+    assert np.isnan(beyond.factor) and beyond.check is None and not beyond.is_static
+
+
+def test_functions_are_sampled():
+    """A function of jax is refuted, or undecided; a margin is that of its samples."""
+
+    def swing(t):
+        return jnp.stack([0.1 * jnp.cos(3.0 * t), 0.1 * jnp.sin(3.0 * t), 1.0 + 0.0 * t])
+
+    check = cspr_jax.check("prototype", swing, duration=3.0)
+    assert check.verdict == "undecided" and check.margin > 0.0 and not np.isfinite(check.margin_bound)
+    times = np.linspace(0.0, 3.0, 3001)
+    places = np.stack([swing(t) for t in times])
+    velocities = 0.3 * np.stack([-np.sin(3 * times), np.cos(3 * times), 0 * times], axis=1)
+    accelerations = -9.0 * (places - [0.0, 0.0, 1.0])
+    exact = cspr_jax.check("prototype", times, places, velocities=velocities, accelerations=accelerations)
+    assert exact.feasible and check.margin == pytest.approx(exact.margin, rel=0.02)
+    faster = cspr_jax.check("prototype", lambda t: swing(8.0 * t), duration=0.3)
+    assert faster.verdict == "slack_cable" and faster.failing.tolist() == [[0.0, 0.3]]
+
+
+def test_motions_of_this_package():
+    robot = cspr_jax.load_robot("prototype")
+    motion = cspr_jax.spline(robot, TIMES, PLACES)
+    assert cspr_jax.check(robot, motion).margin == cspr_jax.check(robot, TIMES, PLACES).margin
+    np.testing.assert_allclose(motion.state(0.5).position, CubicSpline(TIMES, PLACES, bc_type="clamped")(3.0))
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", ["laval-mssm", "kntu-planar", "cogiro"])
+def test_platforms_keep_their_own_axes(name):
+    """Orientations count in the axes of the platform in its file, whatever the reference orientation is."""
+    robot = cspr_jax.load_robot(name)
+    depth = np.asarray(robot.base_points)[:, 2].mean() + (1.5 if robot.z_axis == "down" else -2.5)
+    centre = np.asarray(robot.base_points).mean(0) * [1.0, 1.0, 0.0] + [0.0, 0.0, depth]
+    places = centre + 0.05 * np.random.default_rng(2).uniform(-1, 1, (4, 3)) * (
+        [1, 0, 1] if name == "kntu-planar" else 1
+    )
+    quaternions = np.tile([1.0, 0.0, 0.0, 0.0], (4, 1))
+    one = cspr_jax.check(name, [0.0, 2.0, 4.0, 6.0], places)
+    same = cspr_jax.check(robot, [0.0, 2.0, 4.0, 6.0], places, quaternions)
+    assert one.verdict == same.verdict and one.margin == pytest.approx(same.margin)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"times": TIMES[::-1]}, "times"),
+        ({"positions": PLACES[:-1]}, "positions"),
+        ({"positions": PLACES * np.nan}, "positions"),
+        ({"quaternions": np.tile([1.0, 0.0, 0.0, 0.0], (7, 1))}, "quaternions"),
+        ({"positions": None}, "positions"),
+        ({"interpolation": "linear"}, "interpolation"),
+        ({"interpolation": "hermite"}, "velocities"),
+        ({"ends": "free"}, "ends"),
+        ({"ends": "periodic"}, "ends"),
+        ({"smooth": -1.0}, "smooth"),
+        ({"limits": {"cable_speed": 1.0}}, "cable_speed"),
+        ({"times": "missing.csv", "positions": None}, "missing.csv"),
+    ],
+)
+def test_one_line_for_what_is_no_motion(arguments, words):
+    with pytest.raises((InputError, ConfigError)) as error:
+        cspr_jax.check("prototype", **({"times": TIMES, "positions": PLACES} | arguments))
+    assert words in str(error.value) and "\n" not in str(error.value)
