@@ -1,1 +1,0 @@
-"""Motions that users bring, read from files of text and XML."""
