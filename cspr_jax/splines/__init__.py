@@ -12,4 +12,6 @@ Files, each importing only from those above it:
     blocks              bounds of states over blocks of time
     motion              positions and rotations over time
     interpolation       cubic, quintic and Hermite curves through samples
+    reading             tables and pieces that were read, curves of SciPy, tables window by window
+    noise               noise of recorded samples, and smoothing
 """
