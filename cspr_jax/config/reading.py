@@ -1,11 +1,13 @@
 """TOML to a checked model; a mistake becomes one line that names file, key, value and what is allowed."""
 
 import codecs
+import contextlib
 import os
 import re
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, BinaryIO, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
@@ -69,18 +71,33 @@ def read_bytes(path: Path) -> bytes:
     Raises:
         ConfigError: the file cannot be read, or is larger than 1 MB.
     """
-    try:
-        if path.exists() and not path.is_file():
-            raise ConfigError(path, "is not a file")
+    with opened(path) as file:
         size = path.stat().st_size
         if size > LARGEST_FILE:
             raise ConfigError(path, f"file of {size} bytes: must be at most {LARGEST_FILE}")
-        return path.read_bytes()
+        return file.read()
+
+
+@contextlib.contextmanager
+def opened(path: Path) -> Iterator[BinaryIO]:
+    """Open a file, and only a file, and turn failures to read it into lines.
+
+    Yields:
+        the file, open for reading.
+
+    Raises:
+        ConfigError: it cannot be read.
+    """
+    try:
+        if path.exists() and not path.is_file():
+            raise ConfigError(path, "is not a file")
+        with path.open("rb") as file:
+            yield file
     except FileNotFoundError as error:
         raise ConfigError(path, f"cannot be read: {error.strerror or error}{other_case(path)}") from error
     except OSError as error:
         raise ConfigError(path, f"cannot be read: {error.strerror or error}") from error
-    except ValueError as error:
+    except ValueError as error:  # a name with a null byte
         raise ConfigError(path, f"cannot be read: {error}") from error
 
 
@@ -96,11 +113,12 @@ def read_text(path: Path) -> str:
     return decoded(read_bytes(path), path)
 
 
-def decoded(data: bytes, path: Path) -> str:
+def decoded(data: bytes, path: Path, *, line: int = 1) -> str:
     """Text of the content of a file.
 
     Args:
         path: of the file, named in errors.
+        line: number of the first line.
 
     Returns:
         the text, as `read_text` gives it.
@@ -115,7 +133,7 @@ def decoded(data: bytes, path: Path) -> str:
     try:
         text = data.removeprefix(codecs.BOM_UTF8).decode("utf-8")
     except UnicodeDecodeError as error:
-        line = error.object.count(b"\n", 0, error.start) + 1
+        line += error.object.count(b"\n", 0, error.start)
         words = f"byte 0x{error.object[error.start]:02X} in line {line}: save it as UTF-8"
         raise ConfigError(path, f"is not UTF-8 text: {words}") from error
     return text.replace("\r\n", "\n").replace("\r", "\n")

@@ -26,7 +26,10 @@ SEGMENT = {
     ),
     "tension_max": ("N", "Largest tension of any cable on the way."),
     "mu_min": ("s-2", "Smallest tension over mass and cable length."),
-    "margin": ("1", "Smallest margin, as `segment_margin` of a motion file; for straight lines in m/s^2, for splines in N."),
+    "margin": (
+        "1",
+        "Smallest margin, as `segment_margin` of a motion file; for straight lines in m/s^2, for splines in N.",
+    ),
     "margin_bound": ("1", "Proved lower bound of `margin`; null where nothing is proved."),
     "limit_margin": ("1", "Smallest slack of the limits; null without limits."),
     "tolerated": (
@@ -101,12 +104,18 @@ CHECK = {
     "verdict": ("", '"feasible" (proved), "undecided", or names of flags joined by "+" (verdicts, below).'),
     "feasible": ("", "Whether the motion is proved feasible."),
     "duration": ("s", "Duration."),
-    "margin": ("N", "Smallest distance of a tension from its limits; of redundant cables the largest that all can keep."),
+    "margin": (
+        "N",
+        "Smallest distance of a tension from its limits; of redundant cables the largest that all can keep.",
+    ),
     "margin_unit": ("", '"N".'),
     "margin_bound": ("N", "Proved lower bound of `margin`; null where nothing is proved."),
     "limit_margin": ("1", "Smallest slack of the other limits, over the limit; null without limits."),
     "cause": ("", "As of a segment of a plan; empty where the motion is feasible."),
-    "failing": ("s", "All intervals of time in which the motion fails, to 1e-6 s; of a function from sample to sample."),
+    "failing": (
+        "s",
+        "All intervals of time in which the motion fails, to 1e-6 s; of a function from sample to sample.",
+    ),
     "tension_min": ("N", "Smallest tension of any cable, as of a segment of a plan."),
     "tension_max": ("N", "Largest tension of any cable, likewise."),
     "tension_margin": ("N", "Redundant cables: `margin`; else null."),

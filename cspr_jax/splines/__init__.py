@@ -12,6 +12,8 @@ Files, each importing only from those above it:
     blocks              bounds of states over blocks of time
     motion              positions and rotations over time
     interpolation       cubic, quintic and Hermite curves through samples
+    reading             tables and pieces that were read, curves of SciPy, tables window by window
+    noise               noise of recorded samples, and smoothing
     files               motions of files and arrays, in the axes of the kernels
     functions           motions that are functions of time
     leg                 poses at their times, and files, as a leg of plans

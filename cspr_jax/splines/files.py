@@ -1,7 +1,6 @@
 """Motions of files and tables, as splines in the axes of the kernels."""
 
 import dataclasses
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,14 +10,13 @@ from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import IDENTITY, Frame
 from cspr_jax.arithmetic.rotations import products
 from cspr_jax.config.motions.table import MotionPieces, MotionTable
-from cspr_jax.config.motions.text import read
 from cspr_jax.errors import InputError
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.reference_pose import aligned
-from cspr_jax.splines.interpolation import interpolated
 from cspr_jax.splines.motion import Spline
+from cspr_jax.splines.reading import pieces_of, spline_of
 
 # Samples of a motion, not way-points, are at least so many; the part of the largest speed that counts as moving.
 MANY, MOVING = 30, 0.2
@@ -44,25 +42,13 @@ def samples_of(times, positions, quaternions=None, velocities=None, acceleration
     return MotionTable(times, positions, **arrays)
 
 
-def read_motion(path: Path) -> MotionTable | MotionPieces:
-    """A motion of a file.
-
-    Returns:
-        samples, or polynomial pieces.
-
-    Raises:
-        ConfigError: a mistake in the file.
-    """
-    return read(path)
-
-
 def source_spline(
     source: Any, *, z_axis: str, is_platform: bool, interpolation: str | None = None, ends: str | None = None
 ) -> Spline:
     """A motion as a spline, in the axes of a robot file.
 
     Args:
-        source: samples, polynomial pieces, or a spline in these axes.
+        source: samples, polynomial pieces, a curve of SciPy in these axes, or a spline in them.
         z_axis: direction of their z, "up" or "down".
         is_platform: whether the robot has orientations; where the motion has none, it keeps its own axes.
         interpolation: of samples; None: as they say, else "hermite" with velocities, "cubic" without.
@@ -76,17 +62,9 @@ def source_spline(
     """
     if isinstance(source, Spline):
         return source
-    placed = source.in_axes(z_axis)
-    if isinstance(placed, MotionPieces):
-        turning = None if placed.quaternion is None else leaf(placed.quaternion)
-        spline = Spline(leaf(placed.knots - placed.knots[0]), leaf(placed.position), turning)
-    else:
-        known = interpolation or placed.interpolation or ("cubic" if placed.velocities is None else "hermite")
-        rates = {"velocities": placed.velocities, "accelerations": placed.accelerations} if known == "hermite" else {}
-        usual = ends or placed.ends or "rest"
-        spline = interpolated(
-            placed.times, placed.positions, placed.quaternions, interpolation=known, ends=usual, **rates
-        )
+    if not isinstance(source, MotionTable | MotionPieces):
+        source = pieces_of(source)
+    spline = spline_of(source.in_axes(z_axis), interpolation=interpolation, ends=ends)
     if is_platform and spline.quaternion is None:
         turning = np.zeros((len(spline.knots) - 1, 1, 4)) + np.eye(4)[0]
         return dataclasses.replace(spline, quaternion=leaf(turning))

@@ -6,9 +6,10 @@ afterwards; where positions are Hermite pieces, quaternions are a spline of the 
 """
 
 import dataclasses
+import math
 
 import numpy as np
-from scipy.interpolate import BPoly, BSpline, CubicSpline, PPoly, make_interp_spline
+from scipy.interpolate import BSpline, CubicSpline, PPoly, make_interp_spline
 
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.errors import InputError
@@ -66,7 +67,7 @@ def interpolated(
         table = _spline(since, np.asarray(positions, float), degree, ends, np.stack(prescribed, axis=1))
     else:
         degree = 3 if accelerations is None else 5
-        table = _hermite(since, [positions, velocities] + ([] if accelerations is None else [accelerations]))
+        table = hermite(since, [positions, velocities] + ([] if accelerations is None else [accelerations]))
     turning = None if quaternions is None else _spline(since, continuous(np.asarray(quaternions, float)), degree, ends)
     curve = Spline(leaf(since), leaf(table), None if turning is None else leaf(turning))
     return dataclasses.replace(curve, interpolation=interpolation, ends="" if interpolation == "hermite" else ends)
@@ -165,13 +166,30 @@ def _periodic(times: np.ndarray, values: np.ndarray, degree: int) -> np.ndarray:
 
 
 def _quintic(times: np.ndarray, spline: BSpline) -> np.ndarray:
-    return _hermite(times, [spline(times, order) for order in range(3)])
+    return hermite(times, [spline(times, order) for order in range(3)])
 
 
-def _hermite(times: np.ndarray, derivatives: list) -> np.ndarray:
-    # Bernstein coefficients of the pieces with these values and derivatives, (n, width) each, at their ends.
-    table = np.stack([np.asarray(values, float) for values in derivatives], axis=1)
-    return np.moveaxis(BPoly.from_derivatives(times, table).c, 0, 1)
+def hermite(times: np.ndarray, derivatives: list) -> np.ndarray:
+    """Pieces with the values and derivatives of samples.
+
+    Args:
+        times: (n,) s; of two equal ones, the second begins the next piece.
+        derivatives: the values, and as many derivatives as wanted, (n, width) each.
+
+    Returns:
+        (m, 2 len(derivatives), width) Bernstein coefficients of the m pieces between different times.
+    """
+    width = np.diff(times)[:, None]
+    degree = 2 * len(derivatives) - 1
+    falls = [math.factorial(degree - i) / math.factorial(degree) for i in range(len(derivatives))]
+
+    def ends(values: list[np.ndarray], step: np.ndarray) -> list[np.ndarray]:
+        taylor = [fall * step**i * value for i, (fall, value) in enumerate(zip(falls, values, strict=True))]
+        return [sum(math.comb(j, i) * taylor[i] for i in range(j + 1)) for j in range(len(taylor))]
+
+    first = ends([np.asarray(values, float)[:-1] for values in derivatives], width)
+    last = ends([np.asarray(values, float)[1:] for values in derivatives], -width)
+    return np.stack([*first, *reversed(last)], axis=1)[width[:, 0] > 0.0]
 
 
 def _pieces(spline: PPoly) -> np.ndarray:

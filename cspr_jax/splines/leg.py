@@ -6,6 +6,8 @@ import numpy as np
 
 from cspr_jax.build.orientations import given_quaternion, orientations
 from cspr_jax.build.robots import build_robot
+from cspr_jax.config.motions.hints import unit_hints
+from cspr_jax.config.motions.table import MotionTable
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.leg import Leg
@@ -14,9 +16,11 @@ from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import proved_answers
 from cspr_jax.motions.waypoints import Waypoints
 from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.splines.files import moving_ends, placed_inward, read_motion, reference_of, source_spline
+from cspr_jax.splines.files import moving_ends, placed_inward, reference_of, source_spline
 from cspr_jax.splines.interpolation import interpolated
 from cspr_jax.splines.motion import Spline, part
+from cspr_jax.splines.noise import noise_notes, smoothed
+from cspr_jax.store.motion_samples import read_motion
 
 # Keys of poses that other families take, and a spline does not.
 _OTHERS = ("arcs", "beta_hat")
@@ -82,8 +86,8 @@ class Splines(Leg):
             source = read_motion(stops.path.parent / name)
         if isinstance(source, Placed):
             return source.motion
-        self._notes += [f"{name}: {line}" for line in (*source.notes, *moving_ends(source, stops.keys.ends))]
         try:
+            source = self._cleaned(name, source)
             curve = source_spline(
                 source,
                 z_axis=stops.robot_file.z_axis,
@@ -95,6 +99,21 @@ class Splines(Leg):
             raise ConfigError(name, str(error)) from error
         robot = build_robot(stops.robot_file, stops.keys, stops.path)
         return placed_inward(curve, stops.frame, reference_of(robot))
+
+    def _cleaned(self, name: str, source: Any) -> Any:
+        # Take the noise off that the plan names, else tell it.
+        lines: list[str] = []
+        if isinstance(source, MotionTable):
+            lines += [f"hint: {line}" for line in unit_hints(source, np.asarray(self.stops.robot_file.base_points))]
+            lines += moving_ends(source, self.stops.keys.ends)
+            if self.stops.keys.smooth is not None:
+                source = smoothed(source, self.stops.keys.smooth)
+            elif source.velocities is None:
+                lines += noise_notes(source)
+        elif self.stops.keys.smooth is not None:
+            raise InputError("smooth", self.stops.keys.smooth, "absent for a motion without samples")
+        self._notes += [f"{name}: {line}" for line in (*getattr(source, "notes", ()), *lines)]
+        return source
 
     def _check_file(self, i: int) -> None:
         pose = self.stops.poses[i]

@@ -132,6 +132,25 @@ def _body(file: Path) -> tuple[_Joint, Body]:
 _PARTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 
 
+def joint_place(file: Path) -> tuple[str, np.ndarray, np.ndarray]:
+    """Kind and place of the joint of a model.
+
+    Args:
+        file: of its bodies.
+
+    Returns:
+        the kind, such as "PLANAR_XZ"; the rows x, y and z of the robot file in the axes of CASPR (3, 3); and the place
+        of the joint at coordinates 0, in the latter axes, from the origin of the former (3,) m.
+
+    Raises:
+        ConfigError: several links, or a joint that no robot file can express.
+    """
+    link = _link(file)
+    joint = _joint_of(link, file)
+    location = vector(child(child(link, "parent", file), "location", file), file, "parent")
+    return child(link, "joint", file).get("type", ""), joint.axes, np.array(location) - _joint_place(file, joint)
+
+
 def _joint_place(file: Path, joint: _Joint) -> list[float]:
     # Base points count from a joint that does not move; of planar robots the plane is that of the joint.
     parent = child(_link(file), "parent", file)

@@ -1,0 +1,1 @@
+"""Motions that users bring, read from files of text and XML."""

@@ -1,0 +1,36 @@
+"""Likely mistakes in a motion, of which a robot's size tells: units."""
+
+import numpy as np
+
+from cspr_jax.config.motions.table import MotionTable
+
+FAR = 30.0  # sizes of the robot; farther motions are probably in other units
+# Motions of so many rows at whole numbers of seconds are probably in milliseconds, or without units.
+MANY = 50
+
+
+def unit_hints(table: MotionTable, base_points: np.ndarray) -> list[str]:
+    """Units that a table probably has, other than those that it is read in.
+
+    Args:
+        base_points: (n_cables, 3) of the robot, in its file's axes, m.
+
+    Returns:
+        one line each.
+    """
+    points = np.asarray(base_points, float)
+    size = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
+    reach = float(np.abs(table.positions - points.mean(axis=0)).max())
+    lines = []
+    if reach > FAR * size:
+        lines.append(
+            f"positions are up to {reach:.3g} m from the spools of a robot of {size:.3g} m: are they millimetres? "
+            "Then say so: # units: mm"
+        )
+    times = table.times
+    if len(times) > MANY and np.array_equal(times, np.round(times)):
+        lines.append(
+            f"times are whole numbers, from {times[0]:g} to {times[-1]:g} s: are they milliseconds? "
+            "Then say so: # units: ms"
+        )
+    return lines

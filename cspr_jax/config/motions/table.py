@@ -1,0 +1,109 @@
+"""Motions as users bring them: samples over time, or polynomial pieces. SI units and radians."""
+
+import dataclasses
+
+import numpy as np
+
+from cspr_jax.config.wording import either
+from cspr_jax.errors import InputError
+
+# Vectors between a file with z up and one with z down, by half a turn about x; see `arithmetic.frames`.
+_TURN = np.array([1.0, -1.0, -1.0])
+_TURN_QUATERNION = np.array([1.0, 1.0, -1.0, -1.0])
+Z_AXES = ("down", "up")
+
+
+@dataclasses.dataclass(frozen=True)
+class MotionTable:
+    """Samples of a motion.
+
+    Fields:
+        times: (n,) s, increasing; with velocities, a time may stand twice where the acceleration jumps.
+        positions: (n, 3) m.
+        quaternions: (n, 4) unit quaternions, scalar first, or None.
+        velocities: (n, 3) m/s, or None.
+        accelerations: (n, 3) m/s^2, or None.
+        angular_velocities: (n, 3) rad/s, fixed axes, or None.
+        angular_accelerations: (n, 3) rad/s^2, fixed axes, or None.
+        interpolation: that the file names, of `splines.interpolation.INTERPOLATIONS`, or None.
+        ends: that the file names, of `splines.interpolation.ENDS`, or None.
+        z_axis: where z points in it, "up" or "down"; None: as in the file of the robot.
+        notes: lines for the user.
+    """
+
+    times: np.ndarray
+    positions: np.ndarray
+    quaternions: np.ndarray | None = None
+    velocities: np.ndarray | None = None
+    accelerations: np.ndarray | None = None
+    angular_velocities: np.ndarray | None = None
+    angular_accelerations: np.ndarray | None = None
+    interpolation: str | None = None
+    ends: str | None = None
+    z_axis: str | None = None
+    notes: tuple[str, ...] = ()
+
+    def in_axes(self, z_axis: str) -> "MotionTable":
+        """The motion in the axes of a robot file.
+
+        Args:
+            z_axis: of the robot file, "up" or "down".
+
+        Returns:
+            the table; itself where its own axes are these, or not said.
+        """
+        if not _is_turned(self.z_axis, z_axis):
+            return self
+        return dataclasses.replace(
+            self,
+            positions=self.positions * _TURN,
+            quaternions=_turned(self.quaternions, _TURN_QUATERNION),
+            velocities=_turned(self.velocities, _TURN),
+            accelerations=_turned(self.accelerations, _TURN),
+            angular_velocities=_turned(self.angular_velocities, _TURN),
+            angular_accelerations=_turned(self.angular_accelerations, _TURN),
+            z_axis=z_axis,
+        )
+
+
+@dataclasses.dataclass(frozen=True)
+class MotionPieces:
+    """Piecewise polynomial motion.
+
+    Fields:
+        knots: (m + 1,) instants between the pieces, increasing, s.
+        position: (m, degree + 1, 3) Bernstein coefficients of each piece, m.
+        quaternion: (m, degree + 1, 4) likewise, scalar first, of any length but zero; or None.
+        z_axis: where z points in it, "up" or "down"; None: as in the file of the robot.
+        notes: lines for the user.
+    """
+
+    knots: np.ndarray
+    position: np.ndarray
+    quaternion: np.ndarray | None = None
+    z_axis: str | None = None
+    notes: tuple[str, ...] = ()
+
+    def in_axes(self, z_axis: str) -> "MotionPieces":
+        """The motion in the axes of a robot file.
+
+        Args:
+            z_axis: of the robot file, "up" or "down".
+
+        Returns:
+            the pieces; themselves where their own axes are these, or not said.
+        """
+        if not _is_turned(self.z_axis, z_axis):
+            return self
+        quaternion = _turned(self.quaternion, _TURN_QUATERNION)
+        return dataclasses.replace(self, position=self.position * _TURN, quaternion=quaternion, z_axis=z_axis)
+
+
+def _is_turned(before: str | None, after: str) -> bool:
+    if after not in Z_AXES:
+        raise InputError("z_axis", after, either(Z_AXES))
+    return before not in (None, after)
+
+
+def _turned(vectors: np.ndarray | None, signs: np.ndarray) -> np.ndarray | None:
+    return None if vectors is None else vectors * signs

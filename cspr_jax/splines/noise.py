@@ -1,0 +1,229 @@
+"""Noise in recorded samples: recognised by their differences, taken off by a smoothing spline."""
+
+import dataclasses
+import math
+
+import numpy as np
+from scipy.interpolate import CubicSpline, make_smoothing_spline
+from scipy.optimize import brentq
+
+from cspr_jax.config.motions.table import MotionTable
+from cspr_jax.errors import InputError
+from cspr_jax.splines.interpolation import continuous
+
+# Rows of the stretches in which noise is estimated, and the most of them.
+STRETCH, STRETCHES = 96, 64
+ORDERS = range(2, 13)  # of differences
+# Median of the absolute value of a normal variable, over its standard deviation.
+MEDIAN = 0.6745
+# Standard deviation of the second derivative of a cubic spline through white noise of 1 at times 1 apart.
+BENDING = 6.0
+GRAVITY = 9.81
+ACCELERATION = 0.02  # share of gravity, and of the motion's own acceleration, that noise may have
+SHARE = 0.01  # of rows at which the acceleration jumps by so much
+SCATTER = 0.05  # noise is smaller than this share of the way, else the samples are way-points
+CLOSE = 0.02  # s; or they follow each other so closely
+DECIMALS = range(9)  # at which files round
+ONE_STEP = 0.1  # share of the third differences that are not 0
+LEAST_ROWS = 32
+POWERS = (-8.0, 14.0)  # of ten, between which the weight of bending is sought
+
+
+@dataclasses.dataclass(frozen=True)
+class Noise:
+    """Noise of samples.
+
+    Fields:
+        deviation: standard deviation, in the unit of the samples.
+        bending: of their second derivatives that come of it, per s^2.
+        jump: median jump of the second derivative of the spline through the samples, per s^2.
+        step: to which the samples are rounded, if that is the noise; 0: it is not.
+    """
+
+    deviation: float
+    bending: float
+    jump: float
+    step: float
+
+
+def noise_notes(table: MotionTable, *, size: float = 1.0) -> list[str]:
+    """Noise that makes the accelerations of a table useless.
+
+    Args:
+        table: samples, of which an interpolation would be the motion.
+        size: by which angular accelerations count, such as the radius of the platform, m.
+
+    Returns:
+        a line each for positions and orientations that are noisy.
+    """
+    parts = [("accelerations jump", "m/s^2", "m", table.positions, 1.0)]
+    if table.quaternions is not None:
+        parts.append(("angular accelerations jump", "rad/s^2", "rad", 2.0 * continuous(table.quaternions), size))
+    lines = []
+    for words, unit, short, values, arm in parts:
+        noise = noise_of(table.times, values, arm=arm)
+        if noise is not None:
+            reason = f", since they are rounded to {noise.step:g}" if noise.step else ""
+            lines.append(
+                f"{words} by {noise.jump:.2g} {unit} between samples{reason}: smooth the record "
+                f"(--smooth {noise.deviation:.1g}: its noise in {short}) or give fewer samples"
+            )
+    return lines
+
+
+def noise_of(times: np.ndarray, values: np.ndarray, *, arm: float = 1.0) -> Noise | None:
+    """Noise of samples, if it spoils their second derivatives.
+
+    Differences of a high order vanish along smooth motions, but not in noise; so of several orders, the one with the
+    least median says most.
+
+    Args:
+        times: (n,) s; not increasing ones are left out.
+        values: (n, width) samples.
+        arm: factor from their second derivatives to accelerations, m.
+
+    Returns:
+        the noise; None: none that matters, or less than `LEAST_ROWS` samples.
+    """
+    rows = np.append(True, np.diff(times) > 0.0)
+    times, values = times[rows], values[rows]
+    if len(times) < LEAST_ROWS:
+        return None
+    step = float(np.median(np.diff(times)))
+    starts = np.unique(np.linspace(0, len(times) - STRETCH, STRETCHES).astype(int).clip(min=0))
+    spread = max(_deviation(times[i : i + STRETCH], values[i : i + STRETCH]) for i in starts)
+    rounding = _rounding(values)
+    is_rounded = rounding / math.sqrt(12.0) > 0.3 * spread and _is_rounded(values, rounding)
+    deviation = max(spread, rounding / math.sqrt(12.0) if is_rounded else 0.0)
+    way = float(np.ptp(values, axis=0).max())
+    if deviation > SCATTER * way and step > CLOSE:
+        return None
+    bending = BENDING * deviation / step**2
+    if bending * arm <= ACCELERATION * GRAVITY:
+        return None
+    jumps = np.linalg.norm(np.diff(CubicSpline(times, values)(times, 2), axis=0), axis=1)
+    least = ACCELERATION * max(GRAVITY / arm, _calm(times, values, step, deviation))
+    if bending <= least or np.mean(jumps > least) < SHARE:
+        return None
+    return Noise(deviation, bending, float(np.median(jumps[jumps > least])), rounding if is_rounded else 0.0)
+
+
+def _calm(times: np.ndarray, values: np.ndarray, step: float, deviation: float) -> float:
+    # Largest second derivative of so few of the samples that noise adds little to it.
+    stride = 1
+    while len(times) // stride > 8 and BENDING * deviation / (stride * step) ** 2 > ACCELERATION * GRAVITY / 4.0:
+        stride *= 2
+    if len(times) // stride < 4:
+        return 0.0
+    coarse = times[::stride]
+    return float(np.abs(CubicSpline(coarse, values[::stride])(coarse, 2)).max())
+
+
+def _deviation(times: np.ndarray, values: np.ndarray) -> float:
+    # Standard deviation of noise in a short stretch, by divided differences of the order that says most.
+    estimates = []
+    for order in ORDERS:
+        if len(times) < 3 * order:
+            break
+        places = np.arange(order + 1) + np.arange(len(times) - order)[:, None]
+        apart = times[places][:, :, None] - times[places][:, None]
+        apart /= float(np.median(np.diff(times)))
+        apart[:, np.arange(order + 1), np.arange(order + 1)] = 1.0
+        weights = 1.0 / apart.prod(axis=2)
+        weights /= np.linalg.norm(weights, axis=1, keepdims=True)
+        differences = np.einsum("ij,ijk->ik", weights, values[places])
+        estimates.append(np.median(np.abs(differences), axis=0) / MEDIAN)
+    return float(np.max(np.min(estimates, axis=0)))
+
+
+def _rounding(values: np.ndarray) -> float:
+    # Step to which samples are rounded: a power of ten that divides all of them; 0: none that is coarse.
+    sample = values[:: max(len(values) // 1000, 1)]
+    for decimals in DECIMALS:
+        scaled = sample * 10.0**decimals
+        if np.abs(scaled - np.round(scaled)).max() <= 1e-6:
+            return 10.0**-decimals
+    return 0.0
+
+
+def _is_rounded(values: np.ndarray, step: float) -> bool:
+    # Third differences of rounded samples are often one step. Those of coordinates that lie on a grid by design are 0,
+    # or where an acceleration jumps two steps at least, since the position is half of it by the time squared.
+    differences = np.round(np.abs(np.diff(values, 3, axis=0)) / step)
+    changes = differences[differences > 0.0]
+    return len(changes) > 0 and bool(np.mean(changes == 1.0) >= ONE_STEP)
+
+
+def smoothed(table: MotionTable, deviation: float, *, angle: float | None = None) -> MotionTable:
+    """A table without the noise of its samples: a cubic smoothing spline, which misses them by a standard deviation.
+
+    Of all curves that miss the samples by so much in the root mean square, a smoothing spline has the least second
+    derivative in the mean square (Reinsch, Numerische Mathematik 10, 1967).
+
+    Args:
+        deviation: of each coordinate, m.
+        angle: standard deviation of orientations about each axis, rad; None: `deviation` over 1 m.
+
+    Returns:
+        the smoothed samples, without rates; its notes say what was taken off.
+
+    Raises:
+        InputError: a deviation that is not positive, or more than a straight line misses the samples by; or less than
+            five samples.
+    """
+    angle = deviation if angle is None else angle
+    for key, value in (("smooth", deviation), ("smooth (angle)", angle)):
+        if not 0.0 < value < math.inf:
+            raise InputError(key, value, "a number > 0, the standard deviation of the noise")
+    rows = np.append(True, np.diff(table.times) > 0.0)
+    times = table.times[rows]
+    if len(times) < 5:
+        raise InputError("smooth", deviation, f"absent for {len(times)} samples: must have 5 or more")
+    positions, line = _smooth(times, table.positions[rows], deviation, "positions", "m", 1.0)
+    notes, quaternions = [*table.notes, line], None
+    if table.quaternions is not None:
+        units = continuous(table.quaternions[rows])
+        turned, line = _smooth(times, units, angle / 2.0, "orientations", "rad", 2.0)
+        quaternions = turned / np.linalg.norm(turned, axis=1, keepdims=True)
+        notes.append(line)
+    kind = "cubic" if table.interpolation in (None, "hermite") else table.interpolation
+    return MotionTable(
+        times, positions, quaternions, interpolation=kind, ends=table.ends, z_axis=table.z_axis, notes=tuple(notes)
+    )
+
+
+def _smooth(
+    times: np.ndarray, values: np.ndarray, deviation: float, name: str, unit: str, factor: float
+) -> tuple[np.ndarray, str]:
+    # The weight of bending is that at which the spline misses the samples by the deviation; times are in steps.
+    places = (times - times[0]) / float(np.median(np.diff(times)))
+    moved = np.ptp(values, axis=0) > 0.0
+    dims = int(moved.sum())
+
+    def curve(power: float) -> np.ndarray:
+        columns = [
+            make_smoothing_spline(places, column, lam=10.0**power)(places) if is_moved else column
+            for column, is_moved in zip(values.T, moved, strict=True)
+        ]
+        return np.stack(columns, axis=1)
+
+    def miss(power: float) -> float:
+        return math.sqrt(float(((curve(power) - values) ** 2).sum()) / (len(values) * max(dims, 1)))
+
+    low, high = POWERS[0], min(POWERS[1], 4.0 * math.log10(len(values)))
+    most = miss(high)
+    if most <= deviation:
+        raise InputError(
+            "smooth",
+            factor * deviation,
+            f"less than {factor * most:.2g} {unit}, by which a straight line misses the {name}",
+        )
+    is_below = miss(low) < deviation
+    power = float(brentq(lambda power: miss(power) - deviation, low, high, xtol=0.01)) if is_below else low
+    result = curve(power)
+    away = np.linalg.norm(result - values, axis=1) * factor
+    rms = math.sqrt(float(np.mean(away**2)))
+    return (
+        result,
+        f"smoothing moved {name} by {rms:.2g} {unit} in the root mean square, {away.max():.2g} {unit} at most",
+    )

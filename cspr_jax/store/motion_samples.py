@@ -1,0 +1,77 @@
+"""Motions of users, whatever file they come in: text, CASPR's XML, or the HDF5 of `cspr plan -o`."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from cspr_jax.config.formats.xml_text import LONGEST_FAULT
+from cspr_jax.config.motions import caspr, text
+from cspr_jax.config.motions.table import MotionPieces, MotionTable
+from cspr_jax.errors import ConfigError
+from cspr_jax.store.result import Result, open_result
+
+HDF5 = (".h5", ".hdf5", ".nc")
+XML = ".xml"
+
+
+def read_motion(path: Path, trajectory: str | None = None) -> MotionTable | MotionPieces:
+    """A motion as a whole.
+
+    Args:
+        path: of a table of text, of trajectories of CASPR (.xml), or of an HDF5 motion of this program.
+        trajectory: name of one of several that a file of CASPR holds; None: it has one.
+
+    Returns:
+        samples, or polynomial pieces.
+
+    Raises:
+        ConfigError: a mistake in the file.
+        StoreError: an HDF5 file that is damaged or not of this program.
+    """
+    path, ending = Path(path), Path(path).suffix.lower()
+    if ending == XML:
+        return caspr.read(path, trajectory)
+    if trajectory is not None:
+        raise ConfigError(
+            path, f"trajectory = {trajectory!r}: must be absent: only files of CASPR have several"[:LONGEST_FAULT]
+        )
+    return _samples(path, open_result(path)) if ending in HDF5 else text.read(path)
+
+
+def motion_windows(path: Path, rows: int = text.WINDOW) -> Iterator[text.MotionWindow]:
+    """A table of samples, window by window, so that its length is not limited; see `config.motions.text.windows`.
+
+    Args:
+        rows: of a window; of an HDF5 motion, all are one window.
+
+    Yields:
+        the windows.
+
+    Raises:
+        ConfigError: as `read_motion`, and for trajectories of CASPR, which are polynomial pieces.
+        StoreError: as `read_motion`.
+    """
+    path, ending = Path(path), Path(path).suffix.lower()
+    if ending == XML:
+        raise ConfigError(path, "must be a table of samples here")
+    if ending not in HDF5:
+        yield from text.windows(path, rows)
+        return
+    table = _samples(path, open_result(path))
+    yield text.MotionWindow(table, 0, len(table.times) - 1, is_last=True)
+
+
+def _samples(path: Path, result: Result) -> MotionTable:
+    if "position" not in result.data or len(result.axes.get("t", ())) < 2:
+        raise ConfigError(path, "is a map, or a plan without a motion: must be a motion of `cspr plan -o`")
+    data = result.data
+    return MotionTable(
+        result.axes["t"],
+        data["position"],
+        data.get("quaternion"),
+        data.get("velocity"),
+        data.get("acceleration"),
+        data.get("omega"),
+        data.get("omega_dot"),
+        interpolation="hermite" if "velocity" in data else None,
+        z_axis=result.attributes.get("z_axis"),
+    )
