@@ -150,7 +150,7 @@ class PlanFile(TrajectoryKeys, LimitTable):
         """The plan, with a motion in place of a file.
 
         Args:
-            name: of the file in the plan.
+            name: as `motion` has it.
             source: samples, as files of motions give them, or a spline.
 
         Returns:

@@ -28,7 +28,7 @@ SEGMENT = {
     "mu_min": ("s-2", "Smallest tension over mass and cable length."),
     "margin": (
         "1",
-        "Smallest margin, as `segment_margin` of a motion file; for straight lines in m/s^2, for splines in N.",
+        "Smallest margin, as `segment_margin` of a motion file; of lines in m/s^2, of splines in N.",
     ),
     "margin_bound": ("1", "Proved lower bound of `margin`; null where nothing is proved."),
     "limit_margin": ("1", "Smallest slack of the limits; null without limits."),
@@ -97,7 +97,7 @@ SCATTER = {
     "standard_deviation": ("m", "Standard deviation of the distance from the target."),
     "largest_error": ("m", "Largest distance from the target."),
 }
-# Of the object that `cspr check --json` prints.
+# The object that `cspr check --json` prints.
 CHECK = {
     "schema": ("1", "Version of these fields."),
     "robot": ("", "Name of the robot."),
@@ -106,7 +106,7 @@ CHECK = {
     "duration": ("s", "Duration."),
     "margin": (
         "N",
-        "Smallest distance of a tension from its limits; of redundant cables the largest that all can keep.",
+        "Smallest distance of a tension from its limits; of redundant cables that of all together.",
     ),
     "margin_unit": ("", '"N".'),
     "margin_bound": ("N", "Proved lower bound of `margin`; null where nothing is proved."),
@@ -114,7 +114,7 @@ CHECK = {
     "cause": ("", "As of a segment of a plan; empty where the motion is feasible."),
     "failing": (
         "s",
-        "All intervals of time in which the motion fails, to 1e-6 s; of a function from sample to sample.",
+        "All intervals of time in which it fails, to 1e-6 s; of a function from sample to sample.",
     ),
     "tension_min": ("N", "Smallest tension of any cable, as of a segment of a plan."),
     "tension_max": ("N", "Largest tension of any cable, likewise."),

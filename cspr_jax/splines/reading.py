@@ -198,8 +198,8 @@ def _of_rates(table: MotionTable) -> Spline:
         plain = _without_joins(table)
         turned = interpolated(plain.times, plain.positions, plain.quaternions, interpolation="cubic")
         quaternion = np.asarray(turned.quaternion)
-    position, turning = leaf(hermite(since, derivatives)), None if quaternion is None else leaf(quaternion)
-    return Spline(leaf(knots), position, turning, interpolation="hermite")
+    curve = Spline(leaf(knots), leaf(hermite(since, derivatives)), None, interpolation="hermite")
+    return curve if quaternion is None else dataclasses.replace(curve, quaternion=leaf(quaternion))
 
 
 def _pure(vectors: np.ndarray) -> np.ndarray:
