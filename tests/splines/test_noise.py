@@ -140,3 +140,12 @@ def test_smoothing_faults(deviation, line):
     with pytest.raises(InputError) as caught:
         smoothed(MotionTable(times, MOTIONS["circle"](times)[:, [0, 0, 0]] * 0.58), deviation)
     assert line in str(caught.value)
+
+
+def test_rounding_of_slow_motions():
+    """Their differences of any order are mostly 0, but their accelerations jump with each step."""
+    times = np.arange(0.0, 10.0, 0.001)
+    line = np.outer(times, [0.0071, 0.0, 0.0])
+    assert noise_notes(MotionTable(times, line)) == []
+    (note,) = noise_notes(MotionTable(times, np.round(line, 4)))
+    assert "since they are rounded to 0.0001" in note
