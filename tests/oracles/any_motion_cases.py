@@ -37,7 +37,7 @@ def frame(kind):
     """Unit robot, z up: spools at z = 0 or so, platform points (None: a point), reference position, half ranges."""
     pattern, count = kind.split("-")
     if pattern == "2T":
-        base = [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.1], [0.15, 0.0, 0.3]][: int(count)]
+        base = [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.15, 0.0, 0.3]][: int(count)]
         return np.array(base), None, [0.0, 0.0, -1.0], [0.5, 0.0, 0.4]
     if kind == "3T-3":
         return ring(3, 1.0, 0.2), None, [0.0, 0.0, -1.1], [0.3, 0.3, 0.4]
@@ -83,6 +83,8 @@ def random_robot(rng, kind, pulleys=False):
     uneven = 0.03 * rng.normal(size=base.shape)
     if is_planar:
         uneven[:, 1] = 0.0
+    if kind == "2T-2":
+        uneven[:, 2] = 0.0  # two spools are on a level line
     base = size * (base + uneven)
     mass = math.exp(rng.uniform(math.log(0.1), math.log(500.0)))
     flip = rng.random() < 0.5 and not is_planar
@@ -136,16 +138,18 @@ def random_samples(rng, robot, reference, ranges, size, duration):
     """Samples of a motion that lasts a time."""
     is_planar = robot["pattern"] in ("2T", "1R2T")
     interpolation = rng.choice(["cubic", "quintic", "hermite", "hermite"])
-    ends = str(rng.choice(["rest", "natural", "periodic"])) if interpolation != "hermite" else "rest"
-    count = int(rng.choice([4, 6, 9, 14, 40])) if interpolation != "hermite" else int(rng.integers(3, 12))
+    count = int(rng.choice([2, 4, 6, 9, 14, 40, 150])) if interpolation != "hermite" else int(rng.integers(3, 12))
+    # Two samples do not give other splines a motion.
+    is_free = count > 2 and interpolation != "hermite"
+    ends = str(rng.choice(["rest", "natural", "periodic"])) if is_free else "rest"
     steps = np.cumsum(rng.uniform(0.6, 1.4, count - 1)) if rng.random() < 0.5 else np.arange(1.0, count)
     times = rng.choice([0.0, 0.7]) + duration * np.concatenate([[0.0], steps]) / steps[-1]
-    if count == 40 or interpolation == "hermite":
+    if count >= 40 or interpolation == "hermite":
         shifts, turns = waves(rng, times, 3), waves(rng, times, 4)
     else:
         shifts, turns = (np.zeros((count, 3, n)) for n in (3, 4))
         shifts[:, 0], turns[:, 0] = rng.uniform(-1.0, 1.0, (count, 3)), rng.uniform(-1.0, 1.0, (count, 4))
-    shifts, turns = shifts * ranges * rng.uniform(0.3, 1.0), 0.12 * turns
+    shifts, turns = shifts * ranges * rng.choice([0.3, 0.6, 1.0, 1.5]), 0.12 * turns
     shifts[:, 0] += reference
     turns[:, 0, 0] += 1.0
     if is_planar:
@@ -157,56 +161,45 @@ def random_samples(rng, robot, reference, ranges, size, duration):
         orders = slice(1, 2 + int(rng.random() < 0.5))
         samples["rates"] = shifts[:, orders]
     if robot["platform_points"] is not None:
-        samples["quaternions"] = turns[:, 0] * (1.0 if rng.random() < 0.8 else -1.0)
-        if interpolation == "hermite":
-            samples["turning"] = np.sign(samples["quaternions"][0, 0]) * turns[:, orders]
-        else:
-            samples["quaternions"] /= np.linalg.norm(samples["quaternions"], axis=1)[:, None]
+        samples["quaternions"] = turns[:, 0] * rng.choice([1.0, 1.0, 1.0, -1.0], (count, 1))
     return samples
 
 
 def random_limits(rng, robot, motion):
-    """Limits near what a motion needs: one of them decides, by -30 to 50 % of what it needs, or by a hair."""
+    """Limits near what a motion needs; all are there, so that the kernels of a kind of robot are compiled once."""
     times = np.linspace(*motion.times, COARSE)
     state = motion.state(times)
     found = any_motion.cables(robot, state)
     matrix, wrench = any_motion.balance(robot, state, found)
     count, weight = len(robot["base_points"]), robot["mass"] * robot["gravity"]
     dof = matrix.shape[1]
-    limits = {}
 
     def room(part):
-        """Return an excess of a limit over what is needed: small, of either sign for the criterion that decides."""
+        """Return an excess of a limit over what is needed: small, of either sign; or so large that it is none."""
         wide = rng.uniform(0.02, 0.6) * part
-        return -0.4 * wide if rng.random() < 0.18 else wide
+        return rng.choice([-0.4 * wide, wide, 50.0 * part], p=[0.15, 0.45, 0.4])
 
     if count == dof:
         f = any_motion.tensions(matrix, wrench)
-        least, largest = f.min(), f.max()
         spread = weight / count
-        limits["tension_min"] = max(0.0, least - room(0.3 * spread))
-        if rng.random() < 0.6:
-            limits["tension_max"] = max(limits["tension_min"] + spread, largest + room(spread))
+        least = max(0.0, f.min() - room(0.3 * spread))
+        largest = max(least + spread, f.max() + room(spread))
     else:
-        lo, hi = 0.0, rng.uniform(0.8, 2.0) * weight
-        s = any_motion.Centring(np.full(count, lo), np.full(count, hi)).largest(matrix, wrench).min()
-        inset = s - room(0.1 * weight)
-        limits["tension_min"] = max(0.0, lo + inset)
-        limits["tension_max"] = max(hi - inset, limits["tension_min"] + 0.1 * weight)
-    limits["tension_min"] = np.full(count, limits["tension_min"]) * (1.0 + 0.02 * rng.random(count))
-    if "tension_max" in limits:
-        limits["tension_max"] = np.full(count, limits["tension_max"])
+        hi = rng.uniform(0.8, 2.0) * weight
+        s = any_motion.Centring(np.zeros(count), np.full(count, hi)).largest(matrix, wrench).min()
+        inset = s - rng.choice([-0.03, 0.03, 0.06], p=[0.2, 0.4, 0.4]) * weight * rng.random()
+        least = max(0.0, inset)
+        largest = max(hi - inset, least + 0.1 * weight)
+    limits = {"tension_min": least * (1.0 + 0.02 * rng.random(count)), "tension_max": np.full(count, largest)}
     demands = {
         "cable_length_max": found.lengths.max(),
         "cable_speed_max": np.abs(found.rates).max(),
         "cable_acceleration_max": np.abs(found.accelerations).max(),
     }
     for name, demand in demands.items():
-        if rng.random() < 0.4:
-            limits[name] = demand + room(0.5 * demand)
-    if rng.random() < 0.4:
-        sign = 1.0 if robot["z_axis"] == "down" else -1.0
-        limits["floor"] = sign * ((sign * state.position[:, 2]).max() + room(0.2 * np.ptp(state.position[:, 2])))
+        limits[name] = np.full(count, demand + room(0.5 * demand))
+    sign = 1.0 if robot["z_axis"] == "down" else -1.0
+    limits["floor"] = sign * ((sign * state.position[:, 2]).max() + room(0.2 * np.ptp(state.position[:, 2])))
     return limits
 
 
@@ -228,12 +221,11 @@ def random_case(rng, pulleys=False, kind=None):
     times = np.linspace(*motion.times, COARSE)
     quick = np.linalg.norm(motion.state(times).acceleration, axis=1).max()
     # In a time k as long: accelerations are 1 / k^2 of these. None is above the share of gravity drawn.
-    k = math.sqrt(quick / (rng.uniform(0.02, 0.4) * robot["gravity"]))
+    share = rng.choice([rng.uniform(0.02, 0.4), rng.uniform(0.4, 2.0)], p=[0.9, 0.1])
+    k = math.sqrt(quick / (share * robot["gravity"]))
     samples["times"] = samples["times"] * k
-    for name in ("rates", "turning"):
-        if name in samples:
-            orders = np.arange(1, 1 + samples[name].shape[1])[:, None]
-            samples[name] = samples[name] / k**orders
+    if "rates" in samples:
+        samples["rates"] = samples["rates"] / k ** np.arange(1, 1 + samples["rates"].shape[1])[:, None]
     motion = sampled_motion.sampled(**samples)
     if robot["pulley_radius"] is not None and not swivels(robot, motion.state(np.linspace(*motion.times, COARSE))):
         robot["pulley_radius"] = robot["pulley_axes"] = None

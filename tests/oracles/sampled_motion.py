@@ -110,8 +110,8 @@ def spline(times, values, interpolation="cubic", ends="rest"):
 
 
 def signed(quaternions):
-    """Quaternions of which each is as near to the one before as its sign allows, (n, 4)."""
-    quaternions = np.array(quaternions, float)
+    """Unit quaternions of which each is as near to the one before as its sign allows, (n, 4)."""
+    quaternions = quaternions / np.linalg.norm(quaternions, axis=1)[:, None]
     flips = np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0.0
     quaternions[1:] *= np.where(np.cumsum(flips) % 2 == 1, -1.0, 1.0)[:, None]
     return quaternions
@@ -171,21 +171,18 @@ class Motion:
         return State(p, v, a, rotations(q), omega, alpha)
 
 
-def sampled(times, positions, quaternions=None, *, interpolation="cubic", ends="rest", rates=None, turning=None):
-    """Motion through samples.
+def sampled(times, positions, quaternions=None, *, interpolation="cubic", ends="rest", rates=None):
+    """Motion through samples; where positions are Hermite pieces, quaternions are a spline of the same degree.
 
     Args:
         positions: (n, 3) of the mass centre.
         quaternions: (n, 4), or None.
         interpolation: "cubic", "quintic", or "hermite" with rates.
         rates: (n, k, 3) velocities, and accelerations, of Hermite pieces.
-        turning: (n, k, 4) derivatives of the quaternions, with their signs, likewise.
     """
-    if quaternions is not None:
-        quaternions = signed(quaternions)
     if interpolation == "hermite":
-        pieces = [(positions, rates), (quaternions, turning)]
-        made = [None if x is None else hermite(times, np.concatenate([x[:, None], dx], axis=1)) for x, dx in pieces]
-        return Motion(*made)
-    turns = None if quaternions is None else spline(times, quaternions, interpolation, ends)
-    return Motion(spline(times, positions, interpolation, ends), turns)
+        interpolation = ["cubic", "quintic"][rates.shape[1] - 1]
+        moved = hermite(times, np.concatenate([positions[:, None], rates], axis=1))
+    else:
+        moved = spline(times, positions, interpolation, ends)
+    return Motion(moved, None if quaternions is None else spline(times, signed(quaternions), interpolation, ends))
