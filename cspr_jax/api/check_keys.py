@@ -29,9 +29,9 @@ def robot_table(robot: AnyRobot) -> dict[str, Any]:
     table: dict[str, Any] = {"name": robot.name or "robot", "pattern": robot.pattern, "z_axis": robot.z_axis}
     table |= {name: getattr(robot, name) for name in ("base_points", "mass", "gravity", "cable_diameter")}
     if isinstance(robot, PlatformRobot):
-        table |= {name: getattr(robot, name) for name in ("platform_points", "inertia")}
-        if PATTERNS[robot.pattern].is_jointed:
-            table["centre_of_mass"] = robot.centre_of_mass
+        table |= {name: getattr(robot, name) for name in ("platform_points", "inertia", "centre_of_mass")}
+        if robot.centre_of_mass is not None and not PATTERNS[robot.pattern].is_jointed:
+            table["platform_points"] = np.asarray(robot.platform_points) + np.asarray(robot.centre_of_mass)
     if robot.pulleys is not None:
         table |= {"pulley_radius": robot.pulleys.radius, "pulley_axes": robot.pulleys.axes}
     table |= {row.name: getattr(robot.limits, row.name) for row in LIMITS if row.per_cable}

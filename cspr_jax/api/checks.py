@@ -180,6 +180,7 @@ def check(  # noqa: PLR0913
     interpolation: str | None = None,
     ends: str | None = None,
     smooth: float | None = None,
+    point: str | None = None,
     duration: float | None = None,
     limits: Limits | Mapping[str, Any] | None = None,
 ) -> Check:
@@ -198,6 +199,8 @@ def check(  # noqa: PLR0913
             without.
         ends: "rest", "natural" or "periodic"; None: as the file says, else "rest".
         smooth: standard deviation of the noise of positions, m, which a smoothing spline takes off; None: 0.
+        point: point of a platform whose positions these are, "mass-centre" or "origin" of its axes; None: as the file
+            says, else the mass centre.
         duration: of a function, s; None: anything else.
         limits: override those of the robot, one by one; a dictionary may hold all keys of [limits] of a plan.
 
@@ -208,7 +211,7 @@ def check(  # noqa: PLR0913
         ConfigError: a mistake in a file.
         InputError: samples that make no motion, or an impossible argument.
     """
-    keys = check_keys(robot, limits, interpolation=interpolation, ends=ends, smooth=smooth)
+    keys = check_keys(robot, limits, interpolation=interpolation, ends=ends, smooth=smooth, point=point)
     with double_precision():
         if isinstance(times, str | Path):
             return _check_of(plan_keys(keys | {"motion": str(times)}, NAME))

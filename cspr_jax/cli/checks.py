@@ -40,6 +40,11 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
         "--smooth", type=float, metavar="SD", help="take off noise of the positions of this standard deviation, m"
     )
     parser.add_argument(
+        "--point",
+        choices=("mass-centre", "origin"),
+        help="point of a platform whose positions these are (default: as the file says, else its mass centre)",
+    )
+    parser.add_argument(
         "--slower",
         action="store_true",
         help="find the least uniform stretching of time that is feasible, and check what it stretches",
@@ -56,7 +61,7 @@ def _keys(options: argparse.Namespace) -> dict[str, Any]:
 
     if options.smooth is not None and not 0.0 < options.smooth < float("inf"):
         raise ConfigError("--smooth", f"{options.smooth}: must be a number > 0, in m")
-    keys = {name: getattr(options, name) for name in ("interpolation", "ends", "smooth")}
+    keys = {name: getattr(options, name) for name in ("interpolation", "ends", "smooth", "point")}
     keys = {name: value for name, value in keys.items() if value is not None} | {"robot": options.robot}
     if options.limits is not None:
         limits = read_toml(options.limits)

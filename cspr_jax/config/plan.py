@@ -127,6 +127,11 @@ class PlanFile(TrajectoryKeys, LimitTable):
         description='spline: ends of the curve: "rest", the default (velocity 0, of quintics acceleration 0 too), '
         '"natural" or "periodic"',
     )
+    point: Literal["mass-centre", "origin"] | None = Field(
+        None,
+        description='spline: point of a platform whose positions a file has: "mass-centre", the default, as poses of '
+        'plans, or "origin" of its axes',
+    )
     smooth: Positive | None = Field(
         None,
         description="spline: standard deviation of the noise of a file's positions, m, which a smoothing spline takes "

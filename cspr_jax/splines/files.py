@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from scipy.interpolate import BarycentricInterpolator
+from scipy.spatial.transform import Rotation
 
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import IDENTITY, Frame
@@ -35,10 +36,16 @@ def samples_of(times, positions, quaternions=None, velocities=None, acceleration
 
     Returns:
         the samples.
+
+    Raises:
+        InputError: numbers of rows that differ.
     """
     times, positions = np.asarray(times, float), np.asarray(positions, float)
     others = {"quaternions": quaternions, "velocities": velocities, "accelerations": accelerations}
     arrays: dict[str, Any] = {name: np.asarray(rows, float) for name, rows in others.items() if rows is not None}
+    for name, rows in ({"positions": positions} | arrays).items():
+        if len(rows) != len(times):
+            raise InputError(name, None, f"must have {len(times)} rows, one for each time", fault=f"shape {rows.shape}")
     return MotionTable(times, positions, **arrays)
 
 
@@ -101,13 +108,14 @@ def moving_ends(source: Any, ends: str | None) -> list[str]:
     return lines
 
 
-def placed_inward(spline: Spline, frame: Frame, reference: np.ndarray) -> Spline:
+def placed_inward(spline: Spline, frame: Frame, reference: np.ndarray, centre: np.ndarray | None = None) -> Spline:
     """A spline in the axes of a robot file, in those of the kernels.
 
     Args:
         spline: orientations are those of the platform's axes in the file; NumPy leaves.
-        frame: of the file.
         reference: (4,) of `reference_of`.
+        centre: (3,) mass centre in the axes of the platform in the file, m, if the positions are those of their origin;
+            None: the positions are those of the mass centre.
 
     Returns:
         the spline, from the centroid of the spools, z down, orientations from the reference one.
@@ -117,7 +125,10 @@ def placed_inward(spline: Spline, frame: Frame, reference: np.ndarray) -> Spline
         rows = frame.turned_quaternions(np.asarray(turning)).reshape(-1, 4)
         # A product is linear in the quaternion, and so in its coefficients.
         turning = leaf(products(rows, (reference * BACK)[None]).reshape(turning.shape))
-    return dataclasses.replace(spline, position=leaf(frame.inward(spline.position)), quaternion=turning)
+    moved = dataclasses.replace(spline, position=leaf(frame.inward(spline.position)), quaternion=turning)
+    if centre is None or not np.any(centre) or turning is None:
+        return moved
+    return dataclasses.replace(moved, offset=leaf(_rotation(reference).apply(frame.turned(centre))))
 
 
 def reference_of(robot: AnyRobot) -> np.ndarray:
@@ -131,6 +142,8 @@ def reference_of(robot: AnyRobot) -> np.ndarray:
     """
     if not isinstance(robot, PlatformRobot):
         return np.array(IDENTITY)
-    from scipy.spatial.transform import Rotation
-
     return np.roll(Rotation.from_matrix(aligned(centred(robot)[0])[1]).as_quat(), 1)
+
+
+def _rotation(quaternion: np.ndarray) -> Rotation:
+    return Rotation.from_quat(np.roll(quaternion, -1))

@@ -69,7 +69,6 @@ def function_motion(
     Args:
         function: gives positions (3,) m, of a platform also (7,) with quaternions behind them, at instants () s.
         duration: s.
-        frame: of the file.
         reference: (4,) of `splines.files.reference_of`.
         is_platform: whether the robot has orientations.
 

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from cspr_jax.arithmetic.frames import IDENTITY
 from cspr_jax.build.orientations import given_quaternion, orientations
 from cspr_jax.build.robots import build_robot
 from cspr_jax.config.motions.hints import unit_hints
@@ -97,8 +98,20 @@ class Splines(Leg):
             )
         except InputError as error:
             raise ConfigError(name, str(error)) from error
-        robot = build_robot(stops.robot_file, stops.keys, stops.path)
-        return placed_inward(curve, stops.frame, reference_of(robot))
+        reference = np.array(IDENTITY)
+        if not getattr(source, "from_reference", False):
+            reference = reference_of(build_robot(stops.robot_file, stops.keys, stops.path))
+        centre = stops.robot_file.centre_of_mass if self._point(name, source) == "origin" else None
+        return placed_inward(curve, stops.frame, reference, None if centre is None else np.asarray(centre))
+
+    def _point(self, name: str, source: Any) -> str:
+        point, centre = self.stops.keys.point or getattr(source, "point", None), self.stops.robot_file.centre_of_mass
+        if point is None and centre is not None and any(centre):
+            self._notes.append(
+                f"{name}: hint: positions are taken as those of the mass centre, {list(centre)} m from the origin of "
+                'the platform\'s axes; if they are those of the origin, say point = "origin"'
+            )
+        return point or "mass-centre"
 
     def _cleaned(self, name: str, source: Any) -> Any:
         # Take the noise off that the plan names, else tell it.

@@ -10,6 +10,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic import rotations
+from cspr_jax.arithmetic.affine_bounds import cross, turned
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.robots.state import State
 from cspr_jax.robots.state_bounds import StateBounds
@@ -26,6 +27,7 @@ class Spline:
         quaternion: (m, degree + 1, 4) likewise, scalar first, continuous; their length is of no account, but not zero;
             None for a point mass.
         z0: () depth at which slacks are normalised, m.
+        offset: (3,) from the point whose positions these are to the mass centre, platform axes, m; None: it is that.
         interpolation: how its samples were joined, one of `splines.interpolation.INTERPOLATIONS`, or "pieces".
         ends: of the same, or "".
     """
@@ -34,6 +36,7 @@ class Spline:
     position: Array
     quaternion: Array | None
     z0: Any = dataclasses.field(default_factory=lambda: leaf(1.0))
+    offset: Array | None = None
     interpolation: str = "pieces"
     ends: str = ""
 
@@ -51,8 +54,13 @@ class Spline:
         position, velocity, acceleration = _values(jnp.asarray(self.position)[piece], share, width)
         if self.quaternion is None:
             return State(position, velocity, acceleration)
-        turning = turning_of(*_values(jnp.asarray(self.quaternion)[piece], share, width))
-        return State(position, velocity, acceleration, *turning)
+        rotation, spin, spin_rate, unit = turning_of(*_values(jnp.asarray(self.quaternion)[piece], share, width))
+        if self.offset is not None:
+            arm = rotation @ self.offset
+            swing = jnp.cross(spin, arm)
+            position, velocity = position + arm, velocity + swing
+            acceleration = acceleration + jnp.cross(spin_rate, arm) + jnp.cross(spin, swing)
+        return State(position, velocity, acceleration, rotation, spin, spin_rate, unit)
 
     def stretched(self, factor: float) -> "Spline":
         """The motion run more slowly, or faster.
@@ -72,12 +80,27 @@ class Spline:
     def bounds(self, start: np.ndarray, end: np.ndarray) -> StateBounds:
         """Bounds of the states; see `BoundedMotion.bounds`."""
         quaternion = None if self.quaternion is None else np.asarray(self.quaternion)
-        return spline_bounds(np.asarray(self.knots), np.asarray(self.position), quaternion, start, end)
+        bounds = spline_bounds(np.asarray(self.knots), np.asarray(self.position), quaternion, start, end)
+        return bounds if self.offset is None else _moved(bounds, self.offset)
 
 
 jax.tree_util.register_dataclass(
-    Spline, ["knots", "position", "quaternion", "z0"], [], drop_fields=["interpolation", "ends"]
+    Spline, ["knots", "position", "quaternion", "offset", "z0"], [], drop_fields=["interpolation", "ends"]
 )
+
+
+@jax.jit
+def _moved(bounds: StateBounds, offset: Array) -> StateBounds:
+    # Bounds of another point of the platform, over k blocks.
+    def one(state: StateBounds) -> StateBounds:
+        arm = turned(state.rotation, offset)
+        swing = cross(state.angular_velocity, arm)
+        pull = cross(state.angular_acceleration, arm) + cross(state.angular_velocity, swing)
+        return state._replace(
+            position=state.position + arm, velocity=state.velocity + swing, acceleration=state.acceleration + pull
+        )
+
+    return jax.vmap(one)(bounds)
 
 
 def part(spline: Spline, first: int, last: int) -> Spline:

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline, make_smoothing_spline
@@ -187,9 +188,9 @@ def smoothed(table: MotionTable, deviation: float, *, angle: float | None = None
         quaternions = turned / np.linalg.norm(turned, axis=1, keepdims=True)
         notes.append(line)
     kind = "cubic" if table.interpolation in (None, "hermite") else table.interpolation
-    return MotionTable(
-        times, positions, quaternions, interpolation=kind, ends=table.ends, z_axis=table.z_axis, notes=tuple(notes)
-    )
+    rates = dict.fromkeys(("velocities", "accelerations", "angular_velocities", "angular_accelerations"))
+    samples: dict[str, Any] = {"times": times, "positions": positions, "quaternions": quaternions, **rates}
+    return dataclasses.replace(table, **samples, interpolation=kind, notes=tuple(notes))
 
 
 def _smooth(

@@ -74,4 +74,6 @@ def _samples(path: Path, result: Result) -> MotionTable:
         data.get("omega_dot"),
         interpolation="hermite" if "velocity" in data else None,
         z_axis=result.attributes.get("z_axis"),
+        point="mass-centre",
+        from_reference=True,
     )

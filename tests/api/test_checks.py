@@ -134,3 +134,30 @@ def test_one_line_for_what_is_no_motion(arguments, words):
     with pytest.raises((InputError, ConfigError)) as error:
         cspr_jax.check("prototype", **({"times": TIMES, "positions": PLACES} | arguments))
     assert words in str(error.value) and "\n" not in str(error.value)
+
+
+@pytest.mark.thorough
+def test_positions_of_the_origin_of_a_platform():
+    """A rotation about the origin moves the mass centre on a circle: the same motion by both points."""
+    centre = np.array([-0.034, -0.013, 0.264])
+    times = np.linspace(0.0, 4.0, 401)
+    angles = 0.1 * (1.0 - np.cos(np.pi * times / 2.0))
+    zero = 0.0 * times
+    quaternions = np.stack([np.cos(angles / 2.0), zero, np.sin(angles / 2.0), zero], axis=1)
+    turned = np.stack(
+        [
+            np.cos(angles) * centre[0] + np.sin(angles) * centre[2],
+            centre[1] + zero,
+            np.cos(angles) * centre[2] - np.sin(angles) * centre[0],
+        ],
+        axis=1,
+    )
+    origin = np.tile([0.5, 0.0, 2.0], (401, 1))
+    limits = {"tension_min": 100.0, "tension_max": 500.0}
+    by_origin = cspr_jax.check("cogiro", times, origin, quaternions, point="origin", limits=limits)
+    by_centre = cspr_jax.check("cogiro", times, origin + turned, quaternions, limits=limits)
+    other = cspr_jax.check("cogiro", times, origin, quaternions, limits=limits)
+    assert by_origin.margin == pytest.approx(by_centre.margin, rel=1e-3)
+    assert other.margin != pytest.approx(by_centre.margin, rel=1e-2) and "mass centre" in other.plan.warnings[0]
+    rows = by_origin.plan.rows()
+    np.testing.assert_allclose(rows["position"][0], [0.5, 0.0, 2.0] + centre, atol=1e-9)

@@ -94,7 +94,7 @@ def read(path: Path, name: str | None = None, bodies: Path | None = None) -> Mot
     if coordinates.turns:
         knots, position, quaternion = _turned(coordinates, knots, position, table, law, values[0])
         quaternion[:, :, 1:] = quaternion[:, :, 1:] @ axes.T
-    return MotionPieces(knots, (position + start) @ axes.T, quaternion, "up")
+    return MotionPieces(knots, (position + start) @ axes.T, quaternion, "up", "origin")
 
 
 def _chosen(path: Path, name: str | None) -> Element:

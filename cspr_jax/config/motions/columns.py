@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cspr_jax.config.motions.table import Z_AXES
+from cspr_jax.config.motions.table import POINTS, Z_AXES
 from cspr_jax.config.suggestions import did_you_mean, nearest
 from cspr_jax.config.wording import either
 from cspr_jax.errors import ConfigError, shown
@@ -68,6 +68,7 @@ PLAIN = {
     8: ("t", "x", "y", "z", "qw", "qx", "qy", "qz"),
 }
 _VALUES = {
+    "point": POINTS,
     "interpolation": ("cubic", "quintic", "hermite"),
     "ends": ("rest", "natural", "periodic"),
     "z": Z_AXES,

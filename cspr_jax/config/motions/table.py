@@ -11,6 +11,8 @@ from cspr_jax.errors import InputError
 _TURN = np.array([1.0, -1.0, -1.0])
 _TURN_QUATERNION = np.array([1.0, 1.0, -1.0, -1.0])
 Z_AXES = ("down", "up")
+# Points of a platform whose positions a motion may have.
+POINTS = ("mass-centre", "origin")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -28,6 +30,8 @@ class MotionTable:
         interpolation: that the file names, of `splines.interpolation.INTERPOLATIONS`, or None.
         ends: that the file names, of `splines.interpolation.ENDS`, or None.
         z_axis: where z points in it, "up" or "down"; None: as in the file of the robot.
+        point: whose positions it has, one of `POINTS`; None: it does not say.
+        from_reference: whether orientations count from the reference orientation, and not from the platform's own axes.
         notes: lines for the user.
     """
 
@@ -41,6 +45,8 @@ class MotionTable:
     interpolation: str | None = None
     ends: str | None = None
     z_axis: str | None = None
+    point: str | None = None
+    from_reference: bool = False
     notes: tuple[str, ...] = ()
 
     def in_axes(self, z_axis: str) -> "MotionTable":
@@ -75,6 +81,7 @@ class MotionPieces:
         position: (m, degree + 1, 3) Bernstein coefficients of each piece, m.
         quaternion: (m, degree + 1, 4) likewise, scalar first, of any length but zero; or None.
         z_axis: where z points in it, "up" or "down"; None: as in the file of the robot.
+        point: whose positions it has, one of `POINTS`; None: it does not say.
         notes: lines for the user.
     """
 
@@ -82,6 +89,7 @@ class MotionPieces:
     position: np.ndarray
     quaternion: np.ndarray | None = None
     z_axis: str | None = None
+    point: str | None = None
     notes: tuple[str, ...] = ()
 
     def in_axes(self, z_axis: str) -> "MotionPieces":
