@@ -22,7 +22,8 @@ Files, each importing only from those above it:
     proved_verdicts     verdicts that rest on a proof
     sampled             answers of motions that are only sampled
     block_slacks        slacks of any motion over blocks of time, from bounds of its states
-    time_proof          proof of criteria over the whole time of a motion
+    block_parts         blocks of several motions, cut where lines leave little undecided
+    time_proof          proof of criteria over the whole time of a motion, or of several
     blocks              parts of arcs, halved while they are undecided
     enclosures          bounds of a robot's state over a block of time
     cable_rates         speeds and accelerations of cables over blocks

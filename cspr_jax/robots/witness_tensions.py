@@ -27,16 +27,26 @@ class WitnessTensions(NamedTuple):
 
     Fields:
         tension: (n_cables,) bounds of tensions that balance throughout, N; radii are NaN where nothing is known.
-        margin_low: () lower bound of the largest distance of tensions from their limits, at every instant, N; -inf
-            where nothing is known.
-        margin_high: () upper bound of the same, at every instant, N; inf where nothing is known.
+        below: (2,) at start and end of the block, a line below the largest distance of tensions from their limits, N;
+            -inf where nothing is known.
+        above: (2,) likewise a line above it; inf where nothing is known.
         is_regular: () whether the matrix is proved to have full rank throughout.
     """
 
     tension: AffineBounds
-    margin_low: Array
-    margin_high: Array
+    below: Array
+    above: Array
     is_regular: Array
+
+    @property
+    def margin_low(self) -> Array:
+        """Lower bound of the largest distance of tensions from their limits, at every instant, N."""
+        return self.below.min(-1)
+
+    @property
+    def margin_high(self) -> Array:
+        """Upper bound of the same."""
+        return self.above.max(-1)
 
 
 def witness_tensions(matrix: AffineBounds, wrench: AffineBounds, low: Array, high: Array) -> WitnessTensions:
@@ -54,14 +64,17 @@ def witness_tensions(matrix: AffineBounds, wrench: AffineBounds, low: Array, hig
     dof, count = matrix.middle.shape
     if count == dof:
         tension, is_regular = _solution(matrix, wrench, jnp.zeros(count))
-        margin_high = jnp.min(jnp.minimum(tension.high() - low, high - tension.low()))
-        margin_high = jnp.where(is_regular, margin_high, jnp.inf)
+        smallest = jnp.min(jnp.minimum(tension.high() - low, high - tension.low()))
+        above = jnp.broadcast_to(jnp.where(is_regular, smallest, jnp.inf), (2,))
     else:
         face = nearest_face(matrix.middle, wrench.middle, low, high)
         tension, is_regular = _solution(matrix, wrench, face.tensions, face.follow)
-        margin_high = _face_margin(matrix, wrench, low, high, face)
-    margin_low = jnp.min(jnp.minimum(tension.low() - low, high - tension.high()))
-    return WitnessTensions(tension, jnp.where(is_regular, margin_low, -jnp.inf), margin_high, is_regular)
+        above = _face_margin(matrix, wrench, low, high, face)
+    # The smallest of functions above lines is above the line between the smallest values at both ends.
+    lines = tension.middle - tension.slope, tension.middle + tension.slope
+    slacks = [jnp.minimum(line - low, high - line) - tension.radius for line in lines]
+    below = jnp.stack([jnp.min(slack) for slack in slacks])
+    return WitnessTensions(tension, jnp.where(is_regular, below, -jnp.inf), above, is_regular)
 
 
 def _inverse(matrix: Array) -> Array:
@@ -93,7 +106,8 @@ def _solution(
 
 
 def _face_margin(matrix: AffineBounds, wrench: AffineBounds, low: Array, high: Array, face: NearestFace) -> Array:
-    # Bound the largest distance from the limits by the face that is nearest in the middle.
+    # Values at start and end of a line above the largest distance from the limits, by the face that is nearest in the
+    # middle.
     dof, count = matrix.middle.shape
     columns = face.columns
     across = matrix.each(lambda x: x[:, columns].T)
@@ -106,8 +120,12 @@ def _face_margin(matrix: AffineBounds, wrench: AffineBounds, low: Array, high: A
     is_bounded = jnp.isfinite(limit) | (along.size() == 0.0)
     over = jnp.where(is_inward, -along.low(), along.high())
     other = jnp.where(over > FLAT * jnp.abs(along.middle), over * (high - low), 0.0)
-    slack = (dot(normal, wrench) - dot(along, jnp.where(is_bounded, limit, 0.0))).high() + jnp.sum(other)
+    slack = dot(normal, wrench) - dot(along, jnp.where(is_bounded, limit, 0.0))
+    top = slack.middle + slack.radius + jnp.sum(other)
+    ends = jnp.stack([top - slack.slope, top + slack.slope])
+    # The quotient is a convex function of the slack: it is below the line between its values at both ends.
     smallest = jnp.maximum(along.size() - 2.0 * along.reach(), 0.0)
-    size = jnp.sum(jnp.where(slack < 0.0, along.size(), smallest))
-    is_known = is_normal & is_bounded.all() & (size > 0.0) & jnp.isfinite(slack)
-    return jnp.minimum(jnp.where(is_known, slack / size, jnp.inf), 0.5 * jnp.min(high - low))
+    size = jnp.where(ends < 0.0, jnp.sum(along.size()), jnp.sum(smallest))
+    is_known = is_normal & is_bounded.all() & (size > 0.0).all() & jnp.isfinite(ends).all()
+    above, half = jnp.where(is_known, ends / jnp.where(is_known, size, 1.0), jnp.inf), 0.5 * jnp.min(high - low)
+    return jnp.where(jnp.max(above) < half, above, half)

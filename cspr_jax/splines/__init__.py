@@ -11,5 +11,6 @@ Files, each importing only from those above it:
 
     blocks              bounds of states over blocks of time
     motion              positions and rotations over time
+    several             blocks of several motions together
     interpolation       cubic, quintic and Hermite curves through samples
 """
