@@ -187,8 +187,7 @@ def _limits_or_keys(key: str, value: Any) -> None:
         _limits(key, value)
 
 
-def _instants(key: str, value: Any) -> None:
-    # Instants of samples, or what has a motion in itself: a file, a spline, a function.
+def _instants(key: str, value: Any) -> None:  # or what has a motion in itself: a file, a spline, a function
     if not (isinstance(value, str | os.PathLike) or callable(value) or hasattr(value, "state")):
         _real("instants (n,) in s, a path, a spline of SciPy, or a motion", (ANY,))(key, value)
 
@@ -262,7 +261,7 @@ ARGUMENTS: dict[str, Rule] = {
     "divisions": _integer(4, LARGEST_DIVISIONS),
     "dpi": _NUMBER_OR_NONE,
     "drum_radius": _POSITIVE,
-    "duration": _TIME,
+    "duration": _real("a finite number > 0, s", (), least=0.0, above=True, traced=True),
     "durations": _real("finite numbers > 0 of shape (n,), s", (ANY,), least=0.0, above=True),
     "end": _POINT,
     "ends": _POINTS,
@@ -358,6 +357,7 @@ OF_FUNCTIONS: dict[str, Rule] = {
     "AvailableAccelerations.verdict.accelerations": _real("finite numbers of shape (3,) or (n, 3)", (3,), (ANY, 3)),
     "attainable.z0": _real(f"{DEPTH_WORDS}, or None", (), none=True, **DEPTH),
     "bezier.start": _POINT,
+    "check.duration": _POSITIVE_OR_NONE,
     "check.ends": _TEXT_OR_NONE,
     "check.limits": _limits_or_keys,
     "check.point": _TEXT_OR_NONE,

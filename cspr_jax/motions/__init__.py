@@ -23,7 +23,8 @@ Files, each importing only from those above it:
     proved_verdicts     verdicts that rest on a proof
     sampled             answers of motions that are only sampled
     block_slacks        slacks of any motion over blocks of time, from bounds of its states
-    time_proof          proof of criteria over the whole time of a motion
+    block_parts         blocks of several motions, cut where lines leave little undecided
+    time_proof          proof of criteria over the whole time of a motion, or of several
     proved_answers      answers of motions that give bounds of their states
     stretching          the least uniform stretching of time that is feasible
     blocks              parts of arcs, halved while they are undecided

@@ -27,6 +27,7 @@ from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.schema.verdicts import Verdict
 
 BATCH = 64
+Pair = tuple[Array, Array] | Array
 
 
 class Criterion(NamedTuple):
@@ -61,15 +62,40 @@ class Criterion(NamedTuple):
 
 
 class BlockSlacks(NamedTuple):
-    """Bounds of slacks over k blocks.
+    """Bounds of slacks over k blocks: by numbers, and by lines over the block that rise from or to these numbers.
 
     Fields:
         low: (k, n_criteria) lower bounds, -inf where nothing is known.
         high: (k, n_criteria) upper bounds, inf where nothing is known.
+        low_rise: (k, n_criteria) rise of the line below the slack, from start to end, whose lower end is at `low`;
+            None: no line is known.
+        high_rise: (k, n_criteria) likewise of the line above, whose higher end is at `high`.
     """
 
     low: np.ndarray
     high: np.ndarray
+    low_rise: np.ndarray = None  # type: ignore[assignment]
+    high_rise: np.ndarray = None  # type: ignore[assignment]
+
+    def complete(self) -> "BlockSlacks":
+        """The bounds with lines, level ones where none are known.
+
+        Returns:
+            the bounds.
+        """
+        rises = (np.zeros_like(self.low) if rise is None else rise for rise in (self.low_rise, self.high_rise))
+        return BlockSlacks(self.low, self.high, *rises)
+
+
+def _lines(below: Pair, above: Pair) -> tuple[Array, ...]:
+    # Fields of `BlockSlacks` from values of a line below and of a line above, at the start and at the end of a block.
+    return jnp.minimum(*below), jnp.maximum(*above), below[1] - below[0], above[1] - above[0]
+
+
+def _edges(slack: AffineBounds) -> tuple[Pair, Pair]:
+    sides = slack.middle - slack.radius, slack.middle + slack.radius
+    below, above = ((side - slack.slope, side + slack.slope) for side in sides)
+    return below, above
 
 
 def criteria(robot: AnyRobot, limits: Limits) -> list[Criterion]:
@@ -100,44 +126,51 @@ def criteria(robot: AnyRobot, limits: Limits) -> list[Criterion]:
 
 
 @partial(jax.jit, static_argnames="is_redundant")
-def _kernel(robot: AnyRobot, limits: Limits, states: StateBounds, is_redundant: bool) -> tuple[Array, Array]:
-    def one(state: StateBounds) -> tuple[Array, Array]:
+def _kernel(robot: AnyRobot, limits: Limits, states: StateBounds, is_redundant: bool) -> tuple[Array, ...]:
+    def one(state: StateBounds) -> tuple[Array, ...]:
         cables = cable_bounds(robot, state)
         unit = 1.0 / wrench_units(robot)
         matrix, wrench = balance_bounds(robot, state, cables)
         low, high = tension_range(robot, limits)
         tensions = witness_tensions(matrix * unit[:, None], wrench * unit, low, high)
         if is_redundant:
-            parts = [(tensions.margin_low[None], tensions.margin_high[None])]
+            parts = [_lines(tensions.below[:, None], tensions.above[:, None])]
         else:
             slacks = [tensions.tension - low]
             slacks += [] if limits.tension_max is None else [high - tensions.tension]
-            parts = [(slack.low(), slack.high()) for slack in slacks]
+            parts = [_lines(*_edges(slack)) for slack in slacks]
         parts += _of_limits(limits, state, cables)
-        lows, highs = (jnp.concatenate(side) for side in zip(*parts, strict=True))
-        return jnp.where(jnp.isnan(lows), -jnp.inf, lows), jnp.where(jnp.isnan(highs), jnp.inf, highs)
+        # A part of two bounds has no lines.
+        level = [(*part, *[jnp.zeros_like(part[0])] * (4 - len(part))) for part in parts]
+        low, high, *rises = (jnp.concatenate(side) for side in zip(*level, strict=True))
+        low, high = jnp.where(jnp.isnan(low), -jnp.inf, low), jnp.where(jnp.isnan(high), jnp.inf, high)
+        return low, high, *(jnp.where(jnp.isfinite(rise), rise, 0.0) for rise in rises)
 
     return jax.vmap(one)(states)
 
 
-def _of_limits(limits: Limits, state: StateBounds, cables: CableBounds) -> list[tuple[Array, Array]]:
+def _of_limits(limits: Limits, state: StateBounds, cables: CableBounds) -> list[tuple[Array, ...]]:
     # Bound the slacks of all other limits; of speeds and accelerations that of the worse sign.
-    parts = []
+    parts: list[tuple[Array, ...]] = []
     values = {"depth": state.position.each(lambda x: x[2:]), "length": cables.length}
     rates = {"speed": cables.rate, "acceleration": cables.acceleration}
     for row in limits_set(limits):
         limit = jnp.asarray(getattr(limits, row.name))
         if row.quantity in values:
-            slack = limit - values[row.quantity]
-            parts.append((slack.low(), slack.high()))
+            parts.append(_lines(*_edges(limit - values[row.quantity])))
         elif row.quantity in rates:
-            above, below = _both(limit, rates[row.quantity])
-            parts.append((jnp.minimum(above.low(), below.low()), jnp.minimum(above.high(), below.high())))
+            parts.append(_within(limit, rates[row.quantity]))
     return parts
 
 
-def _both(limit: Array, value: AffineBounds) -> tuple[AffineBounds, AffineBounds]:
-    return -value + limit, value + limit
+def _within(limit: Array, value: AffineBounds) -> tuple[Array, ...]:
+    # The smaller of two slacks is above the line between the smaller values at both ends, and below each of both.
+    one, other = limit - value, value + limit
+    (below, above), (other_below, other_above) = _edges(one), _edges(other)
+    is_nearer = one.high() <= other.high()
+    start, end = (jnp.where(is_nearer, *ends) for ends in zip(above, other_above, strict=True))
+    low = jnp.minimum(below[0], other_below[0]), jnp.minimum(below[1], other_below[1])
+    return _lines(low, (start, end))
 
 
 def block_slacks(

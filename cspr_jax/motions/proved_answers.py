@@ -15,7 +15,7 @@ from cspr_jax.motions.block_slacks import Criterion, block_slacks, criteria
 from cspr_jax.motions.cause import Cause
 from cspr_jax.motions.motion import BoundedMotion, Motion
 from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.time_proof import TimeProof, merged, time_proof
+from cspr_jax.motions.time_proof import TimeProof, time_proof
 from cspr_jax.robots.point_mass import spool_radius
 from cspr_jax.robots.state_bounds import StateBounds
 from cspr_jax.schema.verdicts import FLAGS, Verdict
@@ -215,7 +215,7 @@ def sampled_proof(problem: Problem, motion: Motion, samples: int = SAMPLES) -> M
     states = _instants(structure, leaves, tau)
     high = block_slacks(problem.robot, problem.limits, lambda start, end: states, tau, tau).high
     times = tau * float(motion.duration())
-    failing = [merged(times, times, column < 0.0) for column in high.T]
+    failing = [_runs(times, column < 0.0) for column in high.T]
     whole = np.array([[0.0, times[-1]]])
     proof = TimeProof(
         low=np.full(len(rows), -np.inf),
@@ -226,6 +226,12 @@ def sampled_proof(problem: Problem, motion: Motion, samples: int = SAMPLES) -> M
         blocks=len(tau),
     )
     return MotionProof(rows, proof, _scales(problem, rows))
+
+
+def _runs(times: np.ndarray, flags: np.ndarray) -> np.ndarray:
+    # First and last instants of runs of flags, (m, 2).
+    edges = np.diff(np.concatenate([[0], flags.astype(int), [0]]))
+    return np.stack([times[edges[:-1] == 1], times[edges[1:] == -1]], axis=1)
 
 
 def _scales(problem: Problem, rows: Sequence[Criterion]) -> np.ndarray:

@@ -1,8 +1,8 @@
-"""Proof of any motion over its whole time: blocks are halved until each criterion is decided on each of them.
+"""Proof of any motion over its whole time: blocks are cut until each criterion is decided on each of them.
 
 A criterion is met throughout a block if the lower bound of its slack is positive, and broken throughout if the upper
 bound is negative. What is left when blocks are as short as the resolution are the ends of intervals in which a
-criterion fails, or instants that are undecided.
+criterion fails, or instants that are undecided. Open blocks of all motions are bounded together.
 """
 
 import dataclasses
@@ -10,13 +10,16 @@ from collections.abc import Callable
 
 import numpy as np
 
+from cspr_jax.motions.block_parts import Blocks, joined
 from cspr_jax.motions.block_slacks import BlockSlacks
 
 # Blocks at the start, and the share of itself, or of a tenth of usual ones, to which the smallest slack is narrowed.
 FIRST = 32
 CLOSE = 0.01
-# Blocks of all halvings together; beyond, what is open stays undecided, and margins are less close.
+# Blocks of one motion, all cuts together; beyond, what is open stays undecided, and margins are less close.
 MOST, NARROWING = 100_000, 4_000
+# Blocks that narrow a margin are no shorter than this part of the resolution.
+SHORTEST = 1e-3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -54,67 +57,110 @@ def time_proof(
     Returns:
         the proof.
     """
-    edges = np.linspace(0.0, duration, FIRST + 1)
-    start, end = edges[:-1], edges[1:]
-    leaves: list[tuple[np.ndarray, ...]] = []
-    total = 0
-    while len(start):
-        bounds = slacks(start, end)
-        total += len(start)
-        undecided = ~((bounds.low > 0.0) | (bounds.high < 0.0)).all(1)
-        halve = undecided & (end - start > resolution)
-        if total + 2 * halve.sum() > MOST:
-            halve[:] = False
-        leaves.append((start[~halve], end[~halve], bounds.low[~halve], bounds.high[~halve]))
-        middle = 0.5 * (start + end)[halve]
-        start, end = np.concatenate([start[halve], middle]), np.concatenate([middle, end[halve]])
-    starts, ends, low, high = (np.concatenate(parts) for parts in zip(*leaves, strict=True))
-    starts, ends, low, high, more = _narrowed(slacks, starts, ends, low, high)
-    failing = [merged(starts, ends, column < 0.0) for column in high.T]
-    is_open = ~((low > 0.0) | (high < 0.0))
-    return TimeProof(
-        low=low.min(0),
-        high=high.min(0),
-        when=0.5 * (starts + ends)[high.argmin(0)],
-        failing=failing,
-        open=[merged(starts, ends, column) for column in is_open.T],
-        blocks=total + more,
-    )
+    return time_proofs(lambda _, start, end: slacks(start, end), np.array([duration]), resolution)[0]
 
 
-def _narrowed(slacks, starts, ends, low, high):
-    # Halve the blocks that may hold the smallest slack of a criterion until its bounds are close.
-    more = 0
-    # Slacks are as large as they usually are: near zero no share of the smallest one is small enough.
-    usual = np.median(np.abs(np.where(np.isfinite(high), high, np.nan)), axis=0)
-    while more < NARROWING:
-        close = CLOSE * np.fmax(np.abs(high.min(0)), 0.1 * np.nan_to_num(usual))
-        chosen = ((low < high.min(0) - close) & np.isfinite(high.min(0))).any(1)
-        if not chosen.any():
-            break
-        middle = 0.5 * (starts + ends)[chosen]
-        parts = np.concatenate([starts[chosen], middle]), np.concatenate([middle, ends[chosen]])
-        bounds = slacks(*parts)
-        more += len(parts[0])
-        # A part has no looser bounds than the whole.
-        lows, highs = (np.tile(side[chosen], (2, 1)) for side in (low, high))
-        starts, ends = (np.concatenate([x[~chosen], part]) for x, part in zip((starts, ends), parts, strict=True))
-        low = np.concatenate([low[~chosen], np.maximum(bounds.low, lows)])
-        high = np.concatenate([high[~chosen], np.minimum(bounds.high, highs)])
-    order = np.argsort(starts)
-    return starts[order], ends[order], low[order], high[order], more
-
-
-def merged(starts: np.ndarray, ends: np.ndarray, flags: np.ndarray) -> np.ndarray:
-    """Join neighbouring blocks to intervals.
+def time_proofs(
+    slacks: Callable[[np.ndarray, np.ndarray, np.ndarray], BlockSlacks],
+    durations: np.ndarray,
+    resolution: float = 5e-7,
+) -> list[TimeProof]:
+    """Decide criteria over several whole motions at once.
 
     Args:
-        starts: (n,) s, increasing.
-        ends: (n,) s.
-        flags: (n,) whether a block counts.
+        slacks: bounds of the slacks over blocks, from the numbers of their motions, and from their starts and ends,
+            (k,) s each.
+        durations: (n_motions,) s.
+        resolution: length of the shortest blocks, s.
 
     Returns:
-        (m, 2) s.
+        one proof a motion, the same as it has alone.
     """
-    edges = np.diff(np.concatenate([[0], flags.astype(int), [0]]))
-    return np.stack([starts[edges[:-1] == 1], ends[np.flatnonzero(edges == -1) - 1]], axis=1)
+    count = len(durations)
+    if not count:
+        return []
+    edges = np.asarray(durations, float)[:, None] * np.linspace(0.0, 1.0, FIRST + 1)
+    places = np.repeat(np.arange(count), FIRST), edges[:, :-1].ravel(), edges[:, 1:].ravel()
+    start = blocks = _bounded(slacks, *places, whole=None)
+    totals, leaves = np.full(count, FIRST), []
+    while len(blocks.start):
+        undecided = blocks.undecided()
+        is_open = undecided.any(1) & (blocks.end - blocks.start > resolution)
+        is_open &= (totals + 2 * np.bincount(blocks.motion[is_open], minlength=count))[blocks.motion] <= MOST
+        leaves.append(blocks.taken(~is_open))
+        rest = blocks.rest(np.zeros(1), undecided, has_upper=True)
+        outside, inner = blocks.taken(is_open).cut(*(share[is_open] for share in rest))
+        leaves.append(outside)
+        blocks = _bounded(slacks, *inner)
+        totals += np.bincount(blocks.motion, minlength=count)
+    narrow, more = _narrowed(slacks, joined(leaves), _usual(start.slacks.high, count), resolution)
+    return _proofs(narrow.taken(np.lexsort((narrow.start, narrow.motion))), totals + more)
+
+
+def _bounded(slacks, motion: np.ndarray, start: np.ndarray, end: np.ndarray, whole: BlockSlacks | None) -> Blocks:
+    # A part has no looser bounds than the whole.
+    if whole is not None and not len(start):
+        return Blocks(motion, start, end, whole)
+    blocks = Blocks(motion, start, end, slacks(motion, start, end).complete())
+    return blocks if whole is None else blocks.no_looser_than(whole)
+
+
+def _usual(high: np.ndarray, count: int) -> np.ndarray:
+    # Size that slacks of each motion usually have, (count, n_criteria).
+    return np.median(np.where(np.isfinite(high), np.abs(high), 0.0).reshape(count, FIRST, -1), axis=1)
+
+
+def _least(motion: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
+    # Smallest values of each motion, (count, n_criteria), inf for a motion without any.
+    least = np.full((count, values.shape[1]), np.inf)
+    if len(motion):
+        order = np.argsort(motion, kind="stable")
+        firsts = np.flatnonzero(np.diff(motion[order], prepend=-1))
+        least[motion[order][firsts]] = np.minimum.reduceat(values[order], firsts)
+    return least
+
+
+def _narrowed(slacks, blocks: Blocks, usual: np.ndarray, resolution: float) -> tuple[Blocks, np.ndarray]:
+    # Cut the blocks that may hold the smallest slack of a criterion until its bounds are close; tell how many more.
+    count, leaves = len(usual), []
+    more = np.zeros(count, int)
+    least = _least(blocks.motion, blocks.slacks.high, count)
+    while len(blocks.start):
+        # Slacks are as large as they usually are: near zero no share of the smallest one is small enough.
+        level = (least - CLOSE * np.fmax(np.abs(least), 0.1 * usual))[blocks.motion]
+        matters = (blocks.slacks.low < level) & np.isfinite(level)
+        is_open = matters.any(1) & (blocks.end - blocks.start > SHORTEST * resolution)
+        is_open &= (more < NARROWING)[blocks.motion]
+        leaves.append(blocks.taken(~is_open))
+        rest = blocks.rest(level, matters, has_upper=False)
+        outside, inner = blocks.taken(is_open).cut(*(share[is_open] for share in rest))
+        leaves.append(outside)
+        blocks = _bounded(slacks, *inner)
+        more += np.bincount(blocks.motion, minlength=count)
+        least = np.minimum(least, _least(blocks.motion, blocks.slacks.high, count))
+    return joined(leaves), more
+
+
+def _proofs(blocks: Blocks, totals: np.ndarray) -> list[TimeProof]:
+    count = len(totals)
+    low, high = (_least(blocks.motion, side, count) for side in blocks.slacks[:2])
+    failing = [_merged(blocks, column < 0.0, count) for column in blocks.slacks.high.T]
+    is_open = [_merged(blocks, column, count) for column in blocks.undecided().T]
+    when = np.full_like(high, np.nan)
+    firsts = np.searchsorted(blocks.motion, np.arange(count + 1))
+    for i, (first, last) in enumerate(zip(firsts[:-1], firsts[1:], strict=True)):
+        rows = first + blocks.slacks.high[first:last].argmin(0)
+        when[i] = 0.5 * (blocks.start + blocks.end)[rows]
+    return [
+        TimeProof(low[i], high[i], when[i], [parts[i] for parts in failing], [parts[i] for parts in is_open], int(totals[i]))
+        for i in range(count)
+    ]
+
+
+def _merged(blocks: Blocks, flags: np.ndarray, count: int) -> list[np.ndarray]:
+    # Join neighbouring blocks of one motion to intervals, (m, 2) for each motion.
+    is_next = np.diff(blocks.motion, prepend=-1) == 0
+    before, after = np.append(False, flags[:-1]) & is_next, np.append(flags[1:] & is_next[1:], False)
+    firsts, lasts = np.flatnonzero(flags & ~before), np.flatnonzero(flags & ~after)
+    intervals = np.stack([blocks.start[firsts], blocks.end[lasts]], axis=1)
+    return np.split(intervals, np.searchsorted(blocks.motion[firsts], np.arange(1, count)))

@@ -18,8 +18,8 @@ from jax import Array
 
 from cspr_jax.arithmetic.affine_bounds import AffineBounds, constant, dot, turned
 from cspr_jax.arithmetic.elementary import solved
-from cspr_jax.robots.tension_distribution import most_central
-from cspr_jax.robots.wrench_sets import FLAT, spanning, wrench_faces
+from cspr_jax.robots.nearest_face import NearestFace, nearest_face
+from cspr_jax.robots.wrench_sets import FLAT
 
 
 class WitnessTensions(NamedTuple):
@@ -27,16 +27,26 @@ class WitnessTensions(NamedTuple):
 
     Fields:
         tension: (n_cables,) bounds of tensions that balance throughout, N; radii are NaN where nothing is known.
-        margin_low: () lower bound of the largest distance of tensions from their limits, at every instant, N; -inf
-            where nothing is known.
-        margin_high: () upper bound of the same, at every instant, N; inf where nothing is known.
+        below: (2,) at start and end of the block, a line below the largest distance of tensions from their limits, N;
+            -inf where nothing is known.
+        above: (2,) likewise a line above it; inf where nothing is known.
         is_regular: () whether the matrix is proved to have full rank throughout.
     """
 
     tension: AffineBounds
-    margin_low: Array
-    margin_high: Array
+    below: Array
+    above: Array
     is_regular: Array
+
+    @property
+    def margin_low(self) -> Array:
+        """Lower bound of the largest distance of tensions from their limits, at every instant, N."""
+        return self.below.min(-1)
+
+    @property
+    def margin_high(self) -> Array:
+        """Upper bound of the same."""
+        return self.above.max(-1)
 
 
 def witness_tensions(matrix: AffineBounds, wrench: AffineBounds, low: Array, high: Array) -> WitnessTensions:
@@ -52,25 +62,38 @@ def witness_tensions(matrix: AffineBounds, wrench: AffineBounds, low: Array, hig
         the tensions.
     """
     dof, count = matrix.middle.shape
-    start = jnp.zeros(count) if count == dof else most_central(matrix.middle, wrench.middle, low, high)
-    tension, is_regular = _solution(matrix, wrench, start)
-    margin_low = jnp.min(jnp.minimum(tension.low() - low, high - tension.high()))
     if count == dof:
-        margin_high = jnp.min(jnp.minimum(tension.high() - low, high - tension.low()))
-        margin_high = jnp.where(is_regular, margin_high, jnp.inf)
+        tension, is_regular = _solution(matrix, wrench, jnp.zeros(count))
+        smallest = jnp.min(jnp.minimum(tension.high() - low, high - tension.low()))
+        above = jnp.broadcast_to(jnp.where(is_regular, smallest, jnp.inf), (2,))
     else:
-        margin_high = _face_margin(matrix, wrench, low, high)
-    return WitnessTensions(tension, jnp.where(is_regular, margin_low, -jnp.inf), margin_high, is_regular)
+        face = nearest_face(matrix.middle, wrench.middle, low, high)
+        tension, is_regular = _solution(matrix, wrench, face.tensions, face.follow)
+        above = _face_margin(matrix, wrench, low, high, face)
+    # The smallest of functions above lines is above the line between the smallest values at both ends.
+    lines = tension.middle - tension.slope, tension.middle + tension.slope
+    slacks = [jnp.minimum(line - low, high - line) - tension.radius for line in lines]
+    below = jnp.stack([jnp.min(slack) for slack in slacks])
+    return WitnessTensions(tension, jnp.where(is_regular, below, -jnp.inf), above, is_regular)
 
 
-def _solution(matrix: AffineBounds, right: AffineBounds, start: Array) -> tuple[AffineBounds, Array]:
-    # Bound a solution of M(s) x(s) = b(s), with M (m, n) and n >= m, near a line through `start`, (n,); say whether M
-    # is proved to have rank m throughout.
+def _inverse(matrix: Array) -> Array:
+    # A right inverse of (m, n), n >= m.
+    m, n = matrix.shape
+    inverse = solved(matrix if m == n else matrix @ matrix.T, jnp.eye(m))[0]
+    return inverse if m == n else matrix.T @ inverse
+
+
+def _solution(
+    matrix: AffineBounds, right: AffineBounds, start: Array, follow: Array | None = None
+) -> tuple[AffineBounds, Array]:
+    # Bound a solution of M(s) x(s) = b(s), with M (m, n) and n >= m, near a line through `start`, (n,), whose slope
+    # `follow` changes; say whether M is proved to have rank m throughout.
     m, n = matrix.middle.shape
-    inverse = solved(matrix.middle if m == n else matrix.middle @ matrix.middle.T, jnp.eye(m))[0]
-    inverse = inverse if m == n else matrix.middle.T @ inverse
+    inverse = _inverse(matrix.middle)
     middle = start + inverse @ (right.middle - matrix.middle @ start)
     slope = inverse @ (right.slope - matrix.slope @ middle)
+    slope = slope if follow is None else slope + follow @ slope
     line = AffineBounds(middle, slope, jnp.zeros(n))
     residual = (right - turned(matrix, line)).size()
     # Sums of rows of |M B - 1|; that of the middle is rounding.
@@ -82,16 +105,13 @@ def _solution(matrix: AffineBounds, right: AffineBounds, start: Array) -> tuple[
     return line._replace(radius=jnp.where(is_known, radius, jnp.nan)), is_known
 
 
-def _face_margin(matrix: AffineBounds, wrench: AffineBounds, low: Array, high: Array) -> Array:
-    # Bound the largest distance from the limits by the face that is nearest in the middle.
+def _face_margin(matrix: AffineBounds, wrench: AffineBounds, low: Array, high: Array, face: NearestFace) -> Array:
+    # Values at start and end of a line above the largest distance from the limits, by the face that is nearest in the
+    # middle.
     dof, count = matrix.middle.shape
-    faces = wrench_faces(matrix.middle, low, high)
-    sizes = jnp.sum(jnp.abs(faces.normals @ matrix.middle), axis=1)
-    is_face = jnp.isfinite(faces.offsets) & (sizes > 0.0)
-    nearest = jnp.argmin(jnp.where(is_face, faces.slacks(wrench.middle) / jnp.where(is_face, sizes, 1.0), jnp.inf))
-    columns = jnp.asarray(spanning(count, dof))[nearest % (is_face.size // 2)]
+    columns = face.columns
     across = matrix.each(lambda x: x[:, columns].T)
-    normal, is_normal = _solution(across, constant(jnp.zeros(dof - 1)), faces.normals[nearest])
+    normal, is_normal = _solution(across, constant(jnp.zeros(dof - 1)), face.along @ _inverse(matrix.middle))
     is_spanning = (jnp.arange(count)[:, None] == columns[None]).any(1)
     along = turned(matrix.each(jnp.transpose), normal).each(lambda x: jnp.where(is_spanning, 0.0, x))
     # Each cable at the limit that gives the least; the other one counts as far as its product may change sign.
@@ -100,8 +120,12 @@ def _face_margin(matrix: AffineBounds, wrench: AffineBounds, low: Array, high: A
     is_bounded = jnp.isfinite(limit) | (along.size() == 0.0)
     over = jnp.where(is_inward, -along.low(), along.high())
     other = jnp.where(over > FLAT * jnp.abs(along.middle), over * (high - low), 0.0)
-    slack = (dot(normal, wrench) - dot(along, jnp.where(is_bounded, limit, 0.0))).high() + jnp.sum(other)
+    slack = dot(normal, wrench) - dot(along, jnp.where(is_bounded, limit, 0.0))
+    top = slack.middle + slack.radius + jnp.sum(other)
+    ends = jnp.stack([top - slack.slope, top + slack.slope])
+    # The quotient is a convex function of the slack: it is below the line between its values at both ends.
     smallest = jnp.maximum(along.size() - 2.0 * along.reach(), 0.0)
-    size = jnp.sum(jnp.where(slack < 0.0, along.size(), smallest))
-    is_known = is_face[nearest] & is_normal & is_bounded.all() & (size > 0.0) & jnp.isfinite(slack)
-    return jnp.minimum(jnp.where(is_known, slack / size, jnp.inf), 0.5 * jnp.min(high - low))
+    size = jnp.where(ends < 0.0, jnp.sum(along.size()), jnp.sum(smallest))
+    is_known = is_normal & is_bounded.all() & (size > 0.0).all() & jnp.isfinite(ends).all()
+    above, half = jnp.where(is_known, ends / jnp.where(is_known, size, 1.0), jnp.inf), 0.5 * jnp.min(high - low)
+    return jnp.where(jnp.max(above) < half, above, half)

@@ -11,6 +11,7 @@ Files, each importing only from those above it:
 
     blocks              bounds of states over blocks of time
     motion              positions and rotations over time
+    several             blocks of several motions together
     interpolation       cubic, quintic and Hermite curves through samples
     reading             tables and pieces that were read, curves of SciPy, tables window by window
     noise               noise of recorded samples, and smoothing

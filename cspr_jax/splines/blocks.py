@@ -14,34 +14,46 @@ from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.rotation_bounds import rotation_bounds
 from cspr_jax.robots.state_bounds import StateBounds
 
-BATCH = 1024
+BATCH = 256
 
 
 class _Parts(NamedTuple):
-    # Overlaps of blocks and pieces: numbers of both, and where they lie in the piece (0 to 1) and the block (-1 to 1).
+    # Overlaps of blocks and pieces: numbers of both, the piece's width, s, and where they lie in the piece (0 to 1) and
+    # the block (-1 to 1).
     block: np.ndarray
     piece: np.ndarray
+    width: np.ndarray
     of_piece: np.ndarray
     of_block: np.ndarray
 
 
 def spline_bounds(
-    knots: np.ndarray, position: np.ndarray, quaternion: np.ndarray | None, start: np.ndarray, end: np.ndarray
+    knots: np.ndarray,
+    position: np.ndarray,
+    quaternion: np.ndarray | None,
+    start: np.ndarray,
+    end: np.ndarray,
+    *,
+    of_knots: np.ndarray | None = None,
+    of_blocks: np.ndarray | None = None,
 ) -> StateBounds:
-    """Bounds of the states over blocks of time.
+    """Bounds of the states over blocks of time, of one motion or of several, whose tables follow each other.
 
     Args:
-        knots: (m + 1,) s.
+        knots: (m + 1,) s, or (m + n,) those of n motions.
         position: (m, degree + 1, 3) Bernstein coefficients, m.
         quaternion: (m, degree + 1, 4) likewise; None for a point mass.
         start: (k,) s, increasing or not.
         end: (k,) s, later than `start`.
+        of_knots: (m + n,) numbers of the motions, from 0 on; None: there is one.
+        of_blocks: (k,) likewise.
 
     Returns:
         the bounds, leaves (k, ...).
     """
-    parts = _overlaps(knots, start, end)
-    width = np.diff(knots)[parts.piece, None, None]
+    of_knots = np.zeros(len(knots), int) if of_knots is None else of_knots
+    parts = _overlaps(knots, of_knots, np.zeros(len(start), int) if of_blocks is None else of_blocks, start, end)
+    width = parts.width[:, None, None]
     translation = _bands(position, parts, width)
     if quaternion is None:
         return StateBounds(*translation)
@@ -54,16 +66,22 @@ def _rotations(bands):
     return jax.vmap(rotation_bounds)(*bands)
 
 
-def _overlaps(knots: np.ndarray, start: np.ndarray, end: np.ndarray) -> _Parts:
-    first = np.clip(np.searchsorted(knots, start, side="right") - 1, 0, len(knots) - 2)
-    last = np.maximum(np.clip(np.searchsorted(knots, end, side="left") - 1, 0, len(knots) - 2), first)
+def _overlaps(
+    knots: np.ndarray, of_knots: np.ndarray, motion: np.ndarray, start: np.ndarray, end: np.ndarray
+) -> _Parts:
+    # NumPy orders complex numbers by their real parts first.
+    places = of_knots + 1j * knots
+    earliest, latest = np.searchsorted(of_knots, motion), np.searchsorted(of_knots, motion, side="right") - 2
+    first = np.clip(np.searchsorted(places, motion + 1j * start, side="right") - 1, earliest, latest)
+    last = np.maximum(np.clip(np.searchsorted(places, motion + 1j * end) - 1, earliest, latest), first)
     counts = last - first + 1
     block = np.repeat(np.arange(len(start)), counts)
-    piece = first[block] + np.arange(len(block)) - np.repeat(np.cumsum(counts) - counts, counts)
-    low, high = np.maximum(knots[piece], start[block]), np.minimum(knots[piece + 1], end[block])
-    of_piece = (np.stack([low, high]) - knots[piece]) / (knots[piece + 1] - knots[piece])
+    knot = first[block] + np.arange(len(block)) - np.repeat(np.cumsum(counts) - counts, counts)
+    low, high, width = np.maximum(knots[knot], start[block]), np.minimum(knots[knot + 1], end[block]), np.diff(knots)
+    of_piece = (np.stack([low, high]) - knots[knot]) / width[knot]
     of_block = 2.0 * (np.stack([low, high]) - start[block]) / (end - start)[block] - 1.0
-    return _Parts(block, piece, of_piece, of_block)
+    # Each motion has one knot more than pieces.
+    return _Parts(block, knot - motion[block], width[knot], of_piece, of_block)
 
 
 def _bands(table: np.ndarray, parts: _Parts, width: np.ndarray) -> list[AffineBounds]:

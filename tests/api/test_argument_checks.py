@@ -104,6 +104,7 @@ def good():
     values |= dict.fromkeys(("spool_radius", "platform_radius", "drum_radius", "pulses", "cable_error"), 1.0)
     values |= {"base_points": robot.base_points, "platform_points": robot.base_points, "inertia": np.eye(3)}
     values |= dict.fromkeys(("given", "path", "output", "results", "result", "directory", "names", "reference"), "a")
+    values |= {"times": [0.0, 1.0]}
     values |= {"durations": [1.0], "name": "quintic", "what": "robot", "errors": cspr_jax.LaunchErrors()}
     return values
 
@@ -120,6 +121,8 @@ def test_bad_arguments(function, good, tmp_path, monkeypatch):
             if key == "self" or is_good(function, key, kind):
                 continue
             given = {name: None if name == "self" else good[name] for name in needed} | {key: value}
+            if function == "check_many" and key != "positions":
+                given["positions"] = [[[0.4, 0.1, 1.5]] * 2]
             with pytest.raises(InputError) as raised:
                 TAKING[function](**given)
             line = str(raised.value)

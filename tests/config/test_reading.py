@@ -66,7 +66,7 @@ PLANS = {
     "z0 = 0": (Z0, "z0 = 0", "z0 = 0", "greater than 0"),
     "z0 < 0": (Z0, "z0 = -1.5", "z0 = -1.5", "greater than 0"),
     "z0 chosen how": (Z0, 'z0 = { choose = "fast" }', 'z0.choose = "fast"', "mean", "conservative", "fastest"),
-    "family": (Z0, f'{Z0}\nfamily = "spline"', 'family = "spline"', "hypocycloid-standard"),
+    "family": (Z0, f'{Z0}\nfamily = "splines"', 'family = "splines"', "hypocycloid-standard"),
     "max_arcs = 0": (Z0, f"{Z0}\nmax_arcs = 0", "max_arcs = 0", "must be at least 1"),
     "arcs = 0": (POSE, f"{POSE}\narcs = 0", "pose[1].arcs = 0", "must be at least 1"),
     "two coordinates": (POSE, "position = [0.7, 0.7]", "pose[1].position", "3 values"),

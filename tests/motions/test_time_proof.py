@@ -1,5 +1,6 @@
 """Proofs over whole motions against dense samples: the same verdicts, margins and intervals of failure."""
 
+import dataclasses
 from functools import partial
 
 import jax
@@ -9,13 +10,15 @@ from support.splines import random_spline
 
 import cspr_jax
 from cspr_jax.motions.block_slacks import BlockSlacks, block_slacks, criteria
-from cspr_jax.motions.time_proof import time_proof
+from cspr_jax.motions.time_proof import time_proof, time_proofs
 from cspr_jax.robots import cables
 from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.tension_distribution import centred as most_central
 from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.splines.motion import Spline
+from cspr_jax.splines.several import SeveralSplines
 
 # Robots, where they move and how far, m, their tilt, and limits that some motions break.
 CASES = {
@@ -113,6 +116,45 @@ def test_intervals_of_failure_are_exact():
     proof = time_proof(slacks, 7.0, resolution=1e-7)
     np.testing.assert_allclose(proof.failing[0], [[0.7, 2.2], [5.9, 7.0]], atol=2e-6)
     assert len(proof.open[0]) == 3 and all(b - a < 5e-6 for a, b in proof.open[0])
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_several_motions_have_the_proofs_of_each(name):
+    splines = [random_spline(seed, middle=CASES[name][0], size=CASES[name][1], count=4 + seed)[0] for seed in range(3)]
+    splines = [Spline(s.knots, s.position, None, s.z0) for s in splines]
+    robot, limits = case(name, 0)[:2]
+    several = SeveralSplines(splines)
+    together = time_proofs(
+        lambda motion, start, end: block_slacks(robot, limits, partial(several.bounds, motion), start, end),
+        several.durations,
+    )
+    assert len({proof.blocks for proof in together}) > 1 and any(len(x) for x in together[1].failing)
+    for spline, proof in zip(splines, together, strict=True):
+        alone = time_proof(partial(block_slacks, robot, limits, spline.bounds), float(spline.knots[-1]))
+        jax.tree.map(np.testing.assert_array_equal, dataclasses.asdict(proof), dataclasses.asdict(alone))
+
+
+def test_no_motions():
+    assert time_proofs(lambda motion, start, end: BlockSlacks(start, end), np.zeros(0)) == []
+
+
+def test_roots_take_few_blocks():
+    """Lines leave a part that shrinks with the square of its length."""
+    calls = []
+
+    def slacks(start, end):
+        calls.append(len(start))
+        middle, half = 0.5 * (start + end), 0.5 * (end - start)
+        value, slope = np.sin(middle), np.cos(middle) * half
+        low, high = ((value + side * 0.5 * half**2)[:, None] for side in (-1.0, 1.0))
+        rise = 2.0 * slope[:, None]
+        reach = np.abs(slope)[:, None]
+        return BlockSlacks(low - reach, high + reach, rise, rise)
+
+    proof = time_proof(slacks, 9.0)
+    np.testing.assert_allclose(proof.failing[0], [[np.pi, 2.0 * np.pi]], atol=1e-6)
+    assert len(calls) < 14 and proof.blocks < 70
+    assert proof.low[0] <= -1.0 <= proof.high[0] and proof.high[0] - proof.low[0] < 0.02
 
 
 def test_what_stays_open_is_told():

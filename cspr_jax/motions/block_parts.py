@@ -1,0 +1,141 @@
+"""Blocks of several motions with bounds of their slacks, and the parts into which they are cut.
+
+Over a block a slack lies between two lines. Each leaves what it decides: the part in which the lower line is above a
+level, or the upper one below zero, needs no second look. Where the rest is a small part of the block, the block is cut
+there; the rest shrinks with the square of its length at a simple root, while halves would take a step for each digit.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.arithmetic.affine_bounds import ROUNDING
+from cspr_jax.motions.block_slacks import BlockSlacks
+
+# A block is halved unless the rest is a smaller part of it than this; the rest is widened by this part of the block.
+SMALL, WIDER = 0.5, 1e-3
+
+
+class Blocks(NamedTuple):
+    """Blocks of time.
+
+    Fields:
+        motion: (k,) number of the motion, from 0 on.
+        start: (k,) s.
+        end: (k,) s.
+        slacks: bounds, (k, n_criteria).
+    """
+
+    motion: np.ndarray
+    start: np.ndarray
+    end: np.ndarray
+    slacks: BlockSlacks
+
+    def taken(self, chosen: np.ndarray) -> "Blocks":
+        """Some of the blocks.
+
+        Args:
+            chosen: (k,) mask, or (m,) numbers.
+
+        Returns:
+            them.
+        """
+        slacks = BlockSlacks(*(bounds[chosen] for bounds in self.slacks))
+        return Blocks(self.motion[chosen], self.start[chosen], self.end[chosen], slacks)
+
+    def undecided(self) -> np.ndarray:
+        """Tell which criteria are neither met nor broken throughout.
+
+        Returns:
+            (k, n_criteria) mask.
+        """
+        return ~((self.slacks.low > 0.0) | (self.slacks.high < 0.0))
+
+    def rest(self, level: np.ndarray, matters: np.ndarray, *, has_upper: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Part of each block outside of which no lower line is below a level, or the upper one is below zero.
+
+        Args:
+            level: (k, n_criteria).
+            matters: (k, n_criteria) mask of the criteria that are looked at.
+            has_upper: whether upper lines count.
+
+        Returns:
+            first and last: (k,) shares of the block from 0 to 1, widened a little.
+        """
+        low, high, low_rise, high_rise = self.slacks
+        sides = [_below(low + np.maximum(-low_rise, 0.0) - level, low_rise)]
+        if has_upper:
+            sides.append(_below(np.maximum(high_rise, 0.0) - high, -high_rise))
+        first = np.where(matters, np.max([side[0] for side in sides], axis=0), 1.0).min(1)
+        last = np.where(matters, np.min([side[1] for side in sides], axis=0), 0.0).max(1)
+        first, last = first - WIDER, last + WIDER
+        return np.where(first < WIDER, 0.0, first), np.where(last > 1.0 - WIDER, 1.0, last)
+
+    def cut(self, first: np.ndarray, last: np.ndarray) -> "tuple[Blocks, Blocks]":
+        """Cut each block before and after its rest, or in two.
+
+        Args:
+            first: (k,) shares of the block at which its rest begins, from `rest`.
+            last: (k,) where it ends.
+
+        Returns:
+            parts outside of the rests, with bounds; what is left to look at, with the bounds of the blocks themselves.
+        """
+        width = self.end - self.start
+        before, after = self.start + first * width, np.where(last < 1.0, self.start + last * width, self.end)
+        is_cut = (last - first < SMALL) & (before < after)
+        outside = [self._part(is_cut & (first > 0.0), 0.0, first + 0.5 * WIDER, end=before)]
+        outside.append(self._part(is_cut & (last < 1.0), last - 0.5 * WIDER, 1.0, start=after))
+        middle = self.start + 0.5 * width
+        inner = self._replace(start=before, end=after).taken(is_cut)
+        halves = self._replace(end=middle).taken(~is_cut), self._replace(start=middle).taken(~is_cut)
+        return joined(outside), joined([inner, *halves])
+
+    def _part(self, chosen, first, last, **edges) -> "Blocks":
+        # Bounds by the lines between two shares of the block, beyond the edges by more than these are rounded.
+        low, high, low_rise, high_rise = self.slacks
+        ends = [np.broadcast_to(share, len(low))[:, None] for share in (first, last)]
+        fall = np.minimum(*(low_rise * share for share in ends)) + np.maximum(-low_rise, 0.0)
+        rise = np.maximum(*(high_rise * share for share in ends)) - np.maximum(high_rise, 0.0)
+        low = low + fall - ROUNDING * (np.abs(low) + np.abs(low_rise))
+        high = high + rise + ROUNDING * (np.abs(high) + np.abs(high_rise))
+        level = np.zeros_like(low)
+        return self._replace(slacks=BlockSlacks(low, high, level, level), **edges).taken(chosen)
+
+    def no_looser_than(self, whole: BlockSlacks) -> "Blocks":
+        """The blocks with the better of two bounds.
+
+        Args:
+            whole: bounds of the blocks of which these are parts.
+
+        Returns:
+            the blocks.
+        """
+        low, high, low_rise, high_rise = self.slacks
+        is_low, is_high = low < whole.low, high > whole.high
+        return self._replace(
+            slacks=BlockSlacks(
+                np.where(is_low, whole.low, low),
+                np.where(is_high, whole.high, high),
+                np.where(is_low, 0.0, low_rise),
+                np.where(is_high, 0.0, high_rise),
+            )
+        )
+
+
+def joined(several: "list[Blocks]") -> Blocks:
+    """All blocks of several lists.
+
+    Returns:
+        the blocks.
+    """
+    bounds = (np.concatenate(parts) for parts in zip(*(blocks.slacks for blocks in several), strict=True))
+    motion, start, end = (np.concatenate(parts) for parts in zip(*(blocks[:3] for blocks in several), strict=True))
+    return Blocks(motion, start, end, BlockSlacks(*bounds))
+
+
+def _below(value: np.ndarray, rise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    # Shares between which a line with this value at the start is not above zero.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = np.clip(-value / rise, 0.0, 1.0)
+    return np.where(rise < 0.0, root, 0.0), np.where(rise > 0.0, root, 1.0)

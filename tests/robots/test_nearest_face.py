@@ -1,0 +1,86 @@
+"""Nearest faces against the exact most central tensions of random balances."""
+
+import jax
+import numpy as np
+import pytest
+
+from cspr_jax.robots.nearest_face import nearest_face
+from cspr_jax.robots.tension_distribution import centred
+
+COUNT = 60
+
+
+@pytest.fixture(autouse=True)
+def float64():
+    with jax.enable_x64(True):
+        yield
+
+
+def balances(dof: int, count: int, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Unit columns, some of which pull against others, wrenches, and tensions that give them."""
+    rng = np.random.default_rng(seed)
+    matrices = rng.normal(size=(COUNT, dof, count))
+    matrices /= np.linalg.norm(matrices, axis=1, keepdims=True)
+    tensions = rng.uniform(-5.0, 40.0, (COUNT, count))
+    return matrices, np.einsum("kij,kj->ki", matrices, tensions), tensions
+
+
+def judged(matrices, wrenches, low, high):
+    def one(matrix, wrench):
+        face = nearest_face(matrix, wrench, low, high)
+        return face, centred(matrix, wrench, low, high)[1]
+
+    return jax.tree.map(np.asarray, jax.jit(jax.vmap(one))(matrices, wrenches))
+
+
+SHAPES = [(2, 3), (3, 5), (3, 8), (6, 7), (6, 8), pytest.param(6, 10, marks=pytest.mark.thorough)]
+
+
+@pytest.mark.parametrize(("dof", "count"), SHAPES)
+def test_tensions_are_most_central(dof, count):
+    matrices, wrenches, _ = balances(dof, count, count)
+    for top in (25.0, np.inf):
+        low, high = np.full(count, 1.0), np.full(count, top)
+        face, largest = judged(matrices, wrenches, low, high)
+        np.testing.assert_allclose(np.einsum("kij,kj->ki", matrices, face.tensions), wrenches, atol=1e-7)
+        margin = np.minimum(face.tensions - low, high - face.tensions).min(1)
+        bounded = np.isfinite(largest)
+        assert bounded.mean() > 0.1
+        np.testing.assert_allclose(margin[bounded], largest[bounded], rtol=1e-6, atol=1e-6)
+        # Where nothing is the limit, tensions are well above their smallest.
+        assert (margin[np.isinf(largest)] > 10.0).all()
+
+
+def test_changes_follow_the_face():
+    """Tensions that change as the face wants stay most central, to first order."""
+    matrices, wrenches, _ = balances(6, 8, 5)
+    low, high, step = np.full(8, 1.0), np.full(8, 25.0), 1e-6
+    face = judged(matrices, wrenches, low, high)[0]
+    way = np.random.default_rng(1).normal(size=wrenches.shape)
+    change = np.einsum("kij,kj->ki", np.linalg.pinv(matrices), way)
+    change += np.einsum("kij,kj->ki", face.follow, change)
+    np.testing.assert_allclose(np.einsum("kij,kj->ki", matrices, change), way, atol=1e-6)
+    after, exact = judged(matrices, wrenches + step * way, low, high)
+    same = (after.columns == face.columns).all(1)
+    moved = face.tensions + step * change
+    margin = np.minimum(moved - low, high - moved).min(1)
+    assert same.mean() > 0.9
+    np.testing.assert_allclose((margin - exact)[same], 0.0, atol=1e-9)
+
+
+def test_cable_beside_the_face():
+    """Two cables in line, and one that no wrench without change concerns."""
+    matrix, wrench = np.array([[[1.0, -1.0, 0.0], [0.0, 0.0, 1.0]]]), np.array([[2.0, 7.0]])
+    face, largest = judged(matrix, wrench, np.full(3, 1.0), np.full(3, 9.0))
+    np.testing.assert_allclose(face.tensions[0], [7.0, 5.0, 7.0], atol=1e-12)
+    assert largest[0] == pytest.approx(2.0)
+
+
+def test_ranges_of_cables_differ():
+    """Where one cable has less range than the faces leave, tensions are within limits wherever any are."""
+    matrices, wrenches, _ = balances(3, 5, 5)
+    low, high = np.full(5, 1.0), np.array([4.0, 60.0, 40.0, 50.0, 45.0])
+    face, largest = judged(matrices, wrenches, low, high)
+    margin = np.minimum(face.tensions - low, high - face.tensions).min(1)
+    assert (largest == 1.5).mean() > 0.1
+    np.testing.assert_array_equal(margin > 0.0, largest > 0.0)
