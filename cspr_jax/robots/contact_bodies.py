@@ -1,10 +1,9 @@
 """Bodies that can meet while a robot moves, as arrays for compiled functions: cables, obstacles, platform. NumPy."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
-from jax import Array
 
 from cspr_jax.robots import clearance
 from cspr_jax.robots.cables import AnyRobot
@@ -28,9 +27,9 @@ class Shape(NamedTuple):
         planes: of the faces.
     """
 
-    corners: Array
-    edges: Array
-    faces: Array
+    corners: Any
+    edges: Any
+    faces: Any
     planes: Planes
 
 
@@ -52,18 +51,18 @@ class Bodies(NamedTuple):
         deepest: () m.
     """
 
-    pairs: Array
-    points: Array
-    radii: Array
-    rods: Array
-    rod_radii: Array
+    pairs: Any
+    points: Any
+    radii: Any
+    rods: Any
+    rod_radii: Any
     boxes: Shape | None
-    order: Array
+    order: Any
     body: Shape | None
-    leave: Array
-    sectors: tuple[Array, Array] | None
-    size: Array
-    deepest: Array
+    leave: Any
+    sectors: Any
+    size: Any
+    deepest: Any
 
 
 def has_sectors(robot: AnyRobot, scene: Scene) -> bool:

@@ -213,7 +213,7 @@ def _from_sector(sides: Array, normal: Array, way: AffineBounds) -> Range:
     # Bound the distance of the end of a cable (3,), seen from its corner, from the sector of the corner. A direction
     # that points away from the sector has no positive component along its sides, and along the direction between them.
     def off(seen: Array) -> Array:
-        parts = residual((tuple(sides[0]), tuple(sides[1])), tuple(normal), tuple(seen))  # type: ignore[arg-type]
+        parts = residual((tuple(sides[0]), tuple(sides[1])), tuple(normal), tuple(seen))
         return jnp.stack(parts)
 
     def unit(vector: Array) -> Array:

@@ -47,8 +47,8 @@ class Planes(NamedTuple):
         offsets: (n_faces,) products of the normals with points of their planes, m.
     """
 
-    normals: Array
-    offsets: Array
+    normals: Any
+    offsets: Any
 
 
 class _Features(NamedTuple):
@@ -243,7 +243,7 @@ def _weights(p: Array, q: Array, first: Solid, second: Solid, features: _Feature
     s, t = nearest(*_ends(p, one), *_ends(q, two))
 
     def spread(count: int, corners: Array, shares: list[Array]) -> Array:
-        return sum(jnp.where(jnp.arange(count) == corners[k], share, 0.0) for k, share in enumerate(shares))
+        return sum(jnp.where(jnp.arange(count) == corners[k], share, 0.0) for k, share in enumerate(shares))  # type: ignore[return-value]
 
     def on_edge(count: int, edge: Array, part: Array) -> Array:
         return spread(count, edge, [1.0 - part, part])
