@@ -72,6 +72,13 @@ def test_gaps_of_bodies_that_move():
     assert (np.array(closeness[2]) < 0.01).all()
 
 
+def test_faces_of_boxes_look_outward():
+    for face in convex_gaps.BOX[1]:
+        a, b, c = convex_gaps.BOX_SIGNS[face]
+        assert np.cross(b - a, c - a) @ (a + b + c) > 0.0
+    assert (np.abs(np.diff(convex_gaps.BOX_SIGNS[convex_gaps.BOX[0]], axis=1)).sum((1, 2)) == 2.0).all()
+
+
 def test_depths_of_bodies_that_meet():
     """An upper bound below zero means that a fixed point of the segment is inside throughout."""
     rng = np.random.default_rng(2)
