@@ -8,13 +8,14 @@ from support.commands import cspr
 
 import cspr_jax
 from cspr_jax.arithmetic.frames import frame_of
-from cspr_jax.build.surroundings import build_scene
+from cspr_jax.build.surroundings import build_scene, surroundings
 from cspr_jax.config.plan import read_plan
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import ConfigError
 from cspr_jax.robots.kernel_axes import centred
+from cspr_jax.robots.platform import platform_robot
 from cspr_jax.robots.reference_pose import aligned
-from cspr_jax.robots.shapes import is_within
+from cspr_jax.robots.shapes import hull, is_within, rotation_matrix
 
 PLAN = """schema = 1
 robot = "{robot}"
@@ -60,6 +61,19 @@ def test_scenes_are_in_the_axes_of_the_kernels():
     away = np.linalg.norm(np.array(file.base_points) - [1.0, 2.0, 0.5], axis=1)
     np.testing.assert_allclose(np.linalg.norm(scene.base_points - scene.obstacles[0].centre, axis=1), away)
     assert abs(scene.obstacles[0].centre[2]) == pytest.approx(abs(0.5 - middle[2]))
+
+
+def test_shapes_turn_with_the_axes_of_a_platform():
+    """Kernels take a platform in its reference axes."""
+    known = cspr_jax.load_robot("laval-mssm")
+    turn = rotation_matrix(np.array([np.cos(0.3), 0.0, 0.0, np.sin(0.3)]))
+    points = np.asarray(known.platform_points) @ turn.T
+    robot, frame = centred(platform_robot(known.base_points, points, mass=1.0, inertia=np.eye(3)))
+    moved, rotation = aligned(robot)
+    assert np.abs(rotation - np.eye(3)).max() > 0.1
+    body = hull(np.vstack([points, [0.0, 0.0, 0.2]]))
+    scene = surroundings(moved, frame, (), body, rotation)
+    assert is_within(scene.body, scene.platform_points).all()
 
 
 def test_shapes_that_cannot_be():

@@ -70,6 +70,10 @@ def test_gaps_of_bodies_that_move():
         closeness.append([np.median((distance.min(0) - low)[known]), np.median((high - distance.max(0))[known])])
     assert (np.divide(*closeness[:2]) > 3.3).all() and (np.divide(*closeness[1:]) > 3.3).all()
     assert (np.array(closeness[2]) < 0.01).all()
+    (low, high), distance = gaps(300, 1e-9, 1)
+    apart = distance.min(0) > 1e-3
+    for side in (low, high):
+        np.testing.assert_allclose(np.asarray(side)[apart], distance[0, apart], rtol=0, atol=1e-7)
 
 
 def test_faces_of_boxes_look_outward():
@@ -217,5 +221,7 @@ def test_determinants_over_blocks():
 def test_corners_of_a_platform():
     """Depths of the corners of a box that hangs level, and of one that is tilted."""
     robot, around = surrounded("cogiro", shapes.box([0.0, 0.0, 0.2], [0.4, 0.4, 0.4]), 0.0)
-    depths = corner_depths(bodies_of(robot, around).body, lifted(0.05, height=2.0))
+    body = bodies_of(robot, around).body
+    depths = corner_depths(body, lifted(0.05, height=2.0))
+    np.testing.assert_allclose(depths.slope, 0.05 * body.corners[:, 1], atol=1e-15)
     assert float(depths.middle.max()) == pytest.approx(2.4) and float(depths.high().max()) > 2.4 + 0.05 * 0.2
