@@ -1,4 +1,4 @@
-"""Tables of obstacles in sweep files, and keys of the platform's shape; without jax."""
+"""Tables of obstacles in sweep and plan files, and keys of the platform's shape; without jax."""
 
 from collections.abc import Sequence
 from typing import Annotated, Literal
@@ -106,8 +106,8 @@ class PlatformShapeKeys(Table):
 
     platform_box: Corners | None = Field(
         None,
-        description="interference-free: the platform's box, [[x, y, z], [x, y, z]], least and largest, platform axes, "
-        "m; cables must not meet it, nor it obstacles; if platform_hull is absent too, the shape is ignored",
+        description="the platform's box, [[x, y, z], [x, y, z]], least and largest, platform axes, m; cables must not "
+        "meet it, nor it obstacles; if platform_hull is absent too, the shape is ignored",
     )
     platform_hull: HullOf | None = Field(
         None,
@@ -155,6 +155,17 @@ class PlatformShapeKeys(Table):
             points = [[x - c for x, c in zip(point, centre_of_mass, strict=True)] for point in hull_points]
             return shapes.hull(points, name="platform")
         return None
+
+
+class SurroundingsKeys(PlatformShapeKeys):
+    """Bodies that a robot must not meet while it moves."""
+
+    obstacle: Obstacles | None = Field(None, description="[[obstacle]], bodies fixed in space that nothing may meet")
+
+    @property
+    def surroundings(self) -> tuple[str, ...]:
+        """Names of the keys of obstacles and shapes that are given."""
+        return tuple(name for name in SurroundingsKeys.model_fields if getattr(self, name) is not None)
 
 
 def _check_corners(key: str, corners: list[list[float]]) -> None:

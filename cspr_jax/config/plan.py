@@ -9,6 +9,7 @@ from pydantic import Discriminator, Field, PrivateAttr, Tag, model_validator
 from cspr_jax.config.kinds import refuse_other_kinds
 from cspr_jax.config.launch import LaunchTable, Seconds
 from cspr_jax.config.limits import LimitTable, Point, Positive
+from cspr_jax.config.obstacles import SurroundingsKeys
 from cspr_jax.config.reading import LARGEST_FILE, Table, checked, parse_toml
 from cspr_jax.config.trajectory import BetaHat, FamilyName, Quaternion, TiltTorsion, TrajectoryKeys
 from cspr_jax.config.wording import fault, name_of
@@ -85,7 +86,7 @@ class Pose(Table):
     )
 
 
-class PlanFile(TrajectoryKeys, LimitTable):
+class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys):
     """A plan."""
 
     format_version: Literal[1] = Field(alias="schema", description="version of this format: 1")

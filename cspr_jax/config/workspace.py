@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from cspr_jax.config.obstacles import Obstacles, PlatformShapeKeys
+from cspr_jax.config.obstacles import Obstacles, SurroundingsKeys
 from cspr_jax.config.reading import Table
 from cspr_jax.config.trajectory import Quaternion
 from cspr_jax.config.wording import fault
@@ -110,7 +110,7 @@ class PoseConditions(Table):
         return self
 
 
-class WorkspaceTable(PlatformShapeKeys, PoseConditions):
+class WorkspaceTable(SurroundingsKeys, PoseConditions):
     """Conditions of the workspace; a pose meets all of them."""
 
     obstacle: Obstacles | None = Field(

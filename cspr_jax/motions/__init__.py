@@ -22,6 +22,7 @@ Files, each importing only from those above it:
     fewest_limits       the limit that alone refuses a motion
     proved_verdicts     verdicts that rest on a proof
     sampled             answers of motions that are only sampled
+    criteria            criteria of any motion
     block_slacks        slacks of any motion over blocks of time, from bounds of its states
     block_parts         blocks of several motions, cut where lines leave little undecided
     time_proof          proof of criteria over the whole time of a motion, or of several

@@ -1,64 +1,43 @@
 """Slacks of any motion over blocks of time: bounds, from bounds of its states, of how far each criterion is met.
 
-In natural units (N, m, m/s, m/s^2), in this order, with n cables:
-
-    tension     of n = dof cables: n distances of the tensions from their limits; of more: the largest distance that all
-                tensions together can have from their limits
-    limits      that are given, one for each cable, of the floor one: depth, length, speed, acceleration
+A motion passes a singularity, and cables without thickness pass through each other, at an instant only. Where that is
+proved to happen within a block that is short enough, the slack counts as negative there.
 """
 
 from collections.abc import Callable
 from functools import partial
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.arithmetic.affine_bounds import AffineBounds
+from cspr_jax.arithmetic.affine_bounds import AffineBounds, dot
 from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.arithmetic.determinant_bounds import changes_sign, determinant, size_range
+from cspr_jax.motions.criteria import AT_INSTANTS, criteria, judged_poses
 from cspr_jax.motions.limits import limits_set
 from cspr_jax.robots.cables import AnyRobot, wrench_units
+from cspr_jax.robots.clearance import Scene
+from cspr_jax.robots.contact_bodies import Bodies, bodies_of, default_scene
+from cspr_jax.robots.contact_bounds import contact_bounds, corner_depths, passings
 from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.state_bounds import CableBounds, StateBounds, balance_bounds, cable_bounds
 from cspr_jax.robots.witness_tensions import witness_tensions
+from cspr_jax.robots.wrench_balance import SINGULAR
 from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.schema.verdicts import Verdict
 
 BATCH = 64
+# Length of a block and the one before it, together, at which what happens at an instant counts for the block, s.
+INSTANT = 1e-6
+# Upper bound of a slack that vanishes at an instant.
+SMALLEST = 1e-12
 Pair = tuple[Array, Array] | Array
-
-
-class Criterion(NamedTuple):
-    """Criterion of a slack.
-
-    Fields:
-        flag: the verdict where it is broken; of the tensions of redundant cables `WRENCH_INFEASIBLE`.
-        cables: numbers from 0 on: of one cable, of two that meet, or none.
-        unit: of the slack.
-        obstacle: number of the obstacle from 0 on; None: no obstacle is concerned.
-        allowed: the least, or the most, that the quantity may be.
-        sense: whether it must be at least or at most so large.
-    """
-
-    flag: Verdict
-    cables: tuple[int, ...]
-    unit: str
-    obstacle: int | None = None
-    allowed: float = 0.0
-    sense: Literal["least", "most"] = "least"
-
-    def value(self, slack: float) -> float:
-        """Value of the quantity that is bounded.
-
-        Args:
-            slack: (), in `unit`.
-
-        Returns:
-            () likewise.
-        """
-        return self.allowed + slack if self.sense == "least" else self.allowed - slack
+# Bounds of slacks, without lines or with them, in the order of the fields of `BlockSlacks`.
+Part = tuple[Array, ...]
 
 
 class BlockSlacks(NamedTuple):
@@ -87,7 +66,7 @@ class BlockSlacks(NamedTuple):
         return BlockSlacks(self.low, self.high, *rises)
 
 
-def _lines(below: Pair, above: Pair) -> tuple[Array, ...]:
+def _lines(below: Pair, above: Pair) -> Part:
     # Fields of `BlockSlacks` from values of a line below and of a line above, at the start and at the end of a block.
     return jnp.minimum(*below), jnp.maximum(*above), below[1] - below[0], above[1] - above[0]
 
@@ -98,48 +77,23 @@ def _edges(slack: AffineBounds) -> tuple[Pair, Pair]:
     return below, above
 
 
-def criteria(robot: AnyRobot, limits: Limits) -> list[Criterion]:
-    """Criteria, in the order of their slacks.
-
-    Returns:
-        n_criteria of them.
-    """
-    numbers = range(robot.n_cables)
-    if robot.n_cables > robot.dof:
-        rows = [Criterion(Verdict.WRENCH_INFEASIBLE, (), "N")]
-    else:
-        low, high = (np.broadcast_to(side, robot.n_cables).tolist() for side in tension_range(robot, limits))
-        rows = [Criterion(Verdict.SLACK_CABLE, (k,), "N", allowed=low[k]) for k in numbers]
-        if limits.tension_max is not None:
-            rows += [Criterion(Verdict.OVER_TENSION, (k,), "N", allowed=high[k], sense="most") for k in numbers]
-    for row in limits_set(limits):
-        if row.quantity == "tension":
-            continue
-        values = np.atleast_1d(np.asarray(getattr(limits, row.name), float))
-        values = np.broadcast_to(values, robot.n_cables if row.per_cable else 1).tolist()
-        cables = [(k,) if row.per_cable else () for k in range(len(values))]
-        rows += [
-            Criterion(row.flag, each, row.unit, allowed=value, sense=row.sense)
-            for each, value in zip(cables, values, strict=True)
-        ]
-    return rows
-
-
-@partial(jax.jit, static_argnames="is_redundant")
-def _kernel(robot: AnyRobot, limits: Limits, states: StateBounds, is_redundant: bool) -> tuple[Array, ...]:
-    def one(state: StateBounds) -> tuple[Array, ...]:
+@partial(jax.jit, static_argnames="passes")
+def _kernel(
+    robot: AnyRobot, limits: Limits, bodies: Bodies, states: StateBounds, passes: bool = False
+) -> tuple[Array, ...] | Array:
+    # Bound the slacks, or tell which of them are proved to vanish at an instant.
+    def one(state: StateBounds) -> tuple[Array, ...] | Array:
         cables = cable_bounds(robot, state)
         unit = 1.0 / wrench_units(robot)
         matrix, wrench = balance_bounds(robot, state, cables)
-        low, high = tension_range(robot, limits)
-        tensions = witness_tensions(matrix * unit[:, None], wrench * unit, low, high)
-        if is_redundant:
-            parts = [_lines(tensions.below[:, None], tensions.above[:, None])]
-        else:
-            slacks = [tensions.tension - low]
-            slacks += [] if limits.tension_max is None else [high - tensions.tension]
-            parts = [_lines(*_edges(slack)) for slack in slacks]
-        parts += _of_limits(limits, state, cables)
+        matrix, wrench = matrix * unit[:, None], wrench * unit
+        if passes:
+            return _passes(robot, bodies, matrix, state, cables)
+        parts = [*_of_tensions(robot, limits, matrix, wrench), *_of_limits(limits, state, cables)]
+        parts += [*_of_pose(robot, matrix, state), contact_bounds(robot, bodies, state, cables)]
+        if limits.floor is not None and bodies.body is not None:
+            heights = -corner_depths(bodies.body, state) + limits.floor
+            parts.append((jnp.min(heights.low(), keepdims=True), jnp.min(heights.high(), keepdims=True)))
         # A part of two bounds has no lines.
         level = [(*part, *[jnp.zeros_like(part[0])] * (4 - len(part))) for part in parts]
         low, high, *rises = (jnp.concatenate(side) for side in zip(*level, strict=True))
@@ -149,9 +103,38 @@ def _kernel(robot: AnyRobot, limits: Limits, states: StateBounds, is_redundant: 
     return jax.vmap(one)(states)
 
 
-def _of_limits(limits: Limits, state: StateBounds, cables: CableBounds) -> list[tuple[Array, ...]]:
+def _of_tensions(robot: AnyRobot, limits: Limits, matrix: AffineBounds, wrench: AffineBounds) -> list[Part]:
+    low, high = tension_range(robot, limits)
+    tensions = witness_tensions(matrix, wrench, low, high)
+    if robot.n_cables > robot.dof:
+        return [_lines(tensions.below[:, None], tensions.above[:, None])]
+    slacks = [tensions.tension - low]
+    slacks += [] if limits.tension_max is None else [high - tensions.tension]
+    return [_lines(*_edges(slack)) for slack in slacks]
+
+
+def _of_pose(robot: AnyRobot, matrix: AffineBounds, state: StateBounds) -> list[Part]:
+    # Bound the determinant and the depth below the spools, where they are judged.
+    parts: list[Part] = []
+    is_regular, is_below = judged_poses(robot)
+    if is_regular:
+        low, high = size_range(determinant(matrix))
+        parts.append((low[None] - SINGULAR, high[None] - SINGULAR))
+    if is_below:
+        parts.append(_lines(*_edges(dot(state.position, plane_normal(robot)).each(lambda x: x[None]))))
+    return parts
+
+
+def _passes(robot: AnyRobot, bodies: Bodies, matrix: AffineBounds, state: StateBounds, cables: CableBounds) -> Array:
+    # Tell which of the determinant and the contacts are proved to vanish within a block, (1 + n_meetings,).
+    is_regular, _ = judged_poses(robot)
+    through = changes_sign(determinant(matrix)) if is_regular else jnp.zeros((), bool)
+    return jnp.concatenate([through[None], passings(robot, bodies, state, cables)])
+
+
+def _of_limits(limits: Limits, state: StateBounds, cables: CableBounds) -> list[Part]:
     # Bound the slacks of all other limits; of speeds and accelerations that of the worse sign.
-    parts: list[tuple[Array, ...]] = []
+    parts: list[Part] = []
     values = {"depth": state.position.each(lambda x: x[2:]), "length": cables.length}
     rates = {"speed": cables.rate, "acceleration": cables.acceleration}
     for row in limits_set(limits):
@@ -163,7 +146,7 @@ def _of_limits(limits: Limits, state: StateBounds, cables: CableBounds) -> list[
     return parts
 
 
-def _within(limit: Array, value: AffineBounds) -> tuple[Array, ...]:
+def _within(limit: Array, value: AffineBounds) -> Part:
     # The smaller of two slacks is above the line between the smaller values at both ends, and below each of both.
     one, other = limit - value, value + limit
     (below, above), (other_below, other_above) = _edges(one), _edges(other)
@@ -179,6 +162,7 @@ def block_slacks(
     bounds: Callable[[np.ndarray, np.ndarray], StateBounds],
     start: np.ndarray,
     end: np.ndarray,
+    scene: Scene | None = None,
 ) -> BlockSlacks:
     """Bounds of the slacks of a motion over blocks of time.
 
@@ -187,9 +171,25 @@ def block_slacks(
         bounds: gives those of the motion's states over blocks, from their starts and ends, (k,) s each.
         start: (k,) s.
         end: (k,) s.
+        scene: bodies that can meet, in the robot's axes; None: the cables of a platform alone.
 
     Returns:
         the bounds.
     """
-    kernel = partial(_kernel, robot, limits, is_redundant=robot.n_cables > robot.dof)
-    return BlockSlacks(*in_batches(kernel, bounds(start, end), size=BATCH))
+    bodies = bodies_of(robot, scene or default_scene(robot))
+    low, high, *rises = in_batches(partial(_kernel, robot, limits, bodies), bounds(start, end), size=BATCH)
+    rows = criteria(robot, limits, scene)
+    at_instants = np.array([row.flag in AT_INSTANTS for row in rows])
+    is_open = ~((low > 0.0) | (high < 0.0))[:, at_instants]
+    # What happens at the border of two blocks is within the second one and the end of the first.
+    before = np.maximum(2.0 * start - end, 0.0)
+    short = np.flatnonzero(is_open.any(1) & (end - before <= INSTANT) & (end > before))
+    if len(short):
+        kernel = partial(_kernel, robot, limits, bodies, passes=True)
+        passes = in_batches(kernel, bounds(before[short], end[short]), size=BATCH)
+        passes = passes if rows[np.argmax(at_instants)].flag == Verdict.SINGULAR else passes[:, 1:]
+        vanishing = np.zeros((len(short), len(rows)), bool)
+        vanishing[:, at_instants] = passes & is_open[short]
+        high[short] = np.where(vanishing, -SMALLEST, high[short])
+        rises[1][short] = np.where(vanishing, 0.0, rises[1][short])
+    return BlockSlacks(low, high, *rises)

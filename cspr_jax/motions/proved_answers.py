@@ -11,8 +11,9 @@ import numpy as np
 from cspr_jax.arithmetic.affine_bounds import constant
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.motions.answers import Answers
-from cspr_jax.motions.block_slacks import Criterion, block_slacks, criteria
+from cspr_jax.motions.block_slacks import block_slacks
 from cspr_jax.motions.cause import Cause
+from cspr_jax.motions.criteria import Criterion, criteria
 from cspr_jax.motions.motion import BoundedMotion, Motion
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.time_proof import TimeProof, time_proof

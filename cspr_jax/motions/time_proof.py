@@ -152,7 +152,9 @@ def _proofs(blocks: Blocks, totals: np.ndarray) -> list[TimeProof]:
         rows = first + blocks.slacks.high[first:last].argmin(0)
         when[i] = 0.5 * (blocks.start + blocks.end)[rows]
     return [
-        TimeProof(low[i], high[i], when[i], [parts[i] for parts in failing], [parts[i] for parts in is_open], int(totals[i]))
+        TimeProof(
+            low[i], high[i], when[i], [parts[i] for parts in failing], [parts[i] for parts in is_open], int(totals[i])
+        )
         for i in range(count)
     ]
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from cspr_jax.motions.block_slacks import Criterion
+from cspr_jax.motions.criteria import Criterion
 from cspr_jax.motions.proved_answers import MotionProof, ProvedAnswers
 from cspr_jax.outputs.plan_report import finite, verdict_text
 from cspr_jax.plans.planning import PlannedMotions

@@ -7,6 +7,7 @@ time of the row before where steps end at a jump of the acceleration.
 import csv
 import io
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -16,6 +17,7 @@ from cspr_jax import __version__
 from cspr_jax.errors import printable
 from cspr_jax.outputs.mujoco_motion import STEP, Played, Suspended, played, suspended
 from cspr_jax.plans.planning import PlannedMotions
+from cspr_jax.robots.shapes import Body, Box, Cylinder, Hull, Obstacle, Sphere
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.publishing import publish
 
@@ -24,6 +26,7 @@ KEYFRAME = "start"
 MASS_RADIUS, SPOOL_RADIUS, POINT_RADIUS, CABLE_RADIUS, ROD_RADIUS = 0.012, 0.006, 0.004, 0.002, 0.003
 THINNEST = 1e-4  # cables of a known diameter are drawn thicker than this
 DARK, BLUE, ORANGE = (0.2, 0.2, 0.2, 1.0), (0.1, 0.3, 0.6, 1.0), (0.85, 0.45, 0.1, 1.0)
+BROWN, GLASS, HULL = (0.36, 0.24, 0.18, 0.6), (0.85, 0.45, 0.1, 0.35), "platform_hull"
 
 
 def model_xml(body: Suspended, moved: Played, step: float = STEP, control_file: str = "", note: str = "") -> str:
@@ -54,7 +57,9 @@ def model_xml(body: Suspended, moved: Played, step: float = STEP, control_file: 
     _add(root, "statistic", center=0.5 * (low + high), extent=size)
     _add(_add(root, "visual"), "headlight", ambient=[0.4] * 3, diffuse=[0.5] * 3, specular=[0.1] * 3)
     sky = {"type": "skybox", "builtin": "gradient", "width": "64", "height": "64"}
-    _add(_add(root, "asset"), "texture", **sky, rgb1=[1.0] * 3, rgb2=[0.8, 0.85, 0.9])
+    _add(assets := _add(root, "asset"), "texture", **sky, rgb1=[1.0] * 3, rgb2=[0.8, 0.85, 0.9])
+    if isinstance(body.body, Hull):
+        _add(assets, "mesh", name=HULL, vertex=np.unique(body.body.triangles.reshape(-1, 3), axis=0))
     _world(_add(root, "worldbody"), body, moved, size)
     _cables(_add(root, "tendon"), body, size)
     _motors(_add(root, "actuator"), body, moved)
@@ -76,6 +81,9 @@ def _add(parent: ElementTree.Element, tag: str, **attributes) -> ElementTree.Ele
 def _world(world: ElementTree.Element, body: Suspended, moved: Played, size: float) -> None:
     for k, spool in enumerate(body.spools, 1):
         _add(world, "site", name=f"spool_{k}", pos=spool, size=SPOOL_RADIUS * size, rgba=DARK)
+    drawn = {"contype": "0", "conaffinity": "0"}
+    for number, obstacle in enumerate(body.obstacles, 1):
+        _add(world, "geom", name=f"obstacle_{number}", rgba=BROWN, **drawn, **_geom(obstacle))
     start = moved.position[0]
     if body.axes:
         effector = _add(world, "body", name="effector", pos=start)
@@ -90,7 +98,9 @@ def _world(world: ElementTree.Element, body: Suspended, moved: Played, size: flo
     quaternion = np.roll(axes.as_quat(), 1)
     _add(effector, "inertial", pos=np.zeros(3), mass=body.mass, diaginertia=moments, quat=quaternion)
     # Drawn bodies have neither weight nor contacts.
-    drawn = {"rgba": ORANGE, "contype": "0", "conaffinity": "0"}
+    drawn["rgba"] = ORANGE  # type: ignore[assignment]
+    if body.body is not None:
+        _add(effector, "geom", name="platform", **(drawn | {"rgba": GLASS}), **_geom(body.body))
     _add(effector, "geom", type="sphere", size=radius, **drawn)
     for point in np.unique(body.points, axis=0):
         if np.linalg.norm(point) > radius:
@@ -98,6 +108,19 @@ def _world(world: ElementTree.Element, body: Suspended, moved: Played, size: flo
             _add(effector, "geom", type="capsule", fromto=rod, size=ROD_RADIUS * size, **drawn)
     for k, point in enumerate(body.points, 1):
         _add(effector, "site", name=f"point_{k}", pos=point, size=POINT_RADIUS * size, rgba=ORANGE)
+
+
+def _geom(shape: Obstacle | Body) -> dict[str, Any]:
+    if isinstance(shape, Box):
+        quaternion = np.roll(Rotation.from_matrix(shape.rotation).as_quat(), 1)
+        return {"type": "box", "pos": shape.centre, "size": np.maximum(shape.half, THINNEST), "quat": quaternion}
+    if isinstance(shape, Sphere):
+        return {"type": "sphere", "pos": shape.centre, "size": shape.radius}
+    if isinstance(shape, Cylinder):
+        if (shape.start == shape.end).all():
+            return {"type": "sphere", "pos": shape.start, "size": shape.radius}
+        return {"type": "capsule", "fromto": np.concatenate([shape.start, shape.end]), "size": shape.radius}
+    return {"type": "mesh", "mesh": HULL}
 
 
 def _principal(inertia: np.ndarray) -> tuple[np.ndarray, Rotation]:

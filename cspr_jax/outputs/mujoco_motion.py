@@ -19,6 +19,7 @@ from cspr_jax.errors import ConfigError, shown
 from cspr_jax.outputs.motion_files import LARGEST_ROWS, rows_at
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.robots.shapes import Body, Obstacle, inward, rotated
 
 STEP = 0.0005  # s, the longest that MuJoCo takes unless it is told another one
 # Parts of normalised time: rows at a jump are taken the first of them to either side of it, and jumps that are nearer
@@ -41,6 +42,8 @@ class Suspended(NamedTuple):
         points: (n_cables, 3) attachment points from the mass centre, body axes, m.
         tension_max: (n_cables,) N; infinite where no limit is given.
         cable_diameter: m; None: not known.
+        obstacles: bodies fixed in space.
+        body: shape of the platform in body axes, from the mass centre; None: not known.
     """
 
     name: str
@@ -53,6 +56,8 @@ class Suspended(NamedTuple):
     points: np.ndarray
     tension_max: np.ndarray
     cable_diameter: float | None = None
+    obstacles: tuple[Obstacle, ...] = ()
+    body: Body | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -148,7 +153,19 @@ def suspended(plan: PlannedMotions) -> Suspended:
         points=points,
         tension_max=np.broadcast_to(np.asarray(limit, float), len(points)),
         cable_diameter=None if robot.cable_diameter is None else float(robot.cable_diameter),
+        obstacles=tuple(inward(table.shape(), world) for table in plan.keys.obstacle or ()),
+        body=_body(plan, points),
     )
+
+
+def _body(plan: PlannedMotions, points: np.ndarray) -> Body | None:
+    # The shape of the platform, which turns with its attachment points from the axes of the file.
+    written = plan.robot_file.as_written
+    centre = np.asarray(written.centre_of_mass or [0.0] * 3, float)
+    shape = plan.keys.body(centre.tolist(), written.platform_points or ())
+    if shape is None:
+        return None
+    return rotated(shape, Rotation.align_vectors(points, np.asarray(written.platform_points) - centre)[0].as_matrix())
 
 
 def played(plan: PlannedMotions, step: float = STEP) -> Played:

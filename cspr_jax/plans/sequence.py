@@ -83,6 +83,12 @@ def _check_keys(keys: PlanFile, path: Path) -> None:
         families = [name for name, row in FAMILIES.items() if key in row.keys]
         if getattr(keys, key) is not None and not set(keys.families) & set(families):
             raise ConfigError(path, f"{key}: must be absent unless family = {either(families)}")
+    blind = [name for name in keys.families if not FAMILIES[name].knows_obstacles]
+    if keys.surroundings and blind:
+        others = [name for name, row in FAMILIES.items() if row.knows_obstacles]
+        allowed = f", but with {either(others)}" if others else ""
+        key = keys.surroundings[0]
+        raise ConfigError(path, f'{key}: must be absent with family = "{blind[0]}", which knows no obstacles{allowed}')
 
 
 def _check_poses(robot_file: RobotFile, keys: PlanFile, path: Path) -> None:

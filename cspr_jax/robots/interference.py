@@ -11,6 +11,8 @@ from cspr_jax.robots.platform import PlatformRobot, pairs_apart, rays
 # Points nearer than this part of the platform's size are one corner.
 SAME = 1e-9
 PARALLEL = 1e-14
+# Squares of lengths from here on; a segment may be a point.
+TINY = 1e-200
 
 
 class Contacts(NamedTuple):
@@ -111,8 +113,8 @@ def nearest(a: Array, u: Array, b: Array, v: Array) -> tuple[Array, Array]:
     denominator = uu * vv - uv**2
     is_parallel = denominator <= PARALLEL * uu * vv
     s = jnp.clip(jnp.where(is_parallel, 0.0, (au * vv - av * uv) / jnp.where(is_parallel, 1.0, denominator)), 0.0, 1.0)
-    t = jnp.clip((s * uv - av) / vv, 0.0, 1.0)
-    return jnp.clip((au + t * uv) / uu, 0.0, 1.0), t
+    t = jnp.clip((s * uv - av) / jnp.maximum(vv, TINY), 0.0, 1.0)
+    return jnp.clip((au + t * uv) / jnp.maximum(uu, TINY), 0.0, 1.0), t
 
 
 def cable_directions(robot: PlatformRobot, position: Array, rotation: Array) -> Array:

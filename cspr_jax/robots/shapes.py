@@ -1,7 +1,8 @@
 """Solid shapes that cables are kept clear of: spheres, cylinders with round ends, boxes, convex hulls. Without jax."""
 
 import dataclasses
-from typing import TypeAlias
+from collections.abc import Callable
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -258,9 +259,25 @@ def turned(shape: Body, frame: Frame) -> Body:
     Returns:
         the shape, with the same origin.
     """
+    return _changed(shape, frame.turned)
+
+
+def rotated(shape: Body, rotation: np.ndarray) -> Body:
+    """The shape of a platform in other platform axes with the same origin.
+
+    Args:
+        rotation: (3, 3) from the former axes to the new ones.
+
+    Returns:
+        the shape.
+    """
+    return _changed(shape, lambda vectors: vectors @ rotation.T)
+
+
+def _changed(shape: Body, turn: Callable[[Any], Any]) -> Body:
     if isinstance(shape, Box):
-        return dataclasses.replace(shape, centre=frame.turned(shape.centre), rotation=frame.turned(shape.rotation.T).T)
-    normals, triangles, edges, sides = map(frame.turned, (shape.normals, shape.triangles, shape.edges, shape.sides))
+        return dataclasses.replace(shape, centre=turn(shape.centre), rotation=turn(shape.rotation.T).T)
+    normals, triangles, edges, sides = map(turn, (shape.normals, shape.triangles, shape.edges, shape.sides))
     return dataclasses.replace(shape, normals=normals, triangles=triangles, edges=edges, sides=sides)
 
 

@@ -28,6 +28,7 @@ class Family:
         pose_keys: keys of a pose that only this family takes, and others that name them too, if it leads to the pose.
         end_keys: likewise, if it leads to the pose or from it.
         knows_uncertainty: whether its verdicts take all of an uncertainty into account.
+        knows_obstacles: whether its verdicts take obstacles and the shape of the platform into account.
     """
 
     name: str
@@ -41,6 +42,7 @@ class Family:
     pose_keys: tuple[str, ...] = ()
     end_keys: tuple[str, ...] = ()
     knows_uncertainty: bool = False
+    knows_obstacles: bool = False
 
     def leg(self, pattern: str) -> Any:
         """Class that joins the poses of a robot.

@@ -1,16 +1,13 @@
 """Clearance of robots at rest among obstacles, for maps of workspaces. Arrays in, answers out."""
 
-from collections.abc import Sequence
 from typing import get_args
 
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.robots.cables import AnyRobot
-from cspr_jax.robots.clearance import Clearances, Kind, Scene, clearances, scene
+from cspr_jax.robots.clearance import Clearances, Kind, Scene, clearances
 from cspr_jax.robots.patterns import PATTERNS
-from cspr_jax.robots.shapes import Body, Obstacle, inward, turned
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.workspaces import geometry
 
@@ -19,29 +16,12 @@ BATCH = 4096
 KINDS = dict(zip(get_args(Kind), range(1, 5), strict=True))
 
 
-def surroundings(robot: AnyRobot, frame: Frame, obstacles: Sequence[Obstacle] = (), body: Body | None = None) -> Scene:
-    """A robot at rest among the bodies that its cables can meet.
-
-    Args:
-        robot: centred, z down.
-        frame: axes of the robot file.
-        obstacles: bodies fixed in space, in the axes of the file.
-        body: shape of the platform, in platform axes as in the file, from the mass centre, or from the joint.
-
-    Returns:
-        the scene in the kernels' coordinates.
-    """
-    diameter = 0.0 if robot.cable_diameter is None else np.asarray(robot.cable_diameter)
-    kernel_body = None if body is None else turned(body, frame)
-    return scene(robot, diameter=diameter, obstacles=[inward(one, frame) for one in obstacles], body=kernel_body)
-
-
 def at_rest(robot: AnyRobot, around: Scene, positions: np.ndarray, quaternions: np.ndarray) -> Clearances:
     """Clearances of poses.
 
     Args:
         robot: centred, z down.
-        around: of `surroundings`.
+        around: of `build.surroundings`.
         positions: (n, 3) of the mass centre, or of the joint, m.
         quaternions: (n, 4) unit quaternions, scalar first.
 
@@ -79,7 +59,7 @@ def nearest_bodies(around: Scene, distances: Clearances) -> np.ndarray:
     """Kind of the nearest bodies at each pose.
 
     Args:
-        around: of `surroundings`.
+        around: of `build.surroundings`.
         distances: of `at_rest`.
 
     Returns:

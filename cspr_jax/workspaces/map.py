@@ -10,6 +10,7 @@ from cspr_jax.arithmetic.rotations import from_tilt_torsion, products
 from cspr_jax.build.limits import build_limits
 from cspr_jax.build.orientations import given_quaternion
 from cspr_jax.build.robots import build_robot
+from cspr_jax.build.surroundings import build_scene
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile, axis_points
 from cspr_jax.config.workspace import WorkspaceTable
@@ -22,7 +23,6 @@ from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.quantities import TILT_TORSION
 from cspr_jax.schema.tiles import Grid
-from cspr_jax.workspaces.clearances import surroundings
 from cspr_jax.workspaces.questions import FEASIBLE, check_cables, required_wrenches, requirement
 from cspr_jax.workspaces.rest_poses import MARGINS, OrientationSet, RestPoses, over_orientations
 from cspr_jax.workspaces.search import WorkspaceSearch
@@ -82,20 +82,9 @@ class WorkspaceMap(GridMap):
                 raise ConfigError(self._file, f"limits.{limit.name}: {allowed}")
 
     def _surroundings(self, robot_file: RobotFile) -> Scene | None:
-        workspace, row = self._workspace, self._row
-        if INTERFERENCE not in workspace.conditions:
+        if INTERFERENCE not in self._workspace.conditions:
             return None
-        for name in ("platform_box", "platform_hull"):
-            if getattr(workspace, name) is not None and not row.is_body:
-                raise ConfigError(self._file, f"workspace.{name}: must be absent: {robot_file.kind} has no shape")
-        # Shapes have the same origin as the arms of the kernels: the mass centre, or a joint.
-        centre = None if row.is_jointed else robot_file.centre_of_mass
-        try:
-            body = workspace.body(centre or (0.0, 0.0, 0.0), robot_file.platform_points or ())
-        except InputError as error:
-            allowed = "must be points: those where the cables are attached lie in a plane"
-            raise ConfigError(self._file, f"workspace.platform_hull = true: {allowed}") from error
-        return surroundings(self._robot, self._frame, [table.shape() for table in workspace.obstacle or ()], body)
+        return build_scene(self._robot, robot_file, self._frame, self._workspace, self._file, at="workspace.")
 
     def _speeds(self, robot_file: RobotFile) -> CableSpeeds | None:
         workspace, most = self._workspace, self._limits.cable_speed_max

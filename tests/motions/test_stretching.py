@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from cspr_jax.motions.block_slacks import Criterion
+from cspr_jax.motions.criteria import Criterion
 from cspr_jax.motions.proved_answers import MotionProof
 from cspr_jax.motions.stretching import least_stretching
 from cspr_jax.motions.time_proof import TimeProof

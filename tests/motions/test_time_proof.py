@@ -6,17 +6,22 @@ from functools import partial
 import jax
 import numpy as np
 import pytest
+from support.platforms import crossed_robot
 from support.splines import random_spline
 
 import cspr_jax
-from cspr_jax.motions.block_slacks import BlockSlacks, block_slacks, criteria
+from cspr_jax.motions.block_slacks import BlockSlacks, block_slacks
+from cspr_jax.motions.criteria import Criterion, criteria
 from cspr_jax.motions.time_proof import time_proof, time_proofs
-from cspr_jax.robots import cables
+from cspr_jax.robots import cables, clearance, interference, interference_lanes, shapes, wrench_balance
 from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.platform import platform_robot
+from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.tension_distribution import centred as most_central
 from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.splines import interpolation
 from cspr_jax.splines.motion import Spline
 from cspr_jax.splines.several import SeveralSplines
 
@@ -29,6 +34,7 @@ CASES = {
     "cogiro": ((0.0, 0.0, 4.0), 2.0, 0.08, {"tension_min": 100.0, "tension_max": 1500.0, "cable_speed_max": 2.0}),
 }
 SAMPLES = 4001
+CORNERS = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(-1, 3)
 
 
 @pytest.fixture(autouse=True)
@@ -43,6 +49,26 @@ def case(name: str, seed: int):
     numbers = {key: np.full(robot.n_cables, value) for key, value in limits.items()}
     spline, table = random_spline(seed, middle=middle, size=size, tilt=tilt)
     return robot, Limits(**numbers, floor=np.asarray(middle[2] + 0.9 * size)), spline, float(table.x[-1])
+
+
+def of_pose(robot, state) -> list:
+    """Slacks of a pose: determinant, depth below the spools, cables from each other and from the platform's face."""
+    parts = []
+    if robot.n_cables == robot.dof:
+        if robot.pattern == "3R3T":
+            size = wrench_balance.normalised_determinant(robot, state.position, state.rotation)
+            parts.append(abs(size)[None] - wrench_balance.SINGULAR)
+        parts.append((plane_normal(robot) @ state.position)[None])
+    if robot.pattern == "3R3T":
+        near = interference.contacts(robot)
+        apart = interference.gaps(robot, near.pairs, state.position, state.rotation)
+        parts.append(jax.numpy.sqrt((apart**2).sum(1)))
+        if shapes.is_flat(np.asarray(robot.platform_points)):
+            rays = interference.rays(robot, state.position, state.rotation)[0]
+            columns = [tuple(side.T) for side in (near.sides[:, 0], near.sides[:, 1], -(rays @ state.rotation))]
+            left = interference_lanes.residual((columns[0], columns[1]), tuple(near.normal), columns[2])
+            parts.append(jax.numpy.sqrt(sum(x * x for x in left)))
+    return parts
 
 
 def sampled(robot, limits: Limits, spline) -> np.ndarray:
@@ -66,7 +92,7 @@ def sampled(robot, limits: Limits, spline) -> np.ndarray:
             (abs(bend), limits.cable_acceleration_max),
         ):
             parts += [] if limit is None else [limit - value]
-        return jax.numpy.concatenate(parts)
+        return jax.numpy.concatenate([*parts, *of_pose(robot, state)])
 
     return np.asarray(jax.jit(jax.vmap(one))(np.linspace(0.0, 1.0, SAMPLES)))
 
@@ -173,3 +199,93 @@ def test_criteria_name_cables():
         (2,),
     ]
     assert (rows[6].flag, rows[6].cables, rows[6].unit) == (Verdict.BELOW_FLOOR, (), "m")
+
+
+def tilting(times, angles, heights) -> interpolation.Spline:
+    """A platform that tilts about x."""
+    half = 0.5 * np.asarray(angles)
+    zero = np.zeros_like(half)
+    quaternions = np.stack([np.cos(half), np.sin(half), zero, zero], axis=1)
+    return interpolation.interpolated(times, np.stack([zero, zero, np.asarray(heights)], axis=1), quaternions)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("shift", [0.0, 0.0137])
+def test_instants_at_which_cables_pass_each_other(shift):
+    """They count, also at the border of two blocks; the cables are apart at all other times."""
+    robot, times = crossed_robot(), np.array([0.0, 1.0, 2.0])
+    spline = tilting(times, [-0.02 + shift, shift, 0.02 + shift], [0.5, 0.5, 0.5])
+    proof = time_proof(partial(block_slacks, robot, Limits(), spline.bounds), 2.0)
+    at = criteria(robot, Limits()).index((Verdict.CABLE_CABLE, (0, 1), "m", None))
+    fine = np.linspace(0.0, 2.0, 200_001)
+    tilt = jax.jit(jax.vmap(spline.state))(fine / 2.0).quaternion[:, 1]
+    instant = fine[np.argmin(np.abs(tilt))]
+    assert proof.failing[at].shape == (1, 2) and abs(proof.failing[at] - instant).max() < 1.1e-5
+    assert np.diff(proof.failing[at])[0, 0] < 2e-6
+    assert all(np.abs(interval - instant).max() < 1.1e-5 for interval in proof.open[at])
+
+
+@pytest.mark.thorough
+def test_thick_cables_obstacles_and_floors():
+    """Criteria of a scene: their order and cables, and intervals of failure at samples."""
+    robot = centred(cspr_jax.load_robot("cogiro"))[0]
+    bodies = [shapes.box([2.0, -2.0, 5.0], [1.0, 1.0, 3.0]), shapes.sphere([1.0, 1.0, 3.0], 0.3)]
+    around = clearance.scene(robot, diameter=0.01, obstacles=bodies, body=shapes.box([0.0, 0.0, 0.0], [0.6] * 3))
+    limits = Limits(floor=np.asarray(4.9))
+    rows = criteria(robot, limits, around)
+    assert rows[1:3] == [Criterion(Verdict.BELOW_FLOOR, (), "m"), Criterion(Verdict.CABLE_CABLE, (0, 1), "m")]
+    assert rows[-1] == rows[1] and rows[-2] == Criterion(Verdict.OBSTACLE, (), "m", 1)
+    assert Criterion(Verdict.OBSTACLE, (3,), "m", 1) in rows and Criterion(Verdict.CABLE_PLATFORM, (3,), "m") in rows
+    failures = 0
+    for seed in range(2):
+        spline, table = random_spline(seed, middle=(0.0, 0.0, 4.0), size=1.0, tilt=0.05)
+        duration = float(table.x[-1])
+        slacks = partial(block_slacks, robot, limits, spline.bounds, scene=around)
+        proof, times = time_proof(slacks, duration), np.linspace(0.0, duration, SAMPLES)
+        state = jax.jit(jax.vmap(spline.state))(times / duration)
+        exact = clearance.clearances(around, np.asarray(state.position), np.asarray(state.quaternion))
+        for kinds, values in (
+            ((Verdict.OBSTACLE,), exact.obstacles),
+            ((Verdict.CABLE_CABLE,), exact.cables),
+            ((Verdict.CABLE_PLATFORM,), exact.platform),
+        ):
+            fails, unknown = np.zeros(SAMPLES, bool), np.zeros(SAMPLES, bool)
+            for i in [i for i, row in enumerate(rows) if row.flag in kinds]:
+                fails |= np.any([(a <= times) & (times <= b) for a, b in proof.failing[i]] or [fails], axis=0)
+                unknown |= np.any(
+                    [(a - 1e-6 <= times) & (times <= b + 1e-6) for a, b in proof.open[i]] or [fails & False], axis=0
+                )
+            np.testing.assert_array_equal(fails[~unknown], values[~unknown] < 0.0)
+            assert unknown.sum() < 20
+            failures += fails.any()
+        corners = np.asarray(state.position)[:, None] + 0.3 * CORNERS @ np.asarray(state.rotation).swapaxes(1, 2)
+        assert proof.low[-1] == pytest.approx(4.9 - corners[..., 2].max(), abs=5e-3)
+    assert failures > 0
+
+
+@pytest.mark.thorough
+def test_planar_cables_that_cross():
+    """Cables of a planar platform cross while it is turned far."""
+    base = [[-2.0, 0.0, -2.0], [2.0, 0.0, -2.0], [2.0, 0.0, 2.0]]
+    points = [[-0.2, 0.0, 0.0], [0.2, 0.0, 0.0], [0.2, 0.0, 0.1]]
+    robot = platform_robot(base, points, mass=1.0, inertia=np.eye(3), pattern="1R2T")
+    half = 0.5 * np.array([0.0, 1.5, 3.0])
+    quaternions = np.stack([np.cos(half), 0.0 * half, np.sin(half), 0.0 * half], axis=1)
+    spline = interpolation.interpolated(np.array([0.0, 1.0, 2.0]), np.zeros((3, 3)), quaternions)
+    proof = time_proof(partial(block_slacks, robot, Limits(), spline.bounds), 2.0)
+    rows = criteria(robot, Limits())
+    assert all(row.flag != Verdict.ABOVE_SPOOLS for row in rows)
+    at = rows.index(Criterion(Verdict.CABLE_CABLE, (0, 1), "m"))
+    state = jax.jit(jax.vmap(spline.state))(np.linspace(0.0, 1.0, 2001))
+    ends = np.asarray(state.rotation) @ np.asarray(robot.platform_points)[:2].T
+    (ax, az), (bx, bz) = (ends[:, ::2, k].T for k in range(2))
+
+    def side(px, pz, qx, qz, rx, rz):
+        return (qx - px) * (rz - pz) - (qz - pz) * (rx - px)
+
+    crossed = (side(-2.0, -2.0, ax, az, 2.0, -2.0) * side(-2.0, -2.0, ax, az, bx, bz) < 0.0) & (
+        side(2.0, -2.0, bx, bz, -2.0, -2.0) * side(2.0, -2.0, bx, bz, ax, az) < 0.0
+    )
+    times = np.linspace(0.0, 2.0, 2001)
+    fails = np.any([(a <= times) & (times <= b) for a, b in proof.failing[at]], axis=0)
+    assert 100 < crossed.sum() < 1900 and (fails != crossed).sum() <= 2

@@ -158,3 +158,10 @@ def _lowest(chosen, robot, amplitude, poses, p):
 
 # The smallest tension of a segment, and its derivatives with respect to z0 and both values of beta-hat.
 lowest_and_slopes = jax.jit(jax.value_and_grad(_lowest))
+
+
+def crossed_robot(offset: float = 0.0):
+    """A platform on six cables, the first two of which meet where it is turned about the vertical by nothing."""
+    base = [[3, 0.5, -2], [3, -0.5, -2], [-3, 0.5, 2], [-3, -0.5, 2], [-3, 2, -2], [0, 3, -2]]
+    points = [[0.2, -0.2, 0], [0.2, 0.2, offset], [-0.2, 0.2, 0], [-0.2, -0.2, 0], [-0.2, 0.2, 0.1], [0, 0.2, 0.1]]
+    return platform_robot(np.array(base, float), np.array(points, float), mass=1.0, inertia=np.eye(3))

@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from cspr_jax.outputs.plots.fitting import DOUBT, legend_above
 from cspr_jax.outputs.plots.labels import COLOURS, cable_names, line_look, robot_name
 from cspr_jax.outputs.plots.motion_source import keeps_plan, robot_and_plan
+from cspr_jax.outputs.plots.obstacles import draw_shadows
 from cspr_jax.outputs.plots.robot_along import limits_of
 from cspr_jax.schema.quantities import PARTS
 from cspr_jax.store.result import Result
@@ -124,6 +125,10 @@ def _draw_all_limits(drawn: Mapping[str, Axes], result: Result) -> None:
         drawn["tension"].set_ylabel(f"tension (N)\n{keys.tension_rule}")
     for _, level in limits_of(robot_file, keys, "depth"):
         drawn["xz"].axhline(level, **LIMIT)
+    bodies = [table.shape() for table in keys.obstacle or ()]
+    for name in [name for name in ("xy", "xz") if bodies and name in drawn]:
+        draw_shadows(drawn[name], bodies, (0, "xyz".index(name[1])))
+        legend_above(drawn[name], 3)
 
 
 def boundaries(panel: Axes, result: Result) -> None:

@@ -1,4 +1,6 @@
-"""Obstacles of a map of a workspace in its pictures: their sections, their shadows, and their surfaces in space."""
+"""Obstacles of maps of workspaces and of motions in pictures: sections, shadows, and surfaces in space."""
+
+from collections.abc import Iterable
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -23,10 +25,15 @@ def obstacles(result: Result) -> list[np.ndarray]:
     """
     if result.attributes.get("map") != "workspace" or not result.settings:
         return []
-    return [_points(table.shape()) for table in workspace_of(result).obstacle or ()]
+    return [points_of(table.shape()) for table in workspace_of(result).obstacle or ()]
 
 
-def _points(shape: Obstacle) -> np.ndarray:
+def points_of(shape: Obstacle) -> np.ndarray:
+    """Points whose hull an obstacle is.
+
+    Returns:
+        (n, 3) m.
+    """
     if isinstance(shape, Box):
         return shape.centre + (CORNERS * shape.half) @ shape.rotation.T
     around, upward = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False), np.linspace(-0.5, 0.5, UPWARD) * np.pi
@@ -34,6 +41,22 @@ def _points(shape: Obstacle) -> np.ndarray:
     ball = np.stack([np.cos(azimuth) * np.cos(height), np.sin(azimuth) * np.cos(height), np.sin(height)], axis=1)
     centres = (shape.start, shape.end) if isinstance(shape, Cylinder) else (shape.centre,)
     return np.concatenate([centre + shape.radius * ball for centre in centres])
+
+
+def draw_shadows(panel: Axes, bodies: Iterable[Obstacle], across: tuple[int, int]) -> None:
+    """Draw the shadows of obstacles beside a path, and make room for them.
+
+    Args:
+        panel: the path, seen along the third axis.
+        bodies: in the axes of the file.
+        across: numbers of the two axes of the panel.
+    """
+    for number, body in enumerate(bodies):
+        shadow = outline(points_of(body)[:, across])
+        if len(shadow):
+            label = "obstacle" if number == 0 else None
+            panel.add_patch(Polygon(shadow, facecolor=COLOUR, edgecolor=COLOUR, alpha=0.35, label=label))
+    panel.autoscale_view()
 
 
 def outline(points: np.ndarray) -> np.ndarray:
