@@ -24,7 +24,10 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("motion", type=Path, help="motion: samples (CSV, HDF5), or trajectories of CASPR (XML)")
     parser.add_argument("--robot", required=True, help="a catalogue name, or the path of a robot file")
     parser.add_argument(
-        "--limits", type=Path, metavar="FILE", help="limits (TOML), with the keys of [limits] of a plan"
+        "--limits",
+        type=Path,
+        metavar="FILE",
+        help="limits (TOML), with the keys of [limits] of a plan, its [[obstacle]] tables and platform_box or platform_hull",
     )
     parser.add_argument(
         "--interpolation",
@@ -57,6 +60,7 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
 
 def _keys(options: argparse.Namespace) -> dict[str, Any]:
     from cspr_jax.config.limits import LimitTable
+    from cspr_jax.config.obstacles import SurroundingsKeys
     from cspr_jax.config.reading import checked, read_toml
 
     if options.smooth is not None and not 0.0 < options.smooth < float("inf"):
@@ -65,6 +69,7 @@ def _keys(options: argparse.Namespace) -> dict[str, Any]:
     keys = {name: value for name, value in keys.items() if value is not None} | {"robot": options.robot}
     if options.limits is not None:
         limits = read_toml(options.limits)
+        keys |= {name: limits.pop(name) for name in SurroundingsKeys.model_fields if name in limits}
         checked(LimitTable, limits, options.limits)
         keys["limits"] = limits
     return keys

@@ -183,10 +183,12 @@ def block_slacks(
     is_open = ~((low > 0.0) | (high < 0.0))[:, at_instants]
     # What happens at the border of two blocks is within the second one and the end of the first.
     before = np.maximum(2.0 * start - end, 0.0)
-    short = np.flatnonzero(is_open.any(1) & (end - before <= INSTANT) & (end > before))
+    short = np.flatnonzero(is_open.any(1) & (end - before <= INSTANT))
     if len(short):
         kernel = partial(_kernel, robot, limits, bodies, passes=True)
-        passes = in_batches(kernel, bounds(before[short], end[short]), size=BATCH)
+        # Bounds are of all blocks together, which may be those of several motions.
+        states = jax.tree.map(lambda leaf: np.asarray(leaf)[short], bounds(before, end))
+        passes = in_batches(kernel, states, size=BATCH)
         passes = passes if rows[np.argmax(at_instants)].flag == Verdict.SINGULAR else passes[:, 1:]
         vanishing = np.zeros((len(short), len(rows)), bool)
         vanishing[:, at_instants] = passes & is_open[short]

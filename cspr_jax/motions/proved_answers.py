@@ -1,7 +1,7 @@
 """Answers of motions that give bounds of their states: proved or refuted over their whole time, in natural units."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -11,18 +11,20 @@ import numpy as np
 from cspr_jax.arithmetic.affine_bounds import constant
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.motions.answers import Answers
-from cspr_jax.motions.block_slacks import block_slacks
+from cspr_jax.motions.block_slacks import BlockSlacks, block_slacks
 from cspr_jax.motions.cause import Cause
 from cspr_jax.motions.criteria import Criterion, criteria
 from cspr_jax.motions.motion import BoundedMotion, Motion
 from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.time_proof import TimeProof, time_proof
+from cspr_jax.motions.time_proof import TimeProof, time_proofs
+from cspr_jax.robots.clearance import Scene
 from cspr_jax.robots.point_mass import spool_radius
 from cspr_jax.robots.state_bounds import StateBounds
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
 # Intervals between instants of a motion that is only sampled.
 SAMPLES = 2000
+ManyBounds = Callable[[np.ndarray, np.ndarray, np.ndarray], StateBounds]
 TENSIONS = Verdict.SLACK_CABLE | Verdict.OVER_TENSION | Verdict.WRENCH_INFEASIBLE
 
 
@@ -134,33 +136,57 @@ def _cause(case: MotionProof, k: int, frame: Frame) -> Cause:
     return Cause(row.flag.text, row.cables, float(proof.when[k]), needed, allowed, row.unit, obstacle)
 
 
-def proved_answers(problem: Problem, motions: Sequence[Any]) -> ProvedAnswers:
+def proved_answers(problem: Problem, motions: Sequence[Any], scene: Scene | None = None) -> ProvedAnswers:
     """Answers of motions, by bounds of their states; a motion that gives none is sampled.
 
     Args:
         motions: n of them, from the centroid of the spools, z down.
+        scene: bodies that can meet; None: the cables of a platform alone.
 
     Returns:
         the answers: no numbers of arcs.
     """
-    proofs = [
-        proof_of(problem, motion) if hasattr(motion, "bounds") else sampled_proof(problem, motion) for motion in motions
-    ]
+    proofs = [(proof_of if hasattr(motion, "bounds") else sampled_proof)(problem, motion, scene) for motion in motions]
     return answers_of(proofs, np.array([float(motion.duration()) for motion in motions]))
 
 
-def proof_of(problem: Problem, motion: BoundedMotion) -> MotionProof:
+def proof_of(problem: Problem, motion: BoundedMotion, scene: Scene | None = None) -> MotionProof:
     """Proof of one motion.
 
     Args:
         motion: from the centroid of the spools, z down.
+        scene: as for `proved_answers`.
 
     Returns:
         the proof.
     """
-    rows = tuple(criteria(problem.robot, problem.limits))
-    slacks = partial(block_slacks, problem.robot, problem.limits, motion.bounds)
-    return MotionProof(rows, time_proof(slacks, float(motion.duration())), _scales(problem, rows))
+    return proofs_of(problem, lambda _, *ends: motion.bounds(*ends), np.array([float(motion.duration())]), scene)[0]
+
+
+def proofs_of(
+    problem: Problem, bounds: ManyBounds, durations: np.ndarray, scene: Scene | None = None
+) -> list[MotionProof]:
+    """Proofs of several motions at once.
+
+    Args:
+        bounds: of their states over blocks, from the numbers of the motions, and the starts and ends of the blocks, s.
+        durations: (n,) s.
+        scene: as for `proved_answers`.
+
+    Returns:
+        n proofs.
+    """
+
+    def slacks(motion: np.ndarray, start: np.ndarray, end: np.ndarray) -> BlockSlacks:
+        return block_slacks(problem.robot, problem.limits, partial(bounds, motion), start, end, scene)
+
+    return [_proof(problem, proof, scene) for proof in time_proofs(slacks, durations)]
+
+
+def _proof(problem: Problem, proof: TimeProof, scene: Scene | None) -> MotionProof:
+    rows = tuple(criteria(problem.robot, problem.limits, scene))
+    names = () if scene is None else tuple(obstacle.name for obstacle in scene.obstacles)
+    return MotionProof(rows, proof, _scales(problem, rows), names)
 
 
 def answers_of(proofs: Sequence[MotionProof], duration: np.ndarray) -> ProvedAnswers:
@@ -199,34 +225,34 @@ def _instants(structure, leaves, tau):
     return StateBounds(**{name: constant(getattr(states, name)) for name in names})
 
 
-def sampled_proof(problem: Problem, motion: Motion, samples: int = SAMPLES) -> MotionProof:
+def sampled_proof(problem: Problem, motion: Motion, scene: Scene | None = None, samples: int = SAMPLES) -> MotionProof:
     """Refute a motion that has no bounds by its samples, or leave it undecided.
 
     Args:
         motion: from the centroid of the spools, z down.
+        scene: as for `proved_answers`.
         samples: intervals between equidistant instants.
 
     Returns:
         a proof that bounds no slack from below; intervals of failure reach from instant to instant.
     """
-    rows = tuple(criteria(problem.robot, problem.limits))
     leaves, structure = jax.tree.flatten(motion)
     tau = np.linspace(0.0, 1.0, samples + 1)
     # A block without a length has the slacks of its instant.
     states = _instants(structure, leaves, tau)
-    high = block_slacks(problem.robot, problem.limits, lambda start, end: states, tau, tau).high
+    high = block_slacks(problem.robot, problem.limits, lambda start, end: states, tau, tau, scene).high
     times = tau * float(motion.duration())
     failing = [_runs(times, column < 0.0) for column in high.T]
     whole = np.array([[0.0, times[-1]]])
     proof = TimeProof(
-        low=np.full(len(rows), -np.inf),
+        low=np.full(high.shape[1], -np.inf),
         high=high.min(0),
         when=times[high.argmin(0)],
         failing=failing,
-        open=[whole] * len(rows),
+        open=[whole] * high.shape[1],
         blocks=len(tau),
     )
-    return MotionProof(rows, proof, _scales(problem, rows))
+    return _proof(problem, proof, scene)
 
 
 def _runs(times: np.ndarray, flags: np.ndarray) -> np.ndarray:

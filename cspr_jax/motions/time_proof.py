@@ -6,6 +6,7 @@ criterion fails, or instants that are undecided. Open blocks of all motions are 
 """
 
 import dataclasses
+import itertools
 from collections.abc import Callable
 
 import numpy as np
@@ -148,7 +149,7 @@ def _proofs(blocks: Blocks, totals: np.ndarray) -> list[TimeProof]:
     is_open = [_merged(blocks, column, count) for column in blocks.undecided().T]
     when = np.full_like(high, np.nan)
     firsts = np.searchsorted(blocks.motion, np.arange(count + 1))
-    for i, (first, last) in enumerate(zip(firsts[:-1], firsts[1:], strict=True)):
+    for i, (first, last) in enumerate(itertools.pairwise(firsts)):
         rows = first + blocks.slacks.high[first:last].argmin(0)
         when[i] = 0.5 * (blocks.start + blocks.end)[rows]
     return [

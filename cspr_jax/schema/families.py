@@ -113,6 +113,7 @@ _ROWS = (
         dict.fromkeys(ANY_PATTERN, "cspr_jax.splines.leg:Splines"),
         rests_anywhere=True,
         any_cables=ANY_PATTERN,
+        knows_obstacles=True,
         keys=("motion", "interpolation", "ends", "smooth", "stretch", "point"),
         pose_keys=("motion",),
         end_keys=("time", "velocity", "acceleration"),

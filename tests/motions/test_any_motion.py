@@ -9,7 +9,8 @@ from oracles import any_motion
 from oracles.any_motion_cases import KINDS, random_case
 
 import cspr_jax
-from cspr_jax.motions.block_slacks import block_slacks, criteria
+from cspr_jax.motions.block_slacks import block_slacks
+from cspr_jax.motions.criteria import criteria
 from cspr_jax.motions.time_proof import time_proof
 from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.limits import Limits
