@@ -27,7 +27,7 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
         "--limits",
         type=Path,
         metavar="FILE",
-        help="limits (TOML), with the keys of [limits] of a plan, its [[obstacle]] tables and platform_box or platform_hull",
+        help="limits (TOML), with the keys of [limits] of a plan, [[obstacle]] tables, platform_box or platform_hull",
     )
     parser.add_argument(
         "--interpolation",

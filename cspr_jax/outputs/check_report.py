@@ -105,6 +105,7 @@ def _demands(plan: PlannedMotions, case: MotionProof) -> dict[Verdict, dict[str,
             "allowed": allowed,
             "unit": rows[k].unit,
             "cable": rows[k].cables[0] if rows[k].cables else None,
+            **({"cables": list(rows[k].cables)} if len(rows[k].cables) > 1 else {}),
             "t": float(case.proof.when[k]),
         }
     return table
@@ -166,10 +167,11 @@ def check_table(plan: PlannedMotions):
         table.add_column(cell(head), justify="left" if head in ("", "unit") else "right")
     for flag, row in _demands(plan, case).items():
         sign = "≥" if _row(case, flag).sense == "least" else "≤"
-        cable = "-" if row["cable"] is None else str(row["cable"] + 1)
-        numbers = [_digits(row["value"]), f"{sign} {_digits(row['bound'])}", f"{sign} {_digits(row['allowed'])}"]
+        numbers = row.get("cables", [] if row["cable"] is None else [row["cable"]])
+        cable = ", ".join(str(number + 1) for number in numbers) or "-"
+        values = [_digits(row["value"]), f"{sign} {_digits(row['bound'])}", f"{sign} {_digits(row['allowed'])}"]
         unit = row["unit"].replace("^2", "²")
-        table.add_row(*(cell(text) for text in (QUANTITIES[flag][1], *numbers, unit, cable, f"{row['t']:.4f}")))
+        table.add_row(*(cell(text) for text in (QUANTITIES[flag][1], *values, unit, cable, f"{row['t']:.4f}")))
     return table
 
 
