@@ -15,12 +15,14 @@ from cspr_jax.arithmetic.affine_bounds import (
     joined,
     norm_squared,
     reciprocal_root,
+    selected,
     squared,
     turned,
 )
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot, across_line
+from cspr_jax.robots.pulley_bounds import pulley_bounds
 
 
 class StateBounds(NamedTuple):
@@ -63,13 +65,11 @@ class CableBounds(NamedTuple):
 
 
 def cable_bounds(robot: AnyRobot, state: StateBounds) -> CableBounds:
-    """Bounds of the cables.
-
-    Args:
-        robot: without pulleys.
+    """Bounds of the cables, also behind pulleys.
 
     Returns:
-        the bounds, leaves (n_cables, ...); radii are NaN where a cable may have no length.
+        the bounds, leaves (n_cables, ...); radii are NaN where a cable may have no length, or its attachment point may
+        lie within its pulley or on the swivel axis of it.
     """
     arm = None
     target, velocity, pull = (_rows(bounds) for bounds in state[:3])
@@ -83,8 +83,19 @@ def cable_bounds(robot: AnyRobot, state: StateBounds) -> CableBounds:
     inverse = reciprocal_root(square)
     rate = dot(ray, velocity) * inverse
     acceleration = (norm_squared(velocity) + dot(ray, pull) - squared(rate)) * inverse
-    direction = -(ray * inverse.each(lambda x: x[:, None]))
-    return CableBounds(direction, arm, square * inverse, rate, acceleration)
+    straight = CableBounds(-(ray * inverse.each(lambda x: x[:, None])), arm, square * inverse, rate, acceleration)
+    if robot.pulleys is None:
+        return straight
+    way = pulley_bounds(robot.pulleys, ray, velocity)
+    rate = dot(way.direction, velocity)
+    slower = squared(rate) + way.swivel
+    acceleration = dot(way.direction, pull) + (norm_squared(velocity) - slower) * way.inverse
+    wheel = jnp.asarray(robot.pulleys.radius) > 0.0
+    return CableBounds(
+        selected(wheel[:, None], -way.direction, straight.direction),
+        arm,
+        *(selected(wheel, *pair) for pair in zip((way.length, rate, acceleration), straight[2:], strict=True)),
+    )
 
 
 def balance_bounds(robot: AnyRobot, state: StateBounds, cables: CableBounds) -> tuple[AffineBounds, AffineBounds]:

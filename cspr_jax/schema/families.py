@@ -27,6 +27,7 @@ class Family:
         keys: keys of a plan that only this family takes, and others that name them too.
         takes_durations: whether a pose may give the duration of the segment that ends there.
         knows_uncertainty: whether its verdicts take all of an uncertainty into account.
+        knows_pulleys: whether its verdicts are right for cables that leave from pulleys.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Family:
     keys: tuple[str, ...] = ()
     takes_durations: bool = False
     knows_uncertainty: bool = False
+    knows_pulleys: bool = False
 
     def leg(self, pattern: str) -> Any:
         """Class that joins the poses of a robot.
