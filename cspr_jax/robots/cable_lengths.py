@@ -21,8 +21,8 @@ def moved_lengths(robot: Robot, targets: Array, velocities: Array, accelerations
 
     Args:
         targets: (n_cables, 3) or (1, 3) points at which the cables are attached, m.
-        velocities: likewise, m/s.
-        accelerations: likewise, m/s^2.
+        velocities: (n_cables, 3) or (1, 3) of these points, m/s.
+        accelerations: (n_cables, 3) or (1, 3) of these points, m/s^2.
 
     Returns:
         lengths (n_cables,) m, rates (n_cables,) m/s (positive pays out), accelerations (n_cables,) m/s^2; NaN where an

@@ -29,12 +29,14 @@ class PulleyBounds(NamedTuple):
 
     Fields:
         direction: (n_cables, 3) unit vectors of the free cables, towards the effector.
+        exit: (n_cables, 3) points at which the cables leave, from the entry points, m.
         length: (n_cables,) with what lies on the pulleys, m.
         inverse: (n_cables,) 1 over the free length, 1/m.
         swivel: (n_cables,) r (1 - t . k) (p . v)^2 / w of `robots.cable_lengths`, m^2/s^2.
     """
 
     direction: AffineBounds
+    exit: AffineBounds
     length: AffineBounds
     inverse: AffineBounds
     swivel: AffineBounds
@@ -64,10 +66,12 @@ def pulley_bounds(pulleys: Pulleys, ray: AffineBounds, velocity: AffineBounds) -
     sine, cosine = (free * x + z * radius) * turn, (free * z - x * radius) * turn
     side = (ray - _wide(high) * axes) * _wide(narrow)
     direction = side * _wide(sine) + _wide(cosine) * axes
+    # A + r e + r n, with n = -(t . k) e + (t . e) k.
+    exits = side * _wide((1.0 - cosine) * radius) + _wide(sine * radius) * axes
     # Of the speed across the plane of the pulley, with the distance from the swivel axis.
     speed = dot(across, velocity) * narrow
     swivel = (1.0 - cosine) * squared(speed) * narrow * radius
-    return PulleyBounds(direction, _wrapped(radius, x, z, sine, cosine) + free, inverse, swivel)
+    return PulleyBounds(direction, exits, _wrapped(radius, x, z, sine, cosine) + free, inverse, swivel)
 
 
 def _wide(bounds: AffineBounds) -> AffineBounds:

@@ -10,6 +10,7 @@ import numpy as np
 
 from cspr_jax.arithmetic.affine_bounds import (
     AffineBounds,
+    constant,
     cross,
     dot,
     joined,
@@ -55,6 +56,7 @@ class CableBounds(NamedTuple):
         length: (n_cables,) m.
         rate: (n_cables,) m/s.
         acceleration: (n_cables,) m/s^2.
+        exit: (n_cables, 3) points at which the cables leave, m.
     """
 
     direction: AffineBounds
@@ -62,6 +64,7 @@ class CableBounds(NamedTuple):
     length: AffineBounds
     rate: AffineBounds
     acceleration: AffineBounds
+    exit: AffineBounds
 
 
 def cable_bounds(robot: AnyRobot, state: StateBounds) -> CableBounds:
@@ -83,7 +86,8 @@ def cable_bounds(robot: AnyRobot, state: StateBounds) -> CableBounds:
     inverse = reciprocal_root(square)
     rate = dot(ray, velocity) * inverse
     acceleration = (norm_squared(velocity) + dot(ray, pull) - squared(rate)) * inverse
-    straight = CableBounds(-(ray * inverse.each(lambda x: x[:, None])), arm, square * inverse, rate, acceleration)
+    direction, base = -(ray * inverse.each(lambda x: x[:, None])), constant(jnp.asarray(robot.base_points))
+    straight = CableBounds(direction, arm, square * inverse, rate, acceleration, base)
     if robot.pulleys is None:
         return straight
     way = pulley_bounds(robot.pulleys, ray, velocity)
@@ -91,11 +95,11 @@ def cable_bounds(robot: AnyRobot, state: StateBounds) -> CableBounds:
     slower = squared(rate) + way.swivel
     acceleration = dot(way.direction, pull) + (norm_squared(velocity) - slower) * way.inverse
     wheel = jnp.asarray(robot.pulleys.radius) > 0.0
-    return CableBounds(
-        selected(wheel[:, None], -way.direction, straight.direction),
-        arm,
-        *(selected(wheel, *pair) for pair in zip((way.length, rate, acceleration), straight[2:], strict=True)),
-    )
+    values = (way.length, rate, acceleration)
+    length, rate, acceleration = (selected(wheel, f, g) for f, g in zip(values, straight[2:5], strict=True))
+    wheel = wheel[:, None]
+    direction, leaving = selected(wheel, -way.direction, direction), selected(wheel, way.exit + base.middle, base)
+    return CableBounds(direction, arm, length, rate, acceleration, leaving)
 
 
 def balance_bounds(robot: AnyRobot, state: StateBounds, cables: CableBounds) -> tuple[AffineBounds, AffineBounds]:

@@ -15,6 +15,7 @@ from cspr_jax.robots import cables, state_bounds
 from cspr_jax.robots.cable_lengths import moved_lengths
 from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.robots.pulleys import exits
 from cspr_jax.robots.state import State
 from robots.test_patterns import INERTIAL, MATRIX, made, state_of
 
@@ -118,13 +119,22 @@ def test_tensions_balance_any_pattern(pattern):
     assert np.abs(slopes.pulleys.radius).max() > 0.0
 
 
+def exits_of(robot, state):
+    """Points at which cables leave, (3, n_cables)."""
+    if robot.pulleys is None:
+        return jnp.asarray(robot.base_points).T
+    arms = robot.platform_points @ state.rotation.T if PATTERNS[robot.pattern].is_body else np.zeros((1, 3))
+    targets = jnp.broadcast_to(state.position[None] + arms, robot.base_points.shape)
+    return exits(robot.base_points, robot.pulleys.axes, robot.pulleys.radius, targets).point.T
+
+
 @jax.jit
 def exact(robot, spline, taus):
     """Lengths, rates, accelerations and wrench matrices at instants."""
 
     def one(tau):
         state = spline.state(tau)
-        return *cables.cable_motion(robot, state), robot.wrench_matrix(state)
+        return *cables.cable_motion(robot, state), robot.wrench_matrix(state), exits_of(robot, state)
 
     return jax.vmap(jax.vmap(one))(taus)
 
@@ -135,7 +145,8 @@ def bounds_of(robot, states):
 
     def one(state):
         known = state_bounds.cable_bounds(robot, state)
-        return known.length, known.rate, known.acceleration, state_bounds.balance_bounds(robot, state, known)[0]
+        matrix, _ = state_bounds.balance_bounds(robot, state, known)
+        return known.length, known.rate, known.acceleration, matrix, known.exit.each(jnp.transpose)
 
     return jax.vmap(one)(states)
 
