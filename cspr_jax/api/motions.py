@@ -214,7 +214,7 @@ def tensions(robot: AnyRobot, state: State, rule: str = CENTRED) -> Array:
     Raises:
         InputError: an unknown rule, or a rule that needs a largest tension of every cable, which the robot lacks.
     """
-    prepared_robot, frame = prepared(robot)
+    prepared_robot, frame = prepared(robot, pulleys=True)
     if rule not in TENSION_RULES:
         raise InputError("rule", rule, f"one of {', '.join(TENSION_RULES)}")
     high = robot.limits.tension_max

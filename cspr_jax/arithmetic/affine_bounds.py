@@ -14,6 +14,7 @@ from jax import Array
 
 # A few roundings of an operation, in parts of the largest number in it.
 ROUNDING = 8.0 * float(np.finfo(float).eps)
+LARGEST_SINE = 0.9
 
 
 class AffineBounds(NamedTuple):
@@ -175,6 +176,31 @@ def reciprocal_root(f: AffineBounds) -> AffineBounds:
     """
     value = 1.0 / jnp.sqrt(f.middle)
     return _bent(f, value, -0.5 * value**3, 0.75 * _positive(f) ** -2.5)
+
+
+def arc_sine(f: AffineBounds) -> AffineBounds:
+    """Bounds of the angle of a sine, between -pi/2 and pi/2.
+
+    Returns:
+        the bounds; NaN where f may be larger than 0.9, or smaller than -0.9: near 1 no digits are left of 1 - x^2.
+    """
+    size = jnp.where(f.size() < LARGEST_SINE, f.size(), jnp.nan)
+    # The second derivative, x (1 - x^2)^-1.5, changes its sign with x, and is largest where |x| is.
+    bend = 0.5 * size * f.reach() ** 2 * (1.0 - size**2) ** -1.5
+    value, slope = jnp.arcsin(f.middle), (1.0 - f.middle**2) ** -0.5
+    return _rounded(AffineBounds(value, slope * f.slope, slope * f.radius + bend))
+
+
+def selected(choices: Array, f: AffineBounds, g: AffineBounds) -> AffineBounds:
+    """Bounds of f where a condition holds, else of g.
+
+    Args:
+        choices: (...) whether it holds; of the shape of both, or one that extends to it.
+
+    Returns:
+        the bounds.
+    """
+    return AffineBounds(*(jnp.where(choices, a, b) for a, b in zip(f, g, strict=True)))
 
 
 def _positive(f: AffineBounds) -> Array:

@@ -80,7 +80,8 @@ def build_problem(
     """
     amplitude = build_amplitude(keys, file, epsilon=epsilon, at=at, for_bounds=for_bounds)
     limit_values = build_limits(robot_file, limits, file)
-    robot = kernel_robot(robot_file, keys, file, any_cables=any_cables)
+    pulleys = all(FAMILIES[name].knows_pulleys for name in keys.families)
+    robot = kernel_robot(robot_file, keys, file, any_cables=any_cables, pulleys=pulleys)
     try:
         if not is_redundant_platform(robot):
             check_bounded(limit_values)

@@ -75,13 +75,16 @@ def load_robot(reference: str | Path) -> PointMassRobot | PlatformRobot:
     return build_robot(robot_file, TrajectoryKeys(), reference)
 
 
-def kernel_robot(robot_file: RobotFile, keys: TrajectoryKeys, file: object, *, any_cables: bool = False) -> Any:
+def kernel_robot(
+    robot_file: RobotFile, keys: TrajectoryKeys, file: object, *, any_cables: bool = False, pulleys: bool = False
+) -> Any:
     """The robot of a file, as the kernels take it; a platform's axes are still those of the file.
 
     Args:
         keys: of the plan or sweep.
         file: named in errors.
         any_cables: whether there may be more cables than degrees of freedom.
+        pulleys: whether there may be pulleys.
 
     Returns:
         the robot, centred.
@@ -95,7 +98,7 @@ def kernel_robot(robot_file: RobotFile, keys: TrajectoryKeys, file: object, *, a
     try:
         # Families that move robots on any number of cables move the patterns that their rows name.
         if robot.pattern in MOVED or not any_cables:
-            check_moved(robot)
+            check_moved(robot, pulleys=pulleys)
         if not is_redundant_platform(robot):
             check_bounded(robot.limits)
     except InputError as error:
@@ -121,7 +124,8 @@ def fault_at_rest(robot_file: RobotFile) -> str | None:
     """
     robot_file = robot_file.equivalent() if robot_file.translation_only else robot_file
     try:
-        if len(robot_file.base_points) > robot_file.dof or robot_file.own_pattern not in MOVED:
+        is_redundant = len(robot_file.base_points) > robot_file.dof
+        if is_redundant or robot_file.own_pattern not in MOVED or robot_file.pulley_radius is not None:
             return slack_at_rest(
                 centred(shared := build_robot(robot_file, TrajectoryKeys(), robot_file.name))[0], shared.limits
             )

@@ -167,7 +167,7 @@ def block_slacks(
     """Bounds of the slacks of a motion over blocks of time.
 
     Args:
-        robot: centred, z down, without pulleys.
+        robot: centred, z down.
         bounds: gives those of the motion's states over blocks, from their starts and ends, (k,) s each.
         start: (k,) s.
         end: (k,) s.

@@ -35,7 +35,7 @@ class Demands:
         mu_min: smallest tension per mass and length, 1/s^2.
         depth_min: smallest depth of the mass centre below the spool plane, along the vertical, m.
         lowest: largest z, z down, m.
-        length_max: largest length of a cable, m.
+        length_max: largest length of a cable, with what lies on its pulley, m.
         speed_max: largest speed of a cable, m/s.
         acceleration_max: largest acceleration of a cable, m/s^2.
         are_found: whether the rule of redundant cables found tensions within their limits at all instants; 1 or 0.

@@ -101,10 +101,9 @@ def check_certain(
     known = [row.name for row in FAMILIES.values() if row.knows_uncertainty]
     if not families or not set(families) <= set(known):
         raise InputError("uncertainty", None, f"must be absent but for the families {', '.join(known)}", fault="given")
-    if robot.n_cables != robot.dof or in_pairs:
-        raise InputError(
-            "uncertainty", None, "must be absent on redundant cables and on pairs of cables", fault="given"
-        )
+    if robot.n_cables != robot.dof or in_pairs or robot.pulleys is not None:
+        allowed = "must be absent on redundant cables, on pairs of cables, and with pulleys"
+        raise InputError("uncertainty", None, allowed, fault="given")
     if not isinstance(robot, PlatformRobot) and float(uncertainty.mass_centre) > 0.0:
         raise InputError(
             "uncertainty.mass_centre", float(uncertainty.mass_centre), "absent: a point mass has no other one"

@@ -3,7 +3,8 @@
 They serve every robot and family, and can be differentiated; searches use faster forms of the same criteria. In this
 order, with n the number of cables, kappa_k the tension of cable k over its length, and values at rest in P0 below:
 
-    taut       kappa_k over its value at rest, of a point mass with the pseudotension; of a platform n z0 mu_k / g
+    taut       kappa_k over its value at rest, of a point mass without pulleys with the pseudotension; of a platform
+               n z0 mu_k / g
     regular    of a platform: normalised determinant of the structure matrix over its value at rest
     below      depth of the mass centre below the spool plane over z0
     limits     of each limit that is set, one slack for each cable, of the floor one: `motions.limits.slack`
@@ -16,7 +17,8 @@ from jax import Array
 from cspr_jax.motions.limits import limits_set, scales, slack, values
 from cspr_jax.motions.motion import Motion
 from cspr_jax.motions.problem import Problem
-from cspr_jax.robots import force_balance, wrench_balance
+from cspr_jax.robots import cables, force_balance, wrench_balance
+from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PointMassRobot, plane_normal, rest_point
 from cspr_jax.robots.state import State
@@ -62,6 +64,8 @@ def flags(problem: Problem) -> tuple[Verdict, ...]:
 
 def _of_point_mass(robot: PointMassRobot, state: State, z0: Array) -> list[Array]:
     hub = rest_point(z0)
+    if robot.pulleys is not None:
+        return [_per_length(robot, state) / _per_length(robot, State(hub, jnp.zeros_like(hub), jnp.zeros_like(hub)))]
     at_rest = force_balance.pseudotensions(robot, hub, jnp.zeros_like(hub))
     return [force_balance.pseudotensions(robot, state.position, state.acceleration) / at_rest]
 
@@ -70,7 +74,8 @@ def _of_platform(robot: PlatformRobot, state: State, z0: Array) -> list[Array]:
     hub = rest_point(z0)
     at_rest = wrench_balance.normalised_determinant(robot, hub, jnp.eye(3))
     here = wrench_balance.normalised_determinant(robot, state.position, state.rotation)
-    per_length = wrench_balance.tensions_per_length(robot, state)
+    with_pulleys = robot.pulleys is not None
+    per_length = _per_length(robot, state) if with_pulleys else wrench_balance.tensions_per_length(robot, state)
     return [robot.n_cables * z0 / robot.gravity * per_length, jnp.atleast_1d(here / at_rest)]
 
 
@@ -89,3 +94,8 @@ def sampled_margin(problem: Problem, motion: Motion, samples: int = 64) -> Array
     """
     tau = jnp.linspace(0.0, 1.0, samples + 1)
     return jnp.min(jax.vmap(lambda t: slacks(problem, motion, t))(tau))
+
+
+def _per_length(robot: AnyRobot, state: State) -> Array:
+    # Return tensions per mass and length behind pulleys, 1/s^2.
+    return cables.tensions(robot, state) / cables.cable_motion(robot, state)[0] / robot.mass

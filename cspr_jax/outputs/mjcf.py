@@ -6,25 +6,37 @@ time of the row before where steps end at a jump of the acceleration.
 
 import csv
 import io
+import math
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import jax
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cspr_jax import __version__
-from cspr_jax.errors import printable
-from cspr_jax.outputs.mujoco_motion import STEP, Played, Suspended, played, suspended
+from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.errors import ConfigError, printable
+from cspr_jax.outputs.mujoco_motion import STEP, Played, Suspended, attachments, coordinates, played, suspended
 from cspr_jax.plans.planning import PlannedMotions
+from cspr_jax.robots.pulleys import exits
 from cspr_jax.robots.shapes import Body, Box, Cylinder, Hull, Obstacle, Sphere
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.publishing import publish
 
+_EXITS = jax.jit(jax.vmap(exits, in_axes=(None, None, None, 0)))
 KEYFRAME = "start"
 # Sizes of what is drawn, over the diagonal of the box around spools and path.
 MASS_RADIUS, SPOOL_RADIUS, POINT_RADIUS, CABLE_RADIUS, ROD_RADIUS = 0.012, 0.006, 0.004, 0.002, 0.003
 THINNEST = 1e-4  # cables of a known diameter are drawn thicker than this
+# Of a pulley: where its cable comes from, below the entry point, and half its width, over its radius; its inertia over
+# the mass and the size squared, as little as MuJoCo takes well; distance of the points that keep it in the plane of its
+# cable, over the size.
+LEAD, WHEEL_WIDTH, SWIVEL_INERTIA, FOLLOWING = 0.5, 0.15, 1e-9, 0.1
+ROOM = 0.01  # rad, between start and end of a tendon around a pulley
+LYING = (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)  # from z to -y
+CLEAR = (0.0, 0.0, 0.0, 0.0)
 DARK, BLUE, ORANGE = (0.2, 0.2, 0.2, 1.0), (0.1, 0.3, 0.6, 1.0), (0.85, 0.45, 0.1, 1.0)
 BROWN, GLASS, HULL = (0.36, 0.24, 0.18, 0.6), (0.85, 0.45, 0.1, 0.35), "platform_hull"
 
@@ -46,9 +58,10 @@ def model_xml(body: Suspended, moved: Played, step: float = STEP, control_file: 
     words = f"World axes are those of the robot file{turned}; z is up. A control is the tension of a cable, N."
     root.append(ElementTree.Comment(f" Written by cspr_jax {__version__}. SI units. {words}{note} "))
     _add(root, "compiler", angle="radian", inertiafromgeom="false")
-    # A dense Jacobian of the tendons has one row a cable.
+    # A dense Jacobian of the tendons has one row a cable. Pulleys follow their cables by constraints.
     gravity = [0.0, 0.0, -body.gravity]
-    _add(root, "option", timestep=step, gravity=gravity, integrator="RK4", jacobian="dense")
+    solver = {"tolerance": 1e-14} if len(body.wheels) else {}
+    _add(root, "option", timestep=step, gravity=gravity, integrator="RK4", jacobian="dense", **solver)
     if control_file:
         _add(_add(root, "custom"), "text", name="control_file", data=control_file)
     places = np.vstack([body.spools, moved.position])
@@ -61,9 +74,12 @@ def model_xml(body: Suspended, moved: Played, step: float = STEP, control_file: 
     if isinstance(body.body, Hull):
         _add(assets, "mesh", name=HULL, vertex=np.unique(body.body.triangles.reshape(-1, 3), axis=0))
     _world(_add(root, "worldbody"), body, moved, size)
-    _cables(_add(root, "tendon"), body, size)
+    tendons = _add(root, "tendon")
+    _cables(tendons, body, size)
+    if len(body.wheels):
+        _followers(tendons, _add(root, "equality"), body, step)
     _motors(_add(root, "actuator"), body, moved)
-    places, rates, _ = (rows[0] for rows in moved.coordinates(body.axes))
+    places, rates, _ = (rows[0] for rows in coordinates(body, moved))
     _add(_add(root, "keyframe"), "key", name=KEYFRAME, qpos=places, qvel=rates, ctrl=moved.tension[0])
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
@@ -79,7 +95,10 @@ def _add(parent: ElementTree.Element, tag: str, **attributes) -> ElementTree.Ele
 
 
 def _world(world: ElementTree.Element, body: Suspended, moved: Played, size: float) -> None:
-    for k, spool in enumerate(body.spools, 1):
+    spools = body.spools.copy()
+    if body.pulleys is not None:
+        spools -= LEAD * (np.asarray(body.pulleys.radius)[:, None] * np.asarray(body.pulleys.axes))
+    for k, spool in enumerate(spools, 1):
         _add(world, "site", name=f"spool_{k}", pos=spool, size=SPOOL_RADIUS * size, rgba=DARK)
     drawn = {"contype": "0", "conaffinity": "0"}
     for number, obstacle in enumerate(body.obstacles, 1):
@@ -90,7 +109,7 @@ def _world(world: ElementTree.Element, body: Suspended, moved: Played, size: flo
         for axis in body.axes:  # coordinates are places, not ways from the start
             _add(effector, "joint", name="xyz"[axis], type="slide", axis=np.eye(3)[axis], ref=start[axis])
     else:
-        effector = _add(world, "body", name="effector", pos=start, quat=moved.coordinates(())[0][0, 3:])
+        effector = _add(world, "body", name="effector", pos=start, quat=moved.coordinates(())[0][0, 3:7])
         _add(effector, "freejoint", name="pose")
     radius = MASS_RADIUS * size
     # An end effector that does not turn may have any inertia, but it must have one.
@@ -108,6 +127,45 @@ def _world(world: ElementTree.Element, body: Suspended, moved: Played, size: flo
             _add(effector, "geom", type="capsule", fromto=rod, size=ROD_RADIUS * size, **drawn)
     for k, point in enumerate(body.points, 1):
         _add(effector, "site", name=f"point_{k}", pos=point, size=POINT_RADIUS * size, rgba=ORANGE)
+    # Behind the effector, whose coordinates are the first ones.
+    if len(body.wheels):
+        _pulleys(world, body, moved, size)
+
+
+def _pulleys(world: ElementTree.Element, body: Suspended, moved: Played, size: float) -> None:
+    # Each swivels about its axis at the entry point, the x axis of its body towards its centre.
+    axes, radii = np.asarray(body.pulleys.axes), np.asarray(body.pulleys.radius)  # type: ignore[union-attr]
+    points, middles = attachments(body, moved)[0], _sides(body, moved)
+    inertia = np.full(3, SWIVEL_INERTIA * body.mass * size**2)
+    for k, middle in zip(body.wheels.tolist(), middles.tolist(), strict=True):
+        across = np.cross(axes[k], points[k] - body.spools[k])
+        across = across / np.linalg.norm(across)
+        matrix = np.stack([np.cross(across, axes[k]), across, axes[k]], axis=1)
+        quaternion, centre = np.roll(Rotation.from_matrix(matrix).as_quat(), 1), np.array([radii[k], 0.0, 0.0])
+        pulley = _add(world, "body", name=f"pulley_{k + 1}", pos=body.spools[k], quat=quaternion)
+        _add(pulley, "joint", name=f"swivel_{k + 1}", type="hinge", axis=[0.0, 0.0, 1.0])
+        _add(pulley, "inertial", pos=np.zeros(3), mass=SWIVEL_INERTIA * body.mass, diaginertia=inertia)
+        wheel = {"type": "cylinder", "size": [radii[k], WHEEL_WIDTH * radii[k]], "quat": LYING, "rgba": DARK}
+        _add(pulley, "geom", name=f"wheel_{k + 1}", pos=centre, contype="0", conaffinity="0", **wheel)
+        side = 2.0 * radii[k] * np.array([-np.cos(middle), 0.0, np.sin(middle)])
+        _add(pulley, "site", name=f"side_{k + 1}", pos=centre + side, size=THINNEST * size, rgba=CLEAR)
+        for name, way in (("left", 1.0), ("right", -1.0)):
+            arm = [0.0, way * FOLLOWING * size, 0.0]
+            _add(pulley, "site", name=f"{name}_{k + 1}", pos=arm, size=THINNEST * size, rgba=CLEAR)
+
+
+def _sides(body: Suspended, moved: Played) -> np.ndarray:
+    # Return directions from the centres of the pulleys, rad from the entry point on, by which MuJoCo wraps tendons the
+    # right way around: less than half a turn behind the start of the tendon, and before its end, in all rows.
+    axes, radii = (np.asarray(x)[body.wheels] for x in (body.pulleys.axes, body.pulleys.radius))  # type: ignore[union-attr]
+    with double_precision():
+        way = _EXITS(body.spools[body.wheels], axes, radii, attachments(body, moved)[:, body.wheels])
+    start, end = -np.arctan(LEAD), np.max(np.asarray(way.wrapped) / radii + np.arctan2(way.free, radii), axis=0)
+    lost = np.flatnonzero(~(end - start < 2.0 * np.pi - ROOM))
+    if len(lost):
+        fault = f"MuJoCo cannot wrap cable {int(body.wheels[lost[0]]) + 1} around its pulley all along its motion"
+        raise ConfigError("plan", f"has no model for MuJoCo: {fault}")
+    return 0.5 * (start + end)
 
 
 def _geom(shape: Obstacle | Body) -> dict[str, Any]:
@@ -137,7 +195,20 @@ def _cables(tendons: ElementTree.Element, body: Suspended, size: float) -> None:
     for k in range(1, len(body.spools) + 1):
         cable = _add(tendons, "spatial", name=f"cable_{k}", width=radius, rgba=BLUE)
         _add(cable, "site", site=f"spool_{k}")
+        if k - 1 in body.wheels:
+            _add(cable, "geom", geom=f"wheel_{k}", sidesite=f"side_{k}")
         _add(cable, "site", site=f"point_{k}")
+
+
+def _followers(tendons: ElementTree.Element, equality: ElementTree.Element, body: Suspended, step: float) -> None:
+    # A pulley is in one plane with its cable where two points on either side are equally far from the attachment point.
+    for k in (body.wheels + 1).tolist():
+        for name in ("left", "right"):
+            tendon = _add(tendons, "spatial", name=f"{name}_{k}", width=THINNEST, rgba=CLEAR)
+            _add(tendon, "site", site=f"{name}_{k}")
+            _add(tendon, "site", site=f"point_{k}")
+        hard = {"solref": [4.0 * step, 1.0], "solimp": [0.9999, 0.9999, 0.001, 0.5, 2.0]}
+        _add(equality, "tendon", name=f"follow_{k}", tendon1=f"left_{k}", tendon2=f"right_{k}", **hard)
 
 
 def _motors(actuators: ElementTree.Element, body: Suspended, moved: Played) -> None:

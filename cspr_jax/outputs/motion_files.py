@@ -125,18 +125,19 @@ def rows_at(plan: PlannedMotions, taus: Sequence[np.ndarray]) -> dict[str, np.nd
     """
     duration, motions = plan.answers.duration, [motion for leg in plan.legs for motion in leg.motions]
     starts = np.concatenate([[0.0], np.cumsum(duration)])
-    is_redundant = plan.problem.robot.n_cables > plan.problem.robot.dof
+    robot = plan.problem.robot
+    is_redundant = robot.n_cables > robot.dof
     # Other motions do not depend on limits, and which limits there are decides what is compiled.
     needs_limits = is_redundant or any(isinstance(motion, TimedLine) for motion in motions)
     limits = plan.problem.limits if needs_limits else NO_LIMITS
-    with_couples = is_redundant and is_rectangle(plan.problem.robot.base_points)
+    with_couples = is_redundant and robot.pulleys is None and is_rectangle(robot.base_points)
     pairs, parts = plan.robot_file.pairs, []
     longest = max(len(tau) for tau in taus)
     for i, tau in enumerate(taus):
         # Segments of one length are compiled once.
         padded = np.concatenate([tau, np.ones(longest - len(tau))])
         states_of_segment = _states(
-            plan.problem.robot, limits, motions[i], padded, rule=plan.keys.tension_rule, with_couples=with_couples
+            robot, limits, motions[i], padded, rule=plan.keys.tension_rule, with_couples=with_couples
         )
         state, of_cables = jax.tree.map(np.asarray, states_of_segment)
         state = outward(plan.frame, state)

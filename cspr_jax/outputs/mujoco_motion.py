@@ -14,11 +14,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.outputs.motion_files import LARGEST_ROWS, rows_at
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.robots.pulleys import Pulleys
 from cspr_jax.robots.shapes import Body, Obstacle, inward, rotated
 
 STEP = 0.0005  # s, the longest that MuJoCo takes unless it is told another one
@@ -44,6 +46,7 @@ class Suspended(NamedTuple):
         cable_diameter: m; None: not known.
         obstacles: bodies fixed in space.
         body: shape of the platform in body axes, from the mass centre; None: not known.
+        pulleys: whose axes are MuJoCo's; None: cables leave from points.
     """
 
     name: str
@@ -58,6 +61,12 @@ class Suspended(NamedTuple):
     cable_diameter: float | None = None
     obstacles: tuple[Obstacle, ...] = ()
     body: Body | None = None
+    pulleys: Pulleys | None = None
+
+    @property
+    def wheels(self) -> np.ndarray:
+        """Numbers, from 0 on, of the cables that leave from pulleys of some size."""
+        return np.empty(0, int) if self.pulleys is None else np.flatnonzero(np.asarray(self.pulleys.radius) > 0.0)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -140,6 +149,9 @@ def suspended(plan: PlannedMotions) -> Suspended:
     elif row.is_body:
         points = world.turned(plan.frame.turned(np.asarray(robot.platform_points)))
         inertia = world.turned_tensor(plan.frame.turned_tensor(np.asarray(robot.inertia)))
+    pulleys = robot.pulleys
+    if pulleys is not None:
+        pulleys = Pulleys(pulleys.radius, leaf(world.turned(plan.frame.turned(np.asarray(pulleys.axes)))))
     limits = [getattr(keys, "tension_max", None) for keys in (plan.keys, written)]
     limit = next((value for value in limits if value is not None), np.inf)
     return Suspended(
@@ -153,6 +165,7 @@ def suspended(plan: PlannedMotions) -> Suspended:
         points=points,
         tension_max=np.broadcast_to(np.asarray(limit, float), len(points)),
         cable_diameter=None if robot.cable_diameter is None else float(robot.cable_diameter),
+        pulleys=pulleys,
         obstacles=tuple(inward(table.shape(), world) for table in plan.keys.obstacle or ()),
         body=_body(plan, points),
     )
@@ -166,6 +179,42 @@ def _body(plan: PlannedMotions, points: np.ndarray) -> Body | None:
     if shape is None:
         return None
     return rotated(shape, Rotation.align_vectors(points, np.asarray(written.platform_points) - centre)[0].as_matrix())
+
+
+def attachments(body: Suspended, moved: Played) -> np.ndarray:
+    """Points at which the cables are attached.
+
+    Returns:
+        (n, n_cables, 3) m.
+    """
+    arms = body.points[None]
+    if moved.rotation is not None:
+        arms = np.einsum("nij,kj->nki", moved.rotation.as_matrix(), body.points)
+    return moved.position[:, None] + arms
+
+
+def coordinates(body: Suspended, moved: Played) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Coordinates of all of MuJoCo's joints, their velocities and accelerations.
+
+    Returns:
+        (n, nq), (n, nv), (n, nv): as `Played.coordinates`, followed by the angles of pulleys about their swivel axes
+        from where they are in the first row, rad, and their derivatives; accelerations of pulleys are left out, as 0.
+    """
+    places, rates, accelerations = moved.coordinates(body.axes)
+    if body.pulleys is None or not len(body.wheels):
+        return places, rates, accelerations
+    speeds = np.repeat(moved.velocity[:, None], len(body.points), axis=1)
+    if moved.rotation is not None and moved.omega is not None:
+        swing = np.cross(moved.omega[:, None], body.points[None])
+        speeds = speeds + np.einsum("nij,nkj->nki", moved.rotation.as_matrix(), swing)
+    axes = np.asarray(body.pulleys.axes)[body.wheels]
+    rays = (attachments(body, moved) - body.spools)[:, body.wheels]
+    across = np.cross(axes, rays)
+    first = across[0] / np.linalg.norm(across[0], axis=1, keepdims=True)
+    angles = np.arctan2(-np.sum(across * np.cross(first, axes), axis=2), np.sum(across * first, axis=2))
+    turning = np.sum(across * speeds[:, body.wheels], axis=2) / np.sum(across**2, axis=2)
+    both = zip((places, rates, accelerations), (angles, turning, np.zeros_like(turning)), strict=True)
+    return tuple(np.hstack(pair) for pair in both)  # type: ignore[return-value]
 
 
 def played(plan: PlannedMotions, step: float = STEP) -> Played:

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from cspr_jax.errors import ConfigError
 from cspr_jax.outputs.mjcf import model_xml
-from cspr_jax.outputs.mujoco_motion import STEP, Played, Suspended, played, suspended, upward
+from cspr_jax.outputs.mujoco_motion import STEP, Played, Suspended, coordinates, played, suspended, upward
 from cspr_jax.outputs.table_layout import two_digits
 from cspr_jax.plans.planning import PlannedMotions
 
@@ -189,8 +189,8 @@ def way_of(body: Suspended, moved: Played, step: float = STEP, *, by_segment: bo
         ConfigError: MuJoCo is not installed.
     """
     mujoco = need_mujoco()
-    places, rates, _ = moved.coordinates(body.axes)
-    coordinates, row = [], 0
+    places, rates, _ = coordinates(body, moved)
+    reached, row = [], 0
 
     def pull(model: Any, data: Any) -> None:
         # RK4 asks at the start of a step, twice in its middle, and at its end.
@@ -204,12 +204,12 @@ def way_of(body: Suspended, moved: Played, step: float = STEP, *, by_segment: bo
         for run in moved.runs():
             if by_segment and moved.segment[run.start] != moved.segment[run.start - 1]:
                 data.qpos[:], data.qvel[:] = places[run.start], rates[run.start]
-            coordinates.append(data.qpos.copy())
+            reached.append(data.qpos.copy())
             for row in run[:-1:2]:
                 data.time, model.opt.timestep = moved.time[row], moved.time[row + 2] - moved.time[row]
                 mujoco.mj_step(model, data)
-                coordinates.append(data.qpos.copy())
-    return _way(moved, np.array(coordinates), body.axes)
+                reached.append(data.qpos.copy())
+    return _way(moved, np.array(reached), body.axes)
 
 
 @contextlib.contextmanager
@@ -224,14 +224,14 @@ def _callback_lent(mujoco: Any) -> Iterator[None]:
             mujoco.set_mjcb_control(before)
 
 
-def _way(moved: Played, coordinates: np.ndarray, axes: Sequence[int]) -> PlayedPath:
+def _way(moved: Played, reached: np.ndarray, axes: Sequence[int]) -> PlayedPath:
     rows = ends_of_steps(moved)
     position, turned = moved.position[rows], np.zeros(len(rows))
     if moved.rotation is None:
-        position[:, list(axes)] = coordinates
+        position[:, list(axes)] = reached[:, : len(axes)]
     else:
-        position[:] = coordinates[:, :3]
-        turned = (moved.rotation[rows].inv() * Rotation.from_quat(np.roll(coordinates[:, 3:], -1, axis=1))).magnitude()
+        position[:], quaternions = reached[:, :3], np.roll(reached[:, 3:7], -1, axis=1)
+        turned = (moved.rotation[rows].inv() * Rotation.from_quat(quaternions)).magnitude()
     return PlayedPath(position, turned)
 
 
@@ -247,13 +247,25 @@ def tension_deviation(body: Suspended, moved: Played) -> np.ndarray:
     mujoco = need_mujoco()
     with _callback_lent(mujoco):
         model = mujoco.MjModel.from_xml_string(model_xml(body, moved))
-    rows = ends_of_steps(moved)
-    data, (places, rates, accelerations) = mujoco.MjData(model), moved.coordinates(body.axes)
-    pulls, forces = np.empty((len(rows), model.nv, model.ntendon)), np.empty((len(rows), model.nv))
+    # Pulleys are where the cables want them: what keeps them there has nothing to do.
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EQUALITY
+    rows, freedoms = ends_of_steps(moved), model.nv - len(body.wheels)
+    data, (places, rates, accelerations) = mujoco.MjData(model), coordinates(body, moved)
+    pulls, forces = np.empty((len(rows), freedoms, model.nu)), np.empty((len(rows), freedoms))
     for i, row in enumerate(rows.tolist()):
         data.qpos[:], data.qvel[:], data.qacc[:] = places[row], rates[row], accelerations[row]
         mujoco.mj_inverse(model, data)
         # A cable that shortens pulls.
-        pulls[i], forces[i] = -np.reshape(data.ten_J, (model.ntendon, model.nv)).T, data.qfrc_inverse
+        pulls[i], forces[i] = -_tendons(model, data)[: model.nu, :freedoms].T, data.qfrc_inverse[:freedoms]
     missing = forces - np.einsum("nij,nj->ni", pulls, moved.tension[rows])
     return np.einsum("nji,ni->nj", np.linalg.pinv(pulls), missing)
+
+
+def _tendons(model: Any, data: Any) -> np.ndarray:
+    # Jacobian of the tendons, (ntendon, nv). MuJoCo may keep only the coordinates on which a tendon depends.
+    if data.ten_J.size == model.ntendon * model.nv:
+        return np.reshape(data.ten_J, (model.ntendon, model.nv))
+    matrix = np.zeros((model.ntendon, model.nv))
+    row = np.repeat(np.arange(model.ntendon), model.ten_J_rownnz)
+    matrix[row, model.ten_J_colind] = data.ten_J
+    return matrix

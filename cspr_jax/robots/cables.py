@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.arithmetic.elementary import leaf, solved
 from cspr_jax.errors import InputError
 from cspr_jax.robots import force_balance, wrench_balance
 from cspr_jax.robots.limits import NO_LIMITS, Limits
@@ -17,6 +17,7 @@ from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.robots.pulleys import pulleys_of
+from cspr_jax.robots.robot import MOVED
 from cspr_jax.robots.state import State
 from cspr_jax.robots.tension_distribution import Distribution
 from cspr_jax.robots.tension_rule_table import CENTRED
@@ -72,6 +73,10 @@ def tensions(robot: AnyRobot, state: State, limits: Limits = NO_LIMITS, rule: st
     """
     if robot.n_cables > robot.dof:
         return shared(robot, state, limits, rule).tensions
+    if robot.pulleys is not None or robot.pattern not in MOVED:
+        unit = wrench_units(robot)
+        wrench = (robot.inertial_wrench(state) / unit)[:, None]
+        return solved(robot.wrench_matrix(state) / unit[:, None], wrench)[0][:, 0]
     if isinstance(robot, PlatformRobot):
         return wrench_balance.tensions(robot, state)
     return force_balance.tensions(robot, state.position, state.acceleration)
@@ -113,7 +118,8 @@ def cable_motion(robot: AnyRobot, state: State) -> tuple[Array, Array, Array]:
         state: in the robot's axes.
 
     Returns:
-        lengths (n_cables,) m, rates (n_cables,) m/s (positive pays out), accelerations (n_cables,) m/s^2.
+        lengths (n_cables,) m, with what lies on pulleys; rates (n_cables,) m/s (positive pays out), accelerations
+        (n_cables,) m/s^2.
     """
     if isinstance(robot, PlatformRobot):
         return wrench_balance.cable_motion(robot, state)

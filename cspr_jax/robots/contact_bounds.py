@@ -52,7 +52,7 @@ def contact_bounds(robot: AnyRobot, bodies: Bodies, state: StateBounds, cables: 
     Returns:
         (n_meetings,) lower and upper bounds, m, in the order of `contact_bodies.meetings`.
     """
-    ends, parts = _ends(robot, state, cables), []
+    ends, parts = _ends(state, cables), []
     if len(bodies.pairs):
         parts.append(_of_pairs(robot, bodies, ends))
     if len(bodies.order):
@@ -83,7 +83,7 @@ def passings(robot: AnyRobot, bodies: Bodies, state: StateBounds, cables: CableB
     Returns:
         (n_meetings,) in the order of `contact_bodies.meetings`.
     """
-    ends, first = _ends(robot, state, cables), bodies.pairs[:, 0]
+    ends, first = _ends(state, cables), bodies.pairs[:, 0]
     through = jax.vmap(_pass)(*(ends.each(lambda x, k=k: x[bodies.pairs[:, k]]) for k in range(2)))
     n_others = len(bodies.order) * len(bodies.radii)
     if bodies.body is not None:
@@ -107,12 +107,11 @@ def corner_depths(body: Shape, state: StateBounds) -> AffineBounds:
     return dot(state.rotation.each(lambda x: x[2][None]), body.corners) + state.position.each(lambda x: x[2])
 
 
-def _ends(robot: AnyRobot, state: StateBounds, cables: CableBounds) -> AffineBounds:
-    # Spools and attachment points, (n_cables, 2, 3).
-    spools = constant(jnp.asarray(robot.base_points))
-    attached = state.position.each(lambda x: jnp.broadcast_to(x, spools.middle.shape))
+def _ends(state: StateBounds, cables: CableBounds) -> AffineBounds:
+    # Points at which the cables leave, and those at which they are attached, (n_cables, 2, 3).
+    attached = state.position.each(lambda x: jnp.broadcast_to(x, cables.exit.middle.shape))
     attached = attached if cables.arm is None else attached + cables.arm
-    return AffineBounds(*(jnp.stack(pair, axis=1) for pair in zip(spools, attached, strict=True)))
+    return AffineBounds(*(jnp.stack(pair, axis=1) for pair in zip(cables.exit, attached, strict=True)))
 
 
 def _seen(state: StateBounds, ends: AffineBounds) -> AffineBounds:

@@ -3,6 +3,7 @@
 import jax.numpy as jnp
 from jax import Array
 
+from cspr_jax.robots.cable_lengths import moved_lengths
 from cspr_jax.robots.point_mass import PointMassRobot, is_planar, relative_acceleration
 from cspr_jax.robots.robot import check_determined
 
@@ -94,10 +95,7 @@ def cable_motion(
     Returns:
         lengths (n_cables,) m, rates (n_cables,) m/s (positive pays out), accelerations (n_cables,) m/s^2.
     """
-    rays = position[None] - robot.base_points
-    lengths = jnp.linalg.norm(rays, axis=1)
-    rates = rays @ velocity / lengths
-    return lengths, rates, (jnp.dot(velocity, velocity) + rays @ acceleration - rates**2) / lengths
+    return moved_lengths(robot, position[None], velocity[None], acceleration[None])
 
 
 def _planar_adjugate(rays: Array) -> Array:

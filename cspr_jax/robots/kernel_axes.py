@@ -36,11 +36,12 @@ def centred(robot: RobotKind) -> tuple[RobotKind, Frame]:
     return dataclasses.replace(robot, limits=NO_LIMITS, **changes), frame
 
 
-def prepared(robot: RobotKind) -> tuple[RobotKind, Frame]:
+def prepared(robot: RobotKind, *, pulleys: bool = False) -> tuple[RobotKind, Frame]:
     """A robot as the kernels take it, a platform also in its reference axes.
 
     Args:
         robot: in its own axes.
+        pulleys: whether there may be pulleys.
 
     Returns:
         the robot, and the frame that takes points to it and back.
@@ -48,6 +49,6 @@ def prepared(robot: RobotKind) -> tuple[RobotKind, Frame]:
     Raises:
         InputError: a robot that no trajectory moves, as `robots.robot.check_moved` says.
     """
-    check_moved(robot)
+    check_moved(robot, pulleys=pulleys)
     moved, frame = centred(robot)
     return (aligned(moved)[0] if isinstance(moved, PlatformRobot) else moved), frame  # type: ignore[return-value]

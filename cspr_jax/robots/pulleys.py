@@ -95,13 +95,24 @@ def exits(entry: Array, axis: Array, radius: Array, target: Array) -> Exit:
         the exits.
     """
     ray = target - entry
+    # A root at 0, or what lies on the axis of no pulley, would have no derivative, also where it is not chosen.
+    is_wheel = jnp.broadcast_to(radius > 0.0, ray.shape[:-1])
     high = jnp.sum(ray * axis, axis=-1)
     aside = ray - high[..., None] * axis
-    wide = jnp.linalg.norm(aside, axis=-1)
+    square = jnp.sum(aside**2, axis=-1)
+    is_beside = square > 0.0
+    wide = jnp.where(is_beside, jnp.sqrt(jnp.where(is_beside, square, 1.0)), 0.0)
     side = aside / _nonzero(wide)[..., None]
-    (a, b), (c, d), wrapped, free = _in_plane(radius, wide, high)
+    (a, b), (c, d), wrapped, free = _in_plane(radius, jnp.where(is_wheel, wide, 1.0), jnp.where(is_wheel, high, 1.0))
     point = entry + a[..., None] * side + b[..., None] * axis
-    return Exit(point, c[..., None] * side + d[..., None] * axis, wrapped, free)
+    straight = jnp.sqrt(jnp.where(is_wheel, 1.0, jnp.sum(ray**2, axis=-1)))
+    along = jnp.where(is_wheel[..., None], c[..., None] * side + d[..., None] * axis, ray / straight[..., None])
+    return Exit(
+        jnp.where(is_wheel[..., None], point, entry),
+        along,
+        jnp.where(is_wheel, wrapped, 0.0),
+        jnp.where(is_wheel, free, straight),
+    )
 
 
 def exit_lanes(entry: Vector, axis: Vector, radius: Array, target: Vector) -> Exit:

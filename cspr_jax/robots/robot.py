@@ -77,8 +77,11 @@ class Robot(Protocol):
 MOVED = ("2T", "3T", "3R3T")  # patterns of trajectories and searches; workspaces take all patterns
 
 
-def check_moved(robot: Robot) -> None:
+def check_moved(robot: Robot, *, pulleys: bool = False) -> None:
     """Refuse a robot that no trajectory and no search moves.
+
+    Args:
+        pulleys: whether there may be pulleys.
 
     Raises:
         InputError: another pattern than 2T, 3T or 3R3T, or pulleys.
@@ -86,19 +89,22 @@ def check_moved(robot: Robot) -> None:
     if robot.pattern not in MOVED:
         known = " or ".join(f'"{name}"' for name in MOVED)
         raise InputError("pattern", robot.pattern, f"{known} (what is asked for does not exist yet for others)")
-    if robot.pulleys is not None:
+    if robot.pulleys is not None and not pulleys:
         raise InputError(
             "pulley_radius", None, "must be absent (what is asked for does not exist yet for them)", fault="pulleys"
         )
 
 
-def check_determined(robot: Robot) -> None:
+def check_determined(robot: Robot, *, pulleys: bool = False) -> None:
     """Refuse a robot whose motion does not determine its tensions.
+
+    Args:
+        pulleys: whether there may be pulleys.
 
     Raises:
         InputError: more cables than degrees of freedom, or what `check_moved` refuses.
     """
-    check_moved(robot)
+    check_moved(robot, pulleys=pulleys)
     if robot.n_cables != robot.dof:
         raise InputError(
             "base_points",

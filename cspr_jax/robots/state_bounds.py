@@ -10,17 +10,20 @@ import numpy as np
 
 from cspr_jax.arithmetic.affine_bounds import (
     AffineBounds,
+    constant,
     cross,
     dot,
     joined,
     norm_squared,
     reciprocal_root,
+    selected,
     squared,
     turned,
 )
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot, across_line
+from cspr_jax.robots.pulley_bounds import pulley_bounds
 
 
 class StateBounds(NamedTuple):
@@ -53,6 +56,7 @@ class CableBounds(NamedTuple):
         length: (n_cables,) m.
         rate: (n_cables,) m/s.
         acceleration: (n_cables,) m/s^2.
+        exit: (n_cables, 3) points at which the cables leave, m.
     """
 
     direction: AffineBounds
@@ -60,16 +64,15 @@ class CableBounds(NamedTuple):
     length: AffineBounds
     rate: AffineBounds
     acceleration: AffineBounds
+    exit: AffineBounds
 
 
 def cable_bounds(robot: AnyRobot, state: StateBounds) -> CableBounds:
-    """Bounds of the cables.
-
-    Args:
-        robot: without pulleys.
+    """Bounds of the cables, also behind pulleys.
 
     Returns:
-        the bounds, leaves (n_cables, ...); radii are NaN where a cable may have no length.
+        the bounds, leaves (n_cables, ...); radii are NaN where a cable may have no length, or its attachment point may
+        lie within its pulley or on the swivel axis of it.
     """
     arm = None
     target, velocity, pull = (_rows(bounds) for bounds in state[:3])
@@ -83,8 +86,20 @@ def cable_bounds(robot: AnyRobot, state: StateBounds) -> CableBounds:
     inverse = reciprocal_root(square)
     rate = dot(ray, velocity) * inverse
     acceleration = (norm_squared(velocity) + dot(ray, pull) - squared(rate)) * inverse
-    direction = -(ray * inverse.each(lambda x: x[:, None]))
-    return CableBounds(direction, arm, square * inverse, rate, acceleration)
+    direction, base = -(ray * inverse.each(lambda x: x[:, None])), constant(jnp.asarray(robot.base_points))
+    straight = CableBounds(direction, arm, square * inverse, rate, acceleration, base)
+    if robot.pulleys is None:
+        return straight
+    way = pulley_bounds(robot.pulleys, ray, velocity)
+    rate = dot(way.direction, velocity)
+    slower = squared(rate) + way.swivel
+    acceleration = dot(way.direction, pull) + (norm_squared(velocity) - slower) * way.inverse
+    wheel = jnp.asarray(robot.pulleys.radius) > 0.0
+    values = (way.length, rate, acceleration)
+    length, rate, acceleration = (selected(wheel, f, g) for f, g in zip(values, straight[2:5], strict=True))
+    wheel = wheel[:, None]
+    direction, leaving = selected(wheel, -way.direction, direction), selected(wheel, way.exit + base.middle, base)
+    return CableBounds(direction, arm, length, rate, acceleration, leaving)
 
 
 def balance_bounds(robot: AnyRobot, state: StateBounds, cables: CableBounds) -> tuple[AffineBounds, AffineBounds]:

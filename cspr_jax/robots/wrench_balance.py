@@ -4,8 +4,9 @@ import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.arithmetic.elementary import solved
+from cspr_jax.robots.cable_lengths import moved_lengths
 from cspr_jax.robots.platform import PlatformRobot, rays, wrench_per_mass
-from cspr_jax.robots.point_mass import plane_normal, rest_point
+from cspr_jax.robots.point_mass import plane_normal, pulls, rest_point
 from cspr_jax.robots.robot import check_determined
 from cspr_jax.robots.state import State
 
@@ -56,9 +57,9 @@ def normalised_determinant(robot: PlatformRobot, position: Array, rotation: Arra
     Raises:
         InputError: more than six cables.
     """
-    check_determined(robot)
-    cables, arms = rays(robot, position, rotation)
-    units = cables / jnp.linalg.norm(cables, axis=1, keepdims=True)
+    check_determined(robot, pulleys=True)
+    arms = robot.platform_points @ rotation.T
+    units = -pulls(robot, position[None] + arms)
     size = jnp.sqrt(jnp.mean(jnp.sum(robot.platform_points**2, axis=1)))
     return solved(jnp.concatenate([units, jnp.cross(arms / size, units)], axis=1), jnp.zeros((robot.n_cables, 0)))[1]
 
@@ -121,11 +122,8 @@ def cable_motion(robot: PlatformRobot, state: State) -> tuple[Array, Array, Arra
     Returns:
         lengths (n_cables,) m, rates (n_cables,) m/s (positive pays out), accelerations (n_cables,) m/s^2.
     """
-    cables, arms = rays(robot, state.position, state.rotation)
-    lengths = jnp.linalg.norm(cables, axis=1)
+    arms = robot.platform_points @ state.rotation.T
     swing = jnp.cross(state.angular_velocity, arms)
-    velocity = state.velocity[None] + swing
     inward = jnp.cross(state.angular_velocity, swing)
     pull = state.acceleration[None] + jnp.cross(state.angular_acceleration, arms) + inward
-    rates = jnp.sum(cables * velocity, axis=1) / lengths
-    return lengths, rates, (jnp.sum(velocity**2 + cables * pull, axis=1) - rates**2) / lengths
+    return moved_lengths(robot, state.position[None] + arms, state.velocity[None] + swing, pull)

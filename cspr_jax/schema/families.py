@@ -29,6 +29,7 @@ class Family:
         end_keys: likewise, if it leads to the pose or from it.
         knows_uncertainty: whether its verdicts take all of an uncertainty into account.
         knows_obstacles: whether its verdicts take obstacles and the shape of the platform into account.
+        knows_pulleys: whether its verdicts are right for cables that leave from pulleys.
     """
 
     name: str
@@ -43,6 +44,7 @@ class Family:
     end_keys: tuple[str, ...] = ()
     knows_uncertainty: bool = False
     knows_obstacles: bool = False
+    knows_pulleys: bool = False
 
     def leg(self, pattern: str) -> Any:
         """Class that joins the poses of a robot.
@@ -114,6 +116,7 @@ _ROWS = (
         rests_anywhere=True,
         any_cables=ANY_PATTERN,
         knows_obstacles=True,
+        knows_pulleys=True,
         keys=("motion", "interpolation", "ends", "smooth", "stretch", "point"),
         pose_keys=("motion",),
         end_keys=("time", "velocity", "acceleration"),

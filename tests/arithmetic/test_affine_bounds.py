@@ -35,6 +35,7 @@ OPERATIONS = {
     "reciprocal": lambda f, g, of: of.reciprocal(f),
     "root": lambda f, g, of: of.root(f),
     "reciprocal_root": lambda f, g, of: of.reciprocal_root(f),
+    "arc_sine": lambda f, g, of: of.arc_sine(0.25 * (f - 2.0)),
     "cross": lambda f, g, of: of.cross(f, g),
     "dot": lambda f, g, of: of.dot(f, g),
     "norm_squared": lambda f, g, of: of.norm_squared(f),
@@ -46,7 +47,7 @@ TURN = np.array([[0.0, 1.0, 2.0], [-1.0, 3.0, 0.5], [0.2, -0.4, 0.0]])
 class Exact:
     """The same operations on samples."""
 
-    squared, reciprocal, root = np.square, np.reciprocal, np.sqrt
+    squared, reciprocal, root, arc_sine = np.square, np.reciprocal, np.sqrt, np.arcsin
     cross = staticmethod(np.cross)
 
     @staticmethod
@@ -89,7 +90,7 @@ def test_bands_shrink_with_the_square(name):
         assert 3.0 < excess(name, seed, 0.1)[1] / excess(name, seed, 0.05)[1] < 5.0
 
 
-@pytest.mark.parametrize("name", ["product", "square", "reciprocal", "root"])
+@pytest.mark.parametrize("name", ["product", "square", "reciprocal", "root", "arc_sine"])
 def test_a_band_without_its_remainder_is_left(name, monkeypatch):
     """What a mistake in the remainder would do: the test above sees it."""
     monkeypatch.setattr(bounds, "_rounded", lambda band, size=0.0: band._replace(radius=0.7 * band.radius))
@@ -100,3 +101,4 @@ def test_nothing_is_known_where_a_function_may_vanish():
     near = AffineBounds(np.array(0.1), np.array(0.05), np.array(0.06))
     for operation in (bounds.reciprocal, bounds.root, bounds.reciprocal_root):
         assert np.isnan(operation(near).radius)
+    assert np.isnan(bounds.arc_sine(near * 5.0 - 1.0).radius) and np.isfinite(bounds.arc_sine(near).radius)

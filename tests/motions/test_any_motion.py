@@ -17,8 +17,8 @@ from cspr_jax.robots.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.splines.interpolation import interpolated
 
-# Bounds of blocks take no pulleys yet.
-PULLEYS = False
+# Two robots have pulleys.
+PULLEYS = True
 NAMES = {
     Verdict.SLACK_CABLE: "tension",
     Verdict.OVER_TENSION: "tension",

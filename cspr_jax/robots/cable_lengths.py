@@ -1,0 +1,49 @@
+"""Lengths of cables from spools, or around pulleys, to moving points, and their first two derivatives in time.
+
+With t the unit vector of the free cable, n across it in the plane of the pulley and p across this plane, the length
+changes by t . dB if its end B moves by dB: the exit moves along t by as much as the arc changes. Then t turns by
+n . dB / s about p, with s the free length, and with its plane by p . dB / w about the swivel axis k, with w the
+distance of B from this axis. Since w = r (1 - t . k) + s (t . e), the second derivative is
+
+    l'' = t . B'' + ((n . B')^2 + (p . B')^2 s (t . e) / w) / s
+        = t . B'' + (|B'|^2 - l'^2 - (p . B')^2 r (1 - t . k) / w) / s
+"""
+
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.robots.pulleys import exits
+from cspr_jax.robots.robot import Robot
+
+
+def moved_lengths(robot: Robot, targets: Array, velocities: Array, accelerations: Array) -> tuple[Array, Array, Array]:
+    """Lengths of the cables, with what lies on pulleys, and their first two derivatives in time.
+
+    Args:
+        targets: (n_cables, 3) or (1, 3) points at which the cables are attached, m.
+        velocities: (n_cables, 3) or (1, 3) of these points, m/s.
+        accelerations: (n_cables, 3) or (1, 3) of these points, m/s^2.
+
+    Returns:
+        lengths (n_cables,) m, rates (n_cables,) m/s (positive pays out), accelerations (n_cables,) m/s^2; NaN where an
+        attachment point lies within its pulley.
+    """
+    rays, pulleys = targets - robot.base_points, robot.pulleys
+    squares = jnp.sum(velocities**2, axis=1)
+    if pulleys is None:
+        lengths = jnp.linalg.norm(rays, axis=1)
+        rates = jnp.sum(rays * velocities, axis=1) / lengths
+        return lengths, rates, (squares + jnp.sum(rays * accelerations, axis=1) - rates**2) / lengths
+    way = exits(robot.base_points, pulleys.axes, pulleys.radius, rays + robot.base_points)
+    along = jnp.asarray(way.direction)
+    rates = jnp.sum(along * velocities, axis=1)
+    across = jnp.cross(pulleys.axes, rays)
+    wide = jnp.sum(across**2, axis=1)
+    wide = jnp.where(wide > 0.0, wide, 1.0)  # on the axis nothing is across
+    swivel = jnp.sum(across * velocities, axis=1) ** 2 / wide**1.5
+    slower = pulleys.radius * (1.0 - jnp.sum(along * pulleys.axes, axis=1)) * swivel
+    return (
+        way.wrapped + way.free,
+        rates,
+        jnp.sum(along * accelerations, axis=1) + (squares - rates**2 - slower) / way.free,
+    )
