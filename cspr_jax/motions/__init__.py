@@ -8,7 +8,9 @@ Files, each importing only from those above it:
 
     motion              the protocol: duration, state, breaks; motions reversed and placed
     amplitudes          amplitude functions A(tau), with bounds of their derivatives
+    amplitude_bounds    bounds of amplitude functions over blocks of time
     swing_plane         the plane in which an effector swings between two points
+    swing_bounds        bounds of swings about P0 over a block of time
     platform_kind       kinds of motions of platforms, known when a function is compiled
     limits              which limits are set, the quantities that they bound, and their slacks
     given_limits        limits of a file or a caller, checked

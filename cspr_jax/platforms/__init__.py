@@ -11,6 +11,7 @@ orientations).
 Files, each importing only from those above it:
 
     oscillating_slerp       rotation that swings, section 3.7
+    slerp_bounds            bounds of it over a block of time
     platform_segment        segment between two poses, (3.42) to (3.66)
     platform_segment_lanes  the same, one lane a segment
     from_rest_lanes         the same from rest, with the fewest operations

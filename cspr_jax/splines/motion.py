@@ -1,7 +1,6 @@
 """Piecewise polynomial motion: what a table of samples or way-points and an interpolation are, in Bernstein form."""
 
 import dataclasses
-import math
 
 import jax
 import jax.numpy as jnp
@@ -87,17 +86,3 @@ def _turning(quaternion: Array, first: Array, second: Array) -> tuple[Array, Arr
     angular_velocity = across(first)
     angular_acceleration = across(second) - angular_velocity * (2.0 * jnp.dot(quaternion, first) / square)
     return rotation, angular_velocity, angular_acceleration, unit
-
-
-def bernstein_of_powers(coefficients: np.ndarray) -> np.ndarray:
-    """Bernstein coefficients of polynomials over [0, 1].
-
-    Args:
-        coefficients: (..., degree + 1, n) of the powers of the variable, the constant one first.
-
-    Returns:
-        (..., degree + 1, n).
-    """
-    degree = coefficients.shape[-2] - 1
-    matrix = np.array([[math.comb(i, j) / math.comb(degree, j) for j in range(degree + 1)] for i in range(degree + 1)])
-    return matrix @ coefficients

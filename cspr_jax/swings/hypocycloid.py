@@ -17,19 +17,28 @@ least inclined to the spool plane. psi = 0 with p = 1 has no duration: see `dura
 
 import dataclasses
 import math
+from functools import partial
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
+from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.elementary import sincospi
+from cspr_jax.motions.amplitude_bounds import TimeBounds, time_bounds
 from cspr_jax.motions.amplitudes import Amplitude, derivatives
+from cspr_jax.motions.swing_bounds import swing_bounds
 from cspr_jax.motions.swing_plane import swing_plane
 from cspr_jax.robots import point_mass
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.robots.robot import check_determined
 from cspr_jax.robots.state import State
+from cspr_jax.robots.state_bounds import StateBounds
+
+# Blocks of which bounds are computed at a time.
+BATCH = 64
 
 
 @jax.tree_util.register_dataclass
@@ -264,6 +273,17 @@ class Hypocycloid:
     def breaks(self) -> Array:
         """Knots of the amplitude function; see `Motion.breaks`."""
         return self.amplitude.knots
+
+    def bounds(self, start: np.ndarray, end: np.ndarray) -> StateBounds:
+        """Bounds of the states; see `BoundedMotion.bounds`."""
+        blocks = time_bounds(self.amplitude, self.duration(), start, end)
+        return in_batches(partial(_bounds, self.segment, self.arcs), blocks, size=BATCH)
+
+
+@jax.jit
+def _bounds(segment: Segment, arcs: Array, blocks: TimeBounds) -> StateBounds:
+    time = duration(segment, arcs)
+    return jax.vmap(lambda block: StateBounds(*swing_bounds(segment, arcs, time, block)))(blocks)
 
 
 def feasibility_at_infinity(segment: Segment, amplitude: Amplitude) -> Array:
