@@ -25,6 +25,7 @@ Files, each importing only from those above it:
     sampled             answers of motions that are only sampled
     block_slacks        slacks of any motion over blocks of time, from bounds of its states
     time_proof          proof of criteria over the whole time of a motion
+    proved              answers of motions whose states have bounds
     blocks              parts of arcs, halved while they are undecided
     enclosures          bounds of a robot's state over a block of time
     cable_rates         speeds and accelerations of cables over blocks

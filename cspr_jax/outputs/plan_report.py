@@ -43,7 +43,7 @@ def verdict_text(verdict: int, feasible: bool) -> str:
         feasible: whether the segment is; a smaller number of arcs may still be undecided.
 
     Returns:
-        "feasible" (proved; on more than six cables found at samples), "undecided", or the flags joined by "+".
+        "feasible" (proved), "undecided", or the flags joined by "+".
     """
     return "feasible" if feasible else Verdict(int(verdict)).text
 

@@ -18,7 +18,9 @@ from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.motions.amplitudes import named
 from cspr_jax.motions.given_limits import limits_over
 from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.proved import MotionProof
 from cspr_jax.outputs import example_files, motion_files
+from cspr_jax.platforms import redundant_checker
 from cspr_jax.platforms.beta_hat import LARGEST
 from cspr_jax.platforms.redundant_checker import RedundantChecker
 from cspr_jax.robots.kernel_axes import prepared
@@ -114,6 +116,22 @@ def test_margins_are_those_of_linear_programs(robot, example, rows):
         assert least - 0.01 < segment["tension_margin"] <= least + 1e-8
         assert segment["margin"] == pytest.approx(segment["tension_margin"] * 8 / (robot[2] * GRAVITY), rel=1e-12)
         assert segment["verdict"] == "feasible" and segment["tension_margin"] > 0.0
+
+
+def test_the_motion_of_a_plan_is_proved_to_its_margin(example):
+    margin, bound = example.answers.margin, example.answers.margin_bound
+    assert (bound > 0.0).all() and (bound <= margin).all()
+    np.testing.assert_allclose(bound, margin, rtol=0.02)
+
+
+def test_what_no_proof_closes_is_undecided(monkeypatch):
+    """Samples alone make no motion feasible."""
+    keys = FIXED | {"pose": [{"rest": True}, POSE]}
+    unproved = MotionProof(Verdict.UNDECIDED.value, 9.0, -1.0, np.inf, np.nan)
+    monkeypatch.setattr(redundant_checker, "proved", lambda problem, motion: unproved)
+    planned = cspr_jax.plan(keys)
+    assert planned.answers.verdict.tolist() == [Verdict.UNDECIDED.value] and not planned.feasible
+    assert planned.answers.margin_bound[0] < 0.0
 
 
 def test_tensions_give_the_wrench(robot, rows):

@@ -1,0 +1,104 @@
+"""Proofs of any motion agree with those that families have of their own: verdicts, and margins within their bounds."""
+
+import dataclasses
+
+import jax
+import numpy as np
+import pytest
+
+import cspr_jax
+from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.motions import amplitudes, proved
+from cspr_jax.motions.block_slacks import BlockSlacks, Criterion
+from cspr_jax.motions.motion import Backwards
+from cspr_jax.motions.problem import Problem
+from cspr_jax.robots import cables
+from cspr_jax.robots.kernel_axes import centred
+from cspr_jax.robots.limits import Limits
+from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.swings import proof as swing_proof
+from cspr_jax.swings.arcs import segments_between
+from cspr_jax.swings.hypocycloid import Hypocycloid
+from cspr_jax.swings.parities import pick
+
+COUNT = 12
+
+
+@pytest.fixture(autouse=True)
+def float64():
+    with jax.enable_x64(True):
+        yield
+
+
+def problem_of(**numbers) -> Problem:
+    robot = centred(cspr_jax.load_robot("prototype"))[0]
+    return Problem(
+        robot, Limits(**{name: np.full(3, value) for name, value in numbers.items()}), amplitudes.named("quintic")
+    )
+
+
+def swings(problem: Problem, seed: int):
+    """Random segments with random numbers of arcs; their motions."""
+    rng = np.random.default_rng(seed)
+    starts, ends = rng.uniform([-0.7, -0.7, 0.5], [0.7, 0.7, 1.0], (2, COUNT, 3))
+    arcs = rng.integers(2, 6, COUNT)
+    parities, _ = segments_between(problem, starts, ends, np.full(COUNT, 0.75))
+    segments = pick(parities, np.arange(COUNT), arcs)
+    motions = [
+        Hypocycloid(jax.tree.map(lambda x, i=i: np.asarray(x)[i], segments), problem.amplitude, leaf(arcs[i]))
+        for i in range(COUNT)
+    ]
+    return segments, arcs, motions
+
+
+LIMITS = {"tension_min": 0.1, "cable_speed_max": 2.0}
+
+
+# Kernels with limits compile for seconds.
+@pytest.mark.parametrize("limits", [{}, pytest.param(LIMITS, marks=pytest.mark.thorough)], ids=["taut", "limits"])
+def test_swings_on_three_cables_get_the_verdict_of_their_own_proof(limits):
+    problem = problem_of(**limits)
+    segments, arcs, motions = swings(problem, 5)
+    answers, exact = proved.proved_answers(problem, motions), swing_proof.prove(problem, segments, arcs)
+    assert 2 < exact.feasible.sum() < COUNT - 2 and not (answers.verdict & Verdict.UNDECIDED.value).any()
+    np.testing.assert_array_equal(answers.verdict == 0, exact.feasible)
+    np.testing.assert_array_equal(answers.verdict != 0, exact.infeasible)
+    # Tensions of a motion at samples lie above what is proved, and the bounds are close.
+    tensions = jax.jit(lambda motion, tau: jax.vmap(lambda t: cables.tensions(problem.robot, motion.state(t)))(tau))
+    for i, motion in enumerate(motions):
+        tension = tensions(motion, np.linspace(0.0, 1.0, 2001))
+        least = float(tension.min()) - limits.get("tension_min", 0.0)
+        size = float(abs(tension).max())
+        assert answers.margin_bound[i] <= least + 1e-9 * size
+        assert least - answers.margin_bound[i] <= 0.02 * abs(least) + 0.005 * size
+        assert answers.margin[i] >= answers.margin_bound[i]
+
+
+def test_a_motion_in_reverse_has_the_same_answer():
+    problem = problem_of()
+    _, _, motions = swings(problem, 5)
+    there, back = (proved.proved(problem, motion) for motion in (motions[0], Backwards(motions[0])))
+    assert there.verdict == back.verdict and there.bound == pytest.approx(back.bound, rel=0.03)
+
+
+def test_what_fails_is_named_with_its_instant():
+    problem, rows = problem_of(), [Criterion(Verdict.OVER_TENSION, (0,), "N"), Criterion(Verdict.OBSTACLE, (), "m")]
+    motion = swings(problem, 5)[2][0]
+    time = float(motion.duration())
+
+    def slacks(start, end):
+        # The first criterion fails after half of the time; the second one is never met or broken for certain.
+        low, high = 0.5 * time - end, 0.5 * time - start
+        return BlockSlacks(np.stack([low, 0.0 * low - 1.0], 1), np.stack([high, 0.0 * high + 1.0], 1))
+
+    proof = proved.proved(problem, motion, slacks, rows)
+    assert proof.verdict == Verdict.OVER_TENSION.value
+    assert proof.instant == pytest.approx(0.75 * time, abs=1e-3 * time)
+    assert proof.bound == pytest.approx(-0.5 * time) and proof.room == np.inf
+
+
+def test_no_duration_is_no_motion():
+    problem = problem_of()
+    motion = swings(problem, 5)[2][0]
+    still = dataclasses.replace(motion, arcs=leaf(np.nan))
+    assert proved.proved(problem, still).verdict == Verdict.NOT_FINITE.value
