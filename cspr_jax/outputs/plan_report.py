@@ -7,6 +7,7 @@ from typing import Any
 from cspr_jax.outputs.table_layout import two_digits
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.runtime.terminal import cell
+from cspr_jax.schema.families import FAMILIES
 from cspr_jax.schema.verdicts import Verdict
 
 SCHEMA = 1
@@ -102,9 +103,9 @@ def _segment_object(plan: PlannedMotions, i: int) -> dict[str, Any]:
 
 
 def _tension_margin(plan: PlannedMotions, i: int) -> float | None:
-    # The margin of a platform on redundant cables is a multiple of the weight per cable; this one is in N.
+    # The margin of a swing on redundant cables is a multiple of the weight per cable; this one is in N.
     robot = plan.problem.robot
-    if not plan.robot_file.is_platform or robot.n_cables == robot.dof:
+    if robot.n_cables == robot.dof or FAMILIES[plan.keys.family_of(i)].is_line:
         return None
     return float(plan.answers.margin[i] * robot.mass * robot.gravity / robot.n_cables)
 

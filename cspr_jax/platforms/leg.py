@@ -127,8 +127,8 @@ class _Poses(Leg):
         path = _best_paths(of_trials.arcs, refused.arcs, pairs)
         best = FewestArcs(of_trials.arcs[path], of_trials.undecided[path], of_trials.checks.rows(path))
         why = Refused(refused.arcs[path], refused.broken[path])
-        shown = {"max_arcs": largest, "fixed": fixed, "is_final": is_final}
-        return settled(checker, trial.rows(path), best, refused=why, **shown)
+        chosen = trial.rows(path)
+        return settled(checker, chosen, best, refused=why, max_arcs=largest, fixed=fixed, is_final=is_final)
 
     def _refused(self, checker: MotionChecker, trial: Candidates, of_trials: FewestArcs, fixed: np.ndarray) -> Refused:
         # Find the candidates that only limits refuse, in segments where no candidate is feasible, or nearly so.

@@ -16,6 +16,7 @@ import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.minima import narrowed_places
+from cspr_jax.motions.limits import other_limits
 from cspr_jax.motions.platform_kind import USUAL, PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved import proved
@@ -25,7 +26,7 @@ from cspr_jax.platforms.end_acceleration import AT_REST
 from cspr_jax.platforms.motion_checker import BASIC, BESIDE_KNOT, FEW, TOLERANCE, TOUCH, MotionChecker, PlatformChecks
 from cspr_jax.platforms.motions import Motions, rows
 from cspr_jax.platforms.platform_segment import PlatformMotion, PlatformSegment
-from cspr_jax.platforms.redundant_kernels import cable_vectors, end_wrenches, instants, other_limits
+from cspr_jax.platforms.redundant_kernels import cable_vectors, end_wrenches, instants
 from cspr_jax.robots.platform import pairs_apart
 from cspr_jax.schema.verdicts import Verdict, conjunction
 from cspr_jax.workspaces import exact

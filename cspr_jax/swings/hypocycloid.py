@@ -33,7 +33,6 @@ from cspr_jax.motions.swing_bounds import swing_bounds
 from cspr_jax.motions.swing_plane import swing_plane
 from cspr_jax.robots import point_mass
 from cspr_jax.robots.point_mass import PointMassRobot
-from cspr_jax.robots.robot import check_determined
 from cspr_jax.robots.state import State
 from cspr_jax.robots.state_bounds import StateBounds
 
@@ -83,17 +82,18 @@ def couplings(robot: PointMassRobot, hub: Array, axes: Array) -> tuple[Array, Ar
     at rest in p0: cable k has the normalised pseudotension 1 + tilt . c + pull_k . d + twist_k (c x d).
 
     Args:
-        robot: centred; a point mass on three cables, any triangle; or on two, then the motion is a line in their plane.
+        robot: centred; a point mass on three cables, any triangle; or on two, then the motion is a line in their plane;
+            on more cables the motion does not determine tensions.
         hub: (3,) p0 from the centroid of the spools, m.
         axes: (3, n) the directions of the motion, as columns; n is 1 or 2.
 
     Returns:
-        tilt (n,), 1/m; pull (n_cables, n), 1/m, one row for each cable; twist (n_cables,), 1/m^2, zero for a line.
-
-    Raises:
-        InputError: more cables than degrees of freedom.
+        tilt (n,), 1/m; pull (n_cables, n), 1/m, one row for each cable; twist (n_cables,), 1/m^2, zero for a line; NaN
+        on more cables.
     """
-    check_determined(robot)
+    if robot.n_cables > robot.dof:
+        nothing = jnp.full((robot.n_cables, axes.shape[1]), jnp.nan)
+        return point_mass.plane_normal(robot) @ axes / hub[2], nothing, nothing[:, 0]
     if point_mass.is_planar(robot):
         half = robot.base_points[:, 0]
         tilt = axes[2] / hub[2]
@@ -113,7 +113,7 @@ def segment(robot: PointMassRobot, start: Array, end: Array, z0: Array, *, odd: 
     """The segment from one point to another.
 
     Args:
-        robot: a point mass on three cables, centred.
+        robot: a point mass on three cables or more, centred.
         start: (3,) p1, from the centroid of the spools, z down, m.
         end: (3,) p2, m.
         z0: () depth of p0 below the centroid of the spools, m.
