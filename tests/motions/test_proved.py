@@ -5,6 +5,7 @@ import dataclasses
 import jax
 import numpy as np
 import pytest
+from support.platforms import EFFECTIVE, MSSM, Z0, checker_of, made, ours, random_pose, stacked
 
 import cspr_jax
 from cspr_jax.arithmetic.elementary import leaf
@@ -12,6 +13,7 @@ from cspr_jax.motions import amplitudes, proved
 from cspr_jax.motions.block_slacks import BlockSlacks, Criterion
 from cspr_jax.motions.motion import Backwards
 from cspr_jax.motions.problem import Problem
+from cspr_jax.platforms.platform_segment import PlatformMotion
 from cspr_jax.robots import cables
 from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.limits import Limits
@@ -65,6 +67,9 @@ def test_swings_on_three_cables_get_the_verdict_of_their_own_proof(limits):
     np.testing.assert_array_equal(answers.verdict != 0, exact.infeasible)
     # Tensions of a motion at samples lie above what is proved, and the bounds are close.
     tensions = jax.jit(lambda motion, tau: jax.vmap(lambda t: cables.tensions(problem.robot, motion.state(t)))(tau))
+    speeds = jax.jit(
+        lambda motion, tau: jax.vmap(lambda t: cables.cable_motion(problem.robot, motion.state(t))[1])(tau)
+    )
     for i, motion in enumerate(motions):
         tension = tensions(motion, np.linspace(0.0, 1.0, 2001))
         least = float(tension.min()) - limits.get("tension_min", 0.0)
@@ -72,6 +77,29 @@ def test_swings_on_three_cables_get_the_verdict_of_their_own_proof(limits):
         assert answers.margin_bound[i] <= least + 1e-9 * size
         assert least - answers.margin_bound[i] <= 0.02 * abs(least) + 0.005 * size
         assert answers.margin[i] >= answers.margin_bound[i]
+        if limits:
+            rate = np.asarray(speeds(motion, np.linspace(0.0, 1.0, 2001)))
+            least = 1.0 - abs(rate).max() / limits["cable_speed_max"]
+            assert answers.limit_margin[i] == pytest.approx(least, rel=0.02, abs=0.005)
+
+
+@pytest.mark.thorough
+def test_platforms_on_six_cables_get_the_verdict_of_their_own_proof():
+    """Their own proof has contacts too: taut cables and the determinant alone are compared."""
+    rng, checker = np.random.default_rng(8), checker_of()
+    arcs = rng.integers(3, 10, COUNT)
+    segments = [
+        made(ours(MSSM), random_pose(rng, rest=True), random_pose(rng), Z0, (-1.0, float(rng.uniform(-3.0, 0.0))), p)
+        for p in arcs.tolist()
+    ]
+    checks = checker.check(stacked(segments), arcs)
+    motions = [PlatformMotion(*each) for each in zip(segments, [EFFECTIVE] * COUNT, map(leaf, arcs), strict=True)]
+    problem = Problem(checker.problem.robot, Limits(), EFFECTIVE)
+    answers = proved.proved_answers(problem, motions)
+    is_taut = (checks.slack[:, :2] > 0.0).all(1)
+    assert 0 < is_taut.sum() < COUNT
+    np.testing.assert_array_equal(answers.verdict == 0, is_taut)
+    assert (answers.margin_bound[is_taut] > 0.0).all()
 
 
 def test_a_motion_in_reverse_has_the_same_answer():
@@ -95,6 +123,16 @@ def test_what_fails_is_named_with_its_instant():
     assert proof.verdict == Verdict.OVER_TENSION.value
     assert proof.instant == pytest.approx(0.75 * time, abs=1e-3 * time)
     assert proof.bound == pytest.approx(-0.5 * time) and proof.room == np.inf
+
+
+def test_one_open_criterion_leaves_a_motion_undecided():
+    problem, rows = problem_of(), [Criterion(Verdict.OVER_TENSION, (0,), "N"), Criterion(Verdict.OBSTACLE, (), "m")]
+
+    def slacks(start, end):
+        return BlockSlacks(np.tile([1.0, -1.0], (len(start), 1)), np.ones((len(start), 2)))
+
+    proof = proved.proved(problem, swings(problem, 5)[2][0], slacks, rows)
+    assert proof.verdict == Verdict.UNDECIDED.value and np.isnan(proof.instant)
 
 
 def test_no_duration_is_no_motion():
