@@ -6,11 +6,14 @@ the block, so that halving a block closes what is open, and functions that only 
 Each operation widens the band by what rounding may be of it.
 """
 
+import math
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
+
+from cspr_jax.arithmetic import elementary
 
 # A few roundings of an operation, in parts of the largest number in it.
 ROUNDING = 8.0 * float(np.finfo(float).eps)
@@ -155,7 +158,7 @@ def reciprocal(f: AffineBounds) -> AffineBounds:
         the bounds; NaN where f may not be positive.
     """
     value = 1.0 / f.middle
-    return _bent(f, value, -(value**2), 2.0 / _positive(f) ** 3)
+    return bent(f, value, -(value**2), 2.0 / _positive(f) ** 3)
 
 
 def root(f: AffineBounds) -> AffineBounds:
@@ -165,7 +168,7 @@ def root(f: AffineBounds) -> AffineBounds:
         the bounds; NaN where f may not be positive.
     """
     value = jnp.sqrt(f.middle)
-    return _bent(f, value, 0.5 / value, -0.25 * _positive(f) ** -1.5)
+    return bent(f, value, 0.5 / value, -0.25 * _positive(f) ** -1.5)
 
 
 def reciprocal_root(f: AffineBounds) -> AffineBounds:
@@ -175,7 +178,7 @@ def reciprocal_root(f: AffineBounds) -> AffineBounds:
         the bounds; NaN where f may not be positive.
     """
     value = 1.0 / jnp.sqrt(f.middle)
-    return _bent(f, value, -0.5 * value**3, 0.75 * _positive(f) ** -2.5)
+    return bent(f, value, -0.5 * value**3, 0.75 * _positive(f) ** -2.5)
 
 
 def arc_sine(f: AffineBounds) -> AffineBounds:
@@ -208,11 +211,41 @@ def _positive(f: AffineBounds) -> Array:
     return jnp.where(low > 0.0, low, jnp.nan)
 
 
-def _bent(f: AffineBounds, value: Array, slope: Array, bend: Array) -> AffineBounds:
-    # Bound F(f) for F whose second derivative keeps its sign and is nowhere larger than `bend`: by Taylor about the
-    # middle, the remainder is between 0 and bend reach^2 / 2.
+def bent(f: AffineBounds, value: Array, slope: Array, bend: Array) -> AffineBounds:
+    """Bounds of F(f) for a function F whose second derivative keeps its sign.
+
+    Args:
+        value: (...) of F at the middle of f.
+        slope: (...) of its derivative there.
+        bend: (...) the largest second derivative within the band, with its sign.
+
+    Returns:
+        the bounds.
+    """
+    # By Taylor about the middle, the remainder is between 0 and bend reach^2 / 2.
     half = 0.25 * bend * f.reach() ** 2
     return _rounded(AffineBounds(value + half, slope * f.slope, jnp.abs(slope) * f.radius + jnp.abs(half)), value)
+
+
+def sincospi(f: AffineBounds) -> tuple[AffineBounds, AffineBounds]:
+    """Bounds of sin(pi f) and cos(pi f).
+
+    Args:
+        f: angle in half turns.
+
+    Returns:
+        the bounds of both.
+    """
+    sine, cosine = elementary.sincospi(f.middle)
+    # At d from the middle, sin(m + d) = sin m cos d + cos m sin d, with cos d from 1 - d^2 / 2 to 1, and sin d within
+    # |d|^3 / 6 of d.
+    reach, half = math.pi * f.reach(), (0.5 * math.pi * f.reach()) ** 2
+
+    def one(value: Array, slope: Array) -> AffineBounds:
+        radius = jnp.abs(value) * half + jnp.abs(slope) * (math.pi * f.radius + reach**3 / 6.0)
+        return _rounded(AffineBounds(value * (1.0 - half), math.pi * slope * f.slope, radius), 1.0 + reach)
+
+    return one(sine, cosine), one(cosine, -sine)
 
 
 def dot(f: AffineBounds, g: AffineBounds | Array) -> AffineBounds:

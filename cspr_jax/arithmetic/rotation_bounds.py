@@ -28,7 +28,7 @@ class RotationBounds(NamedTuple):
 
 
 def rotation_bounds(quaternion: AffineBounds, first: AffineBounds, second: AffineBounds) -> RotationBounds:
-    """Bounds of the rotation of a quaternion that is normalised afterwards.
+    """Bounds of the rotation of a quaternion that is normalised afterwards; see `unit_rotation_bounds`.
 
     With n = |q|^2, the angular velocity is 2 vec(q' q*) / n; since vec(q' q'*) = 0, the derivative of its numerator is
     2 vec(q'' q*).
@@ -41,7 +41,24 @@ def rotation_bounds(quaternion: AffineBounds, first: AffineBounds, second: Affin
     Returns:
         the bounds; radii are NaN where the quaternion may vanish.
     """
-    inverse = reciprocal(norm_squared(quaternion))
+    unit, inverse = unit_rotation_bounds(quaternion, first, second), reciprocal(norm_squared(quaternion))
+    angular_velocity = unit.angular_velocity * inverse
+    stretch = 2.0 * dot(quaternion, first) * inverse
+    angular_acceleration = unit.angular_acceleration * inverse - angular_velocity * stretch
+    return RotationBounds(unit.rotation * inverse, angular_velocity, angular_acceleration)
+
+
+def unit_rotation_bounds(quaternion: AffineBounds, first: AffineBounds, second: AffineBounds) -> RotationBounds:
+    """Bounds of the rotation of a unit quaternion.
+
+    Args:
+        quaternion: (4,) scalar first.
+        first: (4,) its derivative, 1/s.
+        second: (4,) the second one, 1/s^2.
+
+    Returns:
+        the bounds.
+    """
     w, x, y, z = (quaternion.each(lambda leaf, i=i: leaf[i]) for i in range(4))
     ww, xx, yy, zz = (squared(part) for part in (w, x, y, z))
     rows = [
@@ -49,11 +66,8 @@ def rotation_bounds(quaternion: AffineBounds, first: AffineBounds, second: Affin
         [2.0 * (x * y + w * z), ww - xx + yy - zz, 2.0 * (y * z - w * x)],
         [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), ww - xx - yy + zz],
     ]
-    rotation = stacked([stacked(row) for row in rows], axis=0) * inverse
-    angular_velocity = _across(first, quaternion) * inverse
-    stretch = 2.0 * dot(quaternion, first) * inverse
-    angular_acceleration = _across(second, quaternion) * inverse - angular_velocity * stretch
-    return RotationBounds(rotation, angular_velocity, angular_acceleration)
+    rotation = stacked([stacked(row) for row in rows], axis=0)
+    return RotationBounds(rotation, _across(first, quaternion), _across(second, quaternion))
 
 
 def _across(f: AffineBounds, q: AffineBounds) -> AffineBounds:

@@ -6,6 +6,7 @@ segments meet, both are the same (15).
 """
 
 import dataclasses
+from functools import partial
 from typing import Any
 
 import jax
@@ -13,8 +14,15 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.arithmetic.elementary import sincospi
+from cspr_jax.arithmetic import elementary
+from cspr_jax.arithmetic.affine_bounds import AffineBounds, sincospi
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.motions.amplitude_bounds import normalised
 from cspr_jax.robots.state import State
+from cspr_jax.robots.state_bounds import StateBounds
+
+# Blocks of which bounds are computed at a time.
+BATCH = 64
 
 
 @jax.tree_util.register_dataclass
@@ -42,7 +50,7 @@ class Bezier:
 
     def state(self, tau: Array) -> State:
         """State, (17) and (18); see `Motion.state`."""
-        sine, c = sincospi(jnp.asarray(tau, float))
+        sine, c = elementary.sincospi(jnp.asarray(tau, float))
         square, slope, rest = powers(self.start, self.middle, self.end)
         w = np.pi / self.time
         velocity = -w * sine * (2.0 * square * c + slope)
@@ -52,6 +60,26 @@ class Bezier:
     def breaks(self) -> Array:
         """No breaks; see `Motion.breaks`."""
         return jnp.zeros(0)
+
+    def bounds(self, start: np.ndarray, end: np.ndarray) -> StateBounds:
+        """Bounds of the states; see `BoundedMotion.bounds`."""
+        return in_batches(partial(_bounds, self), normalised(self.time, start, end), size=BATCH)
+
+
+@jax.jit
+def _bounds(curve: Bezier, blocks: AffineBounds) -> StateBounds:
+    def one(tau: AffineBounds) -> StateBounds:
+        # 2 c^2 is 1 + cos(2 pi tau), 2 c sin(pi tau) is sin(2 pi tau).
+        (sine, c), (sine2, c2) = sincospi(tau), sincospi(tau * 2.0)
+        square, slope, rest = powers(curve.start, curve.middle, curve.end)
+        w = np.pi / curve.time
+        return StateBounds(
+            c2 * (0.5 * square) + c * slope + (rest + 0.5 * square),
+            (sine2 * square + sine * slope) * -w,
+            (c * slope + c2 * (2.0 * square)) * -(w**2),
+        )
+
+    return jax.vmap(one)(blocks)
 
 
 def powers(start: Any, middle: Any, end: Any) -> tuple[Any, Any, Any]:

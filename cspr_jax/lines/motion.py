@@ -6,16 +6,22 @@ time, p / T, and one down for the rest. The quintic's acceleration is smooth, th
 """
 
 import dataclasses
+from functools import partial
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.motions import amplitudes
+from cspr_jax.motions.amplitude_bounds import TimeBounds, time_bounds
 from cspr_jax.motions.amplitudes import Amplitude, derivatives
 from cspr_jax.robots.state import State
+from cspr_jax.robots.state_bounds import StateBounds
 
+# Blocks of which bounds are computed at a time.
+BATCH = 64
 LAWS = ("s-curve", "quintic", "cubic")
 
 
@@ -112,3 +118,18 @@ class TimedLine:
     def breaks(self) -> Array:
         """Knots of the law; see `Motion.breaks`."""
         return self.law.knots
+
+    def bounds(self, start: np.ndarray, end: np.ndarray) -> StateBounds:
+        """Bounds of the states; see `BoundedMotion.bounds`."""
+        blocks = time_bounds(self.law, self.time, start, end)
+        return in_batches(partial(_bounds, self), blocks, size=BATCH)
+
+
+@jax.jit
+def _bounds(line: TimedLine, blocks: TimeBounds) -> StateBounds:
+    def one(block: TimeBounds) -> StateBounds:
+        s, s1, s2 = (value.each(lambda x: x[None]) for value in block.values)
+        rates = (s1 * (line.direction / line.time), s2 * (line.direction / line.time**2))
+        return StateBounds(s * line.direction + line.start, *rates)
+
+    return jax.vmap(one)(blocks)

@@ -8,7 +8,9 @@ Files, each importing only from those above it:
 
     motion              the protocol: duration, state, breaks; motions reversed and placed
     amplitudes          amplitude functions A(tau), with bounds of their derivatives
+    amplitude_bounds    bounds of amplitude functions over blocks of time
     swing_plane         the plane in which an effector swings between two points
+    swing_bounds        bounds of swings about P0 over a block of time
     platform_kind       kinds of motions of platforms, known when a function is compiled
     limits              which limits are set, the quantities that they bound, and their slacks
     given_limits        limits of a file or a caller, checked
@@ -28,6 +30,7 @@ Files, each importing only from those above it:
     time_proof          proof of criteria over the whole time of a motion, or of several
     proved_answers      answers of motions that give bounds of their states
     stretching          the least uniform stretching of time that is feasible
+    proved              summaries of proofs of motions
     blocks              parts of arcs, halved while they are undecided
     enclosures          bounds of a robot's state over a block of time
     cable_rates         speeds and accelerations of cables over blocks

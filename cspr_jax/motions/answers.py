@@ -17,13 +17,13 @@ class Answers(Columns):
     """One answer for each segment.
 
     Fields:
-        arcs: (n,) smallest number of arcs proved feasible, on more than six cables feasible at samples; 0: none.
+        arcs: (n,) smallest number of arcs proved feasible; 0: none.
         tried_arcs: (n,) number of arcs of the motion that duration and margins belong to: `arcs`; if that is 0, the
             candidate that one limit alone refuses; if there is none, the candidate with the largest margin.
         verdict: (n,) `Verdict` flags; 0 is feasible.
         duration: (n,) s.
         margin: (n,) smallest normalised pseudotension, or depth below the spools over z0.
-        margin_bound: (n,) proved lower bound of the margin; NaN where nothing is proved, as on more than six cables.
+        margin_bound: (n,) proved lower bound of the margin; NaN where nothing is proved.
         limit_margin: (n,) smallest slack of the limits; inf without limits.
         feasible_at_infinity: (n,) left-hand side of (2.55); positive if enough arcs make the segment feasible.
         tolerated: (n,) largest multiple of the uncertainty that the motion is proved to tolerate; NaN without one.
@@ -43,7 +43,7 @@ class Answers(Columns):
 
     @property
     def feasible(self) -> np.ndarray:
-        """Tell whether each segment is feasible, (n,): proved, on more than six cables at samples."""
+        """Tell whether each segment is proved feasible, (n,)."""
         return self.arcs > 0
 
     def details(self, i: int) -> dict[str, Any]:

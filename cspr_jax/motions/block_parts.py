@@ -71,12 +71,13 @@ class Blocks(NamedTuple):
         first, last = first - WIDER, last + WIDER
         return np.where(first < WIDER, 0.0, first), np.where(last > 1.0 - WIDER, 1.0, last)
 
-    def cut(self, first: np.ndarray, last: np.ndarray) -> "tuple[Blocks, Blocks]":
-        """Cut each block before and after its rest, or in two.
+    def cut(self, first: np.ndarray, last: np.ndarray, jumps: np.ndarray) -> "tuple[Blocks, Blocks]":
+        """Cut each block before and after its rest, or in two; where accelerations jump within a block, there.
 
         Args:
             first: (k,) shares of the block at which its rest begins, from `rest`.
             last: (k,) where it ends.
+            jumps: (n,) complex, increasing: numbers of motions, plus i times instants at which accelerations jump, s.
 
         Returns:
             parts outside of the rests, with bounds; what is left to look at, with the bounds of the blocks themselves.
@@ -86,10 +87,14 @@ class Blocks(NamedTuple):
         is_cut = (last - first < SMALL) & (before < after)
         outside = [self._part(is_cut & (first > 0.0), 0.0, first + 0.5 * WIDER, end=before)]
         outside.append(self._part(is_cut & (last < 1.0), last - 0.5 * WIDER, 1.0, start=after))
-        middle = self.start + 0.5 * width
-        inner = self._replace(start=before, end=after).taken(is_cut)
-        halves = self._replace(end=middle).taken(~is_cut), self._replace(start=middle).taken(~is_cut)
-        return joined(outside), joined([inner, *halves])
+        # No bounds of a block across a jump come close to what is on both of its sides.
+        start, end = np.where(is_cut, before, self.start), np.where(is_cut, after, self.end)
+        middle, has_jump = _jump_within(jumps, self.motion, start, end)
+        middle = np.where(has_jump, middle, 0.5 * (start + end))
+        is_split = has_jump | ~is_cut
+        inner = self._replace(start=start, end=end)
+        halves = [inner._replace(end=middle).taken(is_split), inner._replace(start=middle).taken(is_split)]
+        return joined(outside), joined([inner.taken(~is_split), *halves])
 
     def _part(self, chosen, first, last, **edges) -> "Blocks":
         # Bounds by the lines between two shares of the block, beyond the edges by more than these are rounded.
@@ -132,6 +137,21 @@ def joined(several: "list[Blocks]") -> Blocks:
     bounds = (np.concatenate(parts) for parts in zip(*(blocks.slacks for blocks in several), strict=True))
     motion, start, end = (np.concatenate(parts) for parts in zip(*(blocks[:3] for blocks in several), strict=True))
     return Blocks(motion, start, end, BlockSlacks(*bounds))
+
+
+def _jump_within(
+    jumps: np.ndarray, motion: np.ndarray, start: np.ndarray, end: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    # Instants of jumps strictly within blocks, near their middles, (k,), and whether there are any.
+    if not len(jumps):
+        return start, np.zeros(len(start), bool)
+    # NumPy orders complex numbers by their real parts first.
+    earliest, latest = (
+        np.searchsorted(jumps, motion + 1j * start, side="right"),
+        np.searchsorted(jumps, motion + 1j * end),
+    )
+    chosen = np.clip(np.searchsorted(jumps, motion + 0.5j * (start + end)), earliest, np.maximum(latest - 1, earliest))
+    return jumps.imag[np.minimum(chosen, len(jumps) - 1)], latest > earliest
 
 
 def _below(value: np.ndarray, rise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

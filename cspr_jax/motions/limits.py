@@ -83,3 +83,31 @@ def slack(row: Limit, limit: Array, value: Array, scale: Mapping[str, tuple[floa
         return 1.0 - share if row.sense == "most" else share - 1.0
     factor, size = scale[row.quantity]
     return (limit - value if row.sense == "most" else value - limit) * factor / size
+
+
+def other_limits(limits: Limits) -> list[Limit]:
+    """Rows of the limits that are set, except those of tensions, which the margin of redundant cables contains.
+
+    Returns:
+        the rows.
+    """
+    return [row for row in limits_set(limits) if row.quantity != "tension"]
+
+
+def other_slacks(robot: AnyRobot, limits: Limits, state: State, z0: Array) -> list[Array]:
+    """Smallest slack of each of `other_limits`.
+
+    Args:
+        state: z down.
+        z0: () m.
+
+    Returns:
+        () each.
+    """
+    length, rate, bend = cables.cable_motion(robot, state)
+    quantities = Values(jnp.zeros_like(length), state.position[2], length, jnp.abs(rate), jnp.abs(bend))
+    scale = scales(robot.n_cables, robot.mass * robot.gravity, z0)
+    return [
+        jnp.min(slack(row, getattr(limits, row.name), getattr(quantities, row.quantity), scale))
+        for row in other_limits(limits)
+    ]

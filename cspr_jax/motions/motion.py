@@ -6,7 +6,7 @@ vmapped and differentiated. Normalised time tau runs from 0 to 1.
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar, cast
 
 import jax
 import jax.numpy as jnp
@@ -15,6 +15,7 @@ from jax import Array
 
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.robots import state as states
+from cspr_jax.robots import state_bounds
 from cspr_jax.robots.state import State
 from cspr_jax.robots.state_bounds import StateBounds
 
@@ -102,6 +103,11 @@ class Backwards(Generic[Kind]):
     def breaks(self) -> Array:
         """Breaks; see `Motion.breaks`."""
         return jnp.flip(1.0 - self.motion.breaks())
+
+    def bounds(self, start: np.ndarray, end: np.ndarray) -> StateBounds:
+        """Bounds of the states, of a motion that has them; see `BoundedMotion.bounds`."""
+        whole, motion = float(self.duration()), cast(BoundedMotion, self.motion)
+        return state_bounds.backwards(motion.bounds(whole - end, whole - start))
 
 
 @jax.tree_util.register_dataclass

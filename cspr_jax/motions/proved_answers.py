@@ -160,11 +160,17 @@ def proof_of(problem: Problem, motion: BoundedMotion, scene: Scene | None = None
     Returns:
         the proof.
     """
-    return proofs_of(problem, lambda _, *ends: motion.bounds(*ends), np.array([float(motion.duration())]), scene)[0]
+    jumps = [motion.jumps()] if hasattr(motion, "jumps") else []
+    durations = np.array([float(motion.duration())])
+    return proofs_of(problem, lambda _, *ends: motion.bounds(*ends), durations, scene, jumps)[0]
 
 
 def proofs_of(
-    problem: Problem, bounds: ManyBounds, durations: np.ndarray, scene: Scene | None = None
+    problem: Problem,
+    bounds: ManyBounds,
+    durations: np.ndarray,
+    scene: Scene | None = None,
+    jumps: Sequence[np.ndarray] = (),
 ) -> list[MotionProof]:
     """Proofs of several motions at once.
 
@@ -172,6 +178,7 @@ def proofs_of(
         bounds: of their states over blocks, from the numbers of the motions, and the starts and ends of the blocks, s.
         durations: (n,) s.
         scene: as for `proved_answers`.
+        jumps: for each motion the instants at which its acceleration jumps, s; empty: nowhere.
 
     Returns:
         n proofs.
@@ -180,7 +187,7 @@ def proofs_of(
     def slacks(motion: np.ndarray, start: np.ndarray, end: np.ndarray) -> BlockSlacks:
         return block_slacks(problem.robot, problem.limits, partial(bounds, motion), start, end, scene)
 
-    return [_proof(problem, proof, scene) for proof in time_proofs(slacks, durations)]
+    return [_proof(problem, proof, scene) for proof in time_proofs(slacks, durations, jumps=jumps)]
 
 
 def _proof(problem: Problem, proof: TimeProof, scene: Scene | None) -> MotionProof:

@@ -7,7 +7,7 @@ criterion fails, or instants that are undecided. Open blocks of all motions are 
 
 import dataclasses
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -46,7 +46,10 @@ class TimeProof:
 
 
 def time_proof(
-    slacks: Callable[[np.ndarray, np.ndarray], BlockSlacks], duration: float, resolution: float = 5e-7
+    slacks: Callable[[np.ndarray, np.ndarray], BlockSlacks],
+    duration: float,
+    resolution: float = 5e-7,
+    jumps: np.ndarray | None = None,
 ) -> TimeProof:
     """Decide criteria over a whole motion.
 
@@ -54,17 +57,20 @@ def time_proof(
         slacks: bounds of the slacks over blocks, from their starts and ends, (k,) s each.
         duration: s.
         resolution: length of the shortest blocks, s.
+        jumps: instants at which the acceleration jumps, increasing, s; None: nowhere.
 
     Returns:
         the proof.
     """
-    return time_proofs(lambda _, start, end: slacks(start, end), np.array([duration]), resolution)[0]
+    at_jumps = [] if jumps is None else [jumps]
+    return time_proofs(lambda _, start, end: slacks(start, end), np.array([duration]), resolution, at_jumps)[0]
 
 
 def time_proofs(
     slacks: Callable[[np.ndarray, np.ndarray, np.ndarray], BlockSlacks],
     durations: np.ndarray,
     resolution: float = 5e-7,
+    jumps: Sequence[np.ndarray] = (),
 ) -> list[TimeProof]:
     """Decide criteria over several whole motions at once.
 
@@ -73,6 +79,7 @@ def time_proofs(
             (k,) s each.
         durations: (n_motions,) s.
         resolution: length of the shortest blocks, s.
+        jumps: for each motion the instants at which its acceleration jumps, increasing, s; empty: it jumps nowhere.
 
     Returns:
         one proof a motion, the same as it has alone.
@@ -84,17 +91,18 @@ def time_proofs(
     places = np.repeat(np.arange(count), FIRST), edges[:, :-1].ravel(), edges[:, 1:].ravel()
     start = blocks = _bounded(slacks, *places, whole=None)
     totals, leaves = np.full(count, FIRST), []
+    at_jumps = np.concatenate([np.empty(0, complex), *(i + 1j * np.asarray(row) for i, row in enumerate(jumps))])
     while len(blocks.start):
         undecided = blocks.undecided()
         is_open = undecided.any(1) & (blocks.end - blocks.start > resolution)
         is_open &= (totals + 2 * np.bincount(blocks.motion[is_open], minlength=count))[blocks.motion] <= MOST
         leaves.append(blocks.taken(~is_open))
         rest = blocks.rest(np.zeros(1), undecided, has_upper=True)
-        outside, inner = blocks.taken(is_open).cut(*(share[is_open] for share in rest))
+        outside, inner = blocks.taken(is_open).cut(*(share[is_open] for share in rest), at_jumps)
         leaves.append(outside)
         blocks = _bounded(slacks, *inner)
         totals += np.bincount(blocks.motion, minlength=count)
-    narrow, more = _narrowed(slacks, joined(leaves), _usual(start.slacks.high, count), resolution)
+    narrow, more = _narrowed(slacks, joined(leaves), _usual(start.slacks.high, count), resolution, at_jumps)
     return _proofs(narrow.taken(np.lexsort((narrow.start, narrow.motion))), totals + more)
 
 
@@ -121,7 +129,9 @@ def _least(motion: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
     return least
 
 
-def _narrowed(slacks, blocks: Blocks, usual: np.ndarray, resolution: float) -> tuple[Blocks, np.ndarray]:
+def _narrowed(
+    slacks, blocks: Blocks, usual: np.ndarray, resolution: float, jumps: np.ndarray
+) -> tuple[Blocks, np.ndarray]:
     # Cut the blocks that may hold the smallest slack of a criterion until its bounds are close; tell how many more.
     count, leaves = len(usual), []
     more = np.zeros(count, int)
@@ -134,7 +144,7 @@ def _narrowed(slacks, blocks: Blocks, usual: np.ndarray, resolution: float) -> t
         is_open &= (more < NARROWING)[blocks.motion]
         leaves.append(blocks.taken(~is_open))
         rest = blocks.rest(level, matters, has_upper=False)
-        outside, inner = blocks.taken(is_open).cut(*(share[is_open] for share in rest))
+        outside, inner = blocks.taken(is_open).cut(*(share[is_open] for share in rest), jumps)
         leaves.append(outside)
         blocks = _bounded(slacks, *inner)
         more += np.bincount(blocks.motion, minlength=count)

@@ -7,6 +7,7 @@ from typing import Any
 from cspr_jax.outputs.table_layout import two_digits
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.runtime.terminal import cell
+from cspr_jax.schema.families import FAMILIES
 from cspr_jax.schema.verdicts import Verdict
 
 SCHEMA = 1
@@ -43,7 +44,7 @@ def verdict_text(verdict: int, feasible: bool) -> str:
         feasible: whether the segment is; a smaller number of arcs may still be undecided.
 
     Returns:
-        "feasible" (proved; on more than six cables found at samples), "undecided", or the flags joined by "+".
+        "feasible" (proved), "undecided", or the flags joined by "+".
     """
     return "feasible" if feasible else Verdict(int(verdict)).text
 
@@ -104,9 +105,9 @@ def _segment_object(plan: PlannedMotions, i: int) -> dict[str, Any]:
 
 
 def _tension_margin(plan: PlannedMotions, i: int) -> float | None:
-    # The margin of redundant cables is in N, or a multiple of the weight per cable; this one is in N.
+    # The margin of a swing on redundant cables is a multiple of the weight per cable; this one is in N.
     robot = plan.problem.robot
-    if not plan.is_redundant:
+    if not plan.is_redundant or FAMILIES[plan.keys.family_of(i)].is_line:
         return None
     if plan.details(i).get("margin_unit") == "N":
         return float(plan.answers.margin[i])

@@ -129,6 +129,8 @@ def _rests_anywhere(stops: Waypoints, i: int) -> bool:
 def _depth_of_inclination(problem: Problem, stops: Waypoints) -> float:
     targets, path, inclination = stops.targets, stops.path, stops.keys.inclination
     if inclination == "best":
+        if problem.robot.n_cables > problem.robot.dof:
+            raise ConfigError(path, 'inclination = "best": must be a number on more cables than degrees of freedom')
         if (targets != targets[0]).any():
             raise ConfigError(path, 'inclination = "best": must be a number in a plan with more than one target')
         # The weights do not depend on the depth of P0.

@@ -111,7 +111,7 @@ class PlannedMotions:
 
     @property
     def feasible(self) -> bool:
-        """Tell whether every segment is feasible: proved, on more than six cables found at samples."""
+        """Tell whether every segment is proved feasible."""
         return bool(self.is_feasible.all())
 
     @property

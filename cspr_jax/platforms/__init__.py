@@ -3,7 +3,8 @@
 Position and orientation swing together, so that the cables of a robot that is in equilibrium at P0 stay taut while its
 platform goes to poses far from it. Tensions, determinant, limits on the pose and contacts are proved on blocks of time:
 they are analytic functions of complex time, so that the error of polynomials through their values at Chebyshev nodes
-can be bounded. Motions of platforms on more than six cables are judged by samples.
+can be bounded. On more than six cables searches look at samples, and what they choose is proved by tensions that
+balance it throughout blocks.
 
 Source: Dion-Gauvin's thesis, chapter 3 (sections 3.7 to 3.13: oscillating SLERP, beta-hat, accessible and attainable
 orientations).
@@ -11,6 +12,7 @@ orientations).
 Files, each importing only from those above it:
 
     oscillating_slerp       rotation that swings, section 3.7
+    slerp_bounds            bounds of it over a block of time
     platform_segment        segment between two poses, (3.42) to (3.66)
     platform_segment_lanes  the same, one lane a segment
     from_rest_lanes         the same from rest, with the fewest operations
@@ -35,7 +37,7 @@ Files, each importing only from those above it:
     margins                 smallest values, refined
     checker                 verdicts and margins of motions on six cables
     redundant_kernels       states of motions on more than six cables
-    redundant_checker       verdicts and margins of motions on more than six cables, by samples
+    redundant_checker       verdicts and margins of motions on more than six cables
     checkers                the checker for a number of cables
     arcs                    smallest numbers of arcs between pairs of poses
     answers                 answers for known numbers of arcs

@@ -72,6 +72,7 @@ def settled(
     max_arcs: int,
     fixed: np.ndarray | None = None,
     margins: bool = True,
+    is_final: bool = True,
 ) -> tuple[PlatformMotionAnswers, PlatformSegment]:
     """Answers about motions, with and without a feasible number of arcs.
 
@@ -82,6 +83,7 @@ def settled(
         max_arcs: largest number tried.
         fixed: (n,) a fixed number of arcs, 0 where free; None: all free.
         margins: whether motions without a number of arcs get margins, and not only reasons.
+        is_final: whether these answers are shown: then motions that passed checks without a proof are proved.
 
     Returns:
         the answers, NaN for (2.55), which does not apply; the segments that they belong to.
@@ -92,7 +94,10 @@ def settled(
     none = np.flatnonzero(tried == 0)
     tried[none] = best_candidates(checker, candidates.rows(none), max_arcs=max_arcs)
     segments, checks = segments_with(checker.problem.robot, candidates, tried), smallest.checks
-    others = np.flatnonzero(smallest.arcs == 0)
+    is_open = np.zeros(len(tried), bool)
+    if is_final:
+        smallest, is_open = _confirmed(checker, segments, smallest)
+    others = np.flatnonzero((smallest.arcs == 0) & ~is_open)
     checks.put(others, checker.check(rows(segments, others), tried[others], margins=margins))
     known = np.flatnonzero(~np.isnan(checks.tolerated))
     tolerances = checker.tolerated(rows(segments, known), tried[known])
@@ -125,6 +130,19 @@ def settled(
         refuted_at=checks.instant * duration,
     )
     return answers, segments
+
+
+def _confirmed(
+    checker: MotionChecker, segments: PlatformSegment, smallest: FewestArcs
+) -> tuple[FewestArcs, np.ndarray]:
+    # Numbers of arcs whose motions a proof leaves open, or refutes between samples, are undecided; say which these are.
+    passed = np.flatnonzero(smallest.arcs > 0)
+    if len(passed):
+        part = checker.confirmed(rows(segments, passed), smallest.arcs[passed], smallest.checks.rows(passed))
+        smallest.checks.put(passed, part)
+    is_open = (smallest.arcs > 0) & (smallest.checks.verdict != 0)
+    undecided = np.where(is_open & (smallest.undecided == 0), smallest.arcs, smallest.undecided)
+    return smallest._replace(arcs=np.where(is_open, 0, smallest.arcs), undecided=undecided), is_open
 
 
 def _reasons(

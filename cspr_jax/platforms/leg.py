@@ -90,19 +90,21 @@ class _Poses(Leg):
                 reference_pose(problem.robot, z0)
         except InputError as error:
             raise ConfigError(self.stops.path, self.stops.robot_file.typed(error)) from error
-        answers, segments = self._search(problem, np.array([z0]))
+        answers, segments = self._search(problem, np.array([z0]), is_final=True)
         pairs = zip(each(segments, len(self)), answers.tried_arcs, strict=True)
         return answers, [PlatformMotion(segment, problem.amplitude, leaf(arcs), self._kind) for segment, arcs in pairs]
 
     def answers(self, problem: Problem, depths: np.ndarray) -> PlatformMotionAnswers:
         """Answers for several depths; see `Leg.answers`."""
-        return self._search(problem, depths)[0]
+        return self._search(problem, depths, is_final=False)[0]
 
     def warnings(self, problem: Problem) -> list[str]:
         """Tensions that jump; see `Leg.warnings`."""
         return [_JUMPS.format(problem.amplitude.name)] if self.variable and _jumps(problem.amplitude) else []
 
-    def _search(self, problem: Problem, depths: np.ndarray) -> tuple[PlatformMotionAnswers, PlatformSegment]:
+    def _search(
+        self, problem: Problem, depths: np.ndarray, *, is_final: bool
+    ) -> tuple[PlatformMotionAnswers, PlatformSegment]:
         # Choose the values of beta-hat that give the fewest arcs in sum.
         count, z0 = len(self), np.repeat(depths, len(self))
         points = self.stops.points(depths)
@@ -125,7 +127,8 @@ class _Poses(Leg):
         path = _best_paths(of_trials.arcs, refused.arcs, pairs)
         best = FewestArcs(of_trials.arcs[path], of_trials.undecided[path], of_trials.checks.rows(path))
         why = Refused(refused.arcs[path], refused.broken[path])
-        return settled(checker, trial.rows(path), best, refused=why, max_arcs=largest, fixed=fixed)
+        chosen = trial.rows(path)
+        return settled(checker, chosen, best, refused=why, max_arcs=largest, fixed=fixed, is_final=is_final)
 
     def _refused(self, checker: MotionChecker, trial: Candidates, of_trials: FewestArcs, fixed: np.ndarray) -> Refused:
         # Find the candidates that only limits refuse, in segments where no candidate is feasible, or nearly so.

@@ -31,7 +31,7 @@ class PlatformChecks:
         slack: (n, n_criteria) smallest of each criterion of `MotionChecker.flags`; NaN where unknown.
         gap: (n,) smallest distance between cables that can meet, m; infinite where none can.
         bound: (n,) proved lower bound of the slack of taut cables and of the depth below the spools; NaN where nothing
-            is proved.
+            is proved, as on more than six cables before `MotionChecker.confirmed`.
         instant: (n,) tau at which the motion is refuted: by its tensions, else by limits and contacts (within a small
             step of it); NaN where it is not refuted, or by contacts that were only sampled.
         tolerated: (n,) multiple of the uncertainty that the motion is proved to stand, 1 or 0 as far as verdicts need
@@ -156,6 +156,19 @@ class MotionChecker(abc.ABC):
             the multiples; NaN where there is no uncertainty.
         """
         return Tolerated(np.full(len(arcs), np.nan), np.full(len(arcs), np.nan))
+
+    def confirmed(self, segments: PlatformSegment, arcs: np.ndarray, checks: PlatformChecks) -> PlatformChecks:
+        """Checks of motions that passed, with a proof of each; here they are proofs already.
+
+        Args:
+            segments: leaves (n, ...), of the parity of `arcs`.
+            arcs: (n,).
+            checks: of these motions.
+
+        Returns:
+            the checks.
+        """
+        return checks
 
     @property
     def is_limit(self) -> np.ndarray:

@@ -20,7 +20,7 @@ from cspr_jax.arithmetic.elementary import length, polynomial, sincospi
 # Series replace quotients whose numerators would cancel: arccos(s) / sqrt(1 - s^2) where 1 - s is below the first of
 # these numbers, sin(r) / r where r^2 is below the other.
 _NEAR, _NEAR_TERMS = 0.1, 16
-_LOG = [float(c) for c in np.cumprod([1.0, *((k + 1.0) / (2.0 * k + 3.0) for k in range(_NEAR_TERMS + 1))])]
+_LOG = [float(c) for c in np.cumprod([1.0, *((k + 1.0) / (2.0 * k + 3.0) for k in range(_NEAR_TERMS + 3))])]
 _SMALL, _SERIES = 0.5, 12
 # An envelope shorter than this does not turn.
 _STILL = 1e-12
@@ -137,53 +137,70 @@ def _half_vector(slerp: Slerp, amplitude_values: tuple[Array, ...]) -> tuple[Arr
     along = slerp.across * cosine - slerp.start * sine
     q1, q2 = along * rate, along * bend - q * rate**2
     s, s1, s2, v, v1, v2 = q[0], q1[0], q2[0], q[1:], q1[1:], q2[1:]
-    w, w1, w2 = _angle_ratio(s, v)
+    w, w1, w2 = angle_ratio(s, jnp.dot(v, v), orders=3)
     return v * w, v1 * w + v * w1 * s1, v2 * w + 2.0 * v1 * w1 * s1 + v * (w2 * s1**2 + w1 * s2)
 
 
-def _angle_ratio(s: Array, v: Array) -> tuple[Array, Array, Array]:
-    # Return W = arccos(s) / sqrt(1 - s^2), where |v|^2 = 1 - s^2, and its first two derivatives in s.
+def angle_ratio(s: Array, square: Array, *, orders: int) -> tuple[Array, ...]:
+    """W = arccos(s) / sqrt(1 - s^2), and its derivatives in s, whose signs alternate.
+
+    Args:
+        s: () above -1.
+        square: () 1 - s^2.
+        orders: how many numbers, at most 5.
+
+    Returns:
+        W, W', ..., () each.
+    """
     x = 1.0 - s
     is_near = x < _NEAR
-    square = jnp.where(is_near, 1.0, jnp.dot(v, v))
+    square = jnp.where(is_near, 1.0, square)
     sine = jnp.sqrt(square)
     w = jnp.arctan2(sine, s) / sine
-    w1 = (s * w - 1.0) / square
-    far = (w, w1, (w + 3.0 * s * w1) / square)
+    far = [w, (s * w - 1.0) / square]
+    for n in range(1, orders - 1):
+        far.append((float(n**2) * far[n - 1] + (2.0 * n + 1.0) * s * far[n]) / square)
     small = jnp.where(is_near, x, 0.0)
     near = [
         (-1.0) ** j * polynomial([math.perm(k, j) * _LOG[k] for k in range(j, _NEAR_TERMS + j)], small)
-        for j in range(3)
+        for j in range(orders)
     ]
-    value, slope, bend = (jnp.where(is_near, a, b) for a, b in zip(near, far, strict=True))
-    return value, slope, bend
+    return tuple(jnp.where(is_near, a, b) for a, b in zip(near, far, strict=True))
 
 
 def _exponential(u: Array, u1: Array, u2: Array) -> tuple[Array, Array, Array]:
     # Return the quaternion (cos |u|, u sin |u| / |u|) and its derivatives, with y = |u|^2.
     y, y1, y2 = jnp.dot(u, u), 2.0 * jnp.dot(u, u1), 2.0 * (jnp.dot(u1, u1) + jnp.dot(u, u2))
-    cosine, s, s1, s2 = _sinc(y)
+    cosine, s, s1, s2, _ = sinc(y)
     q = jnp.concatenate([cosine[None], u * s])
     q1 = jnp.concatenate([(-0.5 * s * y1)[None], u1 * s + u * s1 * y1])
     scalar = -0.5 * (s1 * y1**2 + s * y2)
     return q, q1, jnp.concatenate([scalar[None], u2 * s + 2.0 * u1 * s1 * y1 + u * (s2 * y1**2 + s1 * y2)])
 
 
-def _sinc(y: Array) -> tuple[Array, Array, Array, Array]:
-    # Return cos r, sin r / r, and the first two derivatives of the latter in y = r^2.
+def sinc(y: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """Cosine of r, sin r / r, and the first three derivatives of the latter in y = r^2.
+
+    Args:
+        y: () not negative.
+
+    Returns:
+        the numbers, () each.
+    """
     is_small = y < _SMALL
     large = jnp.where(is_small, 1.0, y)
     r = jnp.sqrt(large)
     cosine, s = jnp.cos(r), jnp.sin(r) / r
     s1 = 0.5 * (cosine - s) / large
     s2 = -(0.5 * s + 3.0 * s1) / (2.0 * large)
-    terms = [(-1.0) ** k / math.factorial(2 * k + 1) for k in range(_SERIES + 2)]
+    s3 = -(s1 + 10.0 * s2) / (4.0 * large)
+    terms = [(-1.0) ** k / math.factorial(2 * k + 1) for k in range(_SERIES + 3)]
     small = jnp.where(is_small, y, 0.0)
-    series = [polynomial([math.perm(k, j) * terms[k] for k in range(j, _SERIES + j)], small) for j in range(3)]
+    series = [polynomial([math.perm(k, j) * terms[k] for k in range(j, _SERIES + j)], small) for j in range(4)]
     near = polynomial([(-1.0) ** k / math.factorial(2 * k) for k in range(_SERIES)], small)
-    pairs = zip((near, *series), (cosine, s, s1, s2), strict=True)
-    cosine, s, s1, s2 = (jnp.where(is_small, a, b) for a, b in pairs)
-    return cosine, s, s1, s2
+    pairs = zip((near, *series), (cosine, s, s1, s2, s3), strict=True)
+    cosine, s, s1, s2, s3 = (jnp.where(is_small, a, b) for a, b in pairs)
+    return cosine, s, s1, s2, s3
 
 
 def rates(quaternions: tuple[Array, Array, Array]) -> tuple[Array, Array]:

@@ -16,18 +16,28 @@ from functools import partial
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic import rotations
+from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.elementary import sincospi
+from cspr_jax.arithmetic.rotation_bounds import unit_rotation_bounds
+from cspr_jax.motions.amplitude_bounds import TimeBounds, time_bounds
 from cspr_jax.motions.amplitudes import Amplitude, derivatives
 from cspr_jax.motions.platform_kind import USUAL, PlatformMotionKind
+from cspr_jax.motions.swing_bounds import swing_bounds
 from cspr_jax.motions.swing_plane import swing_plane
 from cspr_jax.platforms.oscillating_slerp import Slerp, beat, orientation, rates, slerp_between
+from cspr_jax.platforms.slerp_bounds import beat_bounds, orientation_bounds
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import rest_point, spool_radius
 from cspr_jax.robots.state import State
+from cspr_jax.robots.state_bounds import StateBounds
 from cspr_jax.robots.wrench_balance import normalised_determinant
+
+# Blocks of which bounds are computed at a time.
+BATCH = 64
 
 
 @jax.tree_util.register_dataclass
@@ -161,9 +171,12 @@ def _quaternions(
     segment: PlatformSegment, values: tuple[Array, ...], arcs: Array, tau: Array, kind: PlatformMotionKind
 ) -> tuple[Array, Array, Array]:
     share = _share(segment, arcs)
+    return orientation(segment.slerp, values, beat(*_beta_hats(segment, share, kind), share, arcs, tau))
+
+
+def _beta_hats(segment: PlatformSegment, share: Array, kind: PlatformMotionKind) -> tuple[Array, Array]:
     slerp = segment.slerp
-    beta_hats = (-1.0 / share, -1.0 / share) if kind.plain else (slerp.start_beta_hat, slerp.end_beta_hat)
-    return orientation(slerp, values, beat(*beta_hats, share, arcs, tau))
+    return (-1.0 / share, -1.0 / share) if kind.plain else (slerp.start_beta_hat, slerp.end_beta_hat)
 
 
 def _swing(
@@ -232,3 +245,22 @@ class PlatformMotion:
     def breaks(self) -> Array:
         """Knots of the amplitude function; see `Motion.breaks`."""
         return self.amplitude.knots
+
+    def bounds(self, start: np.ndarray, end: np.ndarray) -> StateBounds:
+        """Bounds of the states; see `BoundedMotion.bounds`."""
+        blocks = time_bounds(self.amplitude, self.duration(), start, end, orders=4)
+        return in_batches(partial(_bounds, self.segment, self.arcs, kind=self.kind), blocks, size=BATCH)
+
+
+@partial(jax.jit, static_argnames="kind")
+def _bounds(segment: PlatformSegment, arcs: Array, blocks: TimeBounds, *, kind: PlatformMotionKind) -> StateBounds:
+    time = duration(segment, arcs)
+
+    def one(block: TimeBounds) -> StateBounds:
+        share = _share(segment, arcs)
+        translation = swing_bounds(segment, arcs, time, block, variable=kind.variable)
+        beats = beat_bounds(*_beta_hats(segment, share, kind), share, arcs, block.tau)
+        q, q1, q2 = orientation_bounds(segment.slerp, block.values, beats)
+        return StateBounds(*translation, *unit_rotation_bounds(q, q1 * (1.0 / time), q2 * (1.0 / time**2)))
+
+    return jax.vmap(one)(blocks)

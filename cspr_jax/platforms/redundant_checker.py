@@ -1,27 +1,32 @@
-"""Feasibility of motions of a platform on more than six cables, with margins: by samples, finer where it matters.
+"""Feasibility of motions of a platform on more than six cables, with margins: samples first, a proof at the end.
 
 Motion and limits leave a choice of tensions. The margin of an instant is the margin of a workspace (`workspaces`) at
 its pose, for the wrench that the motion needs: the largest s such that tensions between f_min + s and f_max - s supply
 the wrench. Neither the determinant nor the side of the spools on which the platform is matters: where the cables cannot
-supply the wrench there is no s. Nothing here is a proof that a motion is feasible. Contacts between cables, thick ones
-too, are looked for, but not contacts with the platform, whose attachment points need not lie in a plane.
+supply the wrench there is no s. Searches look at samples, finer where it matters; what they choose is then proved, by
+tensions that balance the motion throughout blocks of time (`motions.proved`). Contacts between cables, thick ones too,
+are looked for at samples only, and contacts with the platform, whose attachment points need not lie in a plane, not at
+all.
 """
 
 from functools import partial
 
+import jax
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.minima import narrowed_places
+from cspr_jax.motions.limits import other_limits
 from cspr_jax.motions.platform_kind import USUAL, PlatformMotionKind
 from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.proved import proved
 from cspr_jax.platforms.beta_hat import LARGEST
 from cspr_jax.platforms.crossings import CableVectors, passed_over
 from cspr_jax.platforms.end_acceleration import AT_REST
 from cspr_jax.platforms.motion_checker import BASIC, BESIDE_KNOT, FEW, TOLERANCE, TOUCH, MotionChecker, PlatformChecks
 from cspr_jax.platforms.motions import Motions, rows
-from cspr_jax.platforms.platform_segment import PlatformSegment
-from cspr_jax.platforms.redundant_kernels import cable_vectors, end_wrenches, instants, other_limits
+from cspr_jax.platforms.platform_segment import PlatformMotion, PlatformSegment
+from cspr_jax.platforms.redundant_kernels import cable_vectors, end_wrenches, instants
 from cspr_jax.robots.platform import pairs_apart
 from cspr_jax.schema.verdicts import Verdict, conjunction
 from cspr_jax.workspaces import exact
@@ -30,7 +35,10 @@ from cspr_jax.workspaces.search import WorkspaceSearch
 
 # Number of samples that are held at a time, and of instants of the first look that are computed at a time.
 ROOM, CHUNK = 200_000, 8
-SAMPLES = 64  # an arc
+# Samples an arc, in a search and of what it chose.
+SAMPLES, FINE = 32, 64
+# A search looks for minima between samples where a smallest sample is below this part of the largest.
+NEAR = 0.1
 # Halvings of an interval of beta-hat, down to rounding. Slopes below this part of the margins count as zero.
 HALVINGS, FLAT = 60, 1e-12
 # An interval of no values.
@@ -153,19 +161,37 @@ class RedundantChecker(MotionChecker):
         margins: bool = True,
         ignored: np.ndarray | None = None,
     ) -> PlatformChecks:
-        """Check motions in full, by samples: nothing is proved; see `MotionChecker.check`."""
-        checks, motions = self.nothing(len(arcs)), Motions(segments, arcs)
+        """Check motions by samples: nothing is proved yet; see `MotionChecker.check`."""
+        return self._at_samples(Motions(segments, arcs), SAMPLES, whole, ignored)
+
+    def confirmed(self, segments: PlatformSegment, arcs: np.ndarray, checks: PlatformChecks) -> PlatformChecks:
+        """Checks of motions that passed, with a proof of each; see `MotionChecker.confirmed`."""
+        motions = Motions(segments, arcs)
+        # Contacts between cables are looked for at more samples: they are the part without a proof.
+        checks = self._at_samples(motions, FINE, True, None)
+        for i in np.flatnonzero(checks.verdict == 0).tolist():
+            segment, count = jax.tree.map(lambda x: x[0], motions.items(np.array([i])))
+            motion = PlatformMotion(segment, self.problem.amplitude, count, self.kind)
+            proof = proved(self.problem, motion)
+            checks.verdict[i], checks.bound[i] = proof.verdict, proof.bound / self._weight
+            checks.slack[i, 0] = np.fmin(checks.slack[i, 0], proof.margin / self._weight)
+            checks.instant[i] = proof.instant / float(motion.duration())
+        return checks
+
+    def _at_samples(self, motions: Motions, samples: int, whole: bool, ignored: np.ndarray | None) -> PlatformChecks:
+        arcs = motions.arcs
+        checks = self.nothing(len(arcs))
         for count in np.unique(arcs).tolist():
             # Check motions with the same number of samples together.
             alike = np.flatnonzero(arcs == count)
-            size = max(ROOM // (SAMPLES * count), 1)
+            size = max(ROOM // (samples * count), 1)
             for start in range(0, len(alike), size):
                 piece = alike[start : start + size]
-                checks.put(piece, self._checked(motions.rows(piece), count, whole, ignored))
+                checks.put(piece, self._checked(motions.rows(piece), samples * count, whole, ignored))
         return checks
 
-    def _checked(self, motions: Motions, count: int, whole: bool, ignored: np.ndarray | None) -> PlatformChecks:
-        tau = np.linspace(0.0, 1.0, SAMPLES * count + 1)
+    def _checked(self, motions: Motions, steps: int, whole: bool, ignored: np.ndarray | None) -> PlatformChecks:
+        tau = np.linspace(0.0, 1.0, steps + 1)
         samples = self.values(motions, np.tile(tau, (len(motions.arcs), 1)))
         counted = np.ones(len(self.flags), bool) if ignored is None else ~ignored
         first = samples[:, :, :-1][:, :, np.append(True, counted[BASIC:])]
@@ -175,7 +201,7 @@ class RedundantChecker(MotionChecker):
         if not is_open.any():
             return checks
         motions, samples = motions.rows(is_open), samples[is_open]
-        least, when = narrowed_places(partial(self.values, motions), tau, samples)
+        least, when = self._smallest(motions, tau, samples, whole)
         if len(self._knots):  # slacks may jump at knots
             beside = self.values(motions, np.tile(self._knots, (len(least), 1)))
             when = np.where(beside.min(1) < least, self._knots[beside.argmin(1)], when)
@@ -184,6 +210,17 @@ class RedundantChecker(MotionChecker):
         judged.instant[:] = _refuted_at(least[:, :-1], when[:, :-1])
         checks.put(np.flatnonzero(is_open), judged)
         return checks
+
+    def _smallest(
+        self, motions: Motions, tau: np.ndarray, samples: np.ndarray, whole: bool
+    ) -> tuple[np.ndarray, np.ndarray]:
+        # Return smallest values (n, n_values), and their instants.
+        least, when = samples.min(1), tau[samples.argmin(1)]
+        is_near = np.logical_or(whole, ~(least > NEAR * np.abs(samples).max(1)).all(1))
+        if is_near.any():
+            rows_near = motions.rows(is_near)
+            least[is_near], when[is_near] = narrowed_places(partial(self.values, rows_near), tau, samples[is_near])
+        return least, when
 
     def _met(self, motions: Motions, tau: np.ndarray) -> np.ndarray:
         # Find motions in which cables pass through each other between samples.

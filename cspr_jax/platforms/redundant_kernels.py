@@ -7,16 +7,13 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.motions.limits import Values, limits_set, scales, slack
+from cspr_jax.motions.limits import other_slacks
 from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.platforms.end_acceleration import end_state
 from cspr_jax.platforms.platform_segment import PlatformMotion, PlatformSegment
-from cspr_jax.robots.cables import cable_motion
 from cspr_jax.robots.interference import cable_directions, gaps
-from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.schema.limits import Limit
 
 
 class PoseInstants(NamedTuple):
@@ -33,15 +30,6 @@ class PoseInstants(NamedTuple):
     quaternion: Array
     wrench: Array
     slacks: Array
-
-
-def other_limits(limits: Limits) -> list[Limit]:
-    """Rows of the limits that are set, except those of tensions, which the margin contains.
-
-    Returns:
-        the rows.
-    """
-    return [row for row in limits_set(limits) if row.quantity != "tension"]
 
 
 @partial(jax.jit, static_argnames="kind")
@@ -63,16 +51,9 @@ def instants(
     def one(segment, arcs, tau):
         motion = PlatformMotion(segment, problem.amplitude, arcs, kind)
         state = motion.state(tau)
-        length, rate, bend = cable_motion(robot, state)
-        quantities = Values(jnp.zeros_like(length), state.position[2], length, jnp.abs(rate), jnp.abs(bend))
-        scale = scales(robot.n_cables, robot.mass * robot.gravity, motion.z0)
-        each = (
-            slack(row, getattr(limits, row.name), getattr(quantities, row.quantity), scale)
-            for row in other_limits(limits)
-        )
         apart = jnp.linalg.norm(gaps(robot, pairs, state.position, state.rotation), axis=1)
         nearest = jnp.min(apart, initial=jnp.inf)
-        slacks = jnp.stack([*(jnp.min(x) for x in each), nearest])
+        slacks = jnp.stack([*other_slacks(robot, limits, state, motion.z0), nearest])
         return PoseInstants(state.position, state.quaternion, robot.inertial_wrench(state), slacks)
 
     return jax.vmap(one)(*items)

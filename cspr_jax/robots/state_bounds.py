@@ -47,6 +47,17 @@ class StateBounds(NamedTuple):
     angular_acceleration: AffineBounds = None  # type: ignore[assignment]
 
 
+def backwards(state: StateBounds) -> StateBounds:
+    """Bounds of the states of the same motion with time reversed.
+
+    Returns:
+        the bounds; their rates have the other sign, and their lines run the other way.
+    """
+    rates = ("velocity", "angular_velocity")
+    changed = {name: -bounds if name in rates else bounds for name, bounds in state._asdict().items() if bounds}
+    return StateBounds(**{name: bounds._replace(slope=-bounds.slope) for name, bounds in changed.items()})
+
+
 class CableBounds(NamedTuple):
     """Bounds of the cables of one block.
 

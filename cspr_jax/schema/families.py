@@ -68,7 +68,7 @@ _ROWS = (
         "hypocycloid-standard",
         "standard hypocycloids between any poses (thesis chapter 2)",
         {"3T": "cspr_jax.swings.hypocycloid_leg:Hypocycloids", "3R3T": "cspr_jax.platforms.leg:StandardPoses"},
-        any_cables=("3R3T",),
+        any_cables=("3T", "3R3T"),
         knows_uncertainty=True,
     ),
     Family(
@@ -76,6 +76,7 @@ _ROWS = (
         "from rest to a target, swings at it, and back to rest (thesis chapter 1)",
         dict.fromkeys(("2T", "3T"), "cspr_jax.swings.transition_leg:Transitions"),
         free_end=True,
+        any_cables=("2T", "3T"),
         knows_uncertainty=True,
     ),
     Family(

@@ -126,7 +126,7 @@ BEST = {
 }
 
 # These texts say what verdicts rest on, and what the margin is.
-HOW = " (proved; for platforms on more than six cables, sampled)"
+HOW = " (proved; contacts between more than six cables are sampled)"
 MARGIN = (
     "Smallest pseudotension over its value at rest in P0 (platforms: that of six equal ones), "
     "or smallest depth below the spools over z0, whichever is less; platforms on more cables: distance that all "
@@ -309,7 +309,7 @@ QUANTITIES = {
             "margin_bound",
             "1",
             "proved lower bound of the margin",
-            "Proved: no instant of the segment has a smaller margin. Absent on more than six cables.",
+            "Proved: no instant of the segment has a smaller margin.",
         ),
         Quantity(
             "feasible_at_infinity",

@@ -12,8 +12,9 @@ import numpy as np
 from scipy.interpolate import BSpline, CubicSpline, PPoly, make_interp_spline
 
 from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.arithmetic.piecewise_bounds import bernstein_of_powers
 from cspr_jax.errors import InputError
-from cspr_jax.splines.motion import Spline, bernstein_of_powers
+from cspr_jax.splines.motion import Spline
 
 INTERPOLATIONS = ("cubic", "quintic", "hermite")
 ENDS = ("rest", "natural", "periodic")

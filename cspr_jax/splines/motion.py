@@ -1,7 +1,6 @@
 """Piecewise polynomial motion: what a table of samples or way-points and an interpolation are, in Bernstein form."""
 
 import dataclasses
-import math
 from typing import Any
 
 import jax
@@ -15,6 +14,9 @@ from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.robots.state import State
 from cspr_jax.robots.state_bounds import StateBounds
 from cspr_jax.splines.blocks import spline_bounds
+
+# Second derivatives that differ by less than this part of the largest one do not jump.
+SAME = 1e-9
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,6 +78,22 @@ class Spline:
     def breaks(self) -> Array:
         """Breaks; see `Motion.breaks`."""
         return self.knots[1:-1] / self.knots[-1]
+
+    def jumps(self) -> np.ndarray:
+        """Instants at which the acceleration jumps.
+
+        Returns:
+            (n,) s, increasing.
+        """
+        width = np.diff(np.asarray(self.knots))[:, None]
+        is_jump = np.zeros(len(width) - 1, bool)
+        for table in (self.position, self.quaternion):
+            degree = 0 if table is None else table.shape[1] - 1
+            if table is not None and degree >= 2:
+                bends = np.diff(np.asarray(table), 2, axis=1) * (degree * (degree - 1)) / width[:, None] ** 2
+                size = np.abs(bends).max(initial=0.0)
+                is_jump |= (np.abs(bends[1:, 0] - bends[:-1, -1]) > SAME * size).any(1)
+        return np.asarray(self.knots)[1:-1][is_jump]
 
     def bounds(self, start: np.ndarray, end: np.ndarray) -> StateBounds:
         """Bounds of the states; see `BoundedMotion.bounds`."""
@@ -158,17 +176,3 @@ def turning_of(quaternion: Array, first: Array, second: Array) -> tuple[Array, A
     angular_velocity = across(first)
     angular_acceleration = across(second) - angular_velocity * (2.0 * jnp.dot(quaternion, first) / square)
     return rotation, angular_velocity, angular_acceleration, unit
-
-
-def bernstein_of_powers(coefficients: np.ndarray) -> np.ndarray:
-    """Bernstein coefficients of polynomials over [0, 1].
-
-    Args:
-        coefficients: (..., degree + 1, n) of the powers of the variable, the constant one first.
-
-    Returns:
-        (..., degree + 1, n).
-    """
-    degree = coefficients.shape[-2] - 1
-    matrix = np.array([[math.comb(i, j) / math.comb(degree, j) for j in range(degree + 1)] for i in range(degree + 1)])
-    return matrix @ coefficients

@@ -15,11 +15,12 @@ from scipy.interpolate import BPoly, BSpline, PPoly
 
 from cspr_jax.arithmetic import rotations
 from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.arithmetic.piecewise_bounds import bernstein_of_powers
 from cspr_jax.config.motions.table import MotionPieces, MotionTable
 from cspr_jax.config.motions.text import MotionWindow
 from cspr_jax.errors import InputError
 from cspr_jax.splines.interpolation import continuous, hermite, interpolated
-from cspr_jax.splines.motion import Spline, bernstein_of_powers
+from cspr_jax.splines.motion import Spline
 
 # Shares of the largest coefficient by which pieces may miss each other, and by which windows may.
 MEETING, WINDOWS_MEETING = 1e-6, 1e-9

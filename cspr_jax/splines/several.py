@@ -19,8 +19,10 @@ class SeveralSplines:
             splines: at least one.
 
         Raises:
-            ValueError: degrees differ, or only some have orientations.
+            ValueError: degrees differ, only some have orientations, or positions are not those of mass centres.
         """
+        if any(spline.offset is not None for spline in splines):
+            raise ValueError("positions of mass centres alone")
         self._knots = np.concatenate([np.asarray(spline.knots) for spline in splines])
         self._of_knots = np.repeat(np.arange(len(splines)), [len(spline.knots) for spline in splines])
         turning = [spline.quaternion for spline in splines if spline.quaternion is not None]
@@ -29,6 +31,7 @@ class SeveralSplines:
         self._position = np.concatenate([np.asarray(spline.position) for spline in splines])
         self._quaternion = np.concatenate([np.asarray(table) for table in turning]) if turning else None
         self.durations = np.array([float(spline.knots[-1]) for spline in splines])
+        self.jumps = [spline.jumps() for spline in splines]
 
     def bounds(self, motion: np.ndarray, start: np.ndarray, end: np.ndarray) -> StateBounds:
         """Bounds of the states over blocks; see `motions.motion.BoundedMotion.bounds`.

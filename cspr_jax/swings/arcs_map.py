@@ -16,6 +16,7 @@ class MinimumArcsMap(PointMassMap):
     """The smallest number of arcs to each target; see `GridMap`."""
 
     proves = True
+    any_cables = True
 
     def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
         """Refuse a planar robot; build what all tiles share."""

@@ -17,19 +17,27 @@ least inclined to the spool plane. psi = 0 with p = 1 has no duration: see `dura
 
 import dataclasses
 import math
+from functools import partial
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
+from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.elementary import sincospi
+from cspr_jax.motions.amplitude_bounds import TimeBounds, time_bounds
 from cspr_jax.motions.amplitudes import Amplitude, derivatives
+from cspr_jax.motions.swing_bounds import swing_bounds
 from cspr_jax.motions.swing_plane import swing_plane
 from cspr_jax.robots import point_mass
 from cspr_jax.robots.point_mass import PointMassRobot
-from cspr_jax.robots.robot import check_determined
 from cspr_jax.robots.state import State
+from cspr_jax.robots.state_bounds import StateBounds
+
+# Blocks of which bounds are computed at a time.
+BATCH = 64
 
 
 @jax.tree_util.register_dataclass
@@ -74,17 +82,18 @@ def couplings(robot: PointMassRobot, hub: Array, axes: Array) -> tuple[Array, Ar
     at rest in p0: cable k has the normalised pseudotension 1 + tilt . c + pull_k . d + twist_k (c x d).
 
     Args:
-        robot: centred; a point mass on three cables, any triangle; or on two, then the motion is a line in their plane.
+        robot: centred; a point mass on three cables, any triangle; or on two, then the motion is a line in their plane;
+            on more cables the motion does not determine tensions.
         hub: (3,) p0 from the centroid of the spools, m.
         axes: (3, n) the directions of the motion, as columns; n is 1 or 2.
 
     Returns:
-        tilt (n,), 1/m; pull (n_cables, n), 1/m, one row for each cable; twist (n_cables,), 1/m^2, zero for a line.
-
-    Raises:
-        InputError: more cables than degrees of freedom.
+        tilt (n,), 1/m; pull (n_cables, n), 1/m, one row for each cable; twist (n_cables,), 1/m^2, zero for a line; NaN
+        on more cables.
     """
-    check_determined(robot)
+    if robot.n_cables > robot.dof:
+        nothing = jnp.full((robot.n_cables, axes.shape[1]), jnp.nan)
+        return point_mass.plane_normal(robot) @ axes / hub[2], nothing, nothing[:, 0]
     if point_mass.is_planar(robot):
         half = robot.base_points[:, 0]
         tilt = axes[2] / hub[2]
@@ -104,7 +113,7 @@ def segment(robot: PointMassRobot, start: Array, end: Array, z0: Array, *, odd: 
     """The segment from one point to another.
 
     Args:
-        robot: a point mass on three cables, centred.
+        robot: a point mass on three cables or more, centred.
         start: (3,) p1, from the centroid of the spools, z down, m.
         end: (3,) p2, m.
         z0: () depth of p0 below the centroid of the spools, m.
@@ -264,6 +273,17 @@ class Hypocycloid:
     def breaks(self) -> Array:
         """Knots of the amplitude function; see `Motion.breaks`."""
         return self.amplitude.knots
+
+    def bounds(self, start: np.ndarray, end: np.ndarray) -> StateBounds:
+        """Bounds of the states; see `BoundedMotion.bounds`."""
+        blocks = time_bounds(self.amplitude, self.duration(), start, end)
+        return in_batches(partial(_bounds, self.segment, self.arcs), blocks, size=BATCH)
+
+
+@jax.jit
+def _bounds(segment: Segment, arcs: Array, blocks: TimeBounds) -> StateBounds:
+    time = duration(segment, arcs)
+    return jax.vmap(lambda block: StateBounds(*swing_bounds(segment, arcs, time, block)))(blocks)
 
 
 def feasibility_at_infinity(segment: Segment, amplitude: Amplitude) -> Array:

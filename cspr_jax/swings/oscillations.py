@@ -27,6 +27,7 @@ from cspr_jax.swings.envelopes import proved_envelope
 from cspr_jax.swings.hypocycloid import Segment
 from cspr_jax.swings.margins import margins
 from cspr_jax.swings.proof import tolerance
+from cspr_jax.swings.redundant_arcs import redundant_arcs
 from cspr_jax.swings.transition_margins import transition_margins
 
 # Instants of the sieve; odd, so that they do not fall on the zeros of an oscillation.
@@ -191,6 +192,8 @@ def minimum_oscillations(
     check_numbers(problem.robot, z0, max_arcs)
     stage(f"numbers of oscillations, 1 to {max_arcs // 2}")
     largest = max(max_arcs // 2, 1)
+    if problem.robot.n_cables > problem.robot.dof:
+        return _on_more_cables(problem, segments, z0, 2 * largest, arcs)
     v, weights = np.asarray(transition.inclination(segments)), np.asarray(transition.weights(segments))
     envelopes = _level if (v == 0.0).all() else _envelopes
     look = in_batches(partial(envelopes, problem.amplitude), (weights, v), size=BATCH)
@@ -203,7 +206,7 @@ def minimum_oscillations(
     at_ends = in_batches(partial(end_slacks, problem, 4.0), segments, size=BATCH)
     if steady is not None:
         upper[steady, 1::2], real[steady], gain[steady] = np.inf, 0.0, 0.0
-    infinity = 1.0 - np.abs(v) * max(abs(float(problem.amplitude.lowest)), float(problem.amplitude.highest))
+    infinity = _infinity(problem, v)
     allowed = np.floor(np.where(np.isnan(real), np.inf, real)) + 1.0
     parities = {0: segments, 1: segments}
     is_plain = steady is None and not limits_set(problem.limits) and problem.limits.uncertainty is None
@@ -217,6 +220,33 @@ def minimum_oscillations(
         envelope_oscillations=np.where(allowed <= largest, allowed, 0).astype(int),
         least_oscillations=real,
         inclination_gain=np.where(np.isnan(real), np.nan, gain),
+        used_inclination=v,
+        used_z0=np.asarray(z0, float),
+    )
+
+
+def _infinity(problem: Problem, inclination: np.ndarray) -> np.ndarray:
+    # Return the left-hand side of (2.55) of transitions, (n,).
+    highest = max(abs(float(problem.amplitude.lowest)), float(problem.amplitude.highest))
+    return 1.0 - np.abs(inclination) * highest
+
+
+def _on_more_cables(
+    problem: Problem, segments: Segment, z0: np.ndarray, largest: int, arcs: np.ndarray | None
+) -> OscillationAnswers:
+    # Envelopes are of pseudotensions, which the motion does not determine here.
+    v = np.asarray(transition.inclination(segments))
+    answers, _ = redundant_arcs(
+        problem, {0: segments, 1: segments}, _infinity(problem, v), max_arcs=largest, arcs=arcs, step=2
+    )
+    nothing = np.full(len(v), np.nan)
+    return OscillationAnswers(
+        **vars(answers),
+        oscillations=answers.arcs // 2,
+        tried_oscillations=answers.tried_arcs // 2,
+        envelope_oscillations=np.zeros(len(v), int),
+        least_oscillations=nothing,
+        inclination_gain=nothing,
         used_inclination=v,
         used_z0=np.asarray(z0, float),
     )

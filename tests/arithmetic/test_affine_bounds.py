@@ -36,6 +36,8 @@ OPERATIONS = {
     "root": lambda f, g, of: of.root(f),
     "reciprocal_root": lambda f, g, of: of.reciprocal_root(f),
     "arc_sine": lambda f, g, of: of.arc_sine(0.25 * (f - 2.0)),
+    "sine": lambda f, g, of: of.sincospi(f)[0],
+    "cosine": lambda f, g, of: of.sincospi(f - g)[1],
     "cross": lambda f, g, of: of.cross(f, g),
     "dot": lambda f, g, of: of.dot(f, g),
     "norm_squared": lambda f, g, of: of.norm_squared(f),
@@ -53,6 +55,10 @@ class Exact:
     @staticmethod
     def reciprocal_root(f):
         return f**-0.5
+
+    @staticmethod
+    def sincospi(f):
+        return np.sin(np.pi * f), np.cos(np.pi * f)
 
     @staticmethod
     def dot(f, g):
@@ -90,7 +96,7 @@ def test_bands_shrink_with_the_square(name):
         assert 3.0 < excess(name, seed, 0.1)[1] / excess(name, seed, 0.05)[1] < 5.0
 
 
-@pytest.mark.parametrize("name", ["product", "square", "reciprocal", "root", "arc_sine"])
+@pytest.mark.parametrize("name", ["product", "square", "reciprocal", "root", "arc_sine", "cosine"])
 def test_a_band_without_its_remainder_is_left(name, monkeypatch):
     """What a mistake in the remainder would do: the test above sees it."""
     monkeypatch.setattr(bounds, "_rounded", lambda band, size=0.0: band._replace(radius=0.7 * band.radius))

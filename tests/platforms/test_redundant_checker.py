@@ -18,7 +18,9 @@ from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.motions.amplitudes import named
 from cspr_jax.motions.given_limits import limits_over
 from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.proved import ProofSummary
 from cspr_jax.outputs import example_files, motion_files
+from cspr_jax.platforms import redundant_checker
 from cspr_jax.platforms.beta_hat import LARGEST
 from cspr_jax.platforms.redundant_checker import RedundantChecker
 from cspr_jax.robots.kernel_axes import prepared
@@ -116,6 +118,22 @@ def test_margins_are_those_of_linear_programs(robot, example, rows):
         assert segment["verdict"] == "feasible" and segment["tension_margin"] > 0.0
 
 
+def test_the_motion_of_a_plan_is_proved_to_its_margin(example):
+    margin, bound = example.answers.margin, example.answers.margin_bound
+    assert (bound > 0.0).all() and (bound <= margin).all()
+    np.testing.assert_allclose(bound, margin, rtol=0.02)
+
+
+def test_what_no_proof_closes_is_undecided(monkeypatch):
+    """Samples alone make no motion feasible."""
+    keys = FIXED | {"pose": [{"rest": True}, POSE]}
+    unproved = ProofSummary(Verdict.UNDECIDED.value, 9.0, -1.0, np.inf, np.nan)
+    monkeypatch.setattr(redundant_checker, "proved", lambda problem, motion: unproved)
+    planned = cspr_jax.plan(keys)
+    assert planned.answers.verdict.tolist() == [Verdict.UNDECIDED.value] and not planned.feasible
+    assert planned.answers.margin_bound[0] < 0.0
+
+
 def test_tensions_give_the_wrench(robot, rows):
     """To 1e-9 of the load, as the residual in the file says."""
     load = robot[2] * GRAVITY
@@ -205,7 +223,7 @@ def test_beta_hat_of_the_largest_margin(low):
         ({"tensions": "closed-form", "tension_max": [np.inf] * 8}, "without tension_max of every cable"),
         ({"tension_max": [np.inf] * 7}, "tension_max"),
         ({"robot": "fast", "tensions": "centred"}, 'tensions = "centred": must be absent: on 6 cables'),
-        ({"robot": "kntu-planar"}, "no family moves a planar platform"),
+        ({"robot": "kntu-planar"}, 'must be "spline" for a planar platform'),
         ({"family": "s-curve"}, 'family = "s-curve": must be'),
     ],
 )

@@ -194,15 +194,6 @@ FILES = {
     "eight": ("3R3T", BOX, f"platform_points = {CORNERS}"),
     "eight on a mass": ("3T", BOX, ""),
 }
-PLAN = """schema = 1
-robot = "robot.toml"
-family = "{family}"
-z0 = 1.4
-[[pose]]
-rest = true
-[[pose]]
-position = [0.5, 0.0, 1.4]
-"""
 SWEEP = """schema = 1
 map = "{kind}"
 robot = "robot.toml"
@@ -246,31 +237,27 @@ def test_files_of_any_number_of_cables_load(tmp_path, name):
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_plans_and_maps_of_more_cables_say_that_they_do_not_exist(tmp_path, name, capsys):
-    """Plans of platforms do: `test_redundant_plans`."""
+def test_maps_of_more_cables_say_that_they_do_not_exist(tmp_path, name, capsys):
+    """Plans of swings do, and maps of arcs of point masses: `swings.test_redundant_arcs`."""
     path, _ = written(tmp_path, name)
     is_platform, count = FILES[name][0] == "3R3T", len(FILES[name][1])
-    family = "hypocycloid" if is_platform else "transition" if "planar" in name else "hypocycloid-standard"
-    kind = "poses" if is_platform else "minimum-oscillations" if "planar" in name else "minimum-arcs"
+    family, kind = ("hypocycloid", "poses") if is_platform else ("transition", "minimum-oscillations")
     head = SWEEP.replace("from = {{ rest = true }}\n", "") if family == "transition" else SWEEP
-    (tmp_path / "plan.toml").write_text(PLAN.format(family=family))
     (tmp_path / "sweep.toml").write_text(head.format(family=family, kind=kind))
     freedoms = 6 if is_platform else 2 if "planar" in name else 3
-    commands = (["plan", "plan.toml"], ["run", "sweep.toml", "-o", str(tmp_path / "run")])
-    for command in commands[is_platform:]:
-        code = main([command[0], str(tmp_path / command[1]), *command[2:]])
-        line = capsys.readouterr().err.strip()
-        wanted = f'{path}: base_points: {count} points: must be {freedoms} for family "{family}" (it does not exist yet'
-        assert code == 2 and wanted in line and len(line.splitlines()) == 1, line
-        assert not (tmp_path / "run").exists()
+    code = main(["run", str(tmp_path / "sweep.toml"), "-o", str(tmp_path / "run")])
+    line = capsys.readouterr().err.strip()
+    wanted = f'{path}: base_points: {count} points: must be {freedoms} for family "{family}" (it does not exist yet'
+    assert code == 2 and wanted in line and len(line.splitlines()) == 1, line
+    assert not (tmp_path / "run").exists()
 
 
 def test_an_inline_robot_of_more_cables_is_named_where_it_stands(tmp_path, capsys):
     inline = f'{{ name = "r", base_points = {SPOOLS}, mass = 1.0 }}'
-    text = PLAN.format(family="hypocycloid-standard").replace('"robot.toml"', inline)
-    (tmp_path / "plan.toml").write_text(text)
-    assert main(["plan", str(tmp_path / "plan.toml")]) == 2
-    assert "plan.toml: robot.base_points: 4 points: must be 3 for family" in capsys.readouterr().err
+    text = SWEEP.replace("from = {{ rest = true }}\n", "").format(family="transition", kind="minimum-oscillations")
+    (tmp_path / "sweep.toml").write_text(text.replace('"robot.toml"', inline))
+    assert main(["run", str(tmp_path / "sweep.toml"), "-o", str(tmp_path / "run")]) == 2
+    assert "sweep.toml: robot.base_points: 4 points: must be 3 for family" in capsys.readouterr().err
 
 
 def test_a_limit_is_one_row():

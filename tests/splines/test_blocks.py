@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from support.splines import random_spline
 
-from cspr_jax.splines import blocks
+from cspr_jax.arithmetic import piecewise_bounds
 
 S = np.linspace(-1.0, 1.0, 33)
 NAMES = ("position", "velocity", "acceleration", "rotation", "angular_velocity", "angular_acceleration")
@@ -49,6 +49,6 @@ def test_bounds_shrink_with_the_square():
 
 def test_a_hull_of_the_whole_piece_would_not_do(monkeypatch):
     """Coefficients that are cut at the wrong share leave the band: the test above sees it."""
-    split = blocks._split
-    monkeypatch.setattr(blocks, "_split", lambda table, share: split(table, 0.9 * share))
+    split = piecewise_bounds._split
+    monkeypatch.setattr(piecewise_bounds, "_split", lambda table, share: split(table, 0.9 * share))
     assert excess(0, 5, 60)["acceleration"][0] > 1e-3

@@ -3,7 +3,8 @@
 import numpy as np
 from scipy.interpolate import CubicSpline, PPoly, make_interp_spline
 
-from cspr_jax.splines.motion import Spline, bernstein_of_powers
+from cspr_jax.arithmetic.piecewise_bounds import bernstein_of_powers
+from cspr_jax.splines.motion import Spline
 
 
 def pieces(times: np.ndarray, values: np.ndarray, degree: int) -> PPoly:
