@@ -7,24 +7,21 @@ that jax may trace pass where jax traces them.
 import functools
 import inspect
 import os
-import sys
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, TypeVar
 
 import numpy as np
 
+from cspr_jax.api.argument_rules import Rule, choice, integer, kind_of, many, real, word
 from cspr_jax.errors import InputError
-from cspr_jax.schema.given_numbers import ANY, Numbers, whole
+from cspr_jax.schema.given_numbers import ANY
 from cspr_jax.schema.limits import LARGEST_MAX_ARCS, LIMITS, UNCERTAINTIES
 
-# A rule refuses what an argument, named in errors, may not be.
-Rule = Callable[[str, Any], None]
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 LARGEST_LENGTH = 1e6  # m
 LARGEST_POPULATION, LARGEST_DIVISIONS, LARGEST_SAMPLES = 4096, 128, 1_000_000
 MOST = 10**9  # for numbers that functions bound more narrowly by themselves
-NESTED = 4  # lists in a list are searched so deep for what jax traces
 
 
 def checked(function: Function, name: str = "", module: str = "") -> Function:
@@ -61,70 +58,9 @@ def checked(function: Function, name: str = "", module: str = "") -> Function:
     return with_checks  # type: ignore[return-value]
 
 
-def _real(
-    allowed: str, *shapes: tuple[int | None, ...], traced: bool = False, none: bool = False, **bounds: Any
-) -> Rule:
-    # Real numbers of one of the shapes, or of any; bounds are those of `Numbers`.
-    kind = Numbers(allowed, shapes or None, **bounds)
-
-    def check(key: str, value: Any) -> None:
-        if not ((none and value is None) or (traced and _is_traced(value, NESTED))):
-            kind.array(key, value)
-
-    return check
-
-
-def _integer(least: int, largest: int, *, none: bool = False) -> Rule:
-    def check(key: str, value: Any) -> None:
-        if not (none and value is None):
-            whole(key, value, least, largest)
-
-    return check
-
-
-def _kind_of(allowed: str, *kinds: type, none: bool = False, has: tuple[str, ...] = ()) -> Rule:
-    # One of some types, or of a further one that need not be imported for this: it has these attributes.
-    def check(key: str, value: Any) -> None:
-        is_kind = isinstance(value, kinds) or (bool(has) and all(hasattr(value, name) for name in has))
-        if not (is_kind or (none and value is None)):
-            raise InputError(key, value, allowed)
-        if isinstance(value, str | os.PathLike) and "\0" in str(value):
-            raise InputError(key, value, f"{allowed}, without a NUL character")
-
-    return check
-
-
-def _choice(rule: Rule, *others: Any) -> Rule:
-    # The others are strings, or None.
-    def check(key: str, value: Any) -> None:
-        if not (value is None or isinstance(value, str)) or value not in others:
-            rule(key, value)
-
-    return check
-
-
-def _many(rule: Rule, allowed: str) -> Rule:
-    def check(key: str, value: Any) -> None:
-        if isinstance(value, str | bytes | Mapping) or not isinstance(value, Collection):
-            raise InputError(key, value, allowed)
-        for i, one in enumerate(value):
-            rule(f"{key}[{i}]", one)
-
-    return check
-
-
-def _is_traced(value: Any, depth: int) -> bool:
-    jax = sys.modules.get("jax")
-    if jax is None or not depth:
-        return False
-    if isinstance(value, list | tuple):
-        return any(_is_traced(part, depth - 1) for part in value)
-    return isinstance(value, jax.core.Tracer)
-
-
 def _record(allowed: str, names: Iterable[str]) -> Rule:
     # An object whose attributes of these names are real numbers.
-    kind, field = _kind_of(allowed, has=tuple(names)), _real("real numbers", traced=True, none=True, infinite=True)
+    kind, field = kind_of(allowed, has=tuple(names)), real("real numbers", traced=True, none=True, infinite=True)
 
     def check(key: str, value: Any) -> None:
         kind(key, value)
@@ -145,8 +81,8 @@ def _limits(key: str, value: Any) -> None:
 def _pose(key: str, value: Any) -> None:
     if not isinstance(value, list | tuple) or len(value) != 2:
         raise InputError(key, value, "a position (3,) in m, and a unit quaternion (4,), scalar first")
-    _real("a position: three finite numbers, m", (3,))(key, value[0])
-    _real("a unit quaternion: four numbers, scalar first", (4,))(key, value[1])
+    real("a position: three finite numbers, m", (3,))(key, value[0])
+    real("a unit quaternion: four numbers, scalar first", (4,))(key, value[1])
 
 
 def _coordinates(key: str, value: Any) -> None:
@@ -155,7 +91,7 @@ def _coordinates(key: str, value: Any) -> None:
     if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
         raise InputError(key, value, "a number by the name of each axis")
     for name, number in value.items():
-        _real("a finite number", ())(f"{key}[{name!r}]", number)
+        real("a finite number", ())(f"{key}[{name!r}]", number)
 
 
 def _results(key: str, value: Any) -> None:
@@ -173,13 +109,13 @@ def _result(key: str, value: Any) -> None:
 
 def _size(key: str, value: Any) -> None:
     if value is not None and not isinstance(value, str):
-        _real('a width and a height in cm, as (16, 10) or "16x10"', (2,))(key, value)
+        real('a width and a height in cm, as (16, 10) or "16x10"', (2,))(key, value)
 
 
 def _names(key: str, value: Any) -> None:
     # An iterator can be read only once: the function that reads it looks at its names.
     if not isinstance(value, str | Iterator):
-        _many(_kind_of("a string", str), "a name, or several")(key, value)
+        many(kind_of("a string", str), "a name, or several")(key, value)
 
 
 def _limits_or_keys(key: str, value: Any) -> None:
@@ -189,93 +125,94 @@ def _limits_or_keys(key: str, value: Any) -> None:
 
 def _instants(key: str, value: Any) -> None:  # or what has a motion in itself: a file, a spline, a function
     if not (isinstance(value, str | os.PathLike) or callable(value) or hasattr(value, "state")):
-        _real("instants (n,) in s, a path, a spline of SciPy, or a motion", (ANY,))(key, value)
+        real("instants (n,) in s, a path, a spline of SciPy, or a motion", (ANY,))(key, value)
 
 
-_NUMBER = _real("a number", (), infinite=True, nan=True)
-_NUMBER_OR_NONE = _real("a number, or None", (), none=True, infinite=True, nan=True)
-_TEXT = _kind_of("a string", str)
-_TEXT_OR_NONE = _kind_of("a string, or None", str, none=True)
-_FLAG = _kind_of("True or False", bool, np.bool_)
-_PATH = _kind_of("a path", str, os.PathLike)
-_PATH_OR_NONE = _kind_of("a path, or None", str, os.PathLike, none=True)
-_FILE = _kind_of("the path of a file, or a dictionary of what it holds", str, os.PathLike, Mapping)
-_RESULT = _kind_of("a result, or the path of one", str, os.PathLike, has=("data", "axes"))
-_ROBOT = _kind_of(
+_NUMBER = real("a number", (), infinite=True, nan=True)
+_NUMBER_OR_NONE = real("a number, or None", (), none=True, infinite=True, nan=True)
+_TEXT = kind_of("a string", str)
+_TEXT_OR_NONE = kind_of("a string, or None", str, none=True)
+_FLAG = kind_of("True or False", bool, np.bool_)
+_PATH = kind_of("a path", str, os.PathLike)
+_PATH_OR_NONE = kind_of("a path, or None", str, os.PathLike, none=True)
+_FILE = kind_of("the path of a file, or a dictionary of what it holds", str, os.PathLike, Mapping)
+_RESULT = kind_of("a result, or the path of one", str, os.PathLike, has=("data", "axes"))
+_ROBOT = kind_of(
     "a point mass or a platform, as load_robot, point_mass or platform gives it",
     has=("base_points", "n_cables", "limits", "pattern"),
 )
-_ROBOT_OR_NAME = _kind_of("a robot, the name of one, or its file", str, os.PathLike, has=("base_points", "limits"))
-_MANY_POINTS = _real("None, or finite numbers of shape (k, n, 3)", (ANY, ANY, 3), none=True)
+_ROBOT_OR_NAME = kind_of("a robot, the name of one, or its file", str, os.PathLike, has=("base_points", "limits"))
+_MANY_POINTS = real("None, or finite numbers of shape (k, n, 3)", (ANY, ANY, 3), none=True)
+_ENDS = word("rest", "natural", "periodic")
 _PLAN = ("answers", "points", "robot_file")  # attributes of a plan
 _MOTION = ("state", "duration")
-_POSITIVE = _real("a finite number > 0", (), least=0.0, above=True)
-_POSITIVE_OR_NONE = _real("a finite number > 0, or None", (), least=0.0, above=True, none=True)
-_TIME = _real("a finite number > 0, s", (), least=0.0, above=True, traced=True, none=True)
+_POSITIVE = real("a finite number > 0", (), least=0.0, above=True)
+_POSITIVE_OR_NONE = real("a finite number > 0, or None", (), least=0.0, above=True, none=True)
+_TIME = real("a finite number > 0, s", (), least=0.0, above=True, traced=True, none=True)
 LENGTHS: dict[str, Any] = {"least": -LARGEST_LENGTH, "largest": LARGEST_LENGTH}
-_POINT = _real("three finite numbers, at most 1e6 m", (3,), traced=True, **LENGTHS)
-_POINT_OR_NONE = _real("three finite numbers, at most 1e6 m, or None", (3,), traced=True, none=True, **LENGTHS)
+_POINT = real("three finite numbers, at most 1e6 m", (3,), traced=True, **LENGTHS)
+_POINT_OR_NONE = real("three finite numbers, at most 1e6 m, or None", (3,), traced=True, none=True, **LENGTHS)
 POINTS_WORDS = "finite numbers of shape (n, 3), n >= 1, at most 1e6 m"
-_POINTS = _real(POINTS_WORDS, (ANY, 3), **LENGTHS)
-_POINTS_OR_NONE = _real(f"{POINTS_WORDS}, or None", (ANY, 3), none=True, **LENGTHS)
-_STARTS = _real("finite numbers of shape (3,) or (n, 3), at most 1e6 m", (3,), (ANY, 3), **LENGTHS)
-_STARTS_OR_NONE = _real(
+_POINTS = real(POINTS_WORDS, (ANY, 3), **LENGTHS)
+_POINTS_OR_NONE = real(f"{POINTS_WORDS}, or None", (ANY, 3), none=True, **LENGTHS)
+_STARTS = real("finite numbers of shape (3,) or (n, 3), at most 1e6 m", (3,), (ANY, 3), **LENGTHS)
+_STARTS_OR_NONE = real(
     "None, or finite numbers of shape (3,) or (n, 3), at most 1e6 m", (3,), (ANY, 3), none=True, **LENGTHS
 )
-_GEOMETRY = _real("finite numbers of shape (n, 3), one row a cable, at most 1e6 m", (ANY, 3), traced=True, **LENGTHS)
+_GEOMETRY = real("finite numbers of shape (n, 3), one row a cable, at most 1e6 m", (ANY, 3), traced=True, **LENGTHS)
 DEPTH: dict[str, Any] = {"least": 0.0, "above": True, "largest": LARGEST_LENGTH}
 DEPTH_WORDS = "a number > 0, at most 1e6 m"
-_QUATERNIONS = _real("None, or unit quaternions of shape (n, 4), scalar first", (ANY, 4), none=True)
-_TENSIONS = _real("a number in N, or one a cable", (), (ANY,), none=True, infinite=True)
-_RANGE = _real("[least, largest], at most 1e6 m", (2,), none=True, **LENGTHS)
-_AMPLITUDE = _kind_of("the name of an amplitude function, or one of amplitude(...)", str, has=("coefficients", "knots"))
-_ARCS = _integer(1, LARGEST_MAX_ARCS)
-_WORKERS = _integer(-MOST, MOST, none=True)
+_QUATERNIONS = real("None, or unit quaternions of shape (n, 4), scalar first", (ANY, 4), none=True)
+_TENSIONS = real("a number in N, or one a cable", (), (ANY,), none=True, infinite=True)
+_RANGE = real("[least, largest], at most 1e6 m", (2,), none=True, **LENGTHS)
+_AMPLITUDE = kind_of("the name of an amplitude function, or one of amplitude(...)", str, has=("coefficients", "knots"))
+_ARCS = integer(1, LARGEST_MAX_ARCS)
+_WORKERS = integer(-MOST, MOST, none=True)
 
 # Rules by the names of arguments, for all functions with an argument of this name.
 ARGUMENTS: dict[str, Rule] = {
-    "acceleration": _real("a number >= 0, in m/s^2, or None", (), least=0.0, none=True),
+    "acceleration": real("a number >= 0, in m/s^2, or None", (), least=0.0, none=True),
     "acceleration_time": _TIME,
     "accelerations": _POINTS_OR_NONE,
     "accept_environment_change": _FLAG,
     "amplitude": _AMPLITUDE,
     "anyway": _FLAG,
-    "arcs": _real("a whole number from 1 on", (), least=1.0, largest=MOST, traced=True),
+    "arcs": real("a whole number from 1 on", (), least=1.0, largest=MOST, traced=True),
     "at": _coordinates,
     "base_points": _GEOMETRY,
     "best": _names,
-    "beta_hat": _choice(
-        _real('a finite number, "preferred", or None', (), least=-100.0, largest=100.0), "preferred", None
+    "beta_hat": choice(
+        real('a finite number, "preferred", or None', (), least=-100.0, largest=100.0), "preferred", None
     ),
-    "cable_diameter": _real("a number >= 0, in m, or None", (), least=0.0, none=True),
-    "cable_error": _real("a number >= 0, in m, or one a place", (), (ANY,), least=0.0),
+    "cable_diameter": real("a number >= 0, in m, or None", (), least=0.0, none=True),
+    "cable_error": real("a number >= 0, in m, or one a place", (), (ANY,), least=0.0),
     "cable_set": _TEXT_OR_NONE,
-    "capacity_length": _real("a number > 0, in m, or None", (), least=0.0, above=True, none=True),
-    "cells": _many(_coordinates, "a list of coordinates by axis"),
-    "centre_of_mass": _real("three coordinates, at most 1e6 m, or None", (3,), none=True, **LENGTHS),
+    "capacity_length": real("a number > 0, in m, or None", (), least=0.0, above=True, none=True),
+    "cells": many(_coordinates, "a list of coordinates by axis"),
+    "centre_of_mass": real("three coordinates, at most 1e6 m, or None", (3,), none=True, **LENGTHS),
     "condition": _TEXT,
     "control_point": _POINT,
     "control_points": _POINTS_OR_NONE,
     "definition": _TEXT,
     "directory": _PATH_OR_NONE,
-    "divisions": _integer(4, LARGEST_DIVISIONS),
+    "divisions": integer(4, LARGEST_DIVISIONS),
     "dpi": _NUMBER_OR_NONE,
     "drum_radius": _POSITIVE,
-    "duration": _real("a finite number > 0, s", (), least=0.0, above=True, traced=True),
-    "durations": _real("finite numbers > 0 of shape (n,), s", (ANY,), least=0.0, above=True),
+    "duration": real("a finite number > 0, s", (), least=0.0, above=True, traced=True),
+    "durations": real("finite numbers > 0 of shape (n,), s", (ANY,), least=0.0, above=True),
     "end": _POINT,
     "ends": _POINTS,
     "envelope": _FLAG,
     "epsilon": _NUMBER_OR_NONE,
-    "errors": _kind_of("LaunchErrors(...)", has=("throws", "encoder", "seed")),
+    "errors": kind_of("LaunchErrors(...)", has=("throws", "encoder", "seed")),
     "family": _TEXT,
     "fine": _FLAG,
     "folder": _PATH,
     "font_size": _NUMBER_OR_NONE,
     "given": _FILE,
     "gravity": _POSITIVE,
-    "inertia": _real("three rows of three finite numbers, kg m^2", (3, 3), traced=True),
-    "interpolation": _TEXT_OR_NONE,
+    "inertia": real("three rows of three finite numbers, kg m^2", (3, 3), traced=True),
+    "interpolation": word("cubic", "quintic", "hermite"),
     "kernels": _PATH_OR_NONE,
     "law": _TEXT,
     "like": _TEXT,
@@ -286,29 +223,29 @@ ARGUMENTS: dict[str, Rule] = {
     "max_acceleration": _POSITIVE_OR_NONE,
     "max_arcs": _ARCS,
     "max_duration": _POSITIVE_OR_NONE,
-    "motion": _kind_of("a motion, as hypocycloid, a plan or answers give it", has=_MOTION),
+    "motion": kind_of("a motion, as hypocycloid, a plan or answers give it", has=_MOTION),
     "name": _TEXT,
     "names": _names,
-    "on_tile": _kind_of("a function, or None", none=True, has=("__call__",)),
+    "on_tile": kind_of("a function, or None", none=True, has=("__call__",)),
     "orientations": _QUATERNIONS,
-    "oscillations": _real("a number > 0", (), least=0.0, above=True, largest=MOST, traced=True),
+    "oscillations": real("a number > 0", (), least=0.0, above=True, largest=MOST, traced=True),
     "output": _PATH_OR_NONE,
     "path": _PATH,
     "pattern": _TEXT_OR_NONE,
-    "place": _real("three finite numbers, at most 1e6 m", (3,), **LENGTHS),
+    "place": real("three finite numbers, at most 1e6 m", (3,), **LENGTHS),
     "plan": _PATH_OR_NONE,
     "planar": _FLAG,
     "platform_points": _GEOMETRY,
     "platform_radius": _POSITIVE,
-    "population": _integer(16, LARGEST_POPULATION),
+    "population": integer(16, LARGEST_POPULATION),
     "positions": _POINTS,
     "precision": _TEXT,
     "preset": _TEXT_OR_NONE,
     "quaternions": _QUATERNIONS,
-    "problem": _kind_of("a problem, as make_problem gives it", has=("robot", "limits", "amplitude")),
+    "problem": kind_of("a problem, as make_problem gives it", has=("robot", "limits", "amplitude")),
     "prune": _FLAG,
-    "pulley_axes": _real("a vector [x, y, z], or one a cable, or None", (3,), (ANY, 3), none=True),
-    "pulley_radius": _real("a number >= 0, in m, or one a cable, or None", (), (ANY,), none=True),
+    "pulley_axes": real("a vector [x, y, z], or one a cable, or None", (3,), (ANY, 3), none=True),
+    "pulley_radius": real("a number >= 0, in m, or one a cable, or None", (), (ANY,), none=True),
     "pulses": _POSITIVE,
     "quantity": _TEXT_OR_NONE,
     "rate": _NUMBER_OR_NONE,
@@ -320,7 +257,7 @@ ARGUMENTS: dict[str, Rule] = {
     "results": _results,
     "robot": _ROBOT,
     "rule": _TEXT,
-    "samples": _integer(1, LARGEST_SAMPLES),
+    "samples": integer(1, LARGEST_SAMPLES),
     "scheduler": _TEXT_OR_NONE,
     "size": _size,
     "smooth": _POSITIVE_OR_NONE,
@@ -333,68 +270,69 @@ ARGUMENTS: dict[str, Rule] = {
     "step": _NUMBER,
     "target": _POINT,
     "targets": _POINTS,
-    "tau": _real("a number from 0 to 1", (), least=0.0, largest=1.0, traced=True),
+    "tau": real("a number from 0 to 1", (), least=0.0, largest=1.0, traced=True),
     "tension_max": _TENSIONS,
     "tension_min": _TENSIONS,
     "times": _instants,
     "title": _FLAG,
-    "trajectories": _integer(-MOST, MOST),
-    "values": _integer(1, MOST, none=True),
+    "trajectories": integer(-MOST, MOST),
+    "values": integer(1, MOST, none=True),
     "velocities": _POINTS_OR_NONE,
     "variable": _FLAG,
     "what": _TEXT,
     "workers": _WORKERS,
-    "wrench_box": _real("finite numbers, one a degree of freedom, or None", (ANY,), none=True),
-    "wrench_ellipsoid": _real("finite numbers, one a degree of freedom, or None", (ANY,), none=True),
-    "wrenches": _real("finite numbers of shape (k, dof), or None", (ANY, ANY), none=True),
-    "z0": _real(f"{DEPTH_WORDS}, or (n,) of them", (), (ANY,), **DEPTH),
+    "wrench_box": real("finite numbers, one a degree of freedom, or None", (ANY,), none=True),
+    "wrench_ellipsoid": real("finite numbers, one a degree of freedom, or None", (ANY,), none=True),
+    "wrenches": real("finite numbers of shape (k, dof), or None", (ANY, ANY), none=True),
+    "z0": real(f"{DEPTH_WORDS}, or (n,) of them", (), (ANY,), **DEPTH),
     "z_axis": _TEXT,
 }
 # These rules hold for functions whose argument differs from the usual one of the same name.
-_ONE_DEPTH = _real(DEPTH_WORDS, (), traced=True, **DEPTH)
+_ONE_DEPTH = real(DEPTH_WORDS, (), traced=True, **DEPTH)
 OF_FUNCTIONS: dict[str, Rule] = {
-    "AvailableAccelerations.margin.accelerations": _real("finite numbers of shape (3,) or (n, 3)", (3,), (ANY, 3)),
-    "AvailableAccelerations.verdict.accelerations": _real("finite numbers of shape (3,) or (n, 3)", (3,), (ANY, 3)),
-    "attainable.z0": _real(f"{DEPTH_WORDS}, or None", (), none=True, **DEPTH),
+    "AvailableAccelerations.margin.accelerations": real("finite numbers of shape (3,) or (n, 3)", (3,), (ANY, 3)),
+    "AvailableAccelerations.verdict.accelerations": real("finite numbers of shape (3,) or (n, 3)", (3,), (ANY, 3)),
+    "attainable.z0": real(f"{DEPTH_WORDS}, or None", (), none=True, **DEPTH),
     "bezier.start": _POINT,
     "check.duration": _POSITIVE_OR_NONE,
-    "check.ends": _TEXT_OR_NONE,
+    "check.ends": _ENDS,
     "check.limits": _limits_or_keys,
-    "check.point": _TEXT_OR_NONE,
+    "check.point": word("mass-centre", "origin"),
     "check.positions": _POINTS_OR_NONE,
     "check.robot": _ROBOT_OR_NAME,
     "check_many.accelerations": _MANY_POINTS,
-    "check_many.ends": _TEXT_OR_NONE,
+    "check_many.ends": _ENDS,
     "check_many.limits": _limits_or_keys,
-    "check_many.positions": _real("finite numbers of shape (k, n, 3), at most 1e6 m", (ANY, ANY, 3), **LENGTHS),
-    "check_many.quaternions": _real("None, or quaternions of shape (k, n, 4)", (ANY, ANY, 4), none=True),
+    "check_many.positions": real("finite numbers of shape (k, n, 3), at most 1e6 m", (ANY, ANY, 3), **LENGTHS),
+    "check_many.quaternions": real("None, or quaternions of shape (k, n, 4)", (ANY, ANY, 4), none=True),
     "check_many.robot": _ROBOT_OR_NAME,
-    "check_many.times": _real("instants (n,) or (k, n), s", (ANY,), (ANY, ANY)),
+    "check_many.times": real("instants (n,) or (k, n), s", (ANY,), (ANY, ANY)),
     "check_many.velocities": _MANY_POINTS,
     "hypocycloid.z0": _ONE_DEPTH,
     "keep_compiled_code.folder": _PATH_OR_NONE,
     "launch_range.start": _STARTS,
-    "list_robots.names": _many(_kind_of("a string, or a path", str, os.PathLike), "names and paths of robots"),
+    "list_robots.names": many(kind_of("a string, or a path", str, os.PathLike), "names and paths of robots"),
     "least_time.start": _STARTS,
-    "minimum_arcs.amplitude": _choice(_AMPLITUDE, None),
+    "minimum_arcs.amplitude": choice(_AMPLITUDE, None),
     "minimum_arcs.start": _STARTS_OR_NONE,
-    "minimum_pose_arcs.start": _choice(_pose, None),
-    "parallel_pair_robot.inertia": _real("three rows of three finite numbers, kg m^2, or None", (3, 3), none=True),
+    "minimum_pose_arcs.start": choice(_pose, None),
+    "parallel_pair_robot.inertia": real("three rows of three finite numbers, kg m^2, or None", (3, 3), none=True),
     "platform.pattern": _TEXT,
     "point_mass_robot.pattern": _TEXT,
-    "platform_motion.beta_hat": _real("two finite numbers", (2,), traced=True),
-    "platform_motion.orientations": _real("two unit quaternions, scalar first", (2, 4), traced=True),
+    "platform_motion.beta_hat": real("two finite numbers", (2,), traced=True),
+    "platform_motion.orientations": real("two unit quaternions, scalar first", (2, 4), traced=True),
     "platform_motion.z0": _ONE_DEPTH,
-    "replay.given": _kind_of("a plan, its file, or a dictionary of that", str, os.PathLike, Mapping, has=_PLAN),
-    "report.given": _kind_of("a result, a plan, or the path of one", str, os.PathLike, has=("to_xarray",)),
+    "replay.given": kind_of("a plan, its file, or a dictionary of that", str, os.PathLike, Mapping, has=_PLAN),
+    "report.given": kind_of("a result, a plan, or the path of one", str, os.PathLike, has=("to_xarray",)),
     "report.output": _PATH,
     "status.directory": _PATH,
-    "spline.ends": _TEXT_OR_NONE,
-    "spline.positions": _POINTS_OR_NONE,
+    "spline.ends": _ENDS,
+    "spline.positions": _POINTS,
+    "spline.times": real("instants (n,), s", (ANY,)),
     "straight_line.start": _POINT,
     "table.amplitude": _TEXT_OR_NONE,
     "table.definition": _TEXT_OR_NONE,
     "table.name": _TEXT_OR_NONE,
-    "table.max_arcs": _integer(1, LARGEST_MAX_ARCS, none=True),
+    "table.max_arcs": integer(1, LARGEST_MAX_ARCS, none=True),
     "transition.z0": _ONE_DEPTH,
 }

@@ -14,6 +14,7 @@ from cspr_jax.api.plans import Plan
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.build.robots import build_robot
+from cspr_jax.build.surroundings import scene_of
 from cspr_jax.config.plan import PlanFile, plan_keys
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import InputError
@@ -122,7 +123,9 @@ class Check:
             motion = cast(Spline, self.plan.legs[0].motions[0])
             if not hasattr(motion, "stretched") or not hasattr(motion, "bounds"):
                 raise InputError("motion", type(motion).__name__, "a spline or a file: of others nothing is proved")
-            least = least_stretching(lambda factor: proof_of(self.plan.problem, motion.stretched(factor)))
+            plan = self.plan
+            scene = scene_of(plan.problem.robot, plan.robot_file, plan.frame, plan.keys, NAME)
+            least = least_stretching(lambda factor: proof_of(plan.problem, motion.stretched(factor), scene))
             if not np.isfinite(least.factor):
                 return Stretched(np.nan, least.is_static, None)
             factor = least.factor * (self.plan.keys.stretch or 1.0)

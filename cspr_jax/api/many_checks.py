@@ -13,17 +13,19 @@ from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.build.problems import build_problem
 from cspr_jax.build.robots import build_robot
+from cspr_jax.build.surroundings import scene_of
 from cspr_jax.config.equivalents import as_moved
 from cspr_jax.config.plan import plan_keys
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import InputError
 from cspr_jax.motions.cause import Cause
-from cspr_jax.motions.proved_answers import proved_answers
+from cspr_jax.motions.proved_answers import answers_of, proofs_of
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
 from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.families import FAMILIES
 from cspr_jax.splines.files import placed_inward, reference_of, samples_of, source_spline
+from cspr_jax.splines.several import SeveralSplines
 
 
 @dataclasses.dataclass(frozen=True)
@@ -89,6 +91,8 @@ def check_many(
     keys = plan_keys(check_keys(robot, limits, interpolation=interpolation, ends=ends), NAME)
     columns = (positions, quaternions, velocities, accelerations)
     count = len(np.asarray(positions))
+    if not count:
+        raise InputError("positions", None, "must hold at least one motion", fault="none")
     instants = np.broadcast_to(np.asarray(times, float), (count, np.shape(times)[-1]))
     with double_precision():
         file = as_moved(resolve_robot(keys.robot, NAME, Path()), [FAMILIES["spline"].legs])
@@ -104,7 +108,9 @@ def check_many(
                 motions.append(placed_inward(source_spline(samples, **settings), axes, reference))
             except InputError as error:
                 raise InputError(f"motion {i}, {error.key}", error.value, error.allowed, fault=error.fault) from error
-        answers = proved_answers(problem, motions)
+        several, scene = SeveralSplines(motions), scene_of(problem.robot, file, axes, keys, NAME)
+        proofs = proofs_of(problem, several.bounds, several.durations, scene, several.jumps)
+        answers = answers_of(proofs, several.durations)
     names = ("verdict", "duration", "margin", "margin_bound", "limit_margin")
     arrays = {name: getattr(answers, name) for name in names}
     causes = [() if answers.feasible[i] else answers.proved_causes(i, axes) for i in range(count)]

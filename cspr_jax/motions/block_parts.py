@@ -16,7 +16,7 @@ from cspr_jax.motions.block_slacks import BlockSlacks
 SMALL, WIDER = 0.5, 1e-3
 
 
-class Blocks(NamedTuple):
+class TimeBlocks(NamedTuple):
     """Blocks of time.
 
     Fields:
@@ -31,7 +31,7 @@ class Blocks(NamedTuple):
     end: np.ndarray
     slacks: BlockSlacks
 
-    def taken(self, chosen: np.ndarray) -> "Blocks":
+    def taken(self, chosen: np.ndarray) -> "TimeBlocks":
         """Some of the blocks.
 
         Args:
@@ -41,7 +41,7 @@ class Blocks(NamedTuple):
             them.
         """
         slacks = BlockSlacks(*(bounds[chosen] for bounds in self.slacks))
-        return Blocks(self.motion[chosen], self.start[chosen], self.end[chosen], slacks)
+        return TimeBlocks(self.motion[chosen], self.start[chosen], self.end[chosen], slacks)
 
     def undecided(self) -> np.ndarray:
         """Tell which criteria are neither met nor broken throughout.
@@ -71,7 +71,7 @@ class Blocks(NamedTuple):
         first, last = first - WIDER, last + WIDER
         return np.where(first < WIDER, 0.0, first), np.where(last > 1.0 - WIDER, 1.0, last)
 
-    def cut(self, first: np.ndarray, last: np.ndarray, jumps: np.ndarray) -> "tuple[Blocks, Blocks]":
+    def cut(self, first: np.ndarray, last: np.ndarray, jumps: np.ndarray) -> "tuple[TimeBlocks, TimeBlocks]":
         """Cut each block before and after its rest, or in two; where accelerations jump within a block, there.
 
         Args:
@@ -96,7 +96,7 @@ class Blocks(NamedTuple):
         halves = [inner._replace(end=middle).taken(is_split), inner._replace(start=middle).taken(is_split)]
         return joined(outside), joined([inner.taken(~is_split), *halves])
 
-    def _part(self, chosen, first, last, **edges) -> "Blocks":
+    def _part(self, chosen, first, last, **edges) -> "TimeBlocks":
         # Bounds by the lines between two shares of the block, beyond the edges by more than these are rounded.
         low, high, low_rise, high_rise = self.slacks
         ends = [np.broadcast_to(share, len(low))[:, None] for share in (first, last)]
@@ -107,7 +107,7 @@ class Blocks(NamedTuple):
         level = np.zeros_like(low)
         return self._replace(slacks=BlockSlacks(low, high, level, level), **edges).taken(chosen)
 
-    def no_looser_than(self, whole: BlockSlacks) -> "Blocks":
+    def no_looser_than(self, whole: BlockSlacks) -> "TimeBlocks":
         """The blocks with the better of two bounds.
 
         Args:
@@ -128,7 +128,7 @@ class Blocks(NamedTuple):
         )
 
 
-def joined(several: "list[Blocks]") -> Blocks:
+def joined(several: "list[TimeBlocks]") -> TimeBlocks:
     """All blocks of several lists.
 
     Returns:
@@ -136,7 +136,7 @@ def joined(several: "list[Blocks]") -> Blocks:
     """
     bounds = (np.concatenate(parts) for parts in zip(*(blocks.slacks for blocks in several), strict=True))
     motion, start, end = (np.concatenate(parts) for parts in zip(*(blocks[:3] for blocks in several), strict=True))
-    return Blocks(motion, start, end, BlockSlacks(*bounds))
+    return TimeBlocks(motion, start, end, BlockSlacks(*bounds))
 
 
 def _jump_within(

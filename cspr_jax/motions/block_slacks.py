@@ -181,7 +181,7 @@ def block_slacks(
     rows = criteria(robot, limits, scene)
     at_instants = np.array([row.flag in AT_INSTANTS for row in rows])
     is_open = ~((low > 0.0) | (high < 0.0))[:, at_instants]
-    # What happens at the border of two blocks is within the second one and the end of the first.
+    # An event at the border of two blocks is within the second one and the end of the first.
     before = np.maximum(2.0 * start - end, 0.0)
     short = np.flatnonzero(is_open.any(1) & (end - before <= INSTANT))
     if len(short):

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from cspr_jax.motions.block_parts import Blocks, joined
+from cspr_jax.motions.block_parts import TimeBlocks, joined
 from cspr_jax.motions.block_slacks import BlockSlacks
 
 # Blocks at the start, and the share of itself, or of a tenth of usual ones, to which the smallest slack is narrowed.
@@ -19,7 +19,7 @@ FIRST = 32
 CLOSE = 0.01
 # Blocks of one motion, all cuts together; beyond, what is open stays undecided, and margins are less close.
 MOST, NARROWING = 100_000, 4_000
-# Blocks that narrow a margin are no shorter than this part of the resolution.
+# TimeBlocks that narrow a margin are no shorter than this part of the resolution.
 SHORTEST = 1e-3
 
 
@@ -97,8 +97,8 @@ def time_proofs(
         is_open = undecided.any(1) & (blocks.end - blocks.start > resolution)
         is_open &= (totals + 2 * np.bincount(blocks.motion[is_open], minlength=count))[blocks.motion] <= MOST
         leaves.append(blocks.taken(~is_open))
-        rest = blocks.rest(np.zeros(1), undecided, has_upper=True)
-        outside, inner = blocks.taken(is_open).cut(*(share[is_open] for share in rest), at_jumps)
+        first, last = blocks.rest(np.zeros(1), undecided, has_upper=True)
+        outside, inner = blocks.taken(is_open).cut(first[is_open], last[is_open], at_jumps)
         leaves.append(outside)
         blocks = _bounded(slacks, *inner)
         totals += np.bincount(blocks.motion, minlength=count)
@@ -106,11 +106,11 @@ def time_proofs(
     return _proofs(narrow.taken(np.lexsort((narrow.start, narrow.motion))), totals + more)
 
 
-def _bounded(slacks, motion: np.ndarray, start: np.ndarray, end: np.ndarray, whole: BlockSlacks | None) -> Blocks:
+def _bounded(slacks, motion: np.ndarray, start: np.ndarray, end: np.ndarray, whole: BlockSlacks | None) -> TimeBlocks:
     # A part has no looser bounds than the whole.
     if whole is not None and not len(start):
-        return Blocks(motion, start, end, whole)
-    blocks = Blocks(motion, start, end, slacks(motion, start, end).complete())
+        return TimeBlocks(motion, start, end, whole)
+    blocks = TimeBlocks(motion, start, end, slacks(motion, start, end).complete())
     return blocks if whole is None else blocks.no_looser_than(whole)
 
 
@@ -130,8 +130,8 @@ def _least(motion: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
 
 
 def _narrowed(
-    slacks, blocks: Blocks, usual: np.ndarray, resolution: float, jumps: np.ndarray
-) -> tuple[Blocks, np.ndarray]:
+    slacks, blocks: TimeBlocks, usual: np.ndarray, resolution: float, jumps: np.ndarray
+) -> tuple[TimeBlocks, np.ndarray]:
     # Cut the blocks that may hold the smallest slack of a criterion until its bounds are close; tell how many more.
     count, leaves = len(usual), []
     more = np.zeros(count, int)
@@ -143,8 +143,8 @@ def _narrowed(
         is_open = matters.any(1) & (blocks.end - blocks.start > SHORTEST * resolution)
         is_open &= (more < NARROWING)[blocks.motion]
         leaves.append(blocks.taken(~is_open))
-        rest = blocks.rest(level, matters, has_upper=False)
-        outside, inner = blocks.taken(is_open).cut(*(share[is_open] for share in rest), jumps)
+        first, last = blocks.rest(level, matters, has_upper=False)
+        outside, inner = blocks.taken(is_open).cut(first[is_open], last[is_open], jumps)
         leaves.append(outside)
         blocks = _bounded(slacks, *inner)
         more += np.bincount(blocks.motion, minlength=count)
@@ -152,7 +152,7 @@ def _narrowed(
     return joined(leaves), more
 
 
-def _proofs(blocks: Blocks, totals: np.ndarray) -> list[TimeProof]:
+def _proofs(blocks: TimeBlocks, totals: np.ndarray) -> list[TimeProof]:
     count = len(totals)
     low, high = (_least(blocks.motion, side, count) for side in blocks.slacks[:2])
     failing = [_merged(blocks, column < 0.0, count) for column in blocks.slacks.high.T]
@@ -170,7 +170,7 @@ def _proofs(blocks: Blocks, totals: np.ndarray) -> list[TimeProof]:
     ]
 
 
-def _merged(blocks: Blocks, flags: np.ndarray, count: int) -> list[np.ndarray]:
+def _merged(blocks: TimeBlocks, flags: np.ndarray, count: int) -> list[np.ndarray]:
     # Join neighbouring blocks of one motion to intervals, (m, 2) for each motion.
     is_next = np.diff(blocks.motion, prepend=-1) == 0
     before, after = np.append(False, flags[:-1]) & is_next, np.append(flags[1:] & is_next[1:], False)

@@ -8,7 +8,7 @@ import numpy as np
 from cspr_jax.robots import clearance
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.clearance import Meeting, Scene
-from cspr_jax.robots.convex_gaps import BOX, BOX_SIGNS, Planes
+from cspr_jax.robots.convex_gaps import BOX, BOX_SIGNS, FacePlanes
 from cspr_jax.robots.interference import contacts
 from cspr_jax.robots.platform import RIGID, PlatformRobot
 from cspr_jax.robots.shapes import Box, Cylinder, Hull, is_flat
@@ -30,7 +30,7 @@ class Shape(NamedTuple):
     corners: Any
     edges: Any
     faces: Any
-    planes: Planes
+    planes: FacePlanes
 
 
 class Bodies(NamedTuple):
@@ -142,7 +142,7 @@ def _shape(shape: Box | Hull, thinnest: float) -> Shape:
         outward = np.stack([-shape.rotation.T, shape.rotation.T], axis=1).reshape(6, 3)
         normals = np.repeat(outward, 2, axis=0)
         offsets = np.einsum("fi,fi->f", normals, corners[faces[:, 0]])
-        return Shape(corners, edges, faces, Planes(normals, offsets))
+        return Shape(corners, edges, faces, FacePlanes(normals, offsets))
     points = np.concatenate([shape.triangles.reshape(-1, 3), shape.edges.reshape(-1, 3)])
     corners, places = np.unique(points, axis=0, return_inverse=True)
     faces, edges = np.split(places.ravel(), [3 * len(shape.triangles)])
@@ -150,4 +150,4 @@ def _shape(shape: Box | Hull, thinnest: float) -> Shape:
     a, b, c = np.moveaxis(shape.triangles, 1, 0)
     flipped = np.einsum("fi,fi->f", np.cross(b - a, c - a), shape.normals) < 0.0
     faces = np.where(flipped[:, None], faces[:, ::-1], faces)
-    return Shape(corners, edges, faces, Planes(shape.normals, shape.offsets))
+    return Shape(corners, edges, faces, FacePlanes(shape.normals, shape.offsets))

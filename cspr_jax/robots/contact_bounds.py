@@ -98,9 +98,6 @@ def passings(robot: AnyRobot, bodies: Bodies, state: StateBounds, cables: CableB
 def corner_depths(body: Shape, state: StateBounds) -> AffineBounds:
     """Bounds of the depths of the corners of a platform.
 
-    Args:
-        body: its shape.
-
     Returns:
         (n_corners,) z, z down, m.
     """

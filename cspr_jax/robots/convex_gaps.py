@@ -39,8 +39,8 @@ class Solid(NamedTuple):
     faces: Any
 
 
-class Planes(NamedTuple):
-    """Planes of the faces of a body that does not move.
+class FacePlanes(NamedTuple):
+    """FacePlanes of the faces of a body that does not move.
 
     Fields:
         normals: (n_faces, 3) outward unit normals.
@@ -138,7 +138,7 @@ def distance_bound(first: AffineBounds, second: AffineBounds) -> Array:
     return jnp.sqrt(norm_squared(second - first).high()) * (1.0 + ROUNDING)
 
 
-def depth_bound(body: Solid, planes: Planes) -> Array:
+def depth_bound(body: Solid, planes: FacePlanes) -> Array:
     """Bound of how deep a body reaches into another one that does not move, by points of its edges.
 
     Args:
@@ -155,7 +155,7 @@ def depth_bound(body: Solid, planes: Planes) -> Array:
     return jnp.where(least < 0.0, least, jnp.inf)
 
 
-def _inside(start: Array, end: Array, planes: Planes) -> Array:
+def _inside(start: Array, end: Array, planes: FacePlanes) -> Array:
     # Share of each edge at which the middle of its part behind all planes lies, or would lie.
     high, low = (points @ planes.normals.T - planes.offsets[None] for points in (start, end))
     meet = high / jnp.where(high == low, 1.0, high - low)
@@ -224,7 +224,7 @@ def _direction(p: Array, q: Array, first: Solid, second: Solid, features: _Featu
     gap, normal = b + t * v - a - s * u, jnp.cross(u, v)
     inside = (s > 0.0) & (s < 1.0) & (t > 0.0) & (t < 1.0)
     inside &= jnp.dot(normal, normal) > PARALLEL_SQUARE * jnp.dot(u, u) * jnp.dot(v, v)
-    # Where both points are inside of their edges, the common normal is known however near they are.
+    # The common normal of edges is known however near they are, if both points are inside of them.
     gap = jnp.where(inside, jnp.where(jnp.dot(normal, gap) < 0.0, -normal, normal), gap)
     way = _unit(gap)
     for kind, corners, body, face, sign in (

@@ -57,7 +57,7 @@ def pulley_bounds(pulleys: Pulleys, ray: AffineBounds, velocity: AffineBounds) -
     across = cross(constant(axes), ray)
     wide_square = norm_squared(across)
     narrow = reciprocal_root(wide_square)
-    # Of the attachment point from the centre of the pulley, along e and k.
+    # Coordinates of the attachment point from the centre of the pulley, along e and k.
     x, z = wide_square * narrow - radius, high
     square = squared(x) + squared(z)
     free_square = square - radius**2
@@ -68,7 +68,7 @@ def pulley_bounds(pulleys: Pulleys, ray: AffineBounds, velocity: AffineBounds) -
     direction = side * _wide(sine) + _wide(cosine) * axes
     # A + r e + r n, with n = -(t . k) e + (t . e) k.
     exits = side * _wide((1.0 - cosine) * radius) + _wide(sine * radius) * axes
-    # Of the speed across the plane of the pulley, with the distance from the swivel axis.
+    # Speed across the plane of the pulley, with the distance from the swivel axis.
     speed = dot(across, velocity) * narrow
     swivel = (1.0 - cosine) * squared(speed) * narrow * radius
     return PulleyBounds(direction, exits, _wrapped(radius, x, z, sine, cosine) + free, inverse, swivel)

@@ -79,9 +79,8 @@ def proof_of(case):
         interpolation=samples["interpolation"],
         ends=samples["ends"],
     )
-    proof = time_proof(
-        partial(block_slacks, robot, limits, motion.bounds), float(motion.duration()), jumps=motion.jumps()
-    )
+    slacks = partial(block_slacks, robot, limits, motion.bounds)
+    proof = time_proof(slacks, float(motion.duration()), jumps=motion.jumps())
     return proof, criteria(robot, limits), samples["times"][0]
 
 
