@@ -49,7 +49,6 @@ def scene_of(robot: AnyRobot, robot_file: RobotFile, frame: Frame, keys: PlanFil
     """Scene of the robot of a problem, whose platform has its reference axes; see `build_scene`.
 
     Args:
-        robot: of the problem.
         frame: axes of the robot file.
         file: named in errors.
 
