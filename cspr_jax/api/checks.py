@@ -15,6 +15,7 @@ from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.build.robots import build_robot
 from cspr_jax.build.surroundings import scene_of
+from cspr_jax.config.motions.text import TooLongError
 from cspr_jax.config.plan import PlanFile, plan_keys
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import InputError
@@ -23,6 +24,7 @@ from cspr_jax.motions.proved_answers import MotionProof, proof_of
 from cspr_jax.motions.stretching import least_stretching
 from cspr_jax.outputs import check_report
 from cspr_jax.plans import planning
+from cspr_jax.plans.long_motions import long_plan
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
 from cspr_jax.splines.files import reference_of, samples_of
@@ -120,6 +122,8 @@ class Check:
             the factor, and the check of the motion that it stretches.
         """
         with double_precision():
+            if not self.plan.legs[0].motions:
+                raise InputError("slower", None, "absent: the motion is too long to be held", fault="asked for")
             motion = cast(Spline, self.plan.legs[0].motions[0])
             if not hasattr(motion, "stretched") or not hasattr(motion, "bounds"):
                 raise InputError("motion", type(motion).__name__, "a spline or a file: of others nothing is proved")
@@ -217,7 +221,7 @@ def check(  # noqa: PLR0913
     keys = check_keys(robot, limits, interpolation=interpolation, ends=ends, smooth=smooth, point=point)
     with double_precision():
         if isinstance(times, str | Path):
-            return _check_of(plan_keys(keys | {"motion": str(times)}, NAME))
+            return check_file(Path(times), keys)
         plan = plan_keys(keys, NAME)
         if positions is not None:
             source: Any = samples_of(times, positions, quaternions, velocities, accelerations)
@@ -241,11 +245,18 @@ def check_file(motion: Path, keys: Mapping[str, Any]) -> Check:
         ConfigError: a mistake in a file.
     """
     with double_precision():
-        return _check_of(plan_keys({"schema": 1, "family": "spline", "motion": str(motion), **keys}, motion))
+        plan = plan_keys({"schema": 1, "family": "spline", **keys, "motion": str(motion)}, motion)
+        try:
+            return _check_of(plan)
+        except TooLongError:
+            return _shown(long_plan(plan, motion))
 
 
 def _check_of(keys: PlanFile) -> Check:
-    planned = planning.plan_of(keys, NAME)
+    return _shown(planning.plan_of(keys, NAME))
+
+
+def _shown(planned: planning.PlannedMotions) -> Check:
     fields = {field.name: getattr(planned, field.name) for field in dataclasses.fields(planned)}
     return Check(Plan(**fields))
 

@@ -1,7 +1,7 @@
 """Demands of motions on the robot: tensions, heights, cable lengths and speeds, at their extremes."""
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -61,28 +61,34 @@ _NAMES = [field.name for field in dataclasses.fields(Demands)][:-1]
 
 @partial(jax.jit, static_argnames="rule")
 def _values(robot, limits: Limits, arguments, *, rule: str) -> Array:
-    def one(motion, tau):
-        state = motion.state(tau)
-        if robot.n_cables > robot.dof:
-            chosen = cables.shared(robot, state, limits, rule)
-            force, are_found = chosen.tensions, jnp.where(chosen.is_within, 1.0, 0.0)
-        else:
-            force, are_found = cables.tensions(robot, state), jnp.asarray(1.0)
-        length, rate, rate_slope = cables.cable_motion(robot, state)
-        extremes = [
-            jnp.min(force),
-            -jnp.max(force),
-            jnp.min(force / length) / robot.mass,
-            plane_normal(robot) @ state.position,
-            -state.position[2],
-            -jnp.max(length),
-            -jnp.max(jnp.abs(rate)),
-            -jnp.max(jnp.abs(rate_slope)),
-            are_found,
-        ]
-        return jnp.stack(extremes)
+    return jax.vmap(partial(_at_instant, robot, limits, rule))(*arguments)
 
-    return jax.vmap(one)(*arguments)
+
+@partial(jax.jit, static_argnames="rule")
+def _values_of_one(robot, limits: Limits, motion: Motion, tau: Array, *, rule: str) -> Array:
+    return jax.vmap(partial(_at_instant, robot, limits, rule, motion))(tau)
+
+
+def _at_instant(robot, limits: Limits, rule: str, motion: Motion, tau: Array) -> Array:
+    state = motion.state(tau)
+    if robot.n_cables > robot.dof:
+        chosen = cables.shared(robot, state, limits, rule)
+        force, are_found = chosen.tensions, jnp.where(chosen.is_within, 1.0, 0.0)
+    else:
+        force, are_found = cables.tensions(robot, state), jnp.asarray(1.0)
+    length, rate, rate_slope = cables.cable_motion(robot, state)
+    extremes = [
+        jnp.min(force),
+        -jnp.max(force),
+        jnp.min(force / length) / robot.mass,
+        plane_normal(robot) @ state.position,
+        -state.position[2],
+        -jnp.max(length),
+        -jnp.max(jnp.abs(rate)),
+        -jnp.max(jnp.abs(rate_slope)),
+        are_found,
+    ]
+    return jnp.stack(extremes)
 
 
 def demands(
@@ -115,12 +121,22 @@ def demands(
         for first in range(0, len(members), size):
             stage(f"demands of {len(motions)} segments")
             batch = members[first : first + size]
-            table[batch] = _of_alike(partial(_values, robot, limits, rule=rule), [motions[i] for i in batch], count)
+            table[batch] = _of_alike(robot, limits, rule, [motions[i] for i in batch], count)
     columns = (table * _SIGNS + 0.0).T  # no -0
     return Demands(**dict(zip(_NAMES, columns, strict=True)), samples=np.array(samples))
 
 
-def _of_alike(kernel: Callable, motions: list[Motion], count: int) -> np.ndarray:
+def _of_alike(robot: Any, limits: Limits, rule: str, motions: list[Motion], count: int) -> np.ndarray:
+    tau = np.linspace(0.0, 1.0, count)
+    if len(motions) == 1:
+        # One motion may have very many pieces, and is not copied for each instant.
+        of_one = partial(_values_of_one, robot, limits, motions[0], rule=rule)
+
+        def along(tau: np.ndarray) -> np.ndarray:
+            return in_batches(of_one, tau.ravel(), size=BATCH).reshape(*tau.shape, -1)
+
+        return narrowed(along, tau, along(tau[None]))
+    kernel = partial(_values, robot, limits, rule=rule)
     stacked = jax.tree.map(lambda *leaves: np.stack([np.asarray(leaf, float) for leaf in leaves]), *motions)
 
     def at(tau: np.ndarray) -> np.ndarray:
@@ -129,5 +145,4 @@ def _of_alike(kernel: Callable, motions: list[Motion], count: int) -> np.ndarray
         values = in_batches(kernel, (items, tau.ravel()), size=BATCH)
         return values.reshape(*tau.shape, -1)
 
-    tau = np.linspace(0.0, 1.0, count)
     return narrowed(at, tau, at(np.tile(tau, (len(motions), 1))))

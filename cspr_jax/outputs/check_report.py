@@ -64,8 +64,8 @@ def check_object(plan: PlannedMotions) -> dict[str, Any]:
         "cable_acceleration_max": float(demands.acceleration_max[0]),
         "z_lowest": float(demands.lowest[0]),
         "demands": {QUANTITIES[flag][0]: row for flag, row in _demands(plan, case).items()},
-        "interpolation": getattr(plan.legs[0].motions[0], "interpolation", "function"),
-        "ends": getattr(plan.legs[0].motions[0], "ends", "") or None,
+        "interpolation": getattr(_motion(plan), "interpolation", "function"),
+        "ends": getattr(_motion(plan), "ends", "") or None,
         "blocks": case.proof.blocks,
     }
     return finite(fields)
@@ -135,8 +135,15 @@ def check_lines(plan: PlannedMotions) -> list[str]:
     return [*lines, f"it fails from {named}{more}"] if len(intervals) else lines
 
 
+def _motion(plan: PlannedMotions) -> Any:
+    # The motion, if it is short enough to be held.
+    return plan.legs[0].motions[0] if plan.legs[0].motions else None
+
+
 def _taken_as(plan: PlannedMotions) -> str:
-    motion = plan.legs[0].motions[0]
+    motion = _motion(plan)
+    if motion is None:
+        return "judged window by window"
     if not isinstance(motion, Spline):
         proved = (
             "with bounds of its states" if hasattr(motion, "bounds") else "sampled: nothing between instants is proved"

@@ -32,6 +32,10 @@ UNIT, SHORTEST, LONGEST = 1e-3, 0.5, 2.0
 MEETING = 1e-6  # share of the size of a motion by which its legs may miss each other
 
 
+class TooLongError(ConfigError):
+    """A table of more rows than are read as a whole."""
+
+
 @dataclasses.dataclass(frozen=True)
 class MotionWindow:
     """Consecutive rows of a table, with some of the rows before and behind them.
@@ -56,11 +60,12 @@ def read(path: Path) -> MotionTable:
         the samples.
 
     Raises:
-        ConfigError: a mistake in the file, or more than `MOST_ROWS` rows; see `windows`.
+        ConfigError: a mistake in the file.
+        TooLongError: more than `MOST_ROWS` rows; see `windows`.
     """
     window = next(windows(path, MOST_ROWS))
     if not window.is_last:
-        raise ConfigError(path, f"more than {MOST_ROWS} rows: must be fewer where a motion is read as a whole")
+        raise TooLongError(path, f"more than {MOST_ROWS} rows: must be fewer where a motion is read as a whole")
     return window.table
 
 

@@ -1,0 +1,133 @@
+"""Motions of tables that are too long to be held: judged window by window, as one plan of one segment."""
+
+import dataclasses
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.arithmetic.frames import IDENTITY, Frame, frame_of
+from cspr_jax.build.problems import build_problem
+from cspr_jax.build.robots import build_robot
+from cspr_jax.build.surroundings import scene_of
+from cspr_jax.config.equivalents import as_moved
+from cspr_jax.config.plan import PlanFile
+from cspr_jax.config.robot import RobotFile, resolve_robot
+from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.motions.demands import SAMPLES, Demands, demands
+from cspr_jax.motions.leg import JoinedLeg
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.proved_answers import MotionProof, answers_of, proof_of, united
+from cspr_jax.motions.time_proof import TimeProof
+from cspr_jax.plans.planning import PlannedMotions
+from cspr_jax.robots.limits import NO_LIMITS
+from cspr_jax.schema.families import FAMILIES
+from cspr_jax.splines.files import placed_inward, reference_of
+from cspr_jax.splines.motion import Spline
+from cspr_jax.splines.reading import window_splines
+from cspr_jax.store.motion_samples import motion_windows
+
+# Demands that are smallest values; the others are largest ones.
+SMALLEST = ("tension_min", "mu_min", "depth_min", "are_found")
+
+
+class _Window(NamedTuple):
+    start: float
+    duration: float
+    proof: MotionProof
+    demands: Demands
+
+
+def long_plan(keys: PlanFile, path: Path) -> PlannedMotions:
+    """Plan of one motion of a long table, without the motion itself: nothing can be written of it.
+
+    Args:
+        path: of the table.
+
+    Returns:
+        the plan, feasible or not.
+
+    Raises:
+        ConfigError: a mistake in the table, or a key that needs all of it at once.
+    """
+    for key in ("smooth", "stretch"):
+        if getattr(keys, key) is not None:
+            raise ConfigError(path, f"{key}: must be absent in a table of so many rows")
+    robot_file = as_moved(resolve_robot(keys.robot, path, Path()), [FAMILIES["spline"].legs])
+    problem = build_problem(robot_file, keys, keys, path, any_cables=True)
+    frame, notes = frame_of(robot_file.base_points, robot_file.z_axis), dict[str, None]()
+    try:
+        windows = list(_judged(problem, robot_file, frame, keys, path, notes))
+    except InputError as error:
+        raise ConfigError(path, str(error)) from error
+    duration = np.array([windows[-1].start + windows[-1].duration])
+    answers = answers_of([_merged(windows)], duration)
+    extremes = _reduced([window.demands for window in windows])
+    return PlannedMotions(
+        robot_file=robot_file,
+        keys=keys,
+        problem=problem,
+        z0=float("nan"),
+        frame=frame,
+        points=np.full((2, 3), np.nan),
+        legs=(JoinedLeg("spline", answers, []),),
+        demands=dataclasses.replace(extremes, lowest=frame.height(extremes.lowest)),
+        causes=(() if answers.feasible[0] else answers.proved_causes(0, frame),),
+        warnings=tuple(f"{path}: {note}" for note in notes),
+    )
+
+
+def _judged(
+    problem: Problem, robot_file: RobotFile, frame: Frame, keys: PlanFile, path: Path, notes: dict[str, None]
+) -> Iterator[_Window]:
+    scene = scene_of(problem.robot, robot_file, frame, keys, path)
+    own, limits = reference_of(build_robot(robot_file, keys, path)), problem.limits
+    limits = limits if problem.robot.n_cables > problem.robot.dof else NO_LIMITS
+    tables = motion_windows(path)
+    says: dict[str, object] = {}
+
+    def noted():
+        for window in tables:
+            notes.update(dict.fromkeys(window.table.notes))
+            says.update(point=window.table.point, is_written=window.table.from_reference)
+            yield window
+
+    settings = {"z_axis": robot_file.z_axis, "interpolation": keys.interpolation, "ends": keys.ends}
+    for start, curve in window_splines(noted(), **settings):
+        reference = np.array(IDENTITY) if says["is_written"] else own
+        is_origin = (keys.point or says["point"]) == "origin" and robot_file.centre_of_mass is not None
+        centre = np.asarray(robot_file.centre_of_mass) if is_origin else None
+        motion: Spline = placed_inward(curve, frame, reference, centre)
+        extremes = demands(problem.robot, [motion], [SAMPLES + 1], limits, keys.tension_rule)
+        yield _Window(start, float(motion.duration()), proof_of(problem, motion, scene), extremes)
+
+
+def _merged(windows: list[_Window]) -> MotionProof:
+    proofs = [window.proof.proof for window in windows]
+    sides = {name: np.array([getattr(proof, name) for proof in proofs]) for name in ("low", "high", "when")}
+    sides["when"] += np.array([[window.start] for window in windows])
+    worst, columns = sides["high"].argmin(0), np.arange(sides["high"].shape[1])
+
+    def shifted(name: str) -> list[np.ndarray]:
+        parts = [[rows + window.start for rows in getattr(window.proof.proof, name)] for window in windows]
+        return [united(np.concatenate(rows)) for rows in zip(*parts, strict=True)]
+
+    proof = TimeProof(
+        low=sides["low"].min(0),
+        high=sides["high"].min(0),
+        when=sides["when"][worst, columns],
+        failing=shifted("failing"),
+        open=shifted("open"),
+        blocks=sum(proof.blocks for proof in proofs),
+    )
+    return windows[0].proof._replace(proof=proof)
+
+
+def _reduced(each: list[Demands]) -> Demands:
+    columns = {}
+    for field in dataclasses.fields(Demands):
+        values = np.array([getattr(one, field.name)[0] for one in each])
+        columns[field.name] = np.array([values.min() if field.name in SMALLEST else values.max()])
+    columns["samples"] = np.array([sum(int(one.samples[0]) for one in each)])
+    return Demands(**columns)

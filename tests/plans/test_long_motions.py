@@ -1,0 +1,50 @@
+"""Tables that are too long to be held: judged window by window as they are as a whole; nothing is written of them."""
+
+import numpy as np
+import pytest
+from support.commands import cspr, strict_json
+
+import cspr_jax
+from cspr_jax.config.motions import text
+from cspr_jax.plans import long_motions
+from cspr_jax.store import motion_samples
+
+LIMITS = {"cable_speed_max": 0.06}
+
+
+@pytest.fixture
+def table(tmp_path, monkeypatch):
+    """A table of 1,501 rows where 500 are many, and windows have 400."""
+    times = np.linspace(0.0, 30.0, 1501)
+    ends = np.clip(np.minimum(times, 30.0 - times) / 6.0, 0.0, 1.0) ** 2
+    places = np.stack([0.1 * ends * np.cos(times), 0.1 * ends * np.sin(times), 1.0 + 0.0 * times], axis=1)
+    path = tmp_path / "own.csv"
+    np.savetxt(path, np.column_stack([times, places]), fmt="%.17g", delimiter=",", header="t,x,y,z", comments="")
+    (tmp_path / "limits.toml").write_text("cable_speed_max = 0.06\n")
+    whole = cspr_jax.check("prototype", path, limits=LIMITS)
+    monkeypatch.setattr(text, "MOST_ROWS", 500)
+    monkeypatch.setattr(long_motions, "motion_windows", lambda path: motion_samples.motion_windows(path, 400))
+    return path, whole
+
+
+def test_windows_are_judged_as_the_whole(table):
+    path, whole = table
+    check = cspr_jax.check("prototype", path, limits=LIMITS)
+    assert check.verdict == whole.verdict == "cable_too_fast" and check.plan.legs[0].motions == []
+    np.testing.assert_allclose(check.failing, whole.failing, atol=2e-6)
+    assert check.margin == pytest.approx(whole.margin, rel=0.02) and check.duration == pytest.approx(30.0)
+    for name in ("tension_max", "cable_length_max", "cable_speed_max"):
+        assert check.to_dict()[name] == pytest.approx(whole.to_dict()[name], rel=1e-3)
+    assert abs(check.cause[0]["t"] - whole.cause[0]["t"]) < 0.1 or check.cause[0]["cable"] != whole.cause[0]["cable"]
+
+
+def test_nothing_is_written_of_them(table):
+    path, _ = table
+    options = ("check", path, "--robot", "prototype", "--limits", path.with_name("limits.toml"))
+    code, out, _ = cspr(*options, "--json")
+    assert code == 1 and strict_json(out)["verdict"] == "cable_too_fast"
+    for more in (("-o", path.with_name("out.csv")), ("--slower",), ("--animate", path.with_name("film.gif"))):
+        code, out, err = cspr(*options, *more)
+        assert (code, out) == (2, "") and err.count("\n") == 1 and "too long to be held" in err
+    code, out, err = cspr(*options, "--smooth", "0.001")
+    assert (code, out) == (2, "") and err.count("\n") == 1 and "smooth" in err
