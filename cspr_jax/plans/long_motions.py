@@ -42,9 +42,6 @@ class _Window(NamedTuple):
 def long_plan(keys: PlanFile, path: Path) -> PlannedMotions:
     """Plan of one motion of a long table, without the motion itself: nothing can be written of it.
 
-    Args:
-        path: of the table.
-
     Returns:
         the plan, feasible or not.
 
@@ -82,7 +79,7 @@ def _judged(
     problem: Problem, robot_file: RobotFile, frame: Frame, keys: PlanFile, path: Path, notes: dict[str, None]
 ) -> Iterator[_Window]:
     scene = scene_of(problem.robot, robot_file, frame, keys, path)
-    own, limits = reference_of(build_robot(robot_file, keys, path)), problem.limits
+    axes, limits = reference_of(build_robot(robot_file, keys, path)), problem.limits
     limits = limits if problem.robot.n_cables > problem.robot.dof else NO_LIMITS
     tables = motion_windows(path)
     says: dict[str, object] = {}
@@ -95,7 +92,7 @@ def _judged(
 
     settings = {"z_axis": robot_file.z_axis, "interpolation": keys.interpolation, "ends": keys.ends}
     for start, curve in window_splines(noted(), **settings):
-        reference = np.array(IDENTITY) if says["is_written"] else own
+        reference = np.array(IDENTITY) if says["is_written"] else axes
         is_origin = (keys.point or says["point"]) == "origin" and robot_file.centre_of_mass is not None
         centre = np.asarray(robot_file.centre_of_mass) if is_origin else None
         motion: Spline = placed_inward(curve, frame, reference, centre)

@@ -9,18 +9,19 @@ from cspr_jax.config.motions import text
 from cspr_jax.plans import long_motions
 from cspr_jax.store import motion_samples
 
-LIMITS = {"cable_speed_max": 0.06}
+LIMITS = {"cable_speed_max": 0.015}
 
 
 @pytest.fixture
 def table(tmp_path, monkeypatch):
     """A table of 1,501 rows where 500 are many, and windows have 400."""
     times = np.linspace(0.0, 30.0, 1501)
-    ends = np.clip(np.minimum(times, 30.0 - times) / 6.0, 0.0, 1.0) ** 2
+    share = np.clip(np.minimum(times, 30.0 - times) / 6.0, 0.0, 1.0)
+    ends = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
     places = np.stack([0.1 * ends * np.cos(times), 0.1 * ends * np.sin(times), 1.0 + 0.0 * times], axis=1)
     path = tmp_path / "own.csv"
     np.savetxt(path, np.column_stack([times, places]), fmt="%.17g", delimiter=",", header="t,x,y,z", comments="")
-    (tmp_path / "limits.toml").write_text("cable_speed_max = 0.06\n")
+    (tmp_path / "limits.toml").write_text("cable_speed_max = 0.015\n")
     whole = cspr_jax.check("prototype", path, limits=LIMITS)
     monkeypatch.setattr(text, "MOST_ROWS", 500)
     monkeypatch.setattr(long_motions, "motion_windows", lambda path: motion_samples.motion_windows(path, 400))
