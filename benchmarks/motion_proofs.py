@@ -2,14 +2,14 @@
 
 import argparse
 import time
-from functools import partial
 
 import jax
 import numpy as np
 
 from cspr_jax.build.robots import load_robot
-from cspr_jax.motions.block_slacks import block_slacks
-from cspr_jax.motions.time_proof import time_proof, time_proofs
+from cspr_jax.motions.amplitudes import named
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.proved_answers import proof_of, proofs_of
 from cspr_jax.robots.cables import wrench_units
 from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.limits import Limits
@@ -67,19 +67,20 @@ def measure(name: str, count: int) -> None:
     """Print the CPU time of one long record, and of many motions beside linear programs."""
     robot, rng = centred(load_robot(name))[0], np.random.default_rng(0)
     low, high = (np.full(robot.n_cables, value) for value in ROBOTS[name][3])
-    judge = partial(block_slacks, robot, Limits(tension_min=low, tension_max=high))
+    problem = Problem(robot, Limits(tension_min=low, tension_max=high), named("quintic"))
     splines = [motion(rng, name) for _ in range(count)]
-    first, _ = cpu(lambda: time_proof(partial(judge, splines[0].bounds), DURATION))
+    first, _ = cpu(lambda: proof_of(problem, splines[0]))
     record = rows_of(splines[0])
-    seconds, proof = cpu(lambda: time_proof(partial(judge, interpolated(*record).bounds), DURATION))
+    seconds, case = cpu(lambda: proof_of(problem, interpolated(*record)))
     print(f"{name}: {first:.1f} s the first proof, with compiling")
-    print(f"  {ROWS} rows of 10 s: {seconds:.3f} s with interpolation, {proof.blocks} blocks")
+    print(f"  {ROWS} rows of 10 s: {seconds:.3f} s with interpolation, {case.proof.blocks} blocks")
 
     def many():
         several = SeveralSplines(splines)
-        return time_proofs(lambda of, *ends: judge(partial(several.bounds, of), *ends), several.durations)
+        return proofs_of(problem, several.bounds, several.durations, jumps=several.jumps)
 
-    seconds, proofs = cpu(many)
+    seconds, cases = cpu(many)
+    proofs = [case.proof for case in cases]
     each, blocks = seconds / count, sum(proof.blocks for proof in proofs)
     proved, refuted = sum((p.low > 0.0).all() for p in proofs), sum((p.high < 0.0).any() for p in proofs)
     print(f"  {count} motions: {1e3 * each:.2f} ms, {blocks / count:.0f} blocks each, {blocks / seconds:.0f} a second")

@@ -13,7 +13,7 @@ from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.block_slacks import BlockSlacks, block_slacks
 from cspr_jax.motions.cause import Cause
-from cspr_jax.motions.criteria import Criterion, criteria
+from cspr_jax.motions.criteria import AT_INSTANTS, Criterion, criteria
 from cspr_jax.motions.motion import BoundedMotion, Motion
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.time_proof import TimeProof, time_proofs
@@ -187,7 +187,12 @@ def proofs_of(
     def slacks(motion: np.ndarray, start: np.ndarray, end: np.ndarray) -> BlockSlacks:
         return block_slacks(problem.robot, problem.limits, partial(bounds, motion), start, end, scene)
 
-    return [_proof(problem, proof, scene) for proof in time_proofs(slacks, durations, jumps=jumps)]
+    # Of contacts of one kind the nearest alone is told.
+    rows = criteria(problem.robot, problem.limits, scene)
+    names = [(row.flag, () if row.flag in AT_INSTANTS else row.cables) for row in rows]
+    groups = np.array([names.index(name) for name in names])
+    proofs = time_proofs(slacks, durations, jumps=jumps, groups=groups)
+    return [_proof(problem, proof, scene) for proof in proofs]
 
 
 def _proof(problem: Problem, proof: TimeProof, scene: Scene | None) -> MotionProof:

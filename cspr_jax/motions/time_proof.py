@@ -71,6 +71,7 @@ def time_proofs(
     durations: np.ndarray,
     resolution: float = 5e-7,
     jumps: Sequence[np.ndarray] = (),
+    groups: np.ndarray | None = None,
 ) -> list[TimeProof]:
     """Decide criteria over several whole motions at once.
 
@@ -80,6 +81,8 @@ def time_proofs(
         durations: (n_motions,) s.
         resolution: length of the shortest blocks, s.
         jumps: for each motion the instants at which its acceleration jumps, increasing, s; empty: it jumps nowhere.
+        groups: (n_criteria,) numbers, from 0 on, of groups of criteria of which the smallest slack alone is narrowed;
+            None: that of each criterion.
 
     Returns:
         one proof a motion, the same as it has alone.
@@ -102,7 +105,7 @@ def time_proofs(
         leaves.append(outside)
         blocks = _bounded(slacks, *inner)
         totals += np.bincount(blocks.motion, minlength=count)
-    narrow, more = _narrowed(slacks, joined(leaves), _usual(start.slacks.high, count), resolution, at_jumps)
+    narrow, more = _narrowed(slacks, joined(leaves), _usual(start.slacks.high, count), resolution, at_jumps, groups)
     return _proofs(narrow.taken(np.lexsort((narrow.start, narrow.motion))), totals + more)
 
 
@@ -130,12 +133,17 @@ def _least(motion: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
 
 
 def _narrowed(
-    slacks, blocks: TimeBlocks, usual: np.ndarray, resolution: float, jumps: np.ndarray
+    slacks,
+    blocks: TimeBlocks,
+    usual: np.ndarray,
+    resolution: float,
+    jumps: np.ndarray,
+    groups: np.ndarray | None,
 ) -> tuple[TimeBlocks, np.ndarray]:
     # Cut the blocks that may hold the smallest slack of a criterion until its bounds are close; tell how many more.
     count, leaves = len(usual), []
     more = np.zeros(count, int)
-    least = _least(blocks.motion, blocks.slacks.high, count)
+    least = _grouped(_least(blocks.motion, blocks.slacks.high, count), groups)
     while len(blocks.start):
         # Slacks are as large as they usually are: near zero no share of the smallest one is small enough.
         level = (least - CLOSE * np.fmax(np.abs(least), 0.1 * usual))[blocks.motion]
@@ -148,8 +156,17 @@ def _narrowed(
         leaves.append(outside)
         blocks = _bounded(slacks, *inner)
         more += np.bincount(blocks.motion, minlength=count)
-        least = np.minimum(least, _least(blocks.motion, blocks.slacks.high, count))
+        least = np.minimum(least, _grouped(_least(blocks.motion, blocks.slacks.high, count), groups))
     return joined(leaves), more
+
+
+def _grouped(least: np.ndarray, groups: np.ndarray | None) -> np.ndarray:
+    # The smallest value of the group of each column.
+    if groups is None or not len(groups):
+        return least
+    smallest = np.full((len(least), int(groups.max()) + 1), np.inf)
+    np.minimum.at(smallest.T, groups, least.T)
+    return smallest[:, groups]
 
 
 def _proofs(blocks: TimeBlocks, totals: np.ndarray) -> list[TimeProof]:
