@@ -21,7 +21,7 @@ from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import InputError
 from cspr_jax.motions.motion import Placed
 from cspr_jax.motions.proved_answers import MotionProof, proof_of
-from cspr_jax.motions.stretching import least_stretching
+from cspr_jax.motions.stretching import SLOWEST, least_stretching
 from cspr_jax.outputs import check_report
 from cspr_jax.plans import planning
 from cspr_jax.plans.long_motions import long_plan
@@ -167,8 +167,8 @@ class Stretched(NamedTuple):
             the lines that `cspr check --slower` prints.
         """
         if self.check is None:
-            why = "" if self.is_static else ", since the robot cannot stand still at every place of it"
-            return [f"no uniform stretching of time makes it feasible{why}"]
+            why = "" if self.is_static else ": nor is the robot proved to stand still at every place of it"
+            return [f"no uniform stretching of time, up to {SLOWEST:.0e} times, is proved feasible{why}"]
         return [
             f"{self.factor:.7g} times slower, in {self.check.duration:.7g} s, it is feasible, proved; "
             "one part in a million faster it is not proved"
@@ -223,6 +223,8 @@ def check(  # noqa: PLR0913
         if isinstance(times, str | Path):
             return check_file(Path(times), keys)
         plan = plan_keys(keys, NAME)
+        if duration is not None and not callable(times):
+            raise InputError("duration", duration, "absent but for a function of time")
         if positions is not None:
             source: Any = samples_of(times, positions, quaternions, velocities, accelerations)
         elif hasattr(times, "state") or hasattr(times, "x") or hasattr(times, "t"):

@@ -24,7 +24,7 @@ from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
 from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.families import FAMILIES
-from cspr_jax.splines.files import placed_inward, reference_of, samples_of, source_spline
+from cspr_jax.splines.files import kept_to, placed_inward, reference_of, samples_of, source_spline
 from cspr_jax.splines.several import SeveralSplines
 
 
@@ -105,7 +105,8 @@ def check_many(
         for i in range(count):
             samples = samples_of(instants[i], *(None if column is None else column[i] for column in columns))
             try:
-                motions.append(placed_inward(source_spline(samples, **settings), axes, reference))
+                curve = kept_to(file.own_pattern, source_spline(samples, **settings), is_planar=False)
+                motions.append(placed_inward(curve, axes, reference))
             except InputError as error:
                 raise InputError(f"motion {i}, {error.key}", error.value, error.allowed, fault=error.fault) from error
         several, scene = SeveralSplines(motions), scene_of(problem.robot, file, axes, keys, NAME)

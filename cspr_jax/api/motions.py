@@ -31,7 +31,7 @@ from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PointMassRobot, rest_point
 from cspr_jax.robots.state import State
 from cspr_jax.robots.tension_rule_table import CENTRED, TENSION_RULES
-from cspr_jax.splines.files import placed_inward, reference_of, samples_of, source_spline
+from cspr_jax.splines.files import kept_to, placed_inward, reference_of, samples_of, source_spline
 from cspr_jax.splines.motion import Spline
 from cspr_jax.swings import transition as transitions
 from cspr_jax.swings.hypocycloid import Hypocycloid, segment
@@ -193,7 +193,7 @@ def spline(
     is_platform = isinstance(robot, PlatformRobot)
     axis = robot.z_axis
     curve = source_spline(samples, z_axis=axis, is_platform=is_platform, interpolation=interpolation, ends=ends)
-    frame = centred(robot)[1]
+    curve, frame = kept_to(robot.pattern, curve, is_planar=False), centred(robot)[1]
     return Placed(placed_inward(curve, frame, reference_of(robot)), frame)
 
 

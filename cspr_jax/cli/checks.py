@@ -69,14 +69,20 @@ def _keys(options: argparse.Namespace) -> dict[str, Any]:
     keys = {name: value for name, value in keys.items() if value is not None} | {"robot": options.robot}
     if options.limits is not None:
         limits = read_toml(options.limits)
-        keys |= {name: limits.pop(name) for name in SurroundingsKeys.model_fields if name in limits}
+        around = {name: limits.pop(name) for name in SurroundingsKeys.model_fields if name in limits}
+        checked(SurroundingsKeys, around, options.limits)
+        limits = {**limits.pop("limits"), **limits} if isinstance(limits.get("limits"), dict) else limits
         checked(LimitTable, limits, options.limits)
-        keys["limits"] = limits
+        keys |= {**around, "limits": limits}
     return keys
 
 
 def _check(options: argparse.Namespace) -> int:
     check_files(options)
+    control = None if options.mjcf is None else options.mjcf.with_name(f"{options.mjcf.stem}_control.csv")
+    for option, path in (("-o", options.output), ("--mjcf", options.mjcf), ("--mjcf", control)):
+        if path is not None and path.resolve() == options.motion.resolve():
+            raise ConfigError(option, f"{path}: must be another name: the motion is there")
     keys = _keys(options)
     with waiting():
         prepare_jax(options, quick=True)

@@ -16,7 +16,7 @@ from cspr_jax.motions.block_slacks import BlockSlacks
 
 # Blocks at the start, and the share of itself, or of a tenth of usual ones, to which the smallest slack is narrowed.
 FIRST = 32
-CLOSE = 0.01
+CLOSE = 0.002
 # Blocks of one motion, all cuts together; beyond, what is open stays undecided, and margins are less close.
 MOST, NARROWING = 100_000, 4_000
 # TimeBlocks that narrow a margin are no shorter than this part of the resolution.
@@ -146,7 +146,8 @@ def _narrowed(
     least = _grouped(_least(blocks.motion, blocks.slacks.high, count), groups)
     while len(blocks.start):
         # Slacks are as large as they usually are: near zero no share of the smallest one is small enough.
-        level = (least - CLOSE * np.fmax(np.abs(least), 0.1 * usual))[blocks.motion]
+        with np.errstate(invalid="ignore"):  # of bounds that are infinite
+            level = (least - CLOSE * np.fmax(np.abs(least), 0.1 * usual))[blocks.motion]
         matters = (blocks.slacks.low < level) & np.isfinite(level)
         is_open = matters.any(1) & (blocks.end - blocks.start > SHORTEST * resolution)
         is_open &= (more < NARROWING)[blocks.motion]

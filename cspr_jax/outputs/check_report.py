@@ -130,7 +130,8 @@ def check_lines(plan: PlannedMotions) -> list[str]:
     word = "undecided" if answers.verdict[0] == Verdict.UNDECIDED else "not feasible"
     lines += [f"{word}: {cause.text}" for cause in plan.causes[0]]
     intervals = case.failing
-    named = ", ".join(f"{start:.6f} to {end:.6f} s" for start, end in intervals[:MOST_INTERVALS])
+    digits = max(6, 3 - math.floor(math.log10(float(answers.duration[0]))))
+    named = ", ".join(f"{start:.{digits}f} to {end:.{digits}f} s" for start, end in intervals[:MOST_INTERVALS])
     more = f", and {len(intervals) - MOST_INTERVALS} more" if len(intervals) > MOST_INTERVALS else ""
     return [*lines, f"it fails from {named}{more}"] if len(intervals) else lines
 

@@ -23,7 +23,7 @@ from cspr_jax.motions.time_proof import TimeProof
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.robots.limits import NO_LIMITS
 from cspr_jax.schema.families import FAMILIES
-from cspr_jax.splines.files import placed_inward, reference_of
+from cspr_jax.splines.files import kept_to, placed_inward, reference_of
 from cspr_jax.splines.motion import Spline
 from cspr_jax.splines.reading import window_splines
 from cspr_jax.store.motion_samples import motion_windows
@@ -88,6 +88,7 @@ def _judged(
         for window in tables:
             notes.update(dict.fromkeys(window.table.notes))
             says.update(point=window.table.point, is_written=window.table.from_reference)
+            says.update(is_planar=getattr(window.table, "is_planar", False))
             yield window
 
     settings = {"z_axis": robot_file.z_axis, "interpolation": keys.interpolation, "ends": keys.ends}
@@ -95,6 +96,7 @@ def _judged(
         reference = np.array(IDENTITY) if says["is_written"] else axes
         is_origin = (keys.point or says["point"]) == "origin" and robot_file.centre_of_mass is not None
         centre = np.asarray(robot_file.centre_of_mass) if is_origin else None
+        curve = kept_to(robot_file.own_pattern, curve, is_planar=bool(says["is_planar"]))
         motion: Spline = placed_inward(curve, frame, reference, centre)
         extremes = demands(problem.robot, [motion], [SAMPLES + 1], limits, keys.tension_rule)
         yield _Window(start, float(motion.duration()), proof_of(problem, motion, scene), extremes)

@@ -11,9 +11,11 @@ from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import IDENTITY, Frame
 from cspr_jax.arithmetic.rotations import products
 from cspr_jax.config.motions.table import MotionPieces, MotionTable
+from cspr_jax.config.motions.text import LONGEST, SHORTEST
 from cspr_jax.errors import InputError
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.kernel_axes import centred
+from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.reference_pose import aligned
 from cspr_jax.splines.motion import Spline
@@ -21,6 +23,8 @@ from cspr_jax.splines.reading import pieces_of, spline_of
 
 # Samples of a motion, not way-points, are at least so many; the part of the largest speed that counts as moving.
 MANY, MOVING = 30, 0.2
+STILL = 1e-6  # m/s; slower samples are at rest but for rounding
+BESIDE = 1e-9  # share of the size of a motion by which rounding takes it off the plane or the guide of a robot
 BACK = np.array([1.0, -1.0, -1.0, -1.0])
 
 
@@ -38,14 +42,23 @@ def samples_of(times, positions, quaternions=None, velocities=None, acceleration
         the samples.
 
     Raises:
-        InputError: numbers of rows that differ.
+        InputError: numbers of rows that differ, or quaternions far from unit ones.
     """
     times, positions = np.asarray(times, float), np.asarray(positions, float)
     others = {"quaternions": quaternions, "velocities": velocities, "accelerations": accelerations}
     arrays: dict[str, Any] = {name: np.asarray(rows, float) for name, rows in others.items() if rows is not None}
+    if accelerations is not None and velocities is None:
+        raise InputError("accelerations", None, "absent without velocities")
     for name, rows in ({"positions": positions} | arrays).items():
         if len(rows) != len(times):
             raise InputError(name, None, f"must have {len(times)} rows, one for each time", fault=f"shape {rows.shape}")
+    if "quaternions" in arrays:
+        with np.errstate(over="ignore"):
+            sizes = np.linalg.norm(arrays["quaternions"], axis=1)
+        odd = np.flatnonzero(~((sizes >= SHORTEST) & (sizes <= LONGEST)))
+        if len(odd):
+            row = arrays["quaternions"][odd[0]].tolist()
+            raise InputError(f"quaternions[{odd[0]}]", row, "a unit quaternion, scalar first")
     return MotionTable(times, positions, **arrays)
 
 
@@ -80,6 +93,39 @@ def source_spline(
     return spline
 
 
+def kept_to(pattern: str, spline: Spline, *, is_planar: bool) -> Spline:
+    """A motion that a robot of a pattern can follow, without the rounding of what it cannot.
+
+    Args:
+        pattern: one of `robots.patterns.PATTERNS`.
+        spline: in the axes of the robot file; NumPy leaves.
+        is_planar: whether the motion was read without y.
+
+    Returns:
+        the motion.
+
+    Raises:
+        InputError: a motion that leaves the plane or the guide of the robot, or one without y of a robot in space.
+    """
+    row, position = PATTERNS[pattern], np.array(spline.position)
+    turning = None if spline.quaternion is None else np.array(spline.quaternion)
+    if is_planar and not row.is_planar:
+        raise InputError("positions", None, "must have y too, but for planar robots", fault="x and z alone")
+    size = BESIDE * np.abs(position).max()
+    if row.is_planar:
+        beside = float(np.abs(position[:, :, 1]).max())
+        if beside > size:
+            raise InputError("positions", None, "must be 0 on a planar robot", fault=f"y reaches {beside:.3g} m")
+        position[:, :, 1] = 0.0
+        if turning is not None:
+            if np.abs(turning[:, :, [1, 3]]).max() > BESIDE * np.abs(turning).max():
+                raise InputError("orientations", None, "must turn about y alone", fault="those of a planar robot")
+            turning[:, :, [1, 3]] = 0.0
+    if row.name == "1T" and np.ptp(position[:, :, :2], axis=(0, 1)).max() > size:
+        raise InputError("positions", None, "must be the same everywhere on a vertical guide", fault="x and y")
+    return dataclasses.replace(spline, position=leaf(position), quaternion=None if turning is None else leaf(turning))
+
+
 def moving_ends(source: Any, ends: str | None) -> list[str]:
     """Hints of samples that move at an end where the curve is taken to be at rest.
 
@@ -100,7 +146,7 @@ def moving_ends(source: Any, ends: str | None) -> list[str]:
         place = times[rows][0 if word == "begin" else -1]
         curve = BarycentricInterpolator(times[rows] - place, positions[rows])
         speed = float(np.linalg.norm(curve.derivative(0.0)))
-        if speed > MOVING * largest:
+        if speed > max(MOVING * largest, STILL):
             lines.append(
                 f"hint: its samples {word} at {speed:.3g} m/s, where the curve is taken to be at rest: ends natural or "
                 "periodic, or velocities in the file, would keep that"

@@ -76,9 +76,12 @@ def function_motion(
         the motion, from the centroid of the spools, z down.
 
     Raises:
-        InputError: values of another shape.
+        InputError: values of another shape, or a function that jax cannot differentiate.
     """
-    size = jax.eval_shape(function, jnp.asarray(0.0)).shape
+    try:
+        size = jax.eval_shape(lambda t: jnp.asarray(function(t)), jnp.asarray(0.0)).shape
+    except TypeError as error:
+        raise InputError("times", None, "must be one of jax.numpy", fault="jax cannot follow it") from error
     allowed = ((3,), (7,)) if is_platform else ((3,),)
     if size not in allowed:
         raise InputError("times", None, f"must give values of shape {' or '.join(map(str, allowed))}", fault=f"{size}")

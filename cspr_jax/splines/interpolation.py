@@ -20,6 +20,8 @@ INTERPOLATIONS = ("cubic", "quintic", "hermite")
 ENDS = ("rest", "natural", "periodic")
 # The ends of a periodic motion differ by no more than this part of its largest number.
 PERIODIC = 1e-9
+# Samples closer in time than this have accelerations beyond all numbers.
+LEAST_STEP = 1e-12  # s
 
 
 def interpolated(
@@ -57,8 +59,10 @@ def interpolated(
     """
     times = np.asarray(times, float)
     _check(times, positions, quaternions, interpolation, ends)
-    if (velocities is not None) != (interpolation == "hermite"):
-        raise InputError("velocities", None, 'needed with interpolation = "hermite", and with no other')
+    if interpolation == "hermite" and velocities is None:
+        raise InputError("interpolation", interpolation, '"cubic" or "quintic" for samples without velocities')
+    if interpolation != "hermite" and velocities is not None:
+        raise InputError("interpolation", interpolation, '"hermite" for samples with velocities')
     if accelerations is not None and velocities is None:
         raise InputError("accelerations", None, "absent without velocities")
     since = times - times[0]
@@ -88,6 +92,22 @@ def continuous(quaternions: np.ndarray) -> np.ndarray:
     return units * np.cumprod(np.append(1.0, flips))[:, None]
 
 
+def check_steps(times: np.ndarray) -> None:
+    """Refuse instants that are too close for numbers.
+
+    Args:
+        times: (n,) s, in their order; some may be equal.
+
+    Raises:
+        InputError: two that differ by less than `LEAST_STEP`, and are not equal.
+    """
+    steps = np.diff(times)
+    close = np.flatnonzero((steps > 0.0) & (steps < LEAST_STEP))
+    if len(close):
+        i = int(close[0]) + 1
+        raise InputError(f"times[{i}]", float(times[i]), f"{LEAST_STEP:g} s or more behind the time before it")
+
+
 def _check(times: np.ndarray, positions, quaternions, interpolation: str, ends: str) -> None:
     for name, value, allowed in (("interpolation", interpolation, INTERPOLATIONS), ("ends", ends, ENDS)):
         if value not in allowed:
@@ -98,6 +118,7 @@ def _check(times: np.ndarray, positions, quaternions, interpolation: str, ends: 
     if len(late):
         i = int(late[0]) + 1
         raise InputError(f"times[{i}]", float(times[i]), f"more than times[{i - 1}] = {float(times[i - 1])!r}")
+    check_steps(times)
     for name, values, width in (("positions", positions, 3), ("quaternions", quaternions, 4)):
         if values is None:
             continue

@@ -9,7 +9,7 @@ from cspr_jax.build.orientations import given_quaternion, orientations
 from cspr_jax.build.robots import build_robot
 from cspr_jax.build.surroundings import scene_of
 from cspr_jax.config.motions.hints import unit_hints
-from cspr_jax.config.motions.table import MotionTable
+from cspr_jax.config.motions.table import MotionPieces, MotionTable
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.leg import Leg
@@ -18,10 +18,11 @@ from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import proved_answers
 from cspr_jax.motions.waypoints import Waypoints
 from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.splines.files import moving_ends, placed_inward, reference_of, source_spline
+from cspr_jax.splines.files import kept_to, moving_ends, placed_inward, reference_of, source_spline
 from cspr_jax.splines.interpolation import interpolated
 from cspr_jax.splines.motion import Spline, part
 from cspr_jax.splines.noise import noise_notes, smoothed
+from cspr_jax.splines.reading import pieces_of
 from cspr_jax.store.motion_samples import read_motion
 
 # Keys of poses that other families take, and a spline does not.
@@ -91,6 +92,8 @@ class Splines(Leg):
         if isinstance(source, Placed):
             return source.motion
         try:
+            if not isinstance(source, MotionTable | MotionPieces | Spline):
+                source = pieces_of(source)
             source = self._cleaned(name, source)
             curve = source_spline(
                 source,
@@ -99,6 +102,8 @@ class Splines(Leg):
                 interpolation=stops.keys.interpolation,
                 ends=stops.keys.ends,
             )
+            is_planar = getattr(source, "is_planar", False)
+            curve = kept_to(stops.robot_file.own_pattern, curve, is_planar=is_planar)
         except InputError as error:
             raise ConfigError(name, str(error)) from error
         reference = np.array(IDENTITY)
@@ -121,11 +126,13 @@ class Splines(Leg):
         lines: list[str] = []
         if isinstance(source, MotionTable):
             lines += [f"hint: {line}" for line in unit_hints(source, np.asarray(self.stops.robot_file.base_points))]
-            lines += moving_ends(source, self.stops.keys.ends)
+            noise: list[str] = []
             if self.stops.keys.smooth is not None:
                 source = smoothed(source, self.stops.keys.smooth)
             elif source.velocities is None:
-                lines += noise_notes(source)
+                noise = noise_notes(source)
+            # Speeds at the ends of a noisy record say nothing.
+            lines += noise or moving_ends(source, self.stops.keys.ends)
         elif self.stops.keys.smooth is not None:
             raise InputError("smooth", self.stops.keys.smooth, "absent for a motion without samples")
         self._notes += [f"{name}: {line}" for line in (*getattr(source, "notes", ()), *lines)]

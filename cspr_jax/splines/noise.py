@@ -13,7 +13,7 @@ from cspr_jax.errors import InputError
 from cspr_jax.splines.interpolation import continuous
 
 # Rows of the stretches in which noise is estimated, and the most of them.
-STRETCH, STRETCHES = 96, 64
+STRETCH, STRETCHES = 96, 16
 ORDERS = range(2, 13)  # of differences
 # Median of the absolute value of a normal variable, over its standard deviation.
 MEDIAN = 0.6745

@@ -19,7 +19,7 @@ from cspr_jax.arithmetic.piecewise_bounds import bernstein_of_powers
 from cspr_jax.config.motions.table import MotionPieces, MotionTable
 from cspr_jax.config.motions.text import MotionWindow
 from cspr_jax.errors import InputError
-from cspr_jax.splines.interpolation import continuous, hermite, interpolated
+from cspr_jax.splines.interpolation import check_steps, continuous, hermite, interpolated
 from cspr_jax.splines.motion import Spline
 
 # Shares of the largest coefficient by which pieces may miss each other, and by which windows may.
@@ -45,6 +45,7 @@ def spline_of(
     Raises:
         InputError: samples or pieces that are no motion; see `splines.interpolation.interpolated`.
     """
+    check_steps(source.knots if isinstance(source, MotionPieces) else source.times)
     if isinstance(source, MotionPieces):
         return _of_pieces(source, interpolation, ends)
     if (np.diff(source.times) < 0.0).any():
@@ -101,7 +102,8 @@ def pieces_of(curve: Any) -> MotionPieces:
         table = bernstein_of_powers(powers * np.diff(knots)[:, None, None] ** np.arange(powers.shape[1])[:, None])
     values = np.zeros((*table.shape[:2], max(table.shape[2], 3)))
     values[:, :, _WIDTHS[table.shape[2]]] = table
-    return MotionPieces(np.asarray(knots, float), values[:, :, :3], values[:, :, 3:] if values.shape[2] == 7 else None)
+    quaternion = values[:, :, 3:] if values.shape[2] == 7 else None
+    return MotionPieces(np.asarray(knots, float), values[:, :, :3], quaternion, is_planar=table.shape[2] == 2)
 
 
 def window_splines(

@@ -50,6 +50,7 @@ def test_one_table_in_many_forms(tmp_path, content):
     np.testing.assert_array_equal(found.times, [0.0, 1.0])
     np.testing.assert_allclose(found.positions, [[1.0, 2.0, 3.0], [2.0, 3.0, 4.0]], rtol=1e-15)
     assert found.quaternions is None and found.velocities is None and found.interpolation is None
+    assert not found.is_planar
     assert len(found.notes) == ("when" in content)
 
 
@@ -58,7 +59,7 @@ def test_directives_rates_and_planar_robots(tmp_path):
     found = table(
         tmp_path, head + "t,x,z,pitch,vx [mm/s],vz [m/s],ax [cm/s^2],az\n0,1,2,0.5,1,2,3,4\n1,1,2,0,1,2,3,4\n"
     )
-    assert (found.interpolation, found.ends, found.z_axis) == ("quintic", "periodic", "up")
+    assert (found.interpolation, found.ends, found.z_axis) == ("quintic", "periodic", "up") and found.is_planar
     np.testing.assert_array_equal(found.positions, [[1.0, 0.0, 2.0]] * 2)
     np.testing.assert_allclose(found.velocities, [[0.001, 0.0, 2.0]] * 2, rtol=1e-15)
     np.testing.assert_allclose(found.accelerations, [[0.03, 0.0, 4.0]] * 2, rtol=1e-15)
@@ -104,7 +105,7 @@ def test_angles(tmp_path):
 def test_quaternions_are_normalised(tmp_path):
     found = table(tmp_path, "0,1,2,3,1.1,0,0,0\n1,2,3,4,0,0,-0.9,0\n")
     np.testing.assert_array_equal(found.quaternions, [[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0]])
-    assert "are normalised" in found.notes[0]
+    assert found.notes == ("quaternions of lengths other than 1 are normalised",)
     assert table(tmp_path, "0,1,2,3,1,0,0,0\n1,2,3,4,0,0,-1,0\n").notes == ()
 
 
@@ -127,8 +128,12 @@ FAULTS = [
     ("t,x,y,z,x\n0,1,2,3,1\n", 'line 1, column 5: "x" stands twice'),
     ("t,x,y,z,qw,qx,qy,qz,roll,pitch,yaw\n", "columns qw and roll: must be one orientation"),
     ("t,x,y,z,ax,ay,az\n", "column ax without vx"),
+    ("t,x,y,z,wx,wy,wz\n", "line 1: columns of angular rates: must be beside an orientation"),
+    ("t,x,y,z\n0,1,2,3\n1,2,\uff12,3\n", 'line 3, column 3: y = "\uff12": must be a finite number'),
     ("t,x,y,z [inch]\n", 'line 1, column 4: unit of z = "inch": must be "m", "dm"'),
     ("t,x,y,z,vx [m],vy,vz\n", 'unit of vx = "m": must be "m/s", "dm/s"'),
+    ("# units: mm, cm\nt,x,y,z\n", 'units = "cm": must be one of a kind, not mm too'),
+    ("t x y z\n0 1 2 3\n1 2,5 3 4\n", 'line 3, column 2: x = "2,5": must be a finite number, without a comma'),
     ("# units: furlong\nt,x,y,z\n", 'units = "furlong": must be "m"'),
     ("# interpolation: quintc\nt,x,y,z\n", 'line 1: interpolation = "quintc": did you mean quintic? must be'),
     ("1,2,3,4,5\n1,2,3,4,5\n", "line 1: 5 columns without a header: must be 3, 4, 8"),

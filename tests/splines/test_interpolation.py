@@ -105,7 +105,8 @@ def test_signs_of_quaternions_do_not_matter():
         ({"times": TIMES[:2], "positions": PLACES[:2], "interpolation": "quintic", "ends": "natural"}, "ends"),
         ({"ends": "open"}, '"rest" or "natural" or "periodic"'),
         ({"velocities": PLACES}, "velocities"),
-        ({"interpolation": "hermite"}, "velocities"),
+        ({"interpolation": "hermite"}, 'must be "cubic" or "quintic" for samples without velocities'),
+        ({"times": np.arange(6) * 1e-150}, "times[1] = 1e-150: must be 1e-12 s or more behind"),
         ({"accelerations": PLACES}, "accelerations"),
     ],
 )

@@ -184,7 +184,7 @@ def columns(heads: list[str] | None, count: int, units: str, path: Path, line: i
         if not known and head and not _BESIDE.fullmatch(head):
             near = nearest(name, [other for other in NAMES if other not in names])
             question = f"did you mean {near}? " if near else ""
-            notes.append(f"{path}: column {shown(head)} is not read: {question}known: {', '.join(NAMES)}")
+            notes.append(f"column {shown(head)} is not read: {question}known: {', '.join(NAMES)}")
     is_written = "position_x" in heads and "velocity_x" in heads
     result = MotionColumns(tuple(names), tuple(heads), np.array(factors), is_written, tuple(notes))
     _check(result, path, line)
@@ -207,11 +207,15 @@ def _parted(head: str) -> tuple[str, str]:
 def _common(units: str, path: Path) -> dict[int, str]:
     # Units of the directive, by the table that each is of.
     common = {id(TIMES): "s", id(LENGTHS): "m", id(ANGLES): "rad"}
+    said: set[int] = set()
     for word in filter(None, re.split(r"[,;\s]+", units)):
         table = next((table for table in (LENGTHS, ANGLES, TIMES) if word in table), None)
         if table is None:
             raise ConfigError(path, f"units = {shown(word)}: must be {either((*LENGTHS, *ANGLES, *TIMES))}")
+        if id(table) in said and common[id(table)] != word:
+            raise ConfigError(path, f"units = {shown(word)}: must be one of a kind, not {common[id(table)]} too")
         common[id(table)] = word
+        said.add(id(table))
     return common
 
 
@@ -257,3 +261,5 @@ def _check(result: MotionColumns, path: Path, line: int) -> None:
         raise ConfigError(path, f"{place}: columns {first} and {second}: must be one orientation, not two")
     if result.has("accelerations") and not result.has("velocities"):
         raise ConfigError(path, f"{place}: column ax without vx: accelerations need velocities beside them")
+    if not kinds and (result.has("angular_velocities") or result.has("angular_accelerations")):
+        raise ConfigError(path, f"{place}: columns of angular rates: must be beside an orientation, such as qw to qz")

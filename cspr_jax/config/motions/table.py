@@ -32,6 +32,7 @@ class MotionTable:
         z_axis: where z points in it, "up" or "down"; None: as in the file of the robot.
         point: whose positions it has, one of `POINTS`; None: it does not say.
         from_reference: whether orientations count from the reference orientation, and not from the platform's own axes.
+        is_planar: whether it has no y, as motions of planar robots may; its y is 0.
         notes: lines for the user.
     """
 
@@ -47,6 +48,7 @@ class MotionTable:
     z_axis: str | None = None
     point: str | None = None
     from_reference: bool = False
+    is_planar: bool = False
     notes: tuple[str, ...] = ()
 
     def in_axes(self, z_axis: str) -> "MotionTable":
@@ -82,6 +84,7 @@ class MotionPieces:
         quaternion: (m, degree + 1, 4) likewise, scalar first, of any length but zero; or None.
         z_axis: where z points in it, "up" or "down"; None: as in the file of the robot.
         point: whose positions it has, one of `POINTS`; None: it does not say.
+        is_planar: whether it has no y, as motions of planar robots may; its y is 0.
         notes: lines for the user.
     """
 
@@ -90,6 +93,7 @@ class MotionPieces:
     quaternion: np.ndarray | None = None
     z_axis: str | None = None
     point: str | None = None
+    is_planar: bool = False
     notes: tuple[str, ...] = ()
 
     def in_axes(self, z_axis: str) -> "MotionPieces":

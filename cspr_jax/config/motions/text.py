@@ -141,6 +141,7 @@ class _Reader:
             z_axis=self.directives.get("z"),
             point=self.directives.get("point", "mass-centre" if self.columns.is_written else None),
             from_reference=self.columns.is_written,
+            is_planar="y" not in self.columns.names,
             notes=tuple(self.notes),
         )
 
@@ -207,9 +208,10 @@ class _Reader:
                     self.path, f"line {number}: {len(cells)} values: must be {len(heads)}, as in the header"
                 )
             for k, (name, cell) in enumerate(zip(self.columns.names, cells, strict=True)):
-                if name and not abs(_number(cell)) <= LARGEST_NUMBER:
+                is_split = "," in cell and self.delimiter not in (";", "\t")
+                if name and (is_split or not abs(_number(cell)) <= LARGEST_NUMBER):
                     place = f"line {number}, column {k + 1}: {name}"
-                    odd = look_alike(cell[:100])
+                    odd = ", without a comma" if is_split else look_alike(cell[:100])
                     raise ConfigError(self.path, f"{place} = {shown(cell)}: must be a finite number{odd}")
 
     def _check(self, rows: np.ndarray, text: str, line: int) -> None:
@@ -229,10 +231,8 @@ class _Reader:
         for group in ("rotations", "tilts"):
             angles = self.columns.values(group, rows)
             if angles is not None and np.abs(angles).max() > 2.0 * math.pi + 1e-3:
-                self.notes[
-                    f"{self.path}: angles reach {np.abs(angles).max():.4g} rad: are they degrees? Then say so: "
-                    "# units: deg"
-                ] = None
+                reach = np.abs(angles).max()
+                self.notes[f"angles reach {reach:.4g} rad: are they degrees? Then say so: # units: deg"] = None
 
     def _refuse_time(self, chain: np.ndarray, i: int, before: int, text: str, line: int) -> None:
         number = _line_of(text, line, i + 1 - before)
@@ -266,7 +266,7 @@ class _Reader:
                 self.path, f"line {number}: qw, qx, qy, qz = {shown(values)}: must be a unit quaternion, scalar first"
             )
         if np.abs(sizes - 1.0).max() > UNIT:
-            self.notes[f"{self.path}: quaternions of lengths other than 1 are normalised"] = None
+            self.notes["quaternions of lengths other than 1 are normalised"] = None
 
     def _quaternions(self, rows: np.ndarray) -> np.ndarray | None:
         quaternions = self.columns.values("quaternions", rows)
@@ -320,7 +320,7 @@ def _is_number(cell: str) -> bool:
 
 def _number(cell: str) -> float:
     try:
-        return math.nan if "_" in cell else float(cell.replace(",", "."))
+        return float(cell.replace(",", ".")) if cell.isascii() and "_" not in cell else math.nan
     except ValueError:
         return math.nan
 
