@@ -72,6 +72,29 @@ def test_it_reads_what_it_wrote(own):
     assert again.margin == pytest.approx(first.margin, rel=0.02)
 
 
+def test_limits_files(own):
+    """With a header [limits] or without; with obstacles, which name their file in mistakes."""
+    options = ("check", own / "own.csv", "--robot", "prototype", "--limits", own / "limits.toml", "--json")
+    first = cspr(*options)[1]
+    (own / "limits.toml").write_text("[limits]\ncable_speed_max = 0.15\n")
+    assert cspr(*options)[1] == first
+    ball = '[[obstacle]]\nkind = "sphere"\nname = "lamp"\ncentre = [0.1, 0.05, 0.9]\nradius = {}\n'
+    (own / "limits.toml").write_text(ball.format(0.02))
+    code, out, _ = cspr(*options)
+    answer = strict_json(out)
+    assert code == 1 and "obstacle" in answer["verdict"] and answer["cause"][0]["obstacle"] == "lamp"
+    (own / "limits.toml").write_text(ball.format(-1))
+    code, out, err = cspr(*options)
+    assert (code, out) == (2, "") and err.count("\n") == 1 and "limits.toml" in err and "radius = -1" in err
+
+
+def test_the_motion_is_not_overwritten(own):
+    content = (own / "own.csv").read_text()
+    code, _, err = cspr("check", own / "own.csv", "--robot", "prototype", "-o", own / "." / "own.csv")
+    assert code == 2 and err.count("\n") == 1 and "the motion is there" in err
+    assert (own / "own.csv").read_text() == content
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
