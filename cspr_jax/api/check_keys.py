@@ -11,7 +11,7 @@ from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.schema.limits import LIMITS
+from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES
 
 # Errors name this in place of a file where there is none.
 NAME = Path("motion")
@@ -64,4 +64,8 @@ def _limit_keys(limits: Limits | Mapping[str, Any] | None) -> dict[str, Any]:
     if limits is None or isinstance(limits, Mapping):
         return plain(dict(limits or {}))
     values = {row.name: getattr(limits, row.name) for row in LIMITS}
-    return plain({name: np.asarray(value) for name, value in values.items() if value is not None})
+    numbers = {name: np.asarray(value) for name, value in values.items() if value is not None}
+    if limits.uncertainty is None:
+        return plain(numbers)
+    parts = {row.name: np.asarray(getattr(limits.uncertainty, row.name)) for row in UNCERTAINTIES}
+    return plain({"limits": numbers | {"uncertainty": parts}})

@@ -273,6 +273,20 @@ def norm_squared(f: AffineBounds) -> AffineBounds:
     return squared(f).total()
 
 
+def norm_bound(f: AffineBounds) -> Array:
+    """Upper bounds of the lengths of vectors: at the ends of their lines, and of the band.
+
+    Args:
+        f: (..., n).
+
+    Returns:
+        (...).
+    """
+    start, end = (jnp.sqrt(jnp.sum((f.middle + side) ** 2, axis=-1)) for side in (-f.slope, f.slope))
+    length = jnp.maximum(start, end) + jnp.sqrt(jnp.sum(f.radius**2, axis=-1))
+    return length * (1.0 + ROUNDING)
+
+
 def cross(f: AffineBounds, g: AffineBounds) -> AffineBounds:
     """Bounds of the vector products.
 

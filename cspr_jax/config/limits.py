@@ -117,7 +117,7 @@ class LimitTable(_Heights):
 
     uncertainty: UncertaintyTable | None = Field(
         None,
-        description="hypocycloids and transitions: feasible then means feasible for every robot within this "
+        description="hypocycloids, transitions and splines: feasible then means feasible for every robot within this "
         "uncertainty",
     )
 

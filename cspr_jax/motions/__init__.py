@@ -28,14 +28,16 @@ Files, each importing only from those above it:
     block_slacks        slacks of any motion over blocks of time, from bounds of its states
     block_parts         blocks of several motions, cut where lines leave little undecided
     time_proof          proof of criteria over the whole time of a motion, or of several
-    proved_answers      answers of motions that give bounds of their states
-    stretching          the least uniform stretching of time that is feasible
-    proved              summaries of proofs of motions
     blocks              parts of arcs, halved while they are undecided
     enclosures          bounds of a robot's state over a block of time
     cable_rates         speeds and accelerations of cables over blocks
     uncertainty         verdicts about all robots within an uncertainty
     tolerances          the largest multiple of an uncertainty that a motion tolerates
+    uncertain_slacks    slacks of all robots within an uncertainty over blocks of time, from bounds of states
+    motion_tolerances   the largest multiple of an uncertainty that a motion with such bounds tolerates
+    proved_answers      answers of motions that give bounds of their states
+    stretching          the least uniform stretching of time that is feasible
+    proved              summaries of proofs of motions
     waypoints           consecutive poses of a plan, as points of the kernels
     outcome             what comes of a leg beyond its motion
     leg                 consecutive poses that one family joins

@@ -89,7 +89,7 @@ def _kernel(
         matrix, wrench = matrix * unit[:, None], wrench * unit
         if passes:
             return _passes(robot, bodies, matrix, state, cables)
-        parts = [*_of_tensions(robot, limits, matrix, wrench), *_of_limits(limits, state, cables)]
+        parts = [*tension_slacks(robot, limits, matrix, wrench), *limit_slacks(limits, state, cables)]
         parts += [*_of_pose(robot, matrix, state), contact_bounds(robot, bodies, state, cables)]
         if limits.floor is not None and bodies.body is not None:
             heights = -corner_depths(bodies.body, state) + limits.floor
@@ -103,7 +103,16 @@ def _kernel(
     return jax.vmap(one)(states)
 
 
-def _of_tensions(robot: AnyRobot, limits: Limits, matrix: AffineBounds, wrench: AffineBounds) -> list[Part]:
+def tension_slacks(robot: AnyRobot, limits: Limits, matrix: AffineBounds, wrench: AffineBounds) -> list[Part]:
+    """Bounds of the slacks of tensions over one block.
+
+    Args:
+        matrix: (dof, n_cables) wrenches of unit tensions, over their units.
+        wrench: (dof,) what the cables must supply, likewise, N.
+
+    Returns:
+        the bounds.
+    """
     low, high = tension_range(robot, limits)
     tensions = witness_tensions(matrix, wrench, low, high)
     if robot.n_cables > robot.dof:
@@ -132,8 +141,15 @@ def _passes(robot: AnyRobot, bodies: Bodies, matrix: AffineBounds, state: StateB
     return jnp.concatenate([through[None], passings(robot, bodies, state, cables)])
 
 
-def _of_limits(limits: Limits, state: StateBounds, cables: CableBounds) -> list[Part]:
-    # Bound the slacks of all other limits; of speeds and accelerations that of the worse sign.
+def limit_slacks(limits: Limits, state: StateBounds, cables: CableBounds) -> list[Part]:
+    """Bounds of the slacks of all other limits over one block; of speeds and accelerations that of the worse sign.
+
+    Args:
+        cables: of the same block.
+
+    Returns:
+        the bounds.
+    """
     parts: list[Part] = []
     values = {"depth": state.position.each(lambda x: x[2:]), "length": cables.length}
     rates = {"speed": cables.rate, "acceleration": cables.acceleration}

@@ -101,8 +101,9 @@ def check_certain(
     known = [row.name for row in FAMILIES.values() if row.knows_uncertainty]
     if not families or not set(families) <= set(known):
         raise InputError("uncertainty", None, f"must be absent but for the families {', '.join(known)}", fault="given")
-    if robot.n_cables != robot.dof or in_pairs or robot.pulleys is not None:
-        allowed = "must be absent on redundant cables, on pairs of cables, and with pulleys"
+    is_redundant = robot.n_cables != robot.dof and not all(FAMILIES[name].uncertain_redundancy for name in families)
+    if is_redundant or in_pairs or robot.pulleys is not None:
+        allowed = "must be absent on redundant cables (but for splines), on pairs of cables, and with pulleys"
         raise InputError("uncertainty", None, allowed, fault="given")
     if not isinstance(robot, PlatformRobot) and float(uncertainty.mass_centre) > 0.0:
         raise InputError(

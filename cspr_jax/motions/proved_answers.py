@@ -5,16 +5,15 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
-import jax
 import numpy as np
 
-from cspr_jax.arithmetic.affine_bounds import constant
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.block_slacks import BlockSlacks, block_slacks
-from cspr_jax.motions.cause import Cause
+from cspr_jax.motions.cause import UNITS, Cause
 from cspr_jax.motions.criteria import AT_INSTANTS, Criterion, criteria
 from cspr_jax.motions.motion import BoundedMotion, Motion
+from cspr_jax.motions.motion_tolerances import instant_states, motion_tolerances
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.time_proof import TimeProof, time_proofs
 from cspr_jax.robots.clearance import Scene
@@ -118,6 +117,9 @@ class ProvedAnswers(Answers):
     def proved_causes(self, i: int, frame: Frame) -> tuple[Cause, ...]:
         """The worst cable of each criterion that fails, else the nearest to it; see `Answers.proved_causes`."""
         case: MotionProof = self.proof[i]
+        if self.verdict[i] == Verdict.UNCERTAINTY or not case.verdict:
+            flag, stands = Verdict.UNCERTAINTY, float(np.fmin(self.tolerated[i], self.not_tolerated[i]))
+            return (Cause(flag.text, needed=1.0, allowed=stands, unit=UNITS[flag]),)
         order = np.argsort(case.proof.high / case.scales).tolist()
         if not case.broken.any():
             nearest = _cause(case, order[0], frame)
@@ -147,7 +149,14 @@ def proved_answers(problem: Problem, motions: Sequence[Any], scene: Scene | None
         the answers: no numbers of arcs.
     """
     proofs = [(proof_of if hasattr(motion, "bounds") else sampled_proof)(problem, motion, scene) for motion in motions]
-    return answers_of(proofs, np.array([float(motion.duration()) for motion in motions]))
+    answers = answers_of(proofs, np.array([float(motion.duration()) for motion in motions]))
+    if problem.limits.uncertainty is not None:
+        for i in np.flatnonzero(answers.feasible).tolist():
+            proved, refuted = (float(side[0]) for side in motion_tolerances(problem, motions[i], scene))
+            answers.tolerated[i], answers.not_tolerated[i] = proved, refuted
+            if proved < 1.0:
+                answers.verdict[i] = (Verdict.UNCERTAINTY if refuted <= 1.0 else Verdict.UNDECIDED).value
+    return answers
 
 
 def proof_of(problem: Problem, motion: BoundedMotion, scene: Scene | None = None) -> MotionProof:
@@ -224,17 +233,10 @@ def answers_of(proofs: Sequence[MotionProof], duration: np.ndarray) -> ProvedAns
         margin_bound=np.array([row.least(row.proof.low, TENSIONS) for row in proofs]),
         limit_margin=np.array([row.least(row.proof.high, TENSIONS, others=True) for row in proofs]),
         feasible_at_infinity=nothing,
-        tolerated=nothing,
-        not_tolerated=nothing,
+        tolerated=nothing.copy(),
+        not_tolerated=nothing.copy(),
         proof=each,
     )
-
-
-@partial(jax.jit, static_argnums=0)
-def _instants(structure, leaves, tau):
-    states = jax.vmap(jax.tree.unflatten(structure, leaves).state)(tau)
-    names = [name for name in StateBounds._fields if getattr(states, name) is not None]
-    return StateBounds(**{name: constant(getattr(states, name)) for name in names})
 
 
 def sampled_proof(problem: Problem, motion: Motion, scene: Scene | None = None, samples: int = SAMPLES) -> MotionProof:
@@ -248,10 +250,9 @@ def sampled_proof(problem: Problem, motion: Motion, scene: Scene | None = None, 
     Returns:
         a proof that bounds no slack from below; intervals of failure reach from instant to instant.
     """
-    leaves, structure = jax.tree.flatten(motion)
     tau = np.linspace(0.0, 1.0, samples + 1)
     # A block without a length has the slacks of its instant.
-    states = _instants(structure, leaves, tau)
+    states = instant_states(motion, tau)
     high = block_slacks(problem.robot, problem.limits, lambda start, end: states, tau, tau, scene).high
     times = tau * float(motion.duration())
     failing = [_runs(times, column < 0.0) for column in high.T]

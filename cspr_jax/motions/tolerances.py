@@ -6,7 +6,8 @@ middle of a block bounds the multiple from above (`uncertainty.fails`).
 
 import dataclasses
 from collections.abc import Callable
-from typing import NamedTuple
+from functools import partial
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -40,9 +41,50 @@ class Tolerated(NamedTuple):
     refuted: np.ndarray
 
 
+class Pool(Protocol):
+    """Blocks that are not settled, and what is known of them; multiples are (k,), one for each block."""
+
+    blocks: Blocks
+
+    def part(self, rows: np.ndarray) -> "Pool":
+        """Blocks chosen by indices, or by a mask (k,)."""
+        ...
+
+    def halves(self, rows: np.ndarray) -> "Pool":
+        """Halves of chosen blocks."""
+        ...
+
+    def middles(self) -> "Pool":
+        """Middles of the blocks, as if blocks had no length."""
+        ...
+
+    def hold(self, multiple: np.ndarray) -> np.ndarray:
+        """Tell in which blocks every robot within a multiple is proved to meet all criteria.
+
+        Args:
+            multiple: (k,).
+
+        Returns:
+            (k,).
+        """
+        ...
+
+    def fail(self, multiple: np.ndarray) -> np.ndarray:
+        """Tell in the middle of which blocks a robot within a multiple breaks a criterion.
+
+        Args:
+            multiple: (k,).
+
+        Returns:
+            (k,).
+        """
+        ...
+
+
 @dataclasses.dataclass
 class _Open:
-    # Blocks that are not settled, and what is known of them.
+    # Blocks of swings, and of platforms on six cables.
+    look: Callable[[Blocks], "_Open"]
     blocks: Blocks
     known: Enclosure
     influence: Influence
@@ -52,10 +94,13 @@ class _Open:
     def part(self, rows: np.ndarray) -> "_Open":
         worst = WorstDisplacements(*(x[:, rows] for x in self.worst))
         requirements = dataclasses.replace(self.requirements, slack=self.requirements.slack[rows])
-        return _Open(self.blocks.part(rows), self.known.part(rows), self.influence.part(rows), worst, requirements)
+        known, influence = self.known.part(rows), self.influence.part(rows)
+        return _Open(self.look, self.blocks.part(rows), known, influence, worst, requirements)
+
+    def halves(self, rows: np.ndarray) -> "_Open":
+        return self.look(self.blocks.part(rows).halves())
 
     def middles(self) -> "_Open":
-        """Middles of the blocks, as if blocks had no length."""
         return dataclasses.replace(self, known=self.known.middle(self.influence.mu))
 
     def fail(self, multiple: np.ndarray) -> np.ndarray:
@@ -86,7 +131,20 @@ def tolerated(
     """
     if not len(arcs):
         return Tolerated(np.zeros(0), np.zeros(0))
-    pool, search = _looked_at(blocks, requirements, enclose), _MultipleSearch(arcs, whole=whole)
+    return tolerated_by(_looked_at(requirements, enclose, blocks), arcs, whole=whole)
+
+
+def tolerated_by(pool: Pool, arcs: np.ndarray, *, whole: bool = True) -> Tolerated:
+    """Multiples of an uncertainty, as `tolerated` gives them, by any way to prove and to refute blocks.
+
+    Args:
+        pool: blocks of n whole motions, each feasible as planned.
+        arcs: (n,) numbers of arcs, or of as many parts as a motion needs blocks for.
+
+    Returns:
+        the multiples.
+    """
+    search = _MultipleSearch(arcs, whole=whole)
     search.refuted = (
         _refuted_first(pool, len(arcs)) if whole else _refuted_below(pool, search.refuted, np.ones(len(arcs)))
     )
@@ -96,7 +154,7 @@ def tolerated(
         is_open = search.open_blocks(pool, level)
         if not is_open.any():
             break
-        pool = _looked_at(pool.blocks.part(is_open).halves(), requirements, enclose)
+        pool = pool.halves(is_open)
         search.refute(pool)
     return Tolerated(search.proved, search.refuted)
 
@@ -109,14 +167,14 @@ class _MultipleSearch:
         self.refuted, self.targets = np.full(len(arcs), np.inf), np.ones(len(arcs))
         self.proved, self._is_hopeless = np.full(len(arcs), np.nan), np.zeros(len(arcs), bool)
 
-    def left(self, pool: _Open) -> _Open:
+    def left(self, pool: Pool) -> Pool:
         # Return the blocks of motions that are not settled.
         if self._whole:
             self.targets = _reachable(pool, self.targets)
         self.proved = np.where(np.isnan(self.proved) & (self.targets == 0.0), 0.0, self.proved)
         return pool.part(np.isnan(self.proved)[pool.blocks.row])
 
-    def open_blocks(self, pool: _Open, level: int) -> np.ndarray:
+    def open_blocks(self, pool: Pool, level: int) -> np.ndarray:
         # Return the blocks to be halved; settle motions without any, and motions with too many.
         row = pool.blocks.row
         is_open = ~pool.hold(self.targets[row])
@@ -131,7 +189,7 @@ class _MultipleSearch:
         self.proved[done] = np.where(self._is_hopeless, 0.0, self.targets)[done]
         return is_open & ~ends[row]
 
-    def _lessened(self, pool: _Open, is_open: np.ndarray) -> np.ndarray:
+    def _lessened(self, pool: Pool, is_open: np.ndarray) -> np.ndarray:
         # Lower the targets of motions of which too many blocks are open.
         row = pool.blocks.row
         for _ in range(LESSER):
@@ -143,7 +201,7 @@ class _MultipleSearch:
             is_open[indices] = ~pool.part(indices).hold(self.targets[row[indices]])
         return is_open
 
-    def _hopeful(self, pool: _Open, is_open: np.ndarray) -> np.ndarray:
+    def _hopeful(self, pool: Pool, is_open: np.ndarray) -> np.ndarray:
         # Once the middle of a block cannot hold, nothing can be proved for its motion: only look for a robot that
         # fails, in such middles.
         row = pool.blocks.row
@@ -151,13 +209,13 @@ class _MultipleSearch:
         self._is_hopeless |= _any(row, is_bad, self._count)
         return is_open & (is_bad | ~self._is_hopeless[row])
 
-    def refute(self, pool: _Open) -> None:
+    def refute(self, pool: Pool) -> None:
         # Take in the multiples that the middles of new blocks refute.
         self.refuted = _refuted_below(pool, self.refuted, NEAR * self.refuted if self._whole else self.targets)
         self.targets = np.minimum(self.targets, _targets(self.refuted, whole=self._whole))
 
 
-def _reachable(pool: _Open, multiples: np.ndarray) -> np.ndarray:
+def _reachable(pool: Pool, multiples: np.ndarray) -> np.ndarray:
     # Lower the multiples that cannot hold even in a middle.
     row, middles = pool.blocks.row, pool.middles()
     fails = ~middles.hold(multiples[row])
@@ -168,11 +226,12 @@ def _reachable(pool: _Open, multiples: np.ndarray) -> np.ndarray:
     return np.where(least < multiples, _near(least), multiples)
 
 
-def _looked_at(blocks: Blocks, requirements: Requirements, enclose: Callable[[Blocks], Enclosure]) -> _Open:
+def _looked_at(requirements: Requirements, enclose: Callable[[Blocks], Enclosure], blocks: Blocks) -> _Open:
     known = enclose(blocks)
     influences = influence(known)
-    requirements = dataclasses.replace(requirements, slack=requirements.slack[blocks.row])
-    return _Open(blocks, known, influences, worst(known, influences, requirements), requirements)
+    each = dataclasses.replace(requirements, slack=requirements.slack[blocks.row])
+    look = partial(_looked_at, requirements, enclose)
+    return _Open(look, blocks, known, influences, worst(known, influences, each), each)
 
 
 def _targets(refuted: np.ndarray, *, whole: bool) -> np.ndarray:
@@ -191,7 +250,7 @@ def _any(row: np.ndarray, is_so: np.ndarray, count: int) -> np.ndarray:
     return np.bincount(row[is_so], minlength=count) > 0
 
 
-def _refuted_first(pool: _Open, count: int) -> np.ndarray:
+def _refuted_first(pool: Pool, count: int) -> np.ndarray:
     # Find the least multiple of a coarse row that the middles refute, then narrow it down.
     high, row = np.full(count, np.inf), pool.blocks.row
     for multiple in ROW:
@@ -208,7 +267,7 @@ def _refuted_first(pool: _Open, count: int) -> np.ndarray:
     return _narrowed(pool, high / RATIO, high)
 
 
-def _refuted_below(pool: _Open, refuted: np.ndarray, multiples: np.ndarray) -> np.ndarray:
+def _refuted_below(pool: Pool, refuted: np.ndarray, multiples: np.ndarray) -> np.ndarray:
     # Try the multiples on the blocks, narrow down those that they refute, and return the least refuted multiples.
     multiples = np.minimum(multiples, LARGEST_MULTIPLE)
     is_new = _any(pool.blocks.row, pool.fail(multiples[pool.blocks.row]), len(refuted)) & (multiples > 0.0)
@@ -216,7 +275,7 @@ def _refuted_below(pool: _Open, refuted: np.ndarray, multiples: np.ndarray) -> n
     return np.minimum(refuted, _narrowed(pool, np.zeros(len(refuted)), high))
 
 
-def _narrowed(pool: _Open, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+def _narrowed(pool: Pool, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     # Narrow `high`, which some middle refutes where it is finite, down towards `low`: some middle refutes it still.
     pool = pool.part(np.isfinite(high)[pool.blocks.row])
     pool = pool.part(pool.fail(high[pool.blocks.row]))
@@ -232,7 +291,7 @@ def _narrowed(pool: _Open, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     return high
 
 
-def _held(left: _Open, multiples: np.ndarray) -> np.ndarray:
+def _held(left: Pool, multiples: np.ndarray) -> np.ndarray:
     # Find the largest multiple that holds in all blocks of each motion, (n,); motions without blocks keep theirs.
     row = left.blocks.row
     low, high = np.zeros(len(row)), multiples[row]

@@ -54,6 +54,8 @@ def check_object(plan: PlannedMotions) -> dict[str, Any]:
         "margin_unit": "N",
         "margin_bound": float(answers.margin_bound[0]),
         "limit_margin": float(answers.limit_margin[0]),
+        "tolerated": float(answers.tolerated[0]),
+        "not_tolerated": float(answers.not_tolerated[0]),
         "cause": [] if plan.feasible else [cause.to_dict() for cause in plan.causes[0]],
         "failing": case.failing.tolist(),
         "tension_min": float(demands.tension_min[0]),
@@ -126,7 +128,9 @@ def check_lines(plan: PlannedMotions) -> list[str]:
     duration = float(answers.duration[0])
     lines = [f"{plan.robot_file.name}: motion of {duration:.6g} s, {_taken_as(plan)}; z {plan.robot_file.z_axis}"]
     if plan.feasible:
-        return [*lines, "feasible: every criterion is proved to hold at every instant"]
+        text = "feasible: every criterion is proved to hold at every instant"
+        stands = float(answers.tolerated[0])
+        return [*lines, text if math.isnan(stands) else f"{text}, and for {stands:.3g} of the uncertainty"]
     word = "undecided" if answers.verdict[0] == Verdict.UNDECIDED else "not feasible"
     lines += [f"{word}: {cause.text}" for cause in plan.causes[0]]
     intervals = case.failing

@@ -78,6 +78,24 @@ class CableBounds(NamedTuple):
     exit: AffineBounds
 
 
+def attachments(
+    robot: AnyRobot, state: StateBounds
+) -> tuple[AffineBounds | None, AffineBounds, AffineBounds, AffineBounds]:
+    """Bounds of the attachment points.
+
+    Returns:
+        from the mass centre, m, None for a point mass; positions, m; velocities, m/s; accelerations, m/s^2: (n_cables,
+        3) each, of a point mass (1, 3).
+    """
+    target, velocity, pull = (_rows(bounds) for bounds in state[:3])
+    if not isinstance(robot, PlatformRobot):
+        return None, target, velocity, pull
+    arm = turned(state.rotation.each(lambda x: x[None]), robot.platform_points)
+    swing = cross(_rows(state.angular_velocity), arm)
+    pull = pull + cross(_rows(state.angular_acceleration), arm) + cross(_rows(state.angular_velocity), swing)
+    return arm, target + arm, velocity + swing, pull
+
+
 def cable_bounds(robot: AnyRobot, state: StateBounds) -> CableBounds:
     """Bounds of the cables, also behind pulleys.
 
@@ -85,13 +103,7 @@ def cable_bounds(robot: AnyRobot, state: StateBounds) -> CableBounds:
         the bounds, leaves (n_cables, ...); radii are NaN where a cable may have no length, or its attachment point may
         lie within its pulley or on the swivel axis of it.
     """
-    arm = None
-    target, velocity, pull = (_rows(bounds) for bounds in state[:3])
-    if isinstance(robot, PlatformRobot):
-        arm = turned(state.rotation.each(lambda x: x[None]), robot.platform_points)
-        swing = cross(_rows(state.angular_velocity), arm)
-        target, velocity = target + arm, velocity + swing
-        pull = pull + cross(_rows(state.angular_acceleration), arm) + cross(_rows(state.angular_velocity), swing)
+    arm, target, velocity, pull = attachments(robot, state)
     ray = target + -robot.base_points
     square = norm_squared(ray)
     inverse = reciprocal_root(square)
@@ -132,8 +144,8 @@ def balance_bounds(robot: AnyRobot, state: StateBounds, cables: CableBounds) -> 
     moment = _spin_moment(robot, state)
     if row.is_jointed and robot.centre_of_mass is not None:
         moment = moment + cross(turned(state.rotation, robot.centre_of_mass), force)
-    matrix = _balanced(robot, state.rotation, forces, moments)
-    wrench = _balanced(robot, state.rotation, *(bounds.each(lambda x: x[:, None]) for bounds in (force, moment)))
+    matrix = balanced_part(robot, state.rotation, forces, moments)
+    wrench = balanced_part(robot, state.rotation, *(bounds.each(lambda x: x[:, None]) for bounds in (force, moment)))
     return matrix, wrench.each(lambda x: x[:, 0])
 
 
@@ -152,8 +164,19 @@ def _spin_moment(robot: PlatformRobot, state: StateBounds) -> AffineBounds:
     return turned(state.rotation, turned(inertia, acceleration) + cross(velocity, turned(inertia, velocity)))
 
 
-def _balanced(robot: PlatformRobot, rotation: AffineBounds, force: AffineBounds, moment: AffineBounds) -> AffineBounds:
-    # Keep the components that the cables balance, of (3, n) forces and moments.
+def balanced_part(
+    robot: PlatformRobot, rotation: AffineBounds, force: AffineBounds, moment: AffineBounds
+) -> AffineBounds:
+    """Bounds of the components of wrenches that the cables balance.
+
+    Args:
+        rotation: (3, 3) from platform to fixed axes.
+        force: (3, n) N.
+        moment: (3, n) N m.
+
+    Returns:
+        (dof, n).
+    """
     row = PATTERNS[robot.pattern]
     if row.along_line:
         across = turned(rotation.each(lambda x: x[None]), across_line(robot).T)

@@ -77,8 +77,15 @@ def witness_tensions(matrix: AffineBounds, wrench: AffineBounds, low: Array, hig
     return WitnessTensions(tension, jnp.where(is_regular, below, -jnp.inf), above, is_regular)
 
 
-def _inverse(matrix: Array) -> Array:
-    # A right inverse of (m, n), n >= m.
+def right_inverse(matrix: Array) -> Array:
+    """Right inverse of a matrix.
+
+    Args:
+        matrix: (m, n), n >= m.
+
+    Returns:
+        (n, m).
+    """
     m, n = matrix.shape
     inverse = solved(matrix if m == n else matrix @ matrix.T, jnp.eye(m))[0]
     return inverse if m == n else matrix.T @ inverse
@@ -90,7 +97,7 @@ def _solution(
     # Bound a solution of M(s) x(s) = b(s), with M (m, n) and n >= m, near a line through `start`, (n,), whose slope
     # `follow` changes; say whether M is proved to have rank m throughout.
     m, n = matrix.middle.shape
-    inverse = _inverse(matrix.middle)
+    inverse = right_inverse(matrix.middle)
     middle = start + inverse @ (right.middle - matrix.middle @ start)
     slope = inverse @ (right.slope - matrix.slope @ middle)
     slope = slope if follow is None else slope + follow @ slope
@@ -111,7 +118,7 @@ def _face_margin(matrix: AffineBounds, wrench: AffineBounds, low: Array, high: A
     dof, count = matrix.middle.shape
     columns = face.columns
     across = matrix.each(lambda x: x[:, columns].T)
-    normal, is_normal = _solution(across, constant(jnp.zeros(dof - 1)), face.along @ _inverse(matrix.middle))
+    normal, is_normal = _solution(across, constant(jnp.zeros(dof - 1)), face.along @ right_inverse(matrix.middle))
     is_spanning = (jnp.arange(count)[:, None] == columns[None]).any(1)
     along = turned(matrix.each(jnp.transpose), normal).each(lambda x: jnp.where(is_spanning, 0.0, x))
     # Each cable at the limit that gives the least; the other one counts as far as its product may change sign.

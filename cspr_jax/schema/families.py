@@ -28,6 +28,7 @@ class Family:
         pose_keys: keys of a pose that only this family takes, and others that name them too, if it leads to the pose.
         end_keys: likewise, if it leads to the pose or from it.
         knows_uncertainty: whether its verdicts take all of an uncertainty into account.
+        uncertain_redundancy: whether they do so on more cables than degrees of freedom, too.
         knows_obstacles: whether its verdicts take obstacles and the shape of the platform into account.
         knows_pulleys: whether its verdicts are right for cables that leave from pulleys.
     """
@@ -43,6 +44,7 @@ class Family:
     pose_keys: tuple[str, ...] = ()
     end_keys: tuple[str, ...] = ()
     knows_uncertainty: bool = False
+    uncertain_redundancy: bool = False
     knows_obstacles: bool = False
     knows_pulleys: bool = False
 
@@ -116,6 +118,8 @@ _ROWS = (
         dict.fromkeys(ANY_PATTERN, "cspr_jax.splines.leg:Splines"),
         rests_anywhere=True,
         any_cables=ANY_PATTERN,
+        knows_uncertainty=True,
+        uncertain_redundancy=True,
         knows_obstacles=True,
         knows_pulleys=True,
         keys=("motion", "interpolation", "ends", "smooth", "stretch", "point"),

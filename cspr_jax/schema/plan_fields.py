@@ -111,6 +111,14 @@ CHECK = {
     "margin_unit": ("", '"N".'),
     "margin_bound": ("N", "Proved lower bound of `margin`; null where nothing is proved."),
     "limit_margin": ("1", "Smallest slack of the other limits, over the limit; null without limits."),
+    "tolerated": (
+        "1",
+        "Multiple of `limits.uncertainty` for which the motion is proved feasible; null without uncertainty.",
+    ),
+    "not_tolerated": (
+        "1",
+        "Smallest multiple for which a robot was found that fails; null: none, or without uncertainty.",
+    ),
     "cause": ("", "As of a segment of a plan; empty where the motion is feasible."),
     "failing": (
         "s",

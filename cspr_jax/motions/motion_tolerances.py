@@ -1,0 +1,121 @@
+"""Multiples of an uncertainty that motions with bounds of their states are proved to tolerate, and that are refuted.
+
+The search is that of `motions.tolerances`; blocks are proved and refuted by `motions.uncertain_slacks`.
+"""
+
+import dataclasses
+from functools import partial
+from typing import Any
+
+import jax
+import numpy as np
+
+from cspr_jax.arithmetic.affine_bounds import constant
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.motions.block_slacks import BATCH
+from cspr_jax.motions.blocks import Blocks
+from cspr_jax.motions.motion import BoundedMotion, Motion
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.time_proof import FIRST
+from cspr_jax.motions.tolerances import Tolerated, tolerated_by
+from cspr_jax.motions.uncertain_slacks import Share, blocks_hold, instants_fail, worst_ways
+from cspr_jax.robots.clearance import Scene
+from cspr_jax.robots.contact_bodies import Bodies, bodies_of, default_scene
+from cspr_jax.robots.state_bounds import StateBounds
+
+INSTANTS = 256  # in one batch
+
+
+@dataclasses.dataclass
+class _StatePool:
+    # Blocks of one motion, in s, with bounds of its states; see `tolerances.Pool`.
+    problem: Problem
+    bodies: Bodies
+    motion: BoundedMotion
+    blocks: Blocks
+    states: StateBounds
+    instants: StateBounds
+    ways: np.ndarray
+
+    def part(self, rows: np.ndarray) -> "_StatePool":
+        states, instants = (jax.tree.map(lambda x: x[rows], each) for each in (self.states, self.instants))
+        return dataclasses.replace(
+            self, blocks=self.blocks.part(rows), states=states, instants=instants, ways=self.ways[rows]
+        )
+
+    def halves(self, rows: np.ndarray) -> "_StatePool":
+        return _pool(self.problem, self.bodies, self.motion, self.blocks.part(rows).halves())
+
+    def middles(self) -> "_StatePool":
+        return dataclasses.replace(self, states=self.instants)
+
+    def hold(self, multiple: np.ndarray) -> np.ndarray:
+        return self._batched(blocks_hold, self.states, _share(self.problem, multiple))
+
+    def fail(self, multiple: np.ndarray) -> np.ndarray:
+        return self._batched(instants_fail, self.instants, _share(self.problem, multiple), self.ways)
+
+    def _batched(self, kernel: Any, *cases: Any) -> np.ndarray:
+        if not len(self.blocks.row):
+            return np.zeros(0, bool)
+        return in_batches(partial(kernel, self.problem.robot, self.problem.limits, self.bodies), cases, size=BATCH)
+
+
+def _share(problem: Problem, multiple: np.ndarray) -> Share:
+    uncertainty: Any = problem.limits.uncertainty
+    with np.errstate(over="ignore"):
+        factor = leaf(float(uncertainty.mass_factor) ** multiple)
+    spools, centre = (leaf(multiple * float(size)) for size in (uncertainty.spool_positions, uncertainty.mass_centre))
+    return Share(spools, centre, factor)
+
+
+def _pool(problem: Problem, bodies: Bodies, motion: BoundedMotion, blocks: Blocks) -> _StatePool:
+    middle = 0.5 * (blocks.start + blocks.stop)
+    each = motion.bounds(blocks.start, blocks.stop), instant_states(motion, middle / float(motion.duration()))
+    states, instants = (jax.tree.map(np.asarray, bounds) for bounds in each)
+    cases = (instants, _share(problem, np.ones(len(middle))))
+    ways = in_batches(partial(worst_ways, problem.robot, problem.limits, bodies), cases, size=BATCH)
+    return _StatePool(problem, bodies, motion, blocks, states, instants, ways)
+
+
+@partial(jax.jit, static_argnums=0)
+def _instants(structure, leaves, tau):
+    states = jax.vmap(jax.tree.unflatten(structure, leaves).state)(tau)
+    names = [name for name in StateBounds._fields if getattr(states, name) is not None]
+    return StateBounds(**{name: constant(getattr(states, name)) for name in names})
+
+
+def instant_states(motion: Motion, tau: np.ndarray) -> StateBounds:
+    """States of a motion, as bounds of blocks without a length.
+
+    Args:
+        tau: (k,) from 0 to 1.
+
+    Returns:
+        the states, leaves (k, ...).
+    """
+    leaves, structure = jax.tree.flatten(motion)
+    return in_batches(partial(_instants, structure, leaves), tau, size=INSTANTS)
+
+
+def motion_tolerances(problem: Problem, motion: BoundedMotion, scene: Scene | None = None) -> Tolerated:
+    """Multiples of the uncertainty that a motion tolerates.
+
+    Args:
+        problem: robot without pulleys, limits with an uncertainty.
+        motion: feasible as planned, from the centroid of the spools, z down.
+        scene: bodies that can meet; None: the cables of a platform alone.
+
+    Returns:
+        the multiples, () each in arrays (1,).
+    """
+    duration = float(motion.duration())
+    jumps = motion.jumps() if hasattr(motion, "jumps") else np.zeros(0)
+    edges = np.unique(
+        np.concatenate([np.linspace(0.0, duration, FIRST + 1), jumps[(jumps > 0.0) & (jumps < duration)]])
+    )
+    blocks = Blocks(np.zeros(len(edges) - 1, int), edges[:-1], edges[1:])
+    bodies = bodies_of(problem.robot, scene or default_scene(problem.robot))
+    pool = _pool(problem, bodies, motion, blocks)
+    return tolerated_by(pool, np.array([len(blocks.row) / FIRST]))
