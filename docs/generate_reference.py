@@ -20,8 +20,9 @@ from cspr_jax.schema.quantities import (
     ACROSS,
     AXES,
     BEST,
+    FAILURES,
     FLIGHT,
-    FLIGHT_DIMS,
+    OTHER_DIMS,
     PARTS,
     QUANTITIES,
     SEGMENTS,
@@ -158,8 +159,8 @@ def motion_text() -> str:
     rows = "".join(
         f"| `{q.name}` | {_columns(q.name)} | {q.units} | {cell_text(q.description)} |\n" for q in TRAJECTORY.values()
     )
-    scales = {*ACROSS.values(), *(dim for dims in FLIGHT_DIMS.values() for dim in dims)}
-    scales -= {*TRAJECTORY, *FLIGHT}
+    scales = {*ACROSS.values(), *(dim for dims in OTHER_DIMS.values() for dim in dims)}
+    scales -= {*TRAJECTORY, *FLIGHT, *FAILURES}
     words = [
         f"`{name}` ({', '.join(PARTS[name])})" if name in PARTS else f"`{name}` (from 1 on)" for name in sorted(scales)
     ]
@@ -167,6 +168,7 @@ def motion_text() -> str:
         f"| name | columns in CSV | units | meaning |\n|---|---|---|---|\n{rows}\n"
         f"For each segment, in HDF5 files:\n\n{quantities_text(SEGMENTS)}\n"
         f"For an object that is released, in HDF5 files:\n\n{quantities_text(FLIGHT)}\n"
+        f"For a motion that fails in known intervals, in HDF5 files:\n\n{quantities_text(FAILURES)}\n"
         + textwrap.fill(f"Further dimensions of HDF5 files, as datasets: {', '.join(words)}.", 120)
         + "\n"
     )

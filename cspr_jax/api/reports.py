@@ -126,7 +126,7 @@ def _planned(planned: Plan, title: str) -> dict[str, Any]:
     with double_precision():
         length = float(np.sum(planned.answers.duration))
         columns = motion_files.rows(planned, rate=min(RATE, MOST_ROWS / length))
-        columns |= planned.outcome_columns
+        columns |= planned.outcome_columns | motion_files.failures(planned)
         return motion_content(title, columns, motion_files.segments(planned), planned.robot_file, planned.keys)
 
 

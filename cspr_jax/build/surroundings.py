@@ -99,4 +99,4 @@ def build_scene(
     except InputError as error:
         allowed = "must be points: those where the cables are attached lie in a plane"
         raise ConfigError(file, f"{at}platform_hull = true: {allowed}") from error
-    return surroundings(robot, frame, [table.shape() for table in keys.obstacle or ()], body, rotation)
+    return surroundings(robot, frame, keys.bodies, body, rotation)

@@ -163,6 +163,11 @@ class SurroundingsKeys(PlatformShapeKeys):
     obstacle: Obstacles | None = Field(None, description="[[obstacle]], bodies fixed in space that nothing may meet")
 
     @property
+    def bodies(self) -> list[shapes.Obstacle]:
+        """The obstacles, in the axes of the robot file."""
+        return [table.shape() for table in self.obstacle or ()]
+
+    @property
     def surroundings(self) -> tuple[str, ...]:
         """Names of the keys of obstacles and shapes that are given."""
         return tuple(name for name in SurroundingsKeys.model_fields if getattr(self, name) is not None)

@@ -17,6 +17,7 @@ from cspr_jax.errors import ConfigError
 from cspr_jax.lines.motion import TimedLine
 from cspr_jax.motions.acceleration_sets import along
 from cspr_jax.motions.motion import Motion, outward
+from cspr_jax.motions.proved_answers import united
 from cspr_jax.plans.causes import cause_columns
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.robots import cables
@@ -25,8 +26,8 @@ from cspr_jax.robots.tension_couples import is_rectangle, tension_couples
 from cspr_jax.schema.identity import canonical_json
 from cspr_jax.schema.quantities import (
     ACROSS,
-    FLIGHT,
-    FLIGHT_DIMS,
+    EVERY,
+    OTHER_DIMS,
     PARTS,
     SEGMENTS,
     TRAJECTORY,
@@ -219,22 +220,36 @@ def _write_hdf5(plan: PlannedMotions, path: Path, columns: dict[str, np.ndarray]
             if name != "segment":
                 data.dims[0].attach_scale(file["segment"])
         set_attributes(file["segment_verdict"], flag_attributes())
-        _write_outcomes(file, plan.outcome_columns)
+        _write_others(file, plan.outcome_columns | failures(plan))
 
 
-def _write_outcomes(file: h5py.File, columns: dict[str, np.ndarray]) -> None:
-    if "landing" in columns:
-        file["level"] = list(PARTS["level"])
-        file["level"].make_scale("level")
+def _write_others(file: h5py.File, columns: dict[str, np.ndarray]) -> None:
+    for name in (part for column in columns for part in OTHER_DIMS[column] if part in PARTS and part not in file):
+        file[name] = list(PARTS[name])
+        file[name].make_scale(name)
     for name, values in columns.items():
         data = file.create_dataset(name, data=values)
-        describe(data, FLIGHT[name])
-        if FLIGHT_DIMS[name] == (name,):
+        describe(data, EVERY[name])
+        if OTHER_DIMS[name] == (name,):
             data.make_scale(name)
     for name in columns:
-        for i, scale in enumerate(FLIGHT_DIMS[name]):
+        for i, scale in enumerate(OTHER_DIMS[name]):
             if scale != name:
                 file[name].dims[i].attach_scale(file[scale])
+
+
+def failures(plan: PlannedMotions) -> dict[str, np.ndarray]:
+    """Intervals in which segments fail that are proved or refuted over their whole time.
+
+    Returns:
+        by the names of `schema.quantities.FAILURES`, s since the start of the plan; nothing without such intervals.
+    """
+    starts = np.cumsum(plan.answers.duration) - plan.answers.duration
+    intervals = [
+        start + np.reshape(plan.details(i).get("failing", ()), (-1, 2)) for i, start in enumerate(starts.tolist())
+    ]
+    failing = united(np.concatenate([np.empty((0, 2)), *intervals]))
+    return {"failure": np.arange(1.0, len(failing) + 1.0), "failing": failing} if len(failing) else {}
 
 
 def attributes(plan: PlannedMotions) -> dict[str, Any]:

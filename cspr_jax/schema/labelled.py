@@ -9,7 +9,7 @@ import numpy as np
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.schema.map_kinds import quantity_of
 from cspr_jax.schema.meanings import value_attributes
-from cspr_jax.schema.quantities import ACROSS, EVERY, FLIGHT_DIMS, PARTS, SEGMENTS, flag_attributes
+from cspr_jax.schema.quantities import ACROSS, EVERY, OTHER_DIMS, PARTS, SEGMENTS, flag_attributes
 
 if TYPE_CHECKING:
     import xarray
@@ -64,7 +64,7 @@ def motion(arrays: Mapping[str, np.ndarray], attributes: Mapping[str, Any]) -> "
     """A motion: rows over time, and what there is of its segments.
 
     Args:
-        arrays: by the names of `schema.quantities.TRAJECTORY` and `SEGMENTS`.
+        arrays: by the names of `schema.quantities.TRAJECTORY`, `SEGMENTS`, `FLIGHT` and `FAILURES`.
 
     Returns:
         the dataset, over "t" with "axis", "component", "cable" or "couple", and over "segment".
@@ -74,11 +74,11 @@ def motion(arrays: Mapping[str, np.ndarray], attributes: Mapping[str, Any]) -> "
     """
     cables = range(1, arrays["tension"].shape[1] + 1)
     axes: dict[str, Any] = {"t": arrays["t"], **PARTS, "cable": np.array(cables)}
-    used = {ACROSS.get(name) for name in arrays} | {part for name in arrays for part in FLIGHT_DIMS.get(name, ())}
+    used = {ACROSS.get(name) for name in arrays} | {part for name in arrays for part in OTHER_DIMS.get(name, ())}
     for part in PARTS.keys() - used:
         del axes[part]
-    axes |= {name: arrays[name] for name in ("segment", "flight_t", "throw") if name in arrays}
-    dims_of = dict.fromkeys(SEGMENTS, ("segment",)) | FLIGHT_DIMS
+    axes |= {name: arrays[name] for name in ("segment", "flight_t", "throw", "failure") if name in arrays}
+    dims_of = dict.fromkeys(SEGMENTS, ("segment",)) | OTHER_DIMS
     variables = {
         name: (dims_of[name] if name in dims_of else ("t", ACROSS[name]) if name in ACROSS else ("t",), values)
         for name, values in arrays.items()

@@ -237,7 +237,24 @@ FLIGHT = {
         ),
     )
 }
-FLIGHT_DIMS = {
+# A motion file holds these where the intervals are known in which its motion fails.
+FAILURES = {
+    q.name: q
+    for q in (
+        Quantity("failure", "1", "interval of failure", "Number of an interval of failure, from 1 on."),
+        Quantity(
+            "failing",
+            "s",
+            "time of the failure",
+            "Start and end of the interval, since the start of the plan, in which a segment fails that is proved or "
+            "refuted over its whole time.",
+        ),
+    )
+}
+# Dimensions of what a file holds beside rows and segments.
+OTHER_DIMS = {
+    "failure": ("failure",),
+    "failing": ("failure", "edge"),
     "flight_t": ("flight_t",),
     "flight_position": ("flight_t", "axis"),
     "throw": ("throw",),
@@ -259,6 +276,7 @@ PARTS = {
     "component": tuple("wxyz"),
     "couple": ("12", "23", "34", "41"),
     "bound": ("least", "actual", "largest"),
+    "edge": ("start", "end"),
 }
 # Maps of poses have this row in place of the verdict of motions.
 POSE_VERDICT = Quantity(
@@ -727,7 +745,7 @@ QUANTITIES = {
         Quantity("used_z0", "m", "depth of P0 below the centroid", "Depth of P0 that the inclination requires."),
     )
 }
-EVERY = ChainMap(AXES, QUANTITIES, BEST, TRAJECTORY, SEGMENTS, FLIGHT)
+EVERY = ChainMap(AXES, QUANTITIES, BEST, TRAJECTORY, SEGMENTS, FLIGHT, FAILURES)
 _OWN = frozenset(QUANTITIES)
 
 
@@ -752,8 +770,7 @@ def register(quantity: Quantity) -> None:
     Raises:
         InputError: another quantity, or a coordinate, has that name.
     """
-    tables = (AXES, QUANTITIES, BEST, TRAJECTORY, SEGMENTS, FLIGHT)
-    known = next((table[quantity.name] for table in tables if quantity.name in table), quantity)
+    known = EVERY.get(quantity.name, quantity)
     if known != quantity:
         raise InputError("quantity", quantity.name, "a name that no other quantity or axis has")
     QUANTITIES[quantity.name] = quantity

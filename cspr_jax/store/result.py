@@ -14,7 +14,7 @@ from cspr_jax.errors import ConfigError, InputError, StoreError, printable, show
 from cspr_jax.schema import labelled
 from cspr_jax.schema.best import best_of, check_axis
 from cspr_jax.schema.map_kinds import MAP_KINDS, quantity_of
-from cspr_jax.schema.quantities import AXES, EVERY, FLIGHT_DIMS, PARTS, QUANTITIES, SEGMENTS
+from cspr_jax.schema.quantities import AXES, EVERY, OTHER_DIMS, PARTS, QUANTITIES, SEGMENTS
 from cspr_jax.store.documents import plain_json
 from cspr_jax.store.isolated import Reader
 from cspr_jax.store.motion_table import read_table
@@ -278,8 +278,8 @@ def _motion(
         shape: tuple[int, ...] = (len(time), widths.get(name, 3))
         if name in ("t", "tension_residual"):
             shape = (len(time),)
-        elif name in FLIGHT_DIMS:
-            first, *rest = FLIGHT_DIMS[name]
+        elif name in OTHER_DIMS:
+            first, *rest = OTHER_DIMS[name]
             shape = (arrays[first].size if first in arrays else -1, *(len(PARTS[part]) for part in rest))
         elif name in segments:
             shape = (segments["segment"].size if "segment" in segments else -1,)

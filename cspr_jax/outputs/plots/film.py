@@ -14,13 +14,16 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import InputError
+from cspr_jax.outputs.plots.bodies_in_space import draw_bodies
 from cspr_jax.outputs.plots.fitting import fit, legend_above
 from cspr_jax.outputs.plots.labels import cable_names, line_look
-from cspr_jax.outputs.plots.motion import draw_limits
+from cspr_jax.outputs.plots.motion import draw_limits, shade_failing
+from cspr_jax.outputs.plots.obstacles import AREA, points_of
 from cspr_jax.outputs.plots.robot_along import Moving, limits_of, moving
 from cspr_jax.outputs.plots.scene import colours_of_tension, fill_places, set_space
 from cspr_jax.outputs.plots.trajectory import name_spools
@@ -35,6 +38,8 @@ SIZE, DPI = (10.0, 5.6), 90
 # Browsers hardly open a page of more MB than this.
 LARGEST = 100.0
 MARK = "#D55E00"
+# Lines behind the clock would cross its digits.
+BEHIND = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
 
 
 def film(
@@ -49,9 +54,9 @@ def film(
 
     Args:
         ending: of its file, one of `ENDINGS`.
-        columns: rows by the names of `schema.quantities.TRAJECTORY`, in the axes of the robot file.
+        columns: rows by the names of `schema.quantities.TRAJECTORY`, in the axes of the robot file, and `FAILURES`.
         robot_file: the robot whose cables have these tensions.
-        keys: the plan, for the limits.
+        keys: the plan, for limits, obstacles and the shape of the platform.
         speed: times real time, positive.
 
     Returns:
@@ -125,7 +130,8 @@ class _Picture:
         self, title: str, columns: Mapping[str, np.ndarray], robot_file: RobotFile, keys: PlanFile, rows: np.ndarray
     ) -> None:
         all_rows = np.arange(len(columns["t"]))
-        self.robot, self._path = moving(columns, robot_file, rows), moving(columns, robot_file, all_rows).position
+        self.robot, self._path = moving(columns, robot_file, rows, keys), moving(columns, robot_file, all_rows).position
+        self._bodies, self._failing = keys.bodies, {"failing": columns.get("failing", ())}
         self._rows, self._time = rows, np.asarray(columns["t"], float)
         self.tension = np.asarray(columns["tension"], float)
         self._names = cable_names(columns)
@@ -147,13 +153,17 @@ class _Picture:
 
     def _draw_space(self, *, is_down: bool) -> None:
         space, robot = self._space, self.robot
-        flight = np.concatenate([robot.base, robot.attached.reshape(-1, 3), self._path])
-        set_space(space, flight, is_down=is_down)
+        of_robot = [robot.base, robot.attached.reshape(-1, 3), robot.corners.reshape(-1, 3)]
+        set_space(space, np.concatenate([*of_robot, self._path, *map(points_of, self._bodies)]), is_down=is_down)
+        draw_bodies(space, self._bodies, is_down=is_down)
         space.plot(*self._path.T, color="0.7", linewidth=0.8)
         name_spools(space, robot.base)
         for place, marker, name in zip(self._path[[0, -1]], ("o", "D"), ("start", "end"), strict=True):
             space.plot(*place[:, None], linestyle="", marker=marker, color="black", markerfacecolor="white", label=name)
-        self.figure.legend(loc="outside lower left", ncols=3)
+        handles, words = space.get_legend_handles_labels()
+        if self._bodies:
+            handles, words = [*handles, Patch(**AREA)], [*words, "obstacles"]
+        self.figure.legend(handles, words, loc="outside lower left", ncols=3)
         self._behind = space.plot([], [], [], color="black", linewidth=1.1)[0]
         space.plot(*robot.base.T, linestyle="", marker="s", markersize=5, color="0.35", label="spools, by cable")
         self.cables = [space.plot([], [], [], linewidth=2.0)[0] for _ in robot.base]
@@ -171,12 +181,13 @@ class _Picture:
         for k, values in enumerate(self.tension.T):
             panel.plot(self._time, values, linewidth=1.2, label=self._names[k], **line_look(k))
         draw_limits(panel, limits, self.tension, "N")
+        shade_failing(panel, self._failing)
         self._mark = panel.axvline(self._time[0], color=MARK, linewidth=1.8)
         panel.set(xlabel="time (s)", ylabel="tension (N)")
         panel.margins(x=0.01)
         panel.set_ylim(bottom=min(0.0, float(np.nanmin(self.tension))))
-        legend_above(panel, min(4, self.tension.shape[1]))
-        self._clock = panel.annotate("", (0.99, 0.98), xycoords="axes fraction", ha="right", va="top")
+        legend_above(panel, 4)
+        self._clock = panel.annotate("", (0.99, 0.98), xycoords="axes fraction", ha="right", va="top", bbox=BEHIND)
 
     def show(self, number: int) -> None:
         """Move everything to a row."""

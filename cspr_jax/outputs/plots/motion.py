@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
 from cspr_jax.outputs.plots.fitting import DOUBT, legend_above
@@ -21,6 +22,8 @@ BOUNDARIES = 200
 ONE_PLANE = 1e-9
 # Limits beyond this many times the largest value are written and not drawn.
 FAR = 3.0
+FAILS = "fails"
+FAILING: dict[str, Any] = {"facecolor": (0.8, 0.1, 0.1, 0.14), "edgecolor": (0.8, 0.1, 0.1, 0.3), "linewidth": 0.6}
 LIMIT: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": "--"}
 
 
@@ -82,7 +85,7 @@ def motion_figure(result: Result) -> Figure:
         _lines(drawn["acceleration"], time, np.c_[acceleration, sizes], ["x", "y", "z", "size"])
         drawn["acceleration"].set_ylabel("acceleration (m/s²)")
     for name in {"orientation", "tension", *more} & drawn.keys():
-        boundaries(drawn[name], result)
+        _mark_intervals(drawn[name], result, is_named=name == "tension")
     place = "" if z0 is None else f"z0 = {float(z0):.4g} m, "
     figure.suptitle(f"{robot_name(result)}: {place}z axis {result.attributes.get('z_axis', 'down')}{doubt(result)}")
     return figure
@@ -125,9 +128,8 @@ def _draw_all_limits(drawn: Mapping[str, Axes], result: Result) -> None:
         drawn["tension"].set_ylabel(f"tension (N)\n{keys.tension_rule}")
     for _, level in limits_of(robot_file, keys, "depth"):
         drawn["xz"].axhline(level, **LIMIT)
-    bodies = [table.shape() for table in keys.obstacle or ()]
-    for name in [name for name in ("xy", "xz") if bodies and name in drawn]:
-        draw_shadows(drawn[name], bodies, (0, "xyz".index(name[1])))
+    for name in [name for name in ("xy", "xz") if keys.obstacle and name in drawn]:
+        draw_shadows(drawn[name], keys.bodies, (0, "xyz".index(name[1])))
         legend_above(drawn[name], 3)
 
 
@@ -135,6 +137,27 @@ def boundaries(panel: Axes, result: Result) -> None:
     """Lines between the segments of a motion; files of earlier versions do not say where these are."""
     for time in result.data.get("segment_end", np.empty(0))[:-1][:BOUNDARIES]:
         panel.axvline(time, color="black", linewidth=0.8, alpha=0.35)
+
+
+def _mark_intervals(panel: Axes, result: Result, *, is_named: bool) -> None:
+    boundaries(panel, result)
+    shade_failing(panel, result.data)
+    if is_named and "failing" in result.data:
+        legend_above(panel, len(panel.lines) + 1)
+
+
+def shade_failing(panel: Axes, columns: Mapping[str, np.ndarray]) -> None:
+    """Shade the intervals of time in which a motion fails, where they are known.
+
+    Args:
+        columns: of the motion; "failing" (m, 2) s.
+    """
+    intervals = columns.get("failing", ())
+    if len(intervals):
+        # The areas reach from the bottom to the top of any panel; their edges show intervals without a length.
+        areas = [[(start, 0.0), (start, 1.0), (end, 1.0), (end, 0.0)] for start, end in intervals]
+        look: dict[str, Any] = {"transform": panel.get_xaxis_transform(), "zorder": 0.5, "label": FAILS}
+        panel.add_collection(PolyCollection(areas, **look, **FAILING), autolim=False)
 
 
 def doubt(result: Result) -> str:

@@ -39,7 +39,7 @@ def _acceleration(result: Result, file: str, at: dict[str, float]) -> Figure:
 
 MOTION_PICTURES = {
     TRAJECTORY: MotionPicture(
-        lambda result, file, _: trajectory_figure(result, robot_and_plan(result, file, TRAJECTORY)[0])
+        lambda result, file, _: trajectory_figure(result, *robot_and_plan(result, file, TRAJECTORY))
     ),
     TENSIONS: MotionPicture(lambda result, file, _: tensions_figure(result, *robot_and_plan(result, file, TENSIONS))),
     SUMMARY: MotionPicture(lambda result, file, _: summary_figure(result, *robot_and_plan(result, file, SUMMARY))),

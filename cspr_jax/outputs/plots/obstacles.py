@@ -1,10 +1,12 @@
 """Obstacles of maps of workspaces and of motions in pictures: sections, shadows, and surfaces in space."""
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
 from matplotlib.patches import Patch, Polygon
 
 from cspr_jax.outputs.plots.robot_at import hull_of, workspace_of
@@ -12,6 +14,7 @@ from cspr_jax.robots.shapes import Box, Cylinder, Obstacle
 from cspr_jax.store.result import Result
 
 COLOUR = "#5c3d2e"
+AREA: dict[str, Any] = {"facecolor": (*to_rgb(COLOUR), 0.35), "edgecolor": COLOUR, "linewidth": 0.8}
 # Directions of the points of a ball: of azimuths and of heights.
 AROUND, UPWARD = 64, 33
 CORNERS = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(-1, 3)
@@ -25,7 +28,7 @@ def obstacles(result: Result) -> list[np.ndarray]:
     """
     if result.attributes.get("map") != "workspace" or not result.settings:
         return []
-    return [points_of(table.shape()) for table in workspace_of(result).obstacle or ()]
+    return [points_of(body) for body in workspace_of(result).bodies]
 
 
 def points_of(shape: Obstacle) -> np.ndarray:
@@ -55,7 +58,7 @@ def draw_shadows(panel: Axes, bodies: Iterable[Obstacle], across: tuple[int, int
         shadow = outline(points_of(body)[:, across])
         if len(shadow):
             label = "obstacle" if number == 0 else None
-            panel.add_patch(Polygon(shadow, facecolor=COLOUR, edgecolor=COLOUR, alpha=0.35, label=label))
+            panel.add_patch(Polygon(shadow, label=label, **AREA))
     panel.autoscale_view()
 
 

@@ -7,8 +7,9 @@ import numpy as np
 
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
+from cspr_jax.outputs.plots.obstacles import points_of
 from cspr_jax.outputs.plots.robot_at import hull_of
-from cspr_jax.robots.shapes import rotation_matrix
+from cspr_jax.robots.shapes import Hull, rotation_matrix
 from cspr_jax.schema.limits import LIMITS
 
 
@@ -28,13 +29,16 @@ class Moving(NamedTuple):
     corners: np.ndarray
 
 
-def moving(columns: Mapping[str, np.ndarray], robot_file: RobotFile | None, rows: np.ndarray) -> Moving:
+def moving(
+    columns: Mapping[str, np.ndarray], robot_file: RobotFile | None, rows: np.ndarray, keys: PlanFile | None = None
+) -> Moving:
     """The robot at rows of its motion.
 
     Args:
         columns: by the names of `schema.quantities.TRAJECTORY`.
         robot_file: the robot whose cables have these tensions; None: it is not known, and has no cables here.
         rows: (n,) their numbers.
+        keys: the plan, which may know the shape of the platform; None: the hull of the points of its cables is drawn.
 
     Returns:
         the robot.
@@ -48,12 +52,22 @@ def moving(columns: Mapping[str, np.ndarray], robot_file: RobotFile | None, rows
         body = body - np.asarray(robot_file.centre_of_mass, float)
     edges, rotations = np.empty((0, 2, 3)), np.eye(3)[None]
     if quaternion is not None:
-        edges, rotations = hull_of(body)[1], np.array([rotation_matrix(one) for one in np.asarray(quaternion)[rows]])
+        edges = _edges(robot_file, keys, body)
+        rotations = np.array([rotation_matrix(one) for one in np.asarray(quaternion)[rows]])
     # These points turn with the platform, at each row.
     attached, corners = (
         position[:, None] + np.einsum("rij,kj->rki", rotations, x) for x in (body, edges.reshape(-1, 3))
     )
     return Moving(base, position, attached, corners)
+
+
+def _edges(robot_file: RobotFile, keys: PlanFile | None, attached: np.ndarray) -> np.ndarray:
+    # Edges (n, 2, 3) of the platform, from its mass centre.
+    points = robot_file.platform_points or ()
+    shape = None if keys is None else keys.body(robot_file.centre_of_mass or (0.0, 0.0, 0.0), points)
+    if isinstance(shape, Hull):
+        return shape.edges
+    return hull_of(attached if shape is None else points_of(shape))[1]
 
 
 def limits_of(robot_file: RobotFile, plan: PlanFile, quantity: str = "tension") -> list[tuple[str, float]]:

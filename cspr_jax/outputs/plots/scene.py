@@ -16,7 +16,7 @@ ELEVATION, AZIMUTH = 18.0, -62.0  # degrees, of the eye
 # Room around the drawn points, over their size.
 ROOM = 0.04
 # Ticks of an axis at most, and steps that make a picture fit.
-MOST_TICKS, STEPS = 5, 4
+MOST_TICKS, LEAST_TICKS, STEPS = 5, 2, 4
 FILLS = "fills its place"
 
 
@@ -35,12 +35,12 @@ def set_space(panel: Any, points: np.ndarray, *, is_down: bool) -> None:
     Args:
         panel: axes in three dimensions.
         points: (n, 3) what is drawn, m.
-        is_down: whether z points down; then y is turned too, so that nothing is mirrored.
+        is_down: whether z points down.
     """
     low, high = points.min(0), points.max(0)
     size = np.maximum(high - low, 0.1 * (high - low).max())
     middle = 0.5 * (low + high)
-    signs = (1.0, -1.0, -1.0) if is_down else (1.0, 1.0, 1.0)
+    signs = signs_of(is_down=is_down)
     for k, name in enumerate("xyz"):
         half = (0.5 + ROOM) * signs[k] * size[k]
         panel.set(**{f"{name}lim": (middle[k] - half, middle[k] + half), f"{name}label": f"{name} (m)"})
@@ -56,6 +56,33 @@ def set_space(panel: Any, points: np.ndarray, *, is_down: bool) -> None:
     # The square of the panel is larger than its place, and lies over its neighbours.
     panel.patch.set_visible(False)
     panel.set_gid(FILLS)
+
+
+def across_and_up(*, is_down: bool) -> np.ndarray:
+    """Directions to the right and upward in the picture of a robot in space.
+
+    Args:
+        is_down: as for `set_space`.
+
+    Returns:
+        (2, 3) unit vectors, in the axes of the file.
+    """
+    elevation, azimuth = np.radians([ELEVATION, AZIMUTH])
+    across = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
+    up = np.array([-np.sin(elevation) * np.cos(azimuth), -np.sin(elevation) * np.sin(azimuth), np.cos(elevation)])
+    return np.stack([across, up]) * signs_of(is_down=is_down)
+
+
+def signs_of(*, is_down: bool) -> np.ndarray:
+    """Directions in which the axes of a picture in space grow.
+
+    Args:
+        is_down: whether z points down; then y is turned too, so that nothing is mirrored.
+
+    Returns:
+        (3,) signs.
+    """
+    return np.array([1.0, -1.0, -1.0]) if is_down else np.ones(3)
 
 
 def shape_of(points: np.ndarray) -> float:
@@ -95,6 +122,12 @@ def fill_places(figure: Figure) -> None:
             if not _meet(panel):
                 break
         _leave_out(panel)
+        if min(len(axis.get_major_locator()()) for axis in _axes(panel)) < LEAST_TICKS:
+            # Two numbers show a scale: rather leave out single ones of many.
+            for axis in _axes(panel):
+                axis.set_major_locator(MaxNLocator(MOST_TICKS, prune="both"))
+            _fill(figure, panel, place)
+            _leave_out(panel)
 
 
 def _fill(figure: Figure, panel: Any, place: Bbox) -> None:

@@ -10,15 +10,18 @@ from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.outputs.plots.fitting import legend_above
 from cspr_jax.outputs.plots.labels import cable_names, line_look, robot_name
-from cspr_jax.outputs.plots.motion import boundaries, doubt, draw_limits
+from cspr_jax.outputs.plots.motion import FAILS, boundaries, doubt, draw_limits, shade_failing
 from cspr_jax.outputs.plots.robot_along import limits_of
 from cspr_jax.outputs.plots.tensions import draw_tensions, extremes
 from cspr_jax.outputs.plots.trajectory import draw_trajectory, legend_of
 from cspr_jax.outputs.plots.verdict_colours import reasons
+from cspr_jax.schema.verdicts import NO_REASON
 from cspr_jax.store.result import Result
 
 # Lines of the table, which shows the first segments of a longer plan.
 SEGMENTS = 8
+# Inches: height of a line of the table.
+LINE = 0.28
 WIDTHS = (0.15, 0.12, 0.22, 0.18, 0.33)
 HEADS = ("segment", "arcs", "duration (s)", "margin", "verdict")
 
@@ -34,14 +37,14 @@ def summary_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> Fig
         the figure.
     """
     cells = _cells(result)
-    figure = Figure(figsize=(7.2, 8.2 + 0.22 * len(cells)), layout="constrained")
-    parts = figure.add_gridspec(4, 1, height_ratios=[4.4, 2.0, 1.6, 0.3 + 0.22 * len(cells)])
+    figure = Figure(figsize=(7.2, 8.2 + LINE * len(cells)), layout="constrained")
+    parts = figure.add_gridspec(4, 1, height_ratios=[4.4, 2.0, 1.6, 0.3 + LINE * len(cells)])
     space = figure.add_subplot(parts[0], projection="3d", computed_zorder=False)
-    draw_trajectory(figure, space, result, robot_file)
-    figure.legend(*legend_of(result), loc="outside lower center", ncols=6)
+    draw_trajectory(figure, space, result, robot_file, keys)
+    figure.legend(*legend_of(result, keys), loc="outside lower center", ncols=6)
     over_time = figure.add_subplot(parts[1])
     draw_tensions(over_time, result, limits_of(robot_file, keys))
-    legend_above(over_time, len(robot_file.base_points) + 4)
+    legend_above(over_time, len(robot_file.base_points) + 5)
     _rates(figure.add_subplot(parts[2], sharex=over_time), result, limits_of(robot_file, keys, "speed"))
     if cells:
         table = figure.add_subplot(parts[3])
@@ -60,11 +63,13 @@ def _rates(panel: Axes, result: Result, limits: list[tuple[str, float]]) -> None
     draw_limits(panel, limits, result.data["rate"], "m/s", signed=True)
     panel.axhline(0.0, color="black", linewidth=0.8)
     boundaries(panel, result)
+    shade_failing(panel, result.data)
     panel.set(xlabel="time (s)", ylabel="cable speed (m/s)")
     # The names of the cables stand above the tensions.
-    handles, words = panel.get_legend_handles_labels()
-    if len(words) > len(names):
-        legend_above(panel, 2, handles[len(names) :], words[len(names) :])
+    entries = zip(*panel.get_legend_handles_labels(), strict=True)
+    others = {words: handle for handle, words in entries if words not in (*names, FAILS)}
+    if others:
+        legend_above(panel, 2, list(others.values()), list(others))
 
 
 def _cells(result: Result) -> list[list[str]]:
@@ -72,11 +77,17 @@ def _cells(result: Result) -> list[list[str]]:
     count = len(data.get("segment_end", ()))
     cells = []
     for k in range(min(count, SEGMENTS)):
-        numbers, words, _ = reasons(data["segment_verdict"][k : k + 1], "feasible")
         arcs, duration = int(data["segment_arcs"][k]), data["segment_end"][k] - data["segment_start"][k]
         margin = f"{data['segment_margin'][k]:.4g}" if np.isfinite(data["segment_margin"][k]) else "none"
         number = f"{k + 1}" if count <= SEGMENTS else f"{k + 1} of {count}"
-        # Straight lines and Bezier segments have no arcs; a segment that is not feasible has no feasible number.
-        arcs_text = f"{arcs}" if arcs else "none" if data["segment_verdict"][k] else "-"
-        cells.append([number, arcs_text, f"{duration:.4g}", margin, words[int(numbers[0])]])
+        # Lines, Bezier segments and splines have no arcs; a swing that is not feasible has no feasible number.
+        arcs_text = f"{arcs}" if arcs else "none" if data["segment_tried_arcs"][k] else "-"
+        cells.append([number, arcs_text, f"{duration:.4g}", margin, _verdict(data["segment_verdict"][k])])
     return cells
+
+
+def _verdict(verdict: np.ndarray) -> str:
+    # The first of the reasons, and how many there are besides.
+    numbers, words, _ = reasons(verdict[None], "feasible")
+    others = (int(verdict) & ~NO_REASON.value).bit_count() - 1
+    return words[int(numbers[0])] + (f", {others} more" if others > 0 else "")

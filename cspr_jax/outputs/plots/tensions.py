@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.outputs.plots.labels import COLOURS, cable_names, line_look, robot_name
-from cspr_jax.outputs.plots.motion import FAR, boundaries, doubt, draw_limits
+from cspr_jax.outputs.plots.motion import FAR, boundaries, doubt, draw_limits, shade_failing
 from cspr_jax.outputs.plots.robot_along import limits_of
 from cspr_jax.store.result import Result
 
@@ -66,5 +66,6 @@ def draw_tensions(panel: Axes, result: Result, limits: list[tuple[str, float]]) 
     # No cable pulls there.
     panel.axhline(0.0, color="black", linewidth=0.8)
     boundaries(panel, result)
+    shade_failing(panel, result.data)
     panel.set(xlabel="time (s)", ylabel="tension (N)", ylim=(bottom, top))
     panel.margins(x=0.01)

@@ -3,15 +3,20 @@
 from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
+from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
+from cspr_jax.outputs.plots.bodies_in_space import draw_bodies
 from cspr_jax.outputs.plots.labels import COLOURS, robot_name
 from cspr_jax.outputs.plots.motion import doubt
+from cspr_jax.outputs.plots.obstacles import AREA, points_of
 from cspr_jax.outputs.plots.robot_along import moving
 from cspr_jax.outputs.plots.scene import colours_of_tension, set_space, shape_of
 from cspr_jax.store.result import Result
@@ -24,40 +29,43 @@ ACROSS, BESIDE, LOW, HIGH = 5.2, 1.2, 3.6, 7.2
 TOGETHER = 0.08
 
 
-def trajectory_figure(result: Result, robot_file: RobotFile) -> Figure:
+def trajectory_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> Figure:
     """The motion in space.
 
     Args:
         robot_file: the robot whose cables have these tensions.
+        keys: the plan, for obstacles and the shape of the platform.
 
     Returns:
         the figure.
     """
-    points = np.concatenate([result.data["position"], np.asarray(robot_file.base_points, float)])
+    points = np.concatenate(
+        [result.data["position"], np.asarray(robot_file.base_points, float), *map(points_of, keys.bodies)]
+    )
     height = float(np.clip(ACROSS * shape_of(points) + BESIDE, LOW, HIGH))
     figure = Figure(figsize=(7.2, height), layout="constrained")
     panel = figure.add_subplot(projection="3d", computed_zorder=False)
-    draw_trajectory(figure, panel, result, robot_file)
-    figure.legend(*legend_of(result), loc="outside lower center", ncols=6)
+    draw_trajectory(figure, panel, result, robot_file, keys)
+    figure.legend(*legend_of(result, keys), loc="outside lower center", ncols=6)
     figure.suptitle(f"{robot_name(result)}: trajectory, {result.axes['t'][-1]:.4g} s{doubt(result)}")
     return figure
 
 
-def draw_trajectory(figure: Figure, panel: Any, result: Result, robot_file: RobotFile) -> None:
-    """Path, spools, flight of a released object, and the robot where segments begin and end.
+def draw_trajectory(figure: Figure, panel: Any, result: Result, robot_file: RobotFile, keys: PlanFile) -> None:
+    """Path, spools, obstacles, flight of a released object, and the robot where segments begin and end.
 
     Args:
         panel: axes in three dimensions, without computed z order.
         robot_file: the robot whose cables have these tensions.
+        keys: the plan, for obstacles and the shape of the platform.
     """
     rows = _instants(result)
-    robot, path = moving(result.data, robot_file, rows), result.data["position"]
+    robot, path = moving(result.data, robot_file, rows, keys), result.data["position"]
     flight = result.data.get("flight_position", np.empty((0, 3)))
-    set_space(
-        panel,
-        np.concatenate([robot.base, robot.attached.reshape(-1, 3), path, flight]),
-        is_down=result.attributes.get("z_axis", "down") == "down",
-    )
+    bodies, is_down = keys.bodies, result.attributes.get("z_axis", "down") == "down"
+    of_robot = [robot.base, robot.attached.reshape(-1, 3), robot.corners.reshape(-1, 3)]
+    set_space(panel, np.concatenate([*of_robot, path, flight, *map(points_of, bodies)]), is_down=is_down)
+    draw_bodies(panel, bodies, is_down=is_down)
     tension = result.data["tension"]
     norm = Normalize(0.0, float(tension[np.isfinite(tension)].max(initial=0.0)) or 1.0)
     colours = colours_of_tension()
@@ -108,20 +116,25 @@ def _instants(result: Result) -> np.ndarray:
     return rows[np.unique(np.linspace(0, len(rows) - 1, min(SHOWN, len(rows))).round().astype(int))]
 
 
-def legend_of(result: Result) -> tuple[list[Line2D], list[str]]:
+def legend_of(result: Result, keys: PlanFile) -> tuple[list[Artist], list[str]]:
     """Entries of the legend of a motion in space.
 
+    Args:
+        keys: the plan, for obstacles.
+
     Returns:
-        lines and words.
+        artists and words.
     """
     hollow: dict[str, Any] = {"linestyle": "", "color": "black", "markerfacecolor": "white"}
-    entries = {
+    entries: dict[str, Artist] = {
         "path": Line2D([], [], color="black", linewidth=1.2),
         "start": Line2D([], [], marker="o", **hollow),
         "end": Line2D([], [], marker="D", **hollow),
         "cables": Line2D([], [], color=colours_of_tension()(0.6), linewidth=1.6),
         "spools, by cable": Line2D([], [], linestyle="", marker="s", color="0.35"),
     }
+    if keys.obstacle:
+        entries["obstacles"] = Patch(**AREA)
     if "flight_position" in result.data:
         entries["flight"] = Line2D([], [], color=COLOURS[2], linewidth=1.4, linestyle="--")
     return list(entries.values()), list(entries)

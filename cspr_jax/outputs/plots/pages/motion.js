@@ -3,6 +3,7 @@ const motion = { own: null, row: 0, playing: null };
 const PALETTE = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"];
 const DASHES = ["solid", "dash", "dashdot", "dot"];
 const TENSION = [[0, "#7e03a8"], [0.35, "#b73779"], [0.7, "#e8622c"], [1, "#f9a63a"]];
+const BODY = "#8a6a58", FAILS = "rgba(204, 26, 26, 0.18)";
 const known = new Map();
 
 // The charts over time: their places, quantities and units; that of the position has no cables.
@@ -80,6 +81,7 @@ function robotTraces() {
     const flight = [0, 1, 2].map((k) => own.flight.map((point) => point[k]));
     traces.push(points(flight, { mode: "lines", name: "flight", showlegend: true, line: { width: 3, dash: "dash", color: theme.mark } }));
   }
+  own.bodies.forEach((body, k) => traces.push(...surface(body, k === 0)));
   if (!count) return traces;
   // A trace without points holds the bar of the colours.
   traces.push(points([[null], [null], [null]], { mode: "markers", marker: { size: 0.1, color: [range[0]],
@@ -88,9 +90,22 @@ function robotTraces() {
   return traces;
 }
 
+// An obstacle: its surface, and lines on it.
+function surface(body, isFirst) {
+  const place = [0, 1, 2].map((k) => body.corners.map((point) => point[k]));
+  const [i, j, k] = [0, 1, 2].map((side) => body.triangles.map((corners) => corners[side]));
+  const lines = [0, 1, 2].map((axis) => body.lines.flatMap((line) => [...line.map((point) => point[axis]), null]));
+  return [{ type: "mesh3d", x: place[0], y: place[1], z: place[2], i, j, k, color: BODY, opacity: 0.45, name: "obstacles",
+    text: body.name, hoverinfo: "text", legendgroup: "obstacles", showlegend: isFirst, flatshading: false,
+    lighting: { ambient: 0.8, diffuse: 0.3, specular: 0 } },
+  { type: "scatter3d", x: lines[0], y: lines[1], z: lines[2], mode: "lines", hoverinfo: "skip", showlegend: false,
+    legendgroup: "obstacles", line: { width: 2, color: BODY } }];
+}
+
 function box() {
   const { own } = motion, every = [0, 1, 2].map((k) => [...own.base.map((point) => point[k]),
-    ...columnOf(own.attached, 3, k), ...columnOf(own.path, 3, k), ...(own.flight ?? []).map((point) => point[k])]);
+    ...columnOf(own.attached, 3, k), ...columnOf(own.corners, 3, k), ...columnOf(own.path, 3, k),
+    ...own.bodies.flatMap((body) => body.corners.map((point) => point[k])), ...(own.flight ?? []).map((point) => point[k])]);
   const ranges = every.map(extremes), margin = 0.04 * Math.max(...ranges.map(([low, high]) => high - low));
   return ranges.map(([low, high]) => [low - margin, high + margin]);
 }
@@ -98,10 +113,13 @@ function box() {
 function drawRobot() {
   const signs = motion.own.isDown ? [1, -1, -1] : [1, 1, 1], ranges = box();
   Plotly.react("robot", robotTraces(), layoutOf((axis, theme) => {
+    const sizes = ranges.map(([low, high]) => high - low), parts = sizes.map((size) => size / Math.max(...sizes));
     const own = ["x", "y", "z"].map((name, k) => ({ title: { text: `${name} (m)` }, gridcolor: theme.line,
-      zerolinecolor: theme.line, showbackground: false, showspikes: false, nticks: 6,
+      zerolinecolor: theme.line, showbackground: false, showspikes: false,
+      // Numbers of a short axis would lie upon each other.
+      nticks: parts[k] < 0.3 ? 3 : 6, showticklabels: parts[k] > 0.15,
       range: signs[k] > 0 ? ranges[k] : [...ranges[k]].reverse(), autorange: false }));
-    const sizes = ranges.map(([low, high]) => high - low), [x, y, z] = sizes.map((own) => 1.9 * own / Math.hypot(...sizes));
+    const [x, y, z] = sizes.map((own) => 1.9 * own / Math.hypot(...sizes));
     const aspectratio = { x, y, z };
     return { margin: { l: 0, r: 0, t: 0, b: 0 }, uirevision: "robot",
       legend: { orientation: "h", x: 0.5, xanchor: "center", y: 0, yanchor: "bottom" },
@@ -134,6 +152,8 @@ function drawOverTime([place, name, words, unit]) {
     xaxis: { ...axis, title: { text: `time (s)${above}` }, hoverformat: ".4g" },
     yaxis: { ...axis, title: { text: `${words} (${unit})` }, rangemode: name === "tension" ? "tozero" : "normal" },
     shapes: [cursor(theme),
+      ...own.failing.map(([x0, x1]) => ({ type: "rect", yref: "paper", y0: 0, y1: 1, x0, x1, layer: "below",
+        fillcolor: FAILS, line: { color: FAILS, width: 1 } })),
       ...own.segments.slice(0, -1).map((part) => ({ type: "line", yref: "paper", y0: 0, y1: 1, x0: part.end,
         x1: part.end, line: { color: theme.soft, width: 1, dash: "dot" } })),
       ...near.map((limit) => ({ type: "line", xref: "paper", x0: 0, x1: 1, y0: limit.value, y1: limit.value,

@@ -7,17 +7,23 @@ import numpy as np
 
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
+from cspr_jax.outputs.plots.bodies_in_space import lines_on
 from cspr_jax.outputs.plots.fitting import shortened
 from cspr_jax.outputs.plots.labels import WRITTEN, cable_names
+from cspr_jax.outputs.plots.obstacles import points_of
 from cspr_jax.outputs.plots.pages.packing import packed
 from cspr_jax.outputs.plots.robot_along import limits_of, moving
+from cspr_jax.outputs.plots.robot_at import hull_of
 from cspr_jax.outputs.plots.verdict_colours import FEASIBLE_COLOUR, REASONS
 from cspr_jax.plans.causes import cause_text
+from cspr_jax.robots.shapes import Obstacle
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import Verdict
 
 # Rows of a motion in a page, at most.
 MOST_ROWS = 1200
+# Intervals of failure that the page names; it shades all of them.
+MOST_INTERVALS = 12
 # Columns of cables, each with the quantity of its limits; units of all quantities that limits bound.
 OF_CABLES = {"tension": "tension", "rate": "speed", "length": "length"}
 UNITS = {row.quantity: WRITTEN.get(row.unit, row.unit).replace("^2", "²") for row in LIMITS}
@@ -33,19 +39,19 @@ def motion_content(
     """Content of the page of a motion.
 
     Args:
-        columns: rows by the names of `schema.quantities.TRAJECTORY`, and the flight if there is one.
+        columns: rows by the names of `schema.quantities.TRAJECTORY`, and what there is of `FLIGHT` and `FAILURES`.
         segments: by the names of `schema.quantities.SEGMENTS`.
         robot_file: the robot whose cables have these tensions; None: the file does not keep it.
-        keys: the plan, for the limits; None: the file does not keep it.
+        keys: the plan, for limits, obstacles and the shape of the platform; None: the file does not keep it.
 
     Returns:
         plain values, for JSON.
     """
     rows = _chosen(np.asarray(columns["t"]))
-    robot = moving(columns, robot_file, rows)
+    robot = moving(columns, robot_file, rows, keys)
     return {
         "title": title,
-        "facts": _facts(np.asarray(columns["t"]), segments, robot_file, keys),
+        "facts": [*_facts(np.asarray(columns["t"]), segments, robot_file, keys), *_failures(columns)],
         "isDown": robot_file is None or robot_file.z_axis == "down",
         "count": len(rows),
         "cables": cable_names(columns),
@@ -59,6 +65,8 @@ def motion_content(
         "flight": np.asarray(columns["flight_position"]).tolist() if "flight_position" in columns else None,
         "limits": {name: _limits(robot_file, keys, quantity) for name, quantity in OF_CABLES.items()},
         "segments": _segments(segments),
+        "failing": np.asarray(columns.get("failing", ())).tolist(),
+        "bodies": [_surface(body) for body in ([] if keys is None else keys.bodies)],
     }
 
 
@@ -82,6 +90,26 @@ def _facts(
     robot = f"{shortened(robot_file.name)}, {body} of {robot_file.mass:.4g} kg {cables}"
     limits = ", ".join(filter(None, (_bound(row, limits_of(robot_file, keys, row)) for row in UNITS)))
     return [("robot", robot), ("limits", limits or "none, but that all cables are taut"), *facts]
+
+
+def _failures(columns: Mapping[str, np.ndarray]) -> list[tuple[str, str]]:
+    intervals = np.asarray(columns.get("failing", ())).tolist()
+    named = [f"{start:.6f} to {end:.6f} s" for start, end in intervals[:MOST_INTERVALS]]
+    more = [f"{len(intervals) - MOST_INTERVALS} more"] if len(intervals) > MOST_INTERVALS else []
+    return [("fails", f"{', '.join(named + more)}; shaded in the charts")] if intervals else []
+
+
+def _surface(body: Obstacle) -> dict[str, Any]:
+    # Corners and triangles, as a browser draws them.
+    triangles = hull_of(points_of(body))[0]
+    corners, numbers = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    lines = [np.round(line, 9).tolist() for line in lines_on(body)]
+    return {
+        "name": shortened(body.name),
+        "corners": np.round(corners, 9).tolist(),
+        "triangles": numbers.reshape(-1, 3).tolist(),
+        "lines": lines,
+    }
 
 
 def _bound(quantity: str, limits: list[tuple[str, float]]) -> str:

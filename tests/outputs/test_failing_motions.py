@@ -1,0 +1,150 @@
+"""Obstacles, platforms' shapes and intervals of failure in files, pictures, films and pages of motions."""
+
+import re
+
+import h5py
+import numpy as np
+import pytest
+from matplotlib.collections import PolyCollection
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+import cspr_jax
+from cspr_jax.config.plan import plan_keys
+from cspr_jax.config.robot import resolve_robot
+from cspr_jax.outputs.motion_files import failures
+from cspr_jax.outputs.plots import film as films
+from cspr_jax.outputs.plots.bodies_in_space import lines_on
+from cspr_jax.outputs.plots.robot_along import moving
+from cspr_jax.outputs.plots.style import Style, in_style
+from cspr_jax.robots import shapes
+from outputs.test_pages import content_of
+
+OBSTACLES = [
+    {"kind": "sphere", "centre": [0.4, 0.2, 1.5], "radius": 0.1},
+    {"kind": "box", "centre": [0.0, 0.5, 1.2], "size": [0.3, 0.1, 0.2], "quaternion": [0.8, 0.6, 0.0, 0.0]},
+]
+POSES = [
+    {"position": [0.0, 0.0, 1.0]},
+    {"position": [0.1, 0.05, 0.9], "time": 0.6},
+    {"position": [-0.05, 0.1, 1.1], "time": 1.2},
+]
+PLAN = {"schema": 1, "robot": "prototype", "family": "spline", "pose": POSES, "samples": 40}
+LIMIT = 0.2  # m/s of cables
+
+
+@pytest.fixture(scope="module")
+def plan():
+    return cspr_jax.plan(PLAN | {"obstacle": OBSTACLES, "limits": {"cable_speed_max": LIMIT}})
+
+
+@pytest.fixture(scope="module")
+def file(plan, tmp_path_factory):
+    return plan.save(tmp_path_factory.mktemp("failing") / "motion.h5", anyway=True)
+
+
+def test_files_keep_the_intervals_of_failure(plan, file):
+    """Those of all segments, since the start of the plan; exactly there the motion is too fast, or a cable slack."""
+    result = cspr_jax.open_result(file)
+    failing = result.data["failing"]
+    assert len(failing) >= 2 and (np.diff(failing.reshape(-1)) > 0.0).all()
+    time = result.axes["t"]
+    inside = ((time[:, None] >= failing[:, 0]) & (time[:, None] <= failing[:, 1])).any(1)
+    fails = (np.abs(result.data["rate"]).max(1) > LIMIT) | (result.data["tension"].min(1) < 0.0)
+    np.testing.assert_array_equal(inside, fails)
+    table = result.to_xarray()["failing"]
+    assert table.dims == ("failure", "edge") and table["edge"].values.tolist() == ["start", "end"]
+    assert table["failure"].values.tolist() == list(range(1, len(failing) + 1))
+
+
+def test_other_files_have_no_such_intervals(tmp_path):
+    slow = [pose | {"time": 5.0 * pose["time"]} if "time" in pose else pose for pose in POSES]
+    feasible = cspr_jax.plan(PLAN | {"pose": slow})
+    assert feasible.feasible and failures(feasible) == {}
+    with h5py.File(feasible.save(tmp_path / "motion.h5")) as written:
+        assert not {"failure", "failing", "edge"} & set(written)
+
+
+def shaded(panel):
+    areas = [area for area in panel.collections if isinstance(area, PolyCollection) and area.get_label() == "fails"]
+    return np.array([path.vertices[:4, 0][[0, 2]] for area in areas for path in area.get_paths()])
+
+
+@pytest.mark.parametrize("quantity", [None, "tensions", "summary"])
+def test_pictures_over_time_shade_them(plan, file, quantity):
+    figure = cspr_jax.plot(file, quantity=quantity)
+    over_time = [panel for panel in figure.axes if panel.get_xlabel() == "time (s)"]
+    assert over_time
+    for panel in over_time:
+        np.testing.assert_allclose(shaded(panel), failures(plan)["failing"])
+    legends = [*figure.legends, *filter(None, (panel.get_legend() for panel in figure.axes))]
+    assert sum(text.get_text() == "fails" for legend in legends for text in legend.get_texts()) == 1
+
+
+@pytest.mark.parametrize("quantity", ["trajectory", "summary"])
+def test_pictures_in_space_have_the_obstacles(file, quantity):
+    figure = cspr_jax.plot(file, quantity=quantity)
+    space = next(panel for panel in figure.axes if panel.name == "3d")
+    sphere, box = (np.array(area._faces[0]) for area in space.collections if isinstance(area, Poly3DCollection))
+    centre, radius = OBSTACLES[0]["centre"], OBSTACLES[0]["radius"]
+    np.testing.assert_allclose(np.linalg.norm(sphere - centre, axis=1), radius, rtol=0.01)
+    # The area of a box is that of its corners in the picture, and all of it lies within the axes.
+    for points in (sphere, box):
+        for axis, values in zip("xyz", points.T, strict=True):
+            low, high = sorted(getattr(space, f"get_{axis}lim")())
+            assert low < values.min() and values.max() < high
+    assert "obstacles" in [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def test_lines_lie_on_the_surfaces():
+    ball, stick = shapes.sphere([1.0, 2.0, 3.0], 0.5), shapes.cylinder([0.0, 0.0, 0.0], [1.0, 2.0, 2.0], 0.25)
+    assert len(lines_on(ball)) == 3 and len(lines_on(stick)) == 2
+    for line in lines_on(ball):
+        np.testing.assert_allclose(np.linalg.norm(line - ball.centre, axis=1), 0.5)
+    for line, end in zip(lines_on(stick), (stick.start, stick.end), strict=True):
+        np.testing.assert_allclose(np.linalg.norm(line - end, axis=1), 0.25)
+        np.testing.assert_allclose((line - end) @ (stick.end - stick.start), 0.0, atol=1e-12)
+    assert len(lines_on(shapes.box([0.0, 0.0, 0.0], [1.0, 2.0, 3.0]))) == 12
+
+
+def test_films_have_both(plan):
+    columns = plan.rows(100.0) | failures(plan)
+    with in_style(Style()):
+        picture = films._Picture("film", columns, plan.robot_file, plan.keys, np.arange(2))
+    space = picture.figure.axes[0]
+    over_time = next(panel for panel in picture.figure.axes if panel.get_xlabel() == "time (s)")
+    assert sum(isinstance(area, Poly3DCollection) for area in space.collections) == 2
+    np.testing.assert_allclose(shaded(over_time), failures(plan)["failing"])
+
+
+def test_pages_of_plans_and_of_their_files_have_both(plan, file, tmp_path):
+    contents = []
+    for source in (plan, file):
+        cspr_jax.report(source, tmp_path / "page.html")
+        contents.append(content_of(tmp_path / "page.html")["motions"][0])
+    for content in contents:
+        np.testing.assert_allclose(content["failing"], failures(plan)["failing"])
+        said = dict(content["facts"])["fails"]
+        assert re.match(r"\d\.\d{6} to \d\.\d{6} s, ", said)
+        assert "cable" in content["segments"][0]["verdict"] and "needs" in content["segments"][0]["verdict"]
+        ball, box = content["bodies"]
+        corners = np.array(ball["corners"])[np.array(ball["triangles"])].reshape(-1, 3)
+        np.testing.assert_allclose(np.linalg.norm(corners - OBSTACLES[0]["centre"], axis=1), 0.1, rtol=1e-6)
+        assert len(box["corners"]) == 8 and len(box["triangles"]) == 12 and len(box["lines"]) == 12
+
+
+@pytest.mark.parametrize(
+    "shape", [{"platform_box": [[-0.6, -0.5, -0.1], [0.6, 0.5, 1.0]]}, {"platform_hull": True}, {}]
+)
+def test_a_platform_has_its_shape(shape):
+    """From its mass centre, whose position a motion holds."""
+    robot_file = resolve_robot("cogiro", "", None)
+    keys = plan_keys({"schema": 1, "robot": "cogiro", "pose": [{"rest": True}, {"rest": True}]} | shape, "plan")
+    turn = np.array([[0.6, 0.0, 0.0, 0.8]])
+    columns = {"position": np.array([[1.0, 2.0, 3.0]]), "quaternion": turn}
+    corners = moving(columns, robot_file, np.arange(1), keys).corners[0]
+    own = np.array(robot_file.platform_points)
+    if "platform_box" in shape:
+        low, high = np.array(shape["platform_box"])
+        own = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
+    placed = (own - robot_file.centre_of_mass) @ shapes.rotation_matrix(turn[0]).T + columns["position"]
+    np.testing.assert_allclose(np.unique(corners.round(9), axis=0), np.unique(placed.round(9), axis=0))
