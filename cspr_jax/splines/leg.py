@@ -7,7 +7,7 @@ import numpy as np
 from cspr_jax.arithmetic.frames import IDENTITY
 from cspr_jax.build.orientations import given_quaternion, orientations
 from cspr_jax.build.robots import build_robot
-from cspr_jax.build.surroundings import build_scene
+from cspr_jax.build.surroundings import plan_scene
 from cspr_jax.config.motions.hints import unit_hints
 from cspr_jax.config.motions.table import MotionTable
 from cspr_jax.errors import ConfigError, InputError
@@ -17,10 +17,7 @@ from cspr_jax.motions.motion import Motion, Placed
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import proved_answers
 from cspr_jax.motions.waypoints import Waypoints
-from cspr_jax.robots.clearance import Scene
-from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.robots.reference_pose import aligned
 from cspr_jax.splines.files import moving_ends, placed_inward, reference_of, source_spline
 from cspr_jax.splines.interpolation import interpolated
 from cspr_jax.splines.motion import Spline, part
@@ -60,13 +57,9 @@ class Splines(Leg):
                 motions += [part(curve, i, i + 1) for i in range(last - first)]
         if self.stops.keys.stretch is not None:
             motions = [motion.stretched(self.stops.keys.stretch) for motion in motions]
-        return proved_answers(problem, motions, self._scene(problem)), list(motions)
-
-    def _scene(self, problem: Problem) -> Scene:
-        robot_file, keys = self.stops.robot_file, self.stops.keys
-        written = centred(build_robot(robot_file, keys, self.stops.path))[0]
-        rotation = aligned(written)[1] if isinstance(written, PlatformRobot) else None
-        return build_scene(problem.robot, robot_file, self.stops.frame, keys, self.stops.path, rotation=rotation)
+        stops = self.stops
+        scene = plan_scene(problem.robot, stops.robot_file, stops.frame, stops.keys, stops.path)
+        return proved_answers(problem, motions, scene), list(motions)
 
     def warnings(self, problem: Problem) -> list[str]:
         """Notes of files, and hints at what their samples make likely; see `Leg.warnings`."""
