@@ -62,6 +62,7 @@ def build_problem(
     at: str = "",
     for_bounds: bool = False,
     any_cables: bool = False,
+    pulleys: bool = False,
 ) -> Problem:
     """Robot, limits and amplitude function of a plan or sweep, as the kernels take them.
 
@@ -71,6 +72,7 @@ def build_problem(
         at: prefix of keys of the trajectory in errors.
         for_bounds: whether the amplitude function may be "ideal", which is no motion.
         any_cables: whether there may be more cables than degrees of freedom.
+        pulleys: whether there may be pulleys, whatever the families.
 
     Returns:
         the problem: its robot is centred; a platform in its reference axes.
@@ -80,7 +82,7 @@ def build_problem(
     """
     amplitude = build_amplitude(keys, file, epsilon=epsilon, at=at, for_bounds=for_bounds)
     limit_values = build_limits(robot_file, limits, file)
-    pulleys = all(FAMILIES[name].knows_pulleys for name in keys.families)
+    pulleys = pulleys or all(FAMILIES[name].knows_pulleys for name in keys.families)
     robot = kernel_robot(robot_file, keys, file, any_cables=any_cables, pulleys=pulleys)
     try:
         if not is_redundant_platform(robot):

@@ -65,6 +65,17 @@ class BlockSlacks(NamedTuple):
         rises = (np.zeros_like(self.low) if rise is None else rise for rise in (self.low_rise, self.high_rise))
         return BlockSlacks(self.low, self.high, *rises)
 
+    def last(self, count: int) -> "BlockSlacks":
+        """The bounds of the last criteria.
+
+        Args:
+            count: number of these.
+
+        Returns:
+            the bounds, (k, count) each.
+        """
+        return BlockSlacks(*(side[:, side.shape[1] - count :] for side in self.complete()))
+
 
 def _lines(below: Pair, above: Pair) -> Part:
     # Fields of `BlockSlacks` from values of a line below and of a line above, at the start and at the end of a block.

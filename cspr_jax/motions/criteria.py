@@ -99,7 +99,19 @@ def criteria(robot: AnyRobot, limits: Limits, scene: Scene | None = None) -> lis
     is_regular, is_below = judged_poses(robot)
     rows += [Criterion(Verdict.SINGULAR, (), "1", allowed=SINGULAR)] if is_regular else []
     rows += [Criterion(Verdict.ABOVE_SPOOLS, (), "m")] if is_below else []
-    around = scene or default_scene(robot)
+    return rows + contact_criteria(robot, limits, scene)
+
+
+def contact_criteria(robot: AnyRobot, limits: Limits, scene: Scene | None = None) -> list[Criterion]:
+    """Criteria of bodies that can meet: the last of all criteria.
+
+    Args:
+        scene: as for `criteria`.
+
+    Returns:
+        n_contacts of them.
+    """
+    rows, around = [], scene or default_scene(robot)
     for kind, cable, other in meetings(robot, around):
         bodies = [k for k in (cable, other if kind == "cables" else -1) if k >= 0]
         rows.append(Criterion(FLAGS[kind], tuple(bodies), "m", other if FLAGS[kind] == Verdict.OBSTACLE else None))

@@ -2,6 +2,7 @@
 
 import abc
 import dataclasses
+from typing import ClassVar
 
 import jax
 import numpy as np
@@ -31,9 +32,14 @@ class JoinedLeg:
 class Leg(abc.ABC):
     """Consecutive poses of a plan, joined by one family.
 
+    Fields:
+        step: between numbers of arcs that a segment can have; 0: segments have none.
+
     Raises:
         ConfigError: poses, or keys of the plan, that the family cannot use.
     """
+
+    step: ClassVar[int] = 0
 
     def __init__(self, stops: Waypoints) -> None:
         """Keep the poses; a family refuses what it cannot join."""

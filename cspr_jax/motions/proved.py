@@ -29,6 +29,7 @@ class ProofSummary(NamedTuple):
         bound: lower bound of the same.
         room: smallest slack of the limits over their values, of the floor over z0; inf without limits.
         instant: s, at which the motion fails the criterion that it fails first; NaN if it is not refuted.
+        clearance: upper bound of the least clearance of two cables, m; inf where none can meet.
     """
 
     verdict: int
@@ -36,6 +37,7 @@ class ProofSummary(NamedTuple):
     bound: float
     room: float
     instant: float
+    clearance: float = np.inf
 
 
 def proved(
@@ -68,6 +70,7 @@ def proved(
         float(proof.low[of_tensions].min()),
         _room(problem, float(motion.z0), rows, proof),
         min((instant for _, instant in failing), default=np.nan),
+        float(proof.high[[row.flag == Verdict.CABLE_CABLE for row in rows]].min(initial=np.inf)),
     )
 
 

@@ -11,7 +11,7 @@ from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.block_slacks import BlockSlacks, block_slacks
 from cspr_jax.motions.cause import UNITS, Cause
-from cspr_jax.motions.criteria import AT_INSTANTS, Criterion, criteria
+from cspr_jax.motions.criteria import AT_INSTANTS, Criterion, contact_criteria, criteria
 from cspr_jax.motions.motion import BoundedMotion, Motion
 from cspr_jax.motions.motion_tolerances import instant_states, motion_tolerances
 from cspr_jax.motions.problem import Problem
@@ -76,6 +76,22 @@ class MotionProof(NamedTuple):
         """Intervals in which at least one criterion fails, (m, 2) s, in their order and apart from each other."""
         return united(np.concatenate([np.empty((0, 2)), *self.proof.failing]))
 
+    def causes(self, frame: Frame) -> tuple[Cause, ...]:
+        """The worst cable of each criterion that fails, the worst one first; else of the criterion nearest to it.
+
+        Args:
+            frame: of the robot file, in whose axes causes are.
+
+        Returns:
+            the causes.
+        """
+        order = np.argsort(self.proof.high / self.scales).tolist()
+        if not self.broken.any():
+            return (dataclasses.replace(_cause(self, order[0], frame), criterion=Verdict.UNDECIDED.text),)
+        order = [k for k in order if self.broken[k]]
+        flags = [self.criteria[k].flag for k in order]
+        return tuple(_cause(self, k, frame) for j, k in enumerate(order) if flags.index(flags[j]) == j)
+
 
 def united(intervals: np.ndarray) -> np.ndarray:
     """Intervals of which none overlaps or touches another one.
@@ -116,17 +132,10 @@ class ProvedAnswers(Answers):
 
     def proved_causes(self, i: int, frame: Frame) -> tuple[Cause, ...]:
         """The worst cable of each criterion that fails, else the nearest to it; see `Answers.proved_causes`."""
-        case: MotionProof = self.proof[i]
-        if self.verdict[i] == Verdict.UNCERTAINTY or not case.verdict:
+        if self.verdict[i] == Verdict.UNCERTAINTY or not self.proof[i].verdict:
             flag, stands = Verdict.UNCERTAINTY, float(np.fmin(self.tolerated[i], self.not_tolerated[i]))
             return (Cause(flag.text, needed=1.0, allowed=stands, unit=UNITS[flag]),)
-        order = np.argsort(case.proof.high / case.scales).tolist()
-        if not case.broken.any():
-            nearest = _cause(case, order[0], frame)
-            return (dataclasses.replace(nearest, criterion=Verdict.UNDECIDED.text),)
-        order = [k for k in order if case.broken[k]]
-        flags = [case.criteria[k].flag for k in order]
-        return tuple(_cause(case, k, frame) for j, k in enumerate(order) if flags.index(flags[j]) == j)
+        return self.proof[i].causes(frame)
 
 
 def _cause(case: MotionProof, k: int, frame: Frame) -> Cause:
@@ -159,19 +168,23 @@ def proved_answers(problem: Problem, motions: Sequence[Any], scene: Scene | None
     return answers
 
 
-def proof_of(problem: Problem, motion: BoundedMotion, scene: Scene | None = None) -> MotionProof:
+def proof_of(
+    problem: Problem, motion: BoundedMotion, scene: Scene | None = None, *, contacts_alone: bool = False
+) -> MotionProof:
     """Proof of one motion.
 
     Args:
         motion: from the centroid of the spools, z down.
         scene: as for `proved_answers`.
+        contacts_alone: as for `proofs_of`.
 
     Returns:
         the proof.
     """
     jumps = [motion.jumps()] if hasattr(motion, "jumps") else []
     durations = np.array([float(motion.duration())])
-    return proofs_of(problem, lambda _, *ends: motion.bounds(*ends), durations, scene, jumps)[0]
+    bounds = lambda _, *ends: motion.bounds(*ends)  # noqa: E731
+    return proofs_of(problem, bounds, durations, scene, jumps, contacts_alone=contacts_alone)[0]
 
 
 def proofs_of(
@@ -180,6 +193,8 @@ def proofs_of(
     durations: np.ndarray,
     scene: Scene | None = None,
     jumps: Sequence[np.ndarray] = (),
+    *,
+    contacts_alone: bool = False,
 ) -> list[MotionProof]:
     """Proofs of several motions at once.
 
@@ -188,24 +203,29 @@ def proofs_of(
         durations: (n,) s.
         scene: as for `proved_answers`.
         jumps: for each motion the instants at which its acceleration jumps, s; empty: nowhere.
+        contacts_alone: whether the proofs are of `criteria.contact_criteria` alone, since others are proved elsewhere.
 
     Returns:
         n proofs.
     """
+    rows = _criteria(problem, scene, contacts_alone)
 
     def slacks(motion: np.ndarray, start: np.ndarray, end: np.ndarray) -> BlockSlacks:
-        return block_slacks(problem.robot, problem.limits, partial(bounds, motion), start, end, scene)
+        of_all = block_slacks(problem.robot, problem.limits, partial(bounds, motion), start, end, scene)
+        return of_all.last(len(rows))
 
     # Of contacts of one kind the nearest alone is told.
-    rows = criteria(problem.robot, problem.limits, scene)
     names = [(row.flag, () if row.flag in AT_INSTANTS else row.cables) for row in rows]
     groups = np.array([names.index(name) for name in names])
     proofs = time_proofs(slacks, durations, jumps=jumps, groups=groups)
-    return [_proof(problem, proof, scene) for proof in proofs]
+    return [_proof(problem, rows, proof, scene) for proof in proofs]
 
 
-def _proof(problem: Problem, proof: TimeProof, scene: Scene | None) -> MotionProof:
-    rows = tuple(criteria(problem.robot, problem.limits, scene))
+def _criteria(problem: Problem, scene: Scene | None, contacts_alone: bool) -> tuple[Criterion, ...]:
+    return tuple((contact_criteria if contacts_alone else criteria)(problem.robot, problem.limits, scene))
+
+
+def _proof(problem: Problem, rows: tuple[Criterion, ...], proof: TimeProof, scene: Scene | None) -> MotionProof:
     names = () if scene is None else tuple(obstacle.name for obstacle in scene.obstacles)
     return MotionProof(rows, proof, _scales(problem, rows), names)
 
@@ -239,13 +259,21 @@ def answers_of(proofs: Sequence[MotionProof], duration: np.ndarray) -> ProvedAns
     )
 
 
-def sampled_proof(problem: Problem, motion: Motion, scene: Scene | None = None, samples: int = SAMPLES) -> MotionProof:
+def sampled_proof(
+    problem: Problem,
+    motion: Motion,
+    scene: Scene | None = None,
+    samples: int = SAMPLES,
+    *,
+    contacts_alone: bool = False,
+) -> MotionProof:
     """Refute a motion that has no bounds by its samples, or leave it undecided.
 
     Args:
         motion: from the centroid of the spools, z down.
         scene: as for `proved_answers`.
         samples: intervals between equidistant instants.
+        contacts_alone: as for `proofs_of`.
 
     Returns:
         a proof that bounds no slack from below; intervals of failure reach from instant to instant.
@@ -253,7 +281,9 @@ def sampled_proof(problem: Problem, motion: Motion, scene: Scene | None = None, 
     tau = np.linspace(0.0, 1.0, samples + 1)
     # A block without a length has the slacks of its instant.
     states = instant_states(motion, tau)
-    high = block_slacks(problem.robot, problem.limits, lambda start, end: states, tau, tau, scene).high
+    rows = _criteria(problem, scene, contacts_alone)
+    slacks = block_slacks(problem.robot, problem.limits, lambda start, end: states, tau, tau, scene)
+    high = slacks.last(len(rows)).high
     times = tau * float(motion.duration())
     failing = [_runs(times, column < 0.0) for column in high.T]
     whole = np.array([[0.0, times[-1]]])
@@ -265,7 +295,7 @@ def sampled_proof(problem: Problem, motion: Motion, scene: Scene | None = None, 
         open=[whole] * high.shape[1],
         blocks=len(tau),
     )
-    return _proof(problem, proof, scene)
+    return _proof(problem, rows, proof, scene)
 
 
 def _runs(times: np.ndarray, flags: np.ndarray) -> np.ndarray:

@@ -24,6 +24,7 @@ class Waypoints:
         family: name of the family that joins them.
         first: number, in the plan, of the first pose.
         last: number, in the plan, of the last pose.
+        fixed: (n_segments,) numbers of arcs in place of those of the poses; None: those of the poses.
     """
 
     robot_file: RobotFile
@@ -33,6 +34,7 @@ class Waypoints:
     family: str
     first: int
     last: int
+    fixed: np.ndarray | None = None
 
     def __len__(self) -> int:
         """Number of segments."""
@@ -45,8 +47,8 @@ class Waypoints:
 
     @property
     def arcs(self) -> np.ndarray:
-        """Number of arcs that a pose fixes for the segment before it, (n_segments,); 0 where it is free."""
-        return np.array([pose.arcs or 0 for pose in self.poses[1:]])
+        """Number of arcs that is fixed for each segment, (n_segments,); 0 where it is free."""
+        return np.array([pose.arcs or 0 for pose in self.poses[1:]]) if self.fixed is None else self.fixed
 
     @property
     def max_arcs(self) -> int:

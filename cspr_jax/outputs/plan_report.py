@@ -1,5 +1,6 @@
 """A plan as JSON and as a table for people."""
 
+import itertools
 import math
 from collections.abc import Callable
 from typing import Any
@@ -169,7 +170,9 @@ def _numbers(segments: list[dict[str, Any]]) -> dict[str, Column]:
     beziers = all(segment["control_points"] is not None for segment in segments)
     swings = all(segment["inclination"] is not None for segment in segments)
     proved = all(segment["margin_unit"] == "N" for segment in segments)
-    columns = _times() if lines else _durations() if beziers else _proved() if proved else _counts(swings)
+    columns = _times() if lines else _durations() if beziers else _counts(swings)
+    if proved:
+        columns = _proved({} if not any(segment["tried_arcs"] for segment in segments) else columns)
     columns["tension (N)"] = lambda segment: " .. ".join(
         _number(segment[name], ".3f") for name in ("tension_min", "tension_max")
     )
@@ -207,8 +210,9 @@ def _durations() -> dict[str, Column]:
     return {"T (s)": _of("duration", ".4f"), "taut for T (s)": taut, "margin": _two_digits("margin")}
 
 
-def _proved() -> dict[str, Column]:
-    return {
+def _proved(counts: dict[str, Column]) -> dict[str, Column]:
+    # Motions over pulleys have numbers of arcs, too.
+    return dict(itertools.islice(counts.items(), 1)) | {
         "T (s)": _of("duration", ".4f"),
         "margin (N)": _two_digits("margin"),
         "proved (N)": _two_digits("margin_bound"),

@@ -149,7 +149,7 @@ def plan_of(keys: PlanFile, path: Path) -> PlannedMotions:
     robot_file = as_moved(resolve_robot(keys.robot, path, path.parent), legs_of)
     sequence = PlanLegs(robot_file, keys, path)
     any_cables = all(robot_file.own_pattern in FAMILIES[name].any_cables for name in keys.families)
-    problem = build_problem(robot_file, keys, keys, path, epsilon=FIRST_EPSILON, any_cables=any_cables)
+    problem = build_problem(robot_file, keys, keys, path, epsilon=FIRST_EPSILON, any_cables=any_cables, pulleys=True)
     _check_rule(problem, keys, path)
     for leg in sequence.legs:
         leg.check(problem)

@@ -13,6 +13,7 @@ from cspr_jax.errors import ConfigError, shown
 from cspr_jax.motions.leg import Leg
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.waypoints import Waypoints
+from cspr_jax.plans.judged_legs import judged
 from cspr_jax.schema.families import FAMILIES, moving
 
 POINT_MASS = "3T"
@@ -44,7 +45,9 @@ class PlanLegs:
         for first, after in zip([0, *changes], [*changes, last], strict=True):
             family = keys.family_of(first)
             leg = FAMILIES[family].leg(robot_file.own_pattern)
-            self.legs.append(leg(Waypoints(robot_file, keys, path, frame, family, first, after)))
+            plain = leg(Waypoints(robot_file, keys, path, frame, family, first, after))
+            has_pulleys = robot_file.pulley_radius is not None
+            self.legs.append(judged(plain, surroundings=bool(keys.surroundings), pulleys=has_pulleys))
 
     def table(self, problem: Problem, depths: np.ndarray) -> dict[str, np.ndarray]:
         """Feasibility, durations and margins for several depths of P0.
@@ -83,12 +86,6 @@ def _check_keys(keys: PlanFile, path: Path) -> None:
         families = [name for name, row in FAMILIES.items() if key in row.keys]
         if getattr(keys, key) is not None and not set(keys.families) & set(families):
             raise ConfigError(path, f"{key}: must be absent unless family = {either(families)}")
-    blind = [name for name in keys.families if not FAMILIES[name].knows_obstacles]
-    if keys.surroundings and blind:
-        others = [name for name, row in FAMILIES.items() if row.knows_obstacles]
-        allowed = f", but with {either(others)}" if others else ""
-        key = keys.surroundings[0]
-        raise ConfigError(path, f'{key}: must be absent with family = "{blind[0]}", which knows no obstacles{allowed}')
 
 
 def _check_poses(robot_file: RobotFile, keys: PlanFile, path: Path) -> None:

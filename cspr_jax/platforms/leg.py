@@ -50,6 +50,7 @@ FEW_SEGMENTS = 1000
 class _Poses(Leg):
     # Poses of a platform, joined by hypocycloids of variable amplitude or by standard ones, as `variable` says.
 
+    step = 1
     variable: ClassVar[bool]
 
     def __init__(self, stops: Waypoints) -> None:

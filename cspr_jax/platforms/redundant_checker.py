@@ -4,9 +4,9 @@ Motion and limits leave a choice of tensions. The margin of an instant is the ma
 its pose, for the wrench that the motion needs: the largest s such that tensions between f_min + s and f_max - s supply
 the wrench. Neither the determinant nor the side of the spools on which the platform is matters: where the cables cannot
 supply the wrench there is no s. Searches look at samples, finer where it matters; what they choose is then proved, by
-tensions that balance the motion throughout blocks of time (`motions.proved`). Contacts between cables, thick ones too,
-are looked for at samples only, and contacts with the platform, whose attachment points need not lie in a plane, not at
-all.
+tensions that balance the motion throughout blocks of time (`motions.proved`), and so is that cables, thick ones too, do
+not touch each other. Contacts with the platform are judged where its attachment points lie in a plane, or a plan gives
+its shape.
 """
 
 from functools import partial
@@ -35,8 +35,8 @@ from cspr_jax.workspaces.search import WorkspaceSearch
 
 # Number of samples that are held at a time, and of instants of the first look that are computed at a time.
 ROOM, CHUNK = 200_000, 8
-# Samples an arc, in a search and of what it chose.
-SAMPLES, FINE = 32, 64
+# Samples an arc.
+SAMPLES = 32
 # A search looks for minima between samples where a smallest sample is below this part of the largest.
 NEAR = 0.1
 # Halvings of an interval of beta-hat, down to rounding. Slopes below this part of the margins count as zero.
@@ -162,32 +162,32 @@ class RedundantChecker(MotionChecker):
         ignored: np.ndarray | None = None,
     ) -> PlatformChecks:
         """Check motions by samples: nothing is proved yet; see `MotionChecker.check`."""
-        return self._at_samples(Motions(segments, arcs), SAMPLES, whole, ignored)
+        return self._at_samples(Motions(segments, arcs), whole, ignored)
 
     def confirmed(self, segments: PlatformSegment, arcs: np.ndarray, checks: PlatformChecks) -> PlatformChecks:
         """Checks of motions that passed, with a proof of each; see `MotionChecker.confirmed`."""
         motions = Motions(segments, arcs)
-        # Contacts between cables are looked for at more samples: they are the part without a proof.
-        checks = self._at_samples(motions, FINE, True, None)
+        checks = self._at_samples(motions, True, None)
         for i in np.flatnonzero(checks.verdict == 0).tolist():
             segment, count = jax.tree.map(lambda x: x[0], motions.items(np.array([i])))
             motion = PlatformMotion(segment, self.problem.amplitude, count, self.kind)
             proof = proved(self.problem, motion)
             checks.verdict[i], checks.bound[i] = proof.verdict, proof.bound / self._weight
             checks.slack[i, 0] = np.fmin(checks.slack[i, 0], proof.margin / self._weight)
+            checks.gap[i] = np.fmin(checks.gap[i], proof.clearance + self._diameter)
             checks.instant[i] = proof.instant / float(motion.duration())
         return checks
 
-    def _at_samples(self, motions: Motions, samples: int, whole: bool, ignored: np.ndarray | None) -> PlatformChecks:
+    def _at_samples(self, motions: Motions, whole: bool, ignored: np.ndarray | None) -> PlatformChecks:
         arcs = motions.arcs
         checks = self.nothing(len(arcs))
         for count in np.unique(arcs).tolist():
             # Check motions with the same number of samples together.
             alike = np.flatnonzero(arcs == count)
-            size = max(ROOM // (samples * count), 1)
+            size = max(ROOM // (SAMPLES * count), 1)
             for start in range(0, len(alike), size):
                 piece = alike[start : start + size]
-                checks.put(piece, self._checked(motions.rows(piece), samples * count, whole, ignored))
+                checks.put(piece, self._checked(motions.rows(piece), SAMPLES * count, whole, ignored))
         return checks
 
     def _checked(self, motions: Motions, steps: int, whole: bool, ignored: np.ndarray | None) -> PlatformChecks:

@@ -29,8 +29,9 @@ class Family:
         end_keys: likewise, if it leads to the pose or from it.
         knows_uncertainty: whether its verdicts take all of an uncertainty into account.
         uncertain_redundancy: whether they do so on more cables than degrees of freedom, too.
-        knows_obstacles: whether its verdicts take obstacles and the shape of the platform into account.
-        knows_pulleys: whether its verdicts are right for cables that leave from pulleys.
+        knows_obstacles: whether its own verdicts take obstacles and the shape of the platform into account; if not,
+            its motions are judged once more in plans.
+        knows_pulleys: whether its own verdicts are right for cables that leave from pulleys; if not, likewise.
     """
 
     name: str

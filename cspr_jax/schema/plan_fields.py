@@ -28,7 +28,7 @@ SEGMENT = {
     "mu_min": ("s-2", "Smallest tension over mass and cable length."),
     "margin": (
         "1",
-        "Smallest margin, as `segment_margin` of a motion file; of lines in m/s^2, of splines in N.",
+        "Smallest margin, as `segment_margin` of a motion file; of lines in m/s^2, of splines and over pulleys in N.",
     ),
     "margin_bound": ("1", "Proved lower bound of `margin`; null where nothing is proved."),
     "limit_margin": ("1", "Smallest slack of the limits; null without limits."),
@@ -49,7 +49,10 @@ SEGMENT = {
         "null: none), `t` (s from the start of the segment), `needed` and `allowed` (of `unit`), and `cables` where "
         "two touch; null where the segment is feasible.",
     ),
-    "fewer_arcs_undecided": ("", "Whether a smaller number of arcs could not be refuted."),
+    "fewer_arcs_undecided": (
+        "",
+        "Whether a smaller number of arcs could not be refuted, or, over pulleys, was refuted without them only.",
+    ),
     "feasible_at_infinity": ("1", "Point masses: left-hand side of thesis (2.55)."),
     "z_lowest": ("m", "z of the lowest place on the way."),
     "cable_length_max": ("m", "Largest length of any cable on the way."),
@@ -61,7 +64,10 @@ SEGMENT = {
     "envelope_oscillations": ("1", "Transitions: number of oscillations that the envelopes allow; null: none."),
     "least_oscillations": ("1", "Transitions: number of oscillations that the envelopes require, a real number."),
     "inclination": ("1", "Transitions: inclination v."),
-    "det_margin": ("1", "Platforms: smallest determinant of the structure matrix over that at rest in P0."),
+    "det_margin": (
+        "1",
+        "Platforms, not over pulleys: smallest determinant of the structure matrix over that at rest in P0.",
+    ),
     "cable_interference": ("", "Platforms: whether two cables touch."),
     "cable_distance_min": ("m", "Platforms: smallest distance between cables that share no end."),
     "platform_interference": ("", "Platforms: whether a cable touches the platform."),
@@ -75,8 +81,15 @@ SEGMENT = {
     ),
     "control_points": ("m", "Bezier segments: the three control points."),
     "taut_durations": ("s", "Bezier segments: intervals of durations with all cables taut; null: without end."),
-    "margin_unit": ("", 'Unit of `margin` and `margin_bound` where it is not "1": "N" of splines; null elsewhere.'),
-    "failing": ("s", "Splines: intervals of time in which the segment fails, since its start; null elsewhere."),
+    "margin_unit": (
+        "",
+        'Unit of `margin` and `margin_bound` where it is not "1": "N" of splines and over pulleys; null elsewhere.',
+    ),
+    "failing": (
+        "s",
+        "Splines: intervals of time in which the segment fails, since its start; of other families those in which it "
+        "meets a body, over pulleys in which it fails; null elsewhere.",
+    ),
 }
 LAUNCH = {
     "segment": ("1", "Number of the segment on which the object is released, from 0 on."),

@@ -126,7 +126,7 @@ BEST = {
 }
 
 # These texts say what verdicts rest on, and what the margin is.
-HOW = " (proved; contacts between more than six cables are sampled)"
+HOW = " (proved)"
 MARGIN = (
     "Smallest pseudotension over its value at rest in P0 (platforms: that of six equal ones), "
     "or smallest depth below the spools over z0, whichever is less; platforms on more cables: distance that all "

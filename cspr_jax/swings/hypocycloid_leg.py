@@ -16,6 +16,8 @@ from cspr_jax.swings.hypocycloid import Hypocycloid, Segment
 class Hypocycloids(Leg):
     """Any points, joined by standard hypocycloids; see `Leg`."""
 
+    step = 1
+
     def __init__(self, stops: Waypoints) -> None:
         """Refuse a key that belongs to transitions."""
         if stops.keys.inclination is not None:

@@ -60,7 +60,7 @@ class OscillationAnswers(Answers):
     def details(self, i: int) -> dict[str, Any]:
         """Numbers of oscillations; see `Answers.details`."""
         return {
-            "oscillations": int(self.oscillations[i]) or None,
+            "oscillations": int(self.arcs[i]) // 2 or None,
             "tried_oscillations": int(self.tried_oscillations[i]),
             "envelope_oscillations": int(self.envelope_oscillations[i]) or None,
             "least_oscillations": float(self.least_oscillations[i]),

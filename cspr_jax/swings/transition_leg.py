@@ -19,6 +19,8 @@ from cspr_jax.swings.transition import steady
 class Transitions(Leg):
     """Rest and targets, joined by transitions and by swings of constant size; see `Leg`."""
 
+    step = 2
+
     def __init__(self, stops: Waypoints) -> None:
         """Refuse pairs of poses that a transition cannot join."""
         super().__init__(stops)

@@ -1,10 +1,9 @@
-"""Obstacles and shapes of platforms in plans: who refuses them, and the scene that kernels take."""
+"""Obstacles and shapes of platforms in plans: the scene that kernels take."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
-from support.commands import cspr
 
 import cspr_jax
 from cspr_jax.arithmetic.frames import frame_of
@@ -28,15 +27,6 @@ rest = true
 position = [0.1, 0.05, 1.5]
 """
 BALL = '[[obstacle]]\nkind = "sphere"\ncentre = [1.0, 2.0, 0.5]\nradius = 0.1\n'
-
-
-@pytest.mark.parametrize("more", [BALL, "platform_box = [[-0.1, -0.1, 0.0], [0.1, 0.1, 0.1]]"])
-def test_families_that_know_no_obstacles_refuse_them(tmp_path, more):
-    (tmp_path / "plan.toml").write_text(PLAN.format(robot="prototype", more=more))
-    code, out, err = cspr("plan", tmp_path / "plan.toml")
-    key = "obstacle" if "obstacle" in more else "platform_box"
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert f'{key}: must be absent with family = "hypocycloid-standard", which knows no obstacles' in err
 
 
 def built(robot: str, more: str):

@@ -146,7 +146,7 @@ def _mark_intervals(panel: Axes, result: Result, *, is_named: bool) -> None:
         legend_above(panel, len(panel.lines) + 1)
 
 
-def shade_failing(panel: Axes, columns: Mapping[str, np.ndarray]) -> None:
+def shade_failing(panel: Axes, columns: Mapping[str, Any]) -> None:
     """Shade the intervals of time in which a motion fails, where they are known.
 
     Args:
