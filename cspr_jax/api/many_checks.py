@@ -19,7 +19,7 @@ from cspr_jax.config.plan import plan_keys
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import InputError
 from cspr_jax.motions.cause import Cause
-from cspr_jax.motions.proved_answers import answers_of, proofs_of
+from cspr_jax.motions.proved_answers import answers_of, judge_all_robots, proofs_of
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
 from cspr_jax.schema.columns import Columns
@@ -112,6 +112,7 @@ def check_many(
         several, scene = SeveralSplines(motions), scene_of(problem.robot, file, axes, keys, NAME)
         proofs = proofs_of(problem, several.bounds, several.durations, scene, several.jumps)
         answers = answers_of(proofs, several.durations)
+        judge_all_robots(problem, answers, motions, scene)
     names = ("verdict", "duration", "margin", "margin_bound", "limit_margin")
     arrays = {name: getattr(answers, name) for name in names}
     causes = [() if answers.feasible[i] else answers.proved_causes(i, axes) for i in range(count)]

@@ -159,13 +159,26 @@ def proved_answers(problem: Problem, motions: Sequence[Any], scene: Scene | None
     """
     proofs = [(proof_of if hasattr(motion, "bounds") else sampled_proof)(problem, motion, scene) for motion in motions]
     answers = answers_of(proofs, np.array([float(motion.duration()) for motion in motions]))
+    judge_all_robots(problem, answers, motions, scene)
+    return answers
+
+
+def judge_all_robots(
+    problem: Problem, answers: ProvedAnswers, motions: Sequence[Any], scene: Scene | None = None
+) -> None:
+    """Judge feasible motions for all robots within an uncertainty, if there is one.
+
+    Args:
+        answers: of the robot itself, which take the verdicts.
+        motions: n of them, from the centroid of the spools, z down.
+        scene: as for `proved_answers`.
+    """
     if problem.limits.uncertainty is not None:
         for i in np.flatnonzero(answers.feasible).tolist():
             proved, refuted = (float(side[0]) for side in motion_tolerances(problem, motions[i], scene))
             answers.tolerated[i], answers.not_tolerated[i] = proved, refuted
             if proved < 1.0:
                 answers.verdict[i] = (Verdict.UNCERTAINTY if refuted <= 1.0 else Verdict.UNDECIDED).value
-    return answers
 
 
 def proof_of(
@@ -214,7 +227,7 @@ def proofs_of(
         of_all = block_slacks(problem.robot, problem.limits, partial(bounds, motion), start, end, scene)
         return of_all.last(len(rows))
 
-    # Of contacts of one kind the nearest alone is told.
+    # Answers tell the nearest contact of each kind alone.
     names = [(row.flag, () if row.flag in AT_INSTANTS else row.cables) for row in rows]
     groups = np.array([names.index(name) for name in names])
     proofs = time_proofs(slacks, durations, jumps=jumps, groups=groups)

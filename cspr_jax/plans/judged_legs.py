@@ -97,11 +97,7 @@ class _Judge(NamedTuple):
 
 
 class JudgedLeg(Leg):
-    """Leg of a family, its motions judged with surroundings and pulleys; see `Leg`.
-
-    Args:
-        leg: of the family.
-    """
+    """Leg of a family, its motions judged with surroundings and pulleys; see `Leg`."""
 
     def __init__(self, leg: Leg) -> None:
         """Keep the leg of the family."""
@@ -166,10 +162,10 @@ class JudgedLeg(Leg):
     def _searched(self, judge: _Judge, plain: Problem, z0: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         # Find numbers of arcs (0: the family's choice) whose motions are proved; tell where smaller ones, or all, stay
         # undecided, and where there are none.
-        given, step = self.stops.arcs, self._leg.step
+        prescribed, step = self.stops.arcs, self._leg.step
         # Over pulleys the family's choice says nothing.
-        arcs = np.where(given > 0, given, step if judge.has_pulleys else 0)
-        is_open, doubtful, none = given == 0, np.zeros(len(self), bool), np.zeros(len(self), bool)
+        arcs = np.where(prescribed > 0, prescribed, step if judge.has_pulleys else 0)
+        is_open, doubtful, none = prescribed == 0, np.zeros(len(self), bool), np.zeros(len(self), bool)
         while is_open.any():
             answers, motions = self._with(arcs).join(plain, z0)
             for i in np.flatnonzero(is_open).tolist():

@@ -190,7 +190,7 @@ def _whirl(state: StateBounds) -> AffineBounds:
 
 
 def _centre_influence(robot: PlatformRobot, state: StateBounds) -> AffineBounds:
-    # What a displaced mass centre adds to the wrench to first order, (dof, 3) per length.
+    # Share of a displaced mass centre in the wrench, to first order, (dof, 3) per length.
     whirl, axes = _whirl(state) * robot.mass, constant(jnp.eye(3))
     force = (state.acceleration + jnp.asarray([0.0, 0.0, -1.0]) * robot.gravity) * robot.mass
     moment: AffineBounds | None = None

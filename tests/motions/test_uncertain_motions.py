@@ -143,6 +143,7 @@ def demands(base, state):
     return length, np.abs(rate), np.abs(bend / length)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("row", [0, 1, 2])
 def test_limits_of_cables_hold_for_all_robots(row):
     names = "cable_length_max", "cable_speed_max", "cable_acceleration_max"

@@ -203,7 +203,7 @@ def test_what_only_rigid_platforms_have_is_refused_in_one_line(tmp_path, capsys)
             f'{three}\npattern = "3R"\n{bodies}',
             ('must be "spline" for a platform on a', 'pattern = "3R": must be "2T"'),
         ),
-        (f"{three}\npulley_radius = 0.1", ("pulley_radius: pulleys: must be absent",) * 2),
+        (f"{three}\npulley_radius = 0.1", (None, "pulley_radius: pulleys: must be absent")),
         (f"{three}\ntension_max = [inf, 5.0, 5.0]", ("tension_max = [inf, 5.0, 5.0]: must be finite",) * 2),
     ):
         (tmp_path / "r.toml").write_text(f'name = "r"\nmass = 1.0\nz_axis = "up"\n{robot}\n')
@@ -212,6 +212,8 @@ def test_what_only_rigid_platforms_have_is_refused_in_one_line(tmp_path, capsys)
         for words, line in zip(
             (["plan", "p.toml"], ["run", "s.toml", "-o", str(tmp_path / "run")]), wanted, strict=True
         ):
+            if line is None:
+                continue  # plans know pulleys
             code = main([words[0], str(tmp_path / words[1]), *words[2:]])
             err = capsys.readouterr().err.strip()
             assert code == 2 and line in err and len(err.splitlines()) == 1, err
