@@ -32,6 +32,11 @@ PLAN = {"schema": 1, "robot": "prototype", "family": "spline", "pose": POSES, "s
 LIMIT = 0.2  # m/s of cables
 
 
+def first_face(area: Poly3DCollection) -> np.ndarray:
+    """Corners of the first face; versions of matplotlib keep them under different names."""
+    return np.array(area._faces[0]) if hasattr(area, "_faces") else area._vec[:3, area._segslices[0]].T
+
+
 @pytest.fixture(scope="module")
 def plan():
     return cspr_jax.plan(PLAN | {"obstacle": OBSTACLES, "limits": {"cable_speed_max": LIMIT}})
@@ -84,7 +89,7 @@ def test_pictures_over_time_shade_them(plan, file, quantity):
 def test_pictures_in_space_have_the_obstacles(file, quantity):
     figure = cspr_jax.plot(file, quantity=quantity)
     space = next(panel for panel in figure.axes if panel.name == "3d")
-    sphere, box = (np.array(area._faces[0]) for area in space.collections if isinstance(area, Poly3DCollection))
+    sphere, box = (first_face(area) for area in space.collections if isinstance(area, Poly3DCollection))
     centre, radius = OBSTACLES[0]["centre"], OBSTACLES[0]["radius"]
     np.testing.assert_allclose(np.linalg.norm(sphere - centre, axis=1), radius, rtol=0.01)
     # The area of a box is that of its corners in the picture, and all of it lies within the axes.
