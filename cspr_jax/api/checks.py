@@ -1,6 +1,7 @@
 """Checks of motions from Python: is a motion within the limits of a robot, at every instant, and if not, where?"""
 
 import dataclasses
+import json
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
@@ -15,6 +16,7 @@ from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.build.robots import build_robot
 from cspr_jax.build.surroundings import scene_of
+from cspr_jax.config.mappings import text_of
 from cspr_jax.config.motions.text import TooLongError
 from cspr_jax.config.plan import PlanFile, plan_keys
 from cspr_jax.config.robot import resolve_robot
@@ -133,8 +135,9 @@ class Check:
             if not np.isfinite(least.factor):
                 return Stretched(np.nan, least.is_static, None)
             factor = least.factor * (self.plan.keys.stretch or 1.0)
+            text = text_of(json.loads(self.plan.text) | {"stretch": factor})
             return Stretched(
-                least.factor, least.is_static, _check_of(self.plan.keys.model_copy(update={"stretch": factor}))
+                least.factor, least.is_static, _check_of(self.plan.keys.model_copy(update={"stretch": factor}), text)
             )
 
 
@@ -231,7 +234,7 @@ def check(  # noqa: PLR0913
             source = times
         else:
             source = _function(times, duration, plan)
-        return _check_of(plan.with_source(str(NAME), source))
+        return _check_of(plan.with_source(str(NAME), source), text_of(keys))
 
 
 def check_file(motion: Path, keys: Mapping[str, Any]) -> Check:
@@ -247,20 +250,22 @@ def check_file(motion: Path, keys: Mapping[str, Any]) -> Check:
         ConfigError: a mistake in a file.
     """
     with double_precision():
-        plan = plan_keys({"schema": 1, "family": "spline", **keys, "motion": str(motion)}, motion)
+        data = {"schema": 1, "family": "spline", **keys, "motion": str(motion)}
+        plan = plan_keys(data, motion)
         try:
-            return _check_of(plan)
+            return _check_of(plan, text_of(data))
         except TooLongError:
-            return _shown(long_plan(plan, motion))
+            return _shown(long_plan(plan, motion), text_of(data))
 
 
-def _check_of(keys: PlanFile) -> Check:
-    return _shown(planning.plan_of(keys, NAME))
+def _check_of(keys: PlanFile, text: str) -> Check:
+    return _shown(planning.plan_of(keys, NAME), text)
 
 
-def _shown(planned: planning.PlannedMotions) -> Check:
+def _shown(planned: planning.PlannedMotions, text: str) -> Check:
+    # Files of the motion keep the text, from which pictures know limits and obstacles.
     fields = {field.name: getattr(planned, field.name) for field in dataclasses.fields(planned)}
-    return Check(Plan(**fields))
+    return Check(Plan(**fields | {"text": text}))
 
 
 def _function(function: Any, duration: float | None, keys: PlanFile) -> Placed[FunctionMotion]:

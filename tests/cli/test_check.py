@@ -63,6 +63,14 @@ def test_files_of_the_motion(own):
     assert code == 1 and not (own / "no.csv").exists() and "--anyway" in err
 
 
+def test_files_know_limits_and_failures(own):
+    """Pictures of a motion that fails need nothing beside its file."""
+    options = ("--robot", "prototype", "--limits", own / "limits.toml", "--anyway")
+    assert cspr("check", own / "own.csv", *options, "-o", own / "out.h5")[0] == 1
+    code, _, err = cspr("plot", own / "out.h5", "--quantity", "summary", "-o", own / "out.png")
+    assert (code, err) == (0, "") and (own / "out.png").stat().st_size > 10_000
+
+
 def test_it_reads_what_it_wrote(own):
     """The motion of a plan, written and checked: Hermite pieces through its rows come near it."""
     code, _, _ = cspr("check", own / "own.csv", "--robot", "prototype", "-o", own / "out.csv", "--json")
