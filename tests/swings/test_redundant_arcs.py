@@ -94,4 +94,4 @@ def test_maps_have_the_numbers_of_plans(planned, tmp_path):
     code, out, _ = cspr("run", sweep, "-o", tmp_path / "run")
     assert code == 0
     arcs = cspr_jax.open_result(out.strip()).to_xarray()["arcs"]
-    assert arcs.values.ravel().tolist() == [1, planned.answers.arcs[0], 0]
+    assert arcs.values.ravel().tolist() == [1, planned.answers.arcs[0], 4]
