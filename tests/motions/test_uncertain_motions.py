@@ -114,12 +114,8 @@ def worst_rooms(problem, state, multiple):
             yield room(limits, *balances(robot, one, base + spools, centre, ratio))[0]
 
 
-THOROUGH = pytest.mark.thorough
-
-
-@pytest.mark.parametrize(
-    "name", [name if name == "prototype" else pytest.param(name, marks=THOROUGH) for name in CASES]
-)
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", CASES)
 def test_no_robot_within_a_proved_multiple_fails_and_one_within_a_refuted_one_does(name):
     is_redundant = name in ("boralugoda-rectangle", "cogiro")
     rng = np.random.default_rng(0)
