@@ -6,7 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from cspr_jax.config.limits import LimitTable
 from cspr_jax.config.mappings import plain
+from cspr_jax.config.obstacles import SurroundingsKeys
+from cspr_jax.errors import InputError
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.patterns import PATTERNS
@@ -62,6 +65,8 @@ def check_keys(
 
 def _limit_keys(limits: Limits | Mapping[str, Any] | None) -> dict[str, Any]:
     if limits is None or isinstance(limits, Mapping):
+        for key in set(limits or {}) - {*LimitTable.model_fields, *SurroundingsKeys.model_fields}:
+            raise InputError(f"limits[{key!r}]", None, "a key of [limits] of a plan, or of what surrounds the robot")
         return plain(dict(limits or {}))
     values = {row.name: getattr(limits, row.name) for row in LIMITS}
     numbers = {name: np.asarray(value) for name, value in values.items() if value is not None}

@@ -196,7 +196,10 @@ def proof_of(
     """
     jumps = [motion.jumps()] if hasattr(motion, "jumps") else []
     durations = np.array([float(motion.duration())])
-    bounds = lambda _, *ends: motion.bounds(*ends)  # noqa: E731
+
+    def bounds(_: np.ndarray, start: np.ndarray, end: np.ndarray) -> StateBounds:
+        return motion.bounds(start, end)
+
     return proofs_of(problem, bounds, durations, scene, jumps, contacts_alone=contacts_alone)[0]
 
 

@@ -53,6 +53,8 @@ def long_plan(keys: PlanFile, path: Path) -> PlannedMotions:
             raise ConfigError(path, f"{key}: must be absent in a table of so many rows")
     robot_file = as_moved(resolve_robot(keys.robot, path, Path()), [FAMILIES["spline"].legs])
     problem = build_problem(robot_file, keys, keys, path, any_cables=True)
+    if problem.limits.uncertainty is not None:
+        raise ConfigError(path, "uncertainty: must be absent in a table of so many rows")
     frame, notes = frame_of(robot_file.base_points, robot_file.z_axis), dict[str, None]()
     try:
         windows = list(_judged(problem, robot_file, frame, keys, path, notes))

@@ -31,7 +31,11 @@ SEGMENT = {
         "Smallest margin, as `segment_margin` of a motion file; of lines in m/s^2, of splines and over pulleys in N.",
     ),
     "margin_bound": ("1", "Proved lower bound of `margin`; null where nothing is proved."),
-    "limit_margin": ("1", "Smallest slack of the limits; null without limits."),
+    "limit_margin": (
+        "1",
+        "Smallest slack of the limits; null without limits. Of splines, and over pulleys, that of all criteria beside "
+        "tensions, contacts too.",
+    ),
     "tolerated": (
         "1",
         "Multiple of `limits.uncertainty` for which the segment is proved feasible; null without uncertainty.",
@@ -123,7 +127,10 @@ CHECK = {
     ),
     "margin_unit": ("", '"N".'),
     "margin_bound": ("N", "Proved lower bound of `margin`; null where nothing is proved."),
-    "limit_margin": ("1", "Smallest slack of the other limits, over the limit; null without limits."),
+    "limit_margin": (
+        "1",
+        "Smallest slack of all other criteria, over the limit, or the size of the robot; null without any.",
+    ),
     "tolerated": (
         "1",
         "Multiple of `limits.uncertainty` for which the motion is proved feasible; null without uncertainty.",

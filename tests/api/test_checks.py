@@ -127,6 +127,7 @@ def test_platforms_keep_their_own_axes(name):
         ({"ends": "periodic"}, "ends"),
         ({"smooth": -1.0}, "smooth"),
         ({"limits": {"cable_speed": 1.0}}, "cable_speed"),
+        ({"limits": {"robot": "cogiro"}}, "robot"),
         ({"times": "missing.csv", "positions": None}, "missing.csv"),
     ],
 )

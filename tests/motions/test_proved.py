@@ -14,7 +14,8 @@ from cspr_jax.motions.block_slacks import BlockSlacks
 from cspr_jax.motions.criteria import Criterion
 from cspr_jax.motions.motion import Backwards
 from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.proved_answers import proved_answers
+from cspr_jax.motions.proved_answers import MotionProof, proved_answers
+from cspr_jax.motions.time_proof import time_proof
 from cspr_jax.platforms.platform_segment import PlatformMotion
 from cspr_jax.robots import cables
 from cspr_jax.robots.kernel_axes import centred
@@ -112,28 +113,26 @@ def test_a_motion_in_reverse_has_the_same_answer():
 
 
 def test_what_fails_is_named_with_its_instant():
-    problem, rows = problem_of(), [Criterion(Verdict.OVER_TENSION, (0,), "N"), Criterion(Verdict.OBSTACLE, (), "m")]
-    motion = swings(problem, 5)[2][0]
-    time = float(motion.duration())
+    rows, time = (Criterion(Verdict.OVER_TENSION, (0,), "N"), Criterion(Verdict.OBSTACLE, (), "m")), 3.0
 
     def slacks(start, end):
         # The first criterion fails after half of the time; the second one is never met or broken for certain.
         low, high = 0.5 * time - end, 0.5 * time - start
         return BlockSlacks(np.stack([low, 0.0 * low - 1.0], 1), np.stack([high, 0.0 * high + 1.0], 1))
 
-    proof = proved.proved(problem, motion, slacks, rows)
+    proof = proved.summary(MotionProof(rows, time_proof(slacks, time), np.ones(2)), 1.0)
     assert proof.verdict == Verdict.OVER_TENSION.value
     assert proof.instant == pytest.approx(0.75 * time, abs=1e-3 * time)
     assert proof.bound == pytest.approx(-0.5 * time) and proof.room == np.inf
 
 
 def test_one_open_criterion_leaves_a_motion_undecided():
-    problem, rows = problem_of(), [Criterion(Verdict.OVER_TENSION, (0,), "N"), Criterion(Verdict.OBSTACLE, (), "m")]
+    rows = Criterion(Verdict.OVER_TENSION, (0,), "N"), Criterion(Verdict.OBSTACLE, (), "m")
 
     def slacks(start, end):
         return BlockSlacks(np.tile([1.0, -1.0], (len(start), 1)), np.ones((len(start), 2)))
 
-    proof = proved.proved(problem, swings(problem, 5)[2][0], slacks, rows)
+    proof = proved.summary(MotionProof(rows, time_proof(slacks, 2.0), np.ones(2)), 1.0)
     assert proof.verdict == Verdict.UNDECIDED.value and np.isnan(proof.instant)
 
 

@@ -49,3 +49,6 @@ def test_nothing_is_written_of_them(table):
         assert (code, out) == (2, "") and err.count("\n") == 1 and "too long to be held" in err
     code, out, err = cspr(*options, "--smooth", "0.001")
     assert (code, out) == (2, "") and err.count("\n") == 1 and "smooth" in err
+    path.with_name("limits.toml").write_text("uncertainty = { spool_positions = 0.001 }\n")
+    code, out, err = cspr(*options)
+    assert (code, out) == (2, "") and err.count("\n") == 1 and "uncertainty" in err
