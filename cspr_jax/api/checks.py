@@ -15,7 +15,7 @@ from cspr_jax.api.plans import Plan
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.build.robots import build_robot
-from cspr_jax.build.surroundings import scene_of
+from cspr_jax.build.scenes import scene_of
 from cspr_jax.config.mappings import text_of
 from cspr_jax.config.motions.text import TooLongError
 from cspr_jax.config.plan import PlanFile, plan_keys

@@ -13,7 +13,7 @@ from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.build.problems import build_problem
 from cspr_jax.build.robots import build_robot
-from cspr_jax.build.surroundings import scene_of
+from cspr_jax.build.scenes import scene_of
 from cspr_jax.config.equivalents import as_moved
 from cspr_jax.config.plan import plan_keys
 from cspr_jax.config.robot import resolve_robot

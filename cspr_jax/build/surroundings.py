@@ -5,17 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from cspr_jax.arithmetic.frames import Frame
-from cspr_jax.build.robots import build_robot
 from cspr_jax.config.obstacles import SurroundingsKeys
-from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.clearance import Scene, scene
-from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.patterns import PATTERNS
-from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.robots.reference_pose import aligned
 from cspr_jax.robots.shapes import Body, Obstacle, inward, rotated, turned
 
 
@@ -43,24 +38,6 @@ def surroundings(
     if kernel_body is not None and rotation is not None:
         kernel_body = rotated(kernel_body, rotation)
     return scene(robot, diameter=diameter, obstacles=[inward(one, frame) for one in obstacles], body=kernel_body)
-
-
-def scene_of(robot: AnyRobot, robot_file: RobotFile, frame: Frame, keys: PlanFile, file: object) -> Scene:
-    """Scene of the robot of a problem, whose platform has its reference axes; see `build_scene`.
-
-    Args:
-        frame: axes of the robot file.
-        file: named in errors.
-
-    Returns:
-        the scene in the kernels' coordinates.
-
-    Raises:
-        ConfigError: as `build_scene`.
-    """
-    written = centred(build_robot(robot_file, keys, file))[0]
-    rotation = aligned(written)[1] if isinstance(written, PlatformRobot) else None
-    return build_scene(robot, robot_file, frame, keys, file, rotation=rotation)
 
 
 def build_scene(

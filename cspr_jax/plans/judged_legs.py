@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cspr_jax.arithmetic.frames import Frame
-from cspr_jax.build.surroundings import scene_of
+from cspr_jax.build.scenes import scene_of
 from cspr_jax.errors import ConfigError
 from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.cause import Cause

@@ -10,7 +10,7 @@ import numpy as np
 from cspr_jax.arithmetic.frames import IDENTITY, Frame, frame_of
 from cspr_jax.build.problems import build_problem
 from cspr_jax.build.robots import build_robot
-from cspr_jax.build.surroundings import scene_of
+from cspr_jax.build.scenes import scene_of
 from cspr_jax.config.equivalents import as_moved
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile, resolve_robot

@@ -7,7 +7,7 @@ import numpy as np
 from cspr_jax.arithmetic.frames import IDENTITY
 from cspr_jax.build.orientations import given_quaternion, orientations
 from cspr_jax.build.robots import build_robot
-from cspr_jax.build.surroundings import scene_of
+from cspr_jax.build.scenes import scene_of
 from cspr_jax.config.motions.hints import unit_hints
 from cspr_jax.config.motions.table import MotionPieces, MotionTable
 from cspr_jax.errors import ConfigError, InputError

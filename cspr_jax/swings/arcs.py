@@ -19,7 +19,6 @@ from cspr_jax.runtime.stages import stage
 from cspr_jax.swings import hypocycloid, sieve
 from cspr_jax.swings.decide import decided, end_slacks
 from cspr_jax.swings.hypocycloid import Segment
-from cspr_jax.swings.redundant_arcs import redundant_arcs
 
 # Largest number of segments that each thread holds at a time.
 PART = 16 * sieve.BATCH
@@ -127,6 +126,10 @@ def arcs_and_segments(
     stage(f"numbers of arcs, 1 to {max_arcs}")
     parities, infinity = segments_between(problem, starts, ends, z0)
     if problem.robot.n_cables > problem.robot.dof:
+        from cspr_jax.swings.redundant_arcs import (
+            redundant_arcs,
+        )  # with the proofs of any motion, which others need not
+
         return redundant_arcs(problem, parities, infinity, max_arcs=max_arcs, arcs=arcs)
     upper, at_ends = _sieved(problem, parities[0], parities[1], max_arcs, dtype)
     return decided(problem, parities, upper, at_ends, infinity, arcs=arcs)

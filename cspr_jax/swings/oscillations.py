@@ -27,7 +27,6 @@ from cspr_jax.swings.envelopes import proved_envelope
 from cspr_jax.swings.hypocycloid import Segment
 from cspr_jax.swings.margins import margins
 from cspr_jax.swings.proof import tolerance
-from cspr_jax.swings.redundant_arcs import redundant_arcs
 from cspr_jax.swings.transition_margins import transition_margins
 
 # Instants of the sieve; odd, so that they do not fall on the zeros of an oscillation.
@@ -236,6 +235,8 @@ def _on_more_cables(
 ) -> OscillationAnswers:
     # Envelopes are of pseudotensions, which the motion does not determine here.
     v = np.asarray(transition.inclination(segments))
+    from cspr_jax.swings.redundant_arcs import redundant_arcs  # as in `swings.arcs`
+
     answers, _ = redundant_arcs(
         problem, {0: segments, 1: segments}, _infinity(problem, v), max_arcs=largest, arcs=arcs, step=2
     )
