@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, PrivateAttr, Tag, model_validator
 
+from cspr_jax.config.ellipse import WHOLE, EllipseTable
 from cspr_jax.config.kinds import refuse_other_kinds
 from cspr_jax.config.launch import LaunchTable, Seconds
 from cspr_jax.config.limits import LimitTable, Point, Positive
@@ -38,6 +39,8 @@ Duration = Annotated[
     Annotated[Seconds, Tag("~number")] | Annotated[Literal["least"], Tag("~least")],
     Discriminator(lambda value: "~least" if isinstance(value, str) else "~number"),
 ]
+
+Turns = Annotated[float, Field(ge=0.0, le=1e6)]
 
 
 class Pose(Table):
@@ -83,6 +86,15 @@ class Pose(Table):
         None,
         min_length=1,
         description="spline: file of the motion that ends at this pose, in place of poses with times",
+    )
+    ellipse: EllipseTable | None = Field(
+        None,
+        description="ellipse: ellipse that is reached at this pose; absent, and not at rest: that of the pose before",
+    )
+    turns: Turns | None = Field(
+        None,
+        description="ellipse: turns on the ellipse of this pose once it is reached (default 0, where the pose before "
+        "has the same ellipse 1)",
     )
 
 
@@ -141,12 +153,18 @@ class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys):
     limits: LimitTable | None = Field(
         None, description="[limits], as in a sweep: the same keys as here; give each key in only one of the two places"
     )
+    ellipse: EllipseTable | None = Field(
+        None,
+        description="[ellipse], of a plan that turns on one ellipse alone, in place of the poses; its keys may also "
+        "stand in the plan itself",
+    )
+    turns: Turns | None = Field(None, description="ellipse: turns on the ellipse of the plan (default 1)")
     launch: LaunchTable | None = Field(None, description="bezier: [launch] of an object that is released on a segment")
     stretch: Annotated[float, Field(ge=1e-6, le=1e9)] | None = Field(
         None, description="spline: factor by which all durations grow (default 1)"
     )
     pose: Annotated[list[Pose], Field(min_length=2, max_length=10_000)] = Field(
-        description="the poses in their order, at least two [[pose]] tables; absent with `motion`"
+        description="the poses in their order, at least two [[pose]] tables; absent with `motion` or `ellipse`"
     )
 
     # Samples and splines by the names of `motion`, in place of files.
@@ -197,7 +215,12 @@ class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys):
         ends = [i for i, pose in enumerate(self.pose) if pose.motion is not None]
         # The first pose of a leg that begins with a file lies where the file begins.
         starts = [i - 1 for i in ends if i == 1 or self.family_of(i - 2) != self.family_of(i - 1)]
-        return tuple(sorted({*launched, *ends, *starts}))
+        turning = [i for i, pose in enumerate(self.pose) if not pose.rest and self._is_on_ellipse(i)]
+        return tuple(sorted({*launched, *ends, *starts, *turning}))
+
+    def _is_on_ellipse(self, i: int) -> bool:
+        pose = self.pose[i]
+        return pose.ellipse is not None or (pose.position is None and i > 0 and self.family_of(i - 1) == "ellipse")
 
     @property
     def vectors(self) -> dict[str, list[float] | None]:
@@ -221,6 +244,20 @@ class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys):
         if "pose" in data:
             raise fault("motion", shown(data["motion"]), "absent beside [[pose]] tables: its file has the whole motion")
         return data | {"pose": [{}, {"motion": data["motion"]}]}
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_one_ellipse(cls, data: Any) -> Any:
+        # A plan of one ellipse is a plan of two poses, which turns on it.
+        if not isinstance(data, dict) or data.get("family") != "ellipse":
+            return data
+        flat = {name: data[name] for name in WHOLE if name in data}
+        if "pose" in data or not (flat or "ellipse" in data):
+            return data
+        rest = {name: value for name, value in data.items() if name not in flat}
+        if flat:
+            rest["ellipse"] = flat | data.get("ellipse", {})
+        return rest | {"pose": [{"ellipse": rest["ellipse"]}, {"turns": data.get("turns", 1.0)}]}
 
     @model_validator(mode="after")
     def _first_family(self) -> "PlanFile":

@@ -109,4 +109,4 @@ class TrajectoryKeys(Table):
     @property
     def takes_amplitude(self) -> bool:
         """Tell whether a family in use has an amplitude function, and not a law of its own."""
-        return not all(FAMILIES[name].rests_anywhere for name in self.families)
+        return any(FAMILIES[name].takes_amplitude for name in self.families)

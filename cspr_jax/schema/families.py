@@ -23,6 +23,7 @@ class Family:
         rests_anywhere: whether its poses are at rest wherever they are, so that it knows neither P0 nor an amplitude
             function.
         any_cables: patterns of the robots that may have more cables than degrees of freedom.
+        takes_amplitude: whether its motions follow the plan's amplitude function, and not a law of their own.
         is_line: whether its motions are straight lines, in the least time of their law.
         keys: keys of a plan that only this family takes, and others that name them too.
         pose_keys: keys of a pose that only this family takes, and others that name them too, if it leads to the pose.
@@ -40,6 +41,7 @@ class Family:
     free_end: bool = False
     rests_anywhere: bool = False
     any_cables: tuple[str, ...] = ()
+    takes_amplitude: bool = True
     is_line: bool = False
     keys: tuple[str, ...] = ()
     pose_keys: tuple[str, ...] = ()
@@ -95,6 +97,7 @@ _ROWS = (
             f"straight lines from rest to rest {law}",
             dict.fromkeys(("2T", "3T"), "cspr_jax.lines.leg:TimedLines"),
             rests_anywhere=True,
+            takes_amplitude=False,
             any_cables=("2T", "3T"),
             is_line=True,
             keys=("max_acceleration", *keys),
@@ -110,6 +113,7 @@ _ROWS = (
         "Bezier curves of the second order, at rest in every pose (launch paper)",
         dict.fromkeys(("2T", "3T"), "cspr_jax.beziers.leg:Beziers"),
         rests_anywhere=True,
+        takes_amplitude=False,
         keys=("first_control_point", "least"),
         pose_keys=("duration",),
     ),
@@ -118,6 +122,7 @@ _ROWS = (
         "splines through poses at their times, or a file of samples",
         dict.fromkeys(ANY_PATTERN, "cspr_jax.splines.leg:Splines"),
         rests_anywhere=True,
+        takes_amplitude=False,
         any_cables=ANY_PATTERN,
         knows_uncertainty=True,
         uncertain_redundancy=True,
@@ -126,6 +131,20 @@ _ROWS = (
         keys=("motion", "interpolation", "ends", "smooth", "stretch", "point"),
         pose_keys=("motion",),
         end_keys=("time", "velocity", "acceleration"),
+    ),
+    Family(
+        "ellipse",
+        "turns on harmonic ellipses, circles and lines, and the ways from one to another, from rest and to rest",
+        dict.fromkeys(("2T", "3T"), "cspr_jax.ellipses.leg:Ellipses"),
+        rests_anywhere=True,
+        any_cables=("2T", "3T"),
+        knows_uncertainty=True,
+        uncertain_redundancy=True,
+        knows_obstacles=True,
+        knows_pulleys=True,
+        keys=("ellipse", "turns"),
+        pose_keys=("turns",),
+        end_keys=("ellipse",),
     ),
 )
 FAMILIES: dict[str, Family] = {row.name: row for row in _ROWS}

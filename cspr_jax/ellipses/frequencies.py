@@ -1,0 +1,136 @@
+"""Frequencies that a plan leaves open: natural, the best, the fastest and the slowest within all limits.
+
+What cables alone allow is a formula (`harmonics`). Limits, spools in several planes, pulleys and obstacles are asked by
+samples of one turn; a verdict is the proof of the motion that results.
+"""
+
+import math
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax.arithmetic.affine_bounds import constant
+from cspr_jax.ellipses import harmonics
+from cspr_jax.ellipses.harmonics import Ellipse
+from cspr_jax.ellipses.hull import Hull
+from cspr_jax.errors import InputError
+from cspr_jax.motions.block_slacks import block_slacks
+from cspr_jax.motions.criteria import criteria
+from cspr_jax.motions.problem import Problem
+from cspr_jax.robots.clearance import Scene
+from cspr_jax.robots.state_bounds import StateBounds
+
+# Angles of a turn, frequencies of a first look, halvings that follow, and the share by which an end is kept off.
+ANGLES, LOOKS, HALVINGS, INSIDE = 128, 65, 40, 1e-6
+# Factors of the natural frequency between which a frequency is sought where no formula bounds it.
+WIDEST = 100.0
+
+
+def chosen_frequency(problem: Problem, hull: Hull | None, ellipse: Ellipse, rule: str, scene: Scene | None) -> float:
+    """Frequency by a rule.
+
+    Args:
+        hull: of the spools; None: no formula holds for the robot.
+        ellipse: leaves (3,).
+        rule: "natural", "best", "fastest" or "slowest".
+        scene: bodies that can meet.
+
+    Returns:
+        rad/s; the natural one where no frequency is feasible, so that its verdict says why.
+
+    Raises:
+        InputError: a centre that is not below the spools, or nothing that bounds the frequency.
+    """
+    natural = natural_frequency(problem, ellipse)
+    if rule == "natural":
+        return natural
+    if rule == "best" and hull is not None:
+        best = float(harmonics.of_many(harmonics.best_frequency, hull, _row(ellipse))[0])
+        if best == 0.0:
+            raise InputError("frequency", rule, "a number: the slower this ellipse, the larger the margin")
+        return natural if math.isnan(best) else best
+    low, high = natural / WIDEST, natural * WIDEST
+    if hull is not None:
+        first, last = (float(x[0]) for x in harmonics.of_many(harmonics.frequency_interval, hull, _row(ellipse)))
+        if math.isnan(first):
+            return natural
+        low, high = max(low, first), min(high, last)
+
+    def slack(frequencies: np.ndarray) -> np.ndarray:
+        return _sampled(problem, ellipse, frequencies, scene)
+
+    if rule == "best":
+        return _largest(slack, low, high, natural)
+    return _outermost(slack, low, high, natural, rule)
+
+
+def natural_frequency(problem: Problem, ellipse: Ellipse) -> float:
+    """Natural frequency of a pendulum from the plane of the spools to the centre of an ellipse.
+
+    Returns:
+        rad/s.
+
+    Raises:
+        InputError: a centre that is not below the spools.
+    """
+    depth = float(np.asarray(ellipse.centre) @ np.asarray(_normal(problem.robot)))
+    if not depth > 0.0:
+        raise InputError("frequency", "natural", "a number: the centre is not below the spools")
+    return math.sqrt(float(problem.robot.gravity) / depth)
+
+
+def _normal(robot) -> np.ndarray:
+    from cspr_jax.robots.point_mass import plane_normal
+
+    return np.asarray(plane_normal(robot))
+
+
+def _row(ellipse: Ellipse) -> Ellipse:
+    return Ellipse(*(np.asarray(leaf)[None] for leaf in ellipse))
+
+
+def _sampled(problem: Problem, ellipse: Ellipse, frequencies: np.ndarray, scene: Scene | None) -> np.ndarray:
+    # Smallest slack, over the scale of its unit, of one turn at each frequency, (n,).
+    angle = np.linspace(0.0, 2.0 * math.pi, ANGLES, endpoint=False)[:, None]
+    cosine, sine = np.cos(angle), np.sin(angle)
+    outward = ellipse.cosine * cosine + ellipse.sine * sine
+    forward = ellipse.sine * cosine - ellipse.cosine * sine
+    rate = frequencies[:, None, None]
+    place = np.broadcast_to(ellipse.centre + outward, (len(frequencies), ANGLES, 3))
+    states = [place, rate * forward, -(rate**2) * outward]
+    bounds = StateBounds(*(constant(jnp.asarray(x.reshape(-1, 3))) for x in states))
+    tau = np.zeros(len(frequencies) * ANGLES)
+    high = block_slacks(problem.robot, problem.limits, lambda start, end: bounds, tau, tau, scene).high
+    least = high[:, -len(criteria(problem.robot, problem.limits, scene)) :].reshape(len(frequencies), ANGLES, -1)
+    return least.min((1, 2))
+
+
+def _outermost(slack: Callable, low: float, high: float, natural: float, rule: str) -> float:
+    # The fastest, or the slowest, frequency whose samples are feasible.
+    looks = np.geomspace(max(low, natural / WIDEST), high, LOOKS)
+    order = looks[::-1] if rule == "fastest" else looks
+    feasible = np.flatnonzero(slack(order) > 0.0)
+    if not len(feasible):
+        return natural
+    first = int(feasible[0])
+    if first == 0:
+        if (high >= natural * WIDEST) if rule == "fastest" else (low <= natural / WIDEST):
+            raise InputError("frequency", rule, "a number: nothing bounds the frequency")
+        return float(order[0])
+    inside, outside = float(order[first]), float(order[first - 1])
+    for _ in range(HALVINGS):
+        middle = 0.5 * (inside + outside)
+        inside, outside = (middle, outside) if slack(np.array([middle]))[0] > 0.0 else (inside, middle)
+    return inside * (1.0 - INSIDE if rule == "fastest" else 1.0 + INSIDE)
+
+
+def _largest(slack: Callable, low: float, high: float, natural: float) -> float:
+    # The frequency whose smallest sampled slack is the largest: a grid that is narrowed about its best point.
+    looks = np.geomspace(low, high, LOOKS)
+    for _ in range(HALVINGS // 4):
+        values = slack(looks)
+        best = int(values.argmax())
+        looks = np.linspace(looks[max(best - 1, 0)], looks[min(best + 1, LOOKS - 1)], LOOKS)
+    return float(looks[LOOKS // 2]) if values[best] > 0.0 else natural

@@ -1,0 +1,66 @@
+"""Hull of the spools seen from above, by affine functions that are 1 at the centroid and 0 on one edge each."""
+
+from typing import NamedTuple
+
+import numpy as np
+from jax import Array
+from scipy.spatial import ConvexHull
+
+from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.errors import InputError
+from cspr_jax.robots.point_mass import SPATIAL, PointMassRobot, plane_normal, spool_radius
+
+# Spools count as in one plane within this part of the size of the robot.
+IN_PLANE = 1e-9
+
+
+class Hull(NamedTuple):
+    """Hull of the spools, and the plane that they lie in.
+
+    Fields:
+        edges: (n_edges, 2) gradients over x and y of the functions, 1/m.
+        normal: (3,) of the plane, with third component 1.
+        gravity: () m/s^2.
+    """
+
+    edges: Array
+    normal: Array
+    gravity: Array
+
+
+def hull_of(robot: PointMassRobot) -> Hull:
+    """Hull of the spools of a robot.
+
+    Args:
+        robot: centred.
+
+    Returns:
+        the hull; on as many cables as degrees of freedom its edges are in the order of the cables opposite to them.
+
+    Raises:
+        InputError: pulleys, or spools that are not in one plane.
+    """
+    normal, points = np.asarray(plane_normal(robot)), np.asarray(robot.base_points)
+    if robot.pulleys is not None:
+        raise InputError("pulley_radius", np.asarray(robot.pulleys.radius).tolist(), "absent: formulas know no pulleys")
+    if not np.abs(points @ normal).max() <= IN_PLANE * float(spool_radius(robot)):
+        raise InputError("base_points", points.tolist(), "spools in one plane, for a formula of the frequencies")
+    edges = np.stack([_gradient(points[:, :2][ends], robot.dof) for ends in _ends(points, robot.dof)])
+    return Hull(leaf(edges), leaf(normal), leaf(robot.gravity))
+
+
+def _ends(points: np.ndarray, dof: int) -> np.ndarray:
+    # Spools at the ends of each edge, (n_edges, dof - 1); in a vertical plane an edge is a point.
+    count = len(points)
+    if count == dof:
+        return np.array([[i for i in range(count) if i != cable] for cable in range(count)])
+    if dof < SPATIAL:
+        return np.array([[points[:, 0].argmin()], [points[:, 0].argmax()]])
+    return ConvexHull(points[:, :2]).simplices
+
+
+def _gradient(ends: np.ndarray, dof: int) -> np.ndarray:
+    # Gradient of the function that is 1 at the origin and 0 at the ends of an edge.
+    if dof < SPATIAL:
+        return np.array([-1.0 / ends[0, 0], 0.0])
+    return np.linalg.solve(ends, -np.ones(len(ends)))

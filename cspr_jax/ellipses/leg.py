@@ -1,0 +1,206 @@
+"""Leg of ellipses: poses on ellipses and at rest, joined by ways from one to another and by turns."""
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+
+from cspr_jax.build.scenes import scene_of
+from cspr_jax.config.ellipse import EllipseTable, Hertz
+from cspr_jax.config.plan import Pose
+from cspr_jax.ellipses import harmonics
+from cspr_jax.ellipses.frequencies import chosen_frequency
+from cspr_jax.ellipses.harmonics import Ellipse
+from cspr_jax.ellipses.hull import Hull, hull_of
+from cspr_jax.ellipses.ways import Turning, Way, least_way, step_of
+from cspr_jax.errors import ConfigError, InputError, shown
+from cspr_jax.motions.answers import Answers
+from cspr_jax.motions.leg import Leg
+from cspr_jax.motions.motion import Motion
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.proved_answers import ProvedAnswers, answers_of, judge_all_robots
+from cspr_jax.motions.waypoints import Waypoints
+from cspr_jax.robots.clearance import Scene
+from cspr_jax.schema.verdicts import FLAGS, Verdict
+
+_OTHERS = ("beta_hat", "tilt_torsion", "quaternion")
+
+
+@dataclasses.dataclass(frozen=True)
+class EllipseAnswers(ProvedAnswers):
+    """Answers of segments that end on ellipses, or at rest; margins are those of the tensions, in N.
+
+    Fields:
+        of_ellipses: (n,) details of the ellipse on which each segment ends; of one that ends at rest, starts.
+    """
+
+    of_ellipses: np.ndarray
+
+    @property
+    def feasible(self) -> np.ndarray:
+        """Tell whether each segment is proved feasible, (n,); a smaller number of arcs may still be undecided."""
+        return (self.verdict & ~np.array(Verdict.FEWER_ARCS_UNDECIDED.value, FLAGS)) == 0
+
+    def details(self, i: int) -> dict[str, Any]:
+        """Frequencies, and details of proofs; see `Answers.details`."""
+        return super().details(i) | self.of_ellipses[i]
+
+
+class Ellipses(Leg):
+    """Poses on ellipses and at rest; see `Leg`."""
+
+    step = 1
+
+    def __init__(self, stops: Waypoints) -> None:
+        """Refuse poses that are neither on an ellipse nor at rest."""
+        super().__init__(stops)
+        for i, pose in enumerate(stops.poses):
+            self._check_pose(i, pose)
+
+    def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
+        """Join the poses; see `Leg.join`."""
+        stops = self.stops
+        scene = scene_of(problem.robot, stops.robot_file, stops.frame, stops.keys, stops.path)
+        hull = _hull_of(problem)
+        turnings = self._turnings(problem, hull, z0, scene)
+        ways: list[Way] = []
+        place = turnings[0]
+        for i, last in enumerate(turnings[1:], start=1):
+            ways.append(self._way(problem, i, place, last, scene))
+            turns = self._turns(i, place, last)
+            place = dataclasses.replace(last, phase=last.phase + 2.0 * math.pi * turns)
+        return self._answers(problem, hull, turnings, ways, scene), [way.motion for way in ways]
+
+    def _check_pose(self, i: int, pose: Pose) -> None:
+        stops, name = self.stops, self.stops.name(i)
+        for key in _OTHERS:
+            if getattr(pose, key) is not None:
+                raise ConfigError(stops.path, f'{name}.{key}: must be absent with family = "ellipse"')
+        if pose.rest and pose.ellipse is not None:
+            raise ConfigError(stops.path, f"{name}.ellipse: must be absent at rest")
+        if pose.rest and pose.turns is not None and i:
+            raise ConfigError(stops.path, f"{name}.turns = {pose.turns:g}: must be absent at rest")
+        if pose.position is not None and not pose.rest and (i or not stops.first):
+            raise ConfigError(stops.path, f"{name}.position = {shown(pose.position)}: must be absent on an ellipse")
+        before = stops.poses[i - 1] if i else None
+        if not pose.rest and pose.ellipse is None and (before is None or before.rest):
+            raise ConfigError(stops.path, f"{name}.ellipse is missing: the ellipse, or rest = true")
+        if pose.rest and before is not None and before.rest:
+            raise ConfigError(stops.path, f"{name}.rest = true: must follow an ellipse, not another rest")
+
+    def _turnings(self, problem: Problem, hull: Hull | None, z0: float, scene: Scene) -> list[Turning]:
+        # Of all poses, each at the angle at which it is reached.
+        turnings: list[Turning] = []
+        places = self.stops.points(z0)
+        for i, pose in enumerate(self.stops.poses):
+            if pose.rest:
+                nothing = np.zeros(3)
+                turnings.append(Turning(Ellipse(places[i], nothing, nothing)))
+            elif pose.ellipse is None:
+                turnings.append(self._continued(turnings[i - 1], i))
+            else:
+                ellipse = self._ellipse(pose.ellipse)
+                frequency = self._frequency(problem, hull, ellipse, i, scene)
+                turnings.append(Turning(ellipse, frequency, pose.ellipse.phase))
+        return turnings
+
+    def _continued(self, before: Turning, i: int) -> Turning:
+        turns = self.stops.poses[i - 1].turns if i > 1 else None
+        return dataclasses.replace(before, phase=before.phase + 2.0 * math.pi * (turns or 0.0))
+
+    def _ellipse(self, table: EllipseTable) -> Ellipse:
+        frame = self.stops.frame
+        if table.half_axes is not None:
+            axes = [np.asarray(axis) for axis in table.half_axes]
+            a, b = axes[0], axes[1] if len(axes) > 1 else np.zeros(3)
+        else:
+            a, b = circle_axes(table.radius or 0.0, table.normal, is_planar=self.stops.robot_file.is_planar)
+        return Ellipse(frame.inward(table.centre), frame.turned(a), frame.turned(b))
+
+    def _frequency(self, problem: Problem, hull: Hull | None, ellipse: Ellipse, i: int, scene: Scene) -> float:
+        table = self.stops.poses[i].ellipse
+        rule = "natural" if table is None else table.frequency
+        if isinstance(rule, Hertz):
+            return 2.0 * math.pi * rule.hertz
+        if isinstance(rule, float):
+            return rule
+        try:
+            return chosen_frequency(problem, hull, ellipse, rule, scene)
+        except InputError as error:
+            raise ConfigError(self.stops.path, f"{self.stops.name(i)}.ellipse.{error}") from error
+
+    def _turns(self, i: int, first: Turning, last: Turning) -> float:
+        pose = self.stops.poses[i]
+        if pose.turns is not None:
+            return pose.turns
+        return 0.0 if last.rests or step_of(first, last) else 1.0
+
+    def _way(self, problem: Problem, i: int, first: Turning, last: Turning, scene: Scene) -> Way:
+        stops, turns, step = self.stops, self._turns(i, first, last), step_of(first, last)
+        arcs = int(stops.arcs[i - 1])
+        if arcs % max(step, 1) or (arcs and not step):
+            allowed = "absent on one and the same ellipse" if not step else "even between two ellipses"
+            raise ConfigError(stops.path, f"{stops.name(i)}.arcs = {arcs}: must be {allowed}")
+        if not step and not turns and first.phase % (2.0 * math.pi) == last.phase % (2.0 * math.pi):
+            raise ConfigError(stops.path, f"{stops.name(i)}.turns = 0: must be above 0 on one and the same ellipse")
+        return least_way(problem, first, last, turns, scene, arcs=arcs, max_arcs=stops.max_arcs)
+
+    def _answers(
+        self, problem: Problem, hull: Hull | None, turnings: list[Turning], ways: list[Way], scene: Scene
+    ) -> EllipseAnswers:
+        motions = [way.motion for way in ways]
+        plain = answers_of([way.proof for way in ways], np.array([float(motion.duration()) for motion in motions]))
+        judge_all_robots(problem, plain, motions, scene)
+        arcs, verdict = np.array([way.arcs for way in ways]), np.array(plain.verdict, FLAGS)
+        free = (self.stops.arcs == 0) & (arcs > 0)
+        broken = (verdict != 0) & (verdict != Verdict.UNDECIDED.value)
+        verdict[free & broken] |= Verdict.NO_ARCS.value
+        doubtful = np.array([way.fewer_undecided for way in ways]) & (verdict == 0)
+        is_feasible = verdict == 0
+        verdict[doubtful] |= Verdict.FEWER_ARCS_UNDECIDED.value
+        details = np.empty(len(ways), object)
+        details[:] = [
+            _details(hull, first if last.rests else last)
+            for first, last in zip(turnings[:-1], turnings[1:], strict=True)
+        ]
+        changed = {"arcs": np.where(is_feasible, arcs, 0), "tried_arcs": arcs, "verdict": verdict}
+        columns = {field.name: getattr(plain, field.name) for field in dataclasses.fields(plain)}
+        return EllipseAnswers(**columns | changed, of_ellipses=details)
+
+
+def circle_axes(radius: float, normal: Any, *, is_planar: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Half-axes of a circle: the first as near to x, or y, as the normal allows.
+
+    Args:
+        radius: m.
+        normal: (3,) about which it turns by the rule of the right hand; None: z, of a planar robot y.
+
+    Returns:
+        (3,) each, m.
+    """
+    default = np.eye(3)[1 if is_planar else 2]
+    axis = default if normal is None else np.asarray(normal, float)
+    axis = axis / np.linalg.norm(axis)
+    nearest = np.eye(3)[0 if abs(axis[0]) < 0.9 else 1]
+    a = nearest - (nearest @ axis) * axis
+    a *= radius / np.linalg.norm(a)
+    return a, np.cross(axis, a)
+
+
+def _hull_of(problem: Problem) -> Hull | None:
+    try:
+        return hull_of(problem.robot)
+    except InputError:
+        return None
+
+
+def _details(hull: Hull | None, turning: Turning) -> dict[str, Any]:
+    details: dict[str, Any] = {"frequency": turning.frequency}
+    if hull is None:
+        return details
+    row = Ellipse(*(np.asarray(leaf)[None] for leaf in turning.ellipse))
+    low, high = (float(x[0]) for x in harmonics.of_many(harmonics.frequency_interval, hull, row))
+    margins = harmonics.of_many(harmonics.harmonic_margins, hull, row, np.array([turning.frequency]))[0]
+    intervals = [] if math.isnan(low) else [[low, high]]
+    return details | {"frequency_intervals": intervals, "pseudotension_margin": float(margins.min())}

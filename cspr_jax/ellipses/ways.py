@@ -1,0 +1,137 @@
+"""Ways between ellipses: the least number of arcs, half turns, whose motion is proved; samples refute before a proof."""
+
+import dataclasses
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.ellipses.harmonics import Ellipse
+from cspr_jax.ellipses.motion import EllipseMotion, integral, with_turns
+from cspr_jax.motions.amplitudes import Amplitude
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.proved_answers import MotionProof, proof_of, sampled_proof
+from cspr_jax.robots.clearance import Scene
+
+# Intervals of the samples that refute most motions before a proof is tried.
+FEW = 256
+
+
+@dataclasses.dataclass(frozen=True)
+class Turning:
+    """Ellipse with a frequency and an angle.
+
+    Fields:
+        ellipse: leaves (3,); a rest has no axes.
+        frequency: rad/s; 0 for a rest, which takes that of the other end of a way.
+        phase: angle, rad.
+    """
+
+    ellipse: Ellipse
+    frequency: float = 0.0
+    phase: float = 0.0
+
+    @property
+    def rests(self) -> bool:
+        """Whether it is a rest."""
+        return self.frequency == 0.0
+
+    def is_same(self, other: "Turning") -> bool:
+        """Tell whether another one is on the same ellipse at the same pace, at any angle.
+
+        Returns:
+            whether it is.
+        """
+        pairs = zip(self.ellipse, other.ellipse, strict=True)
+        return self.frequency == other.frequency and all(np.array_equal(a, b) for a, b in pairs)
+
+
+class Way(NamedTuple):
+    """Way that was tried.
+
+    Fields:
+        motion: with the turns behind it.
+        proof: of all of it; None: samples refute it.
+        arcs: number of half turns of the way.
+        fewer_undecided: whether a smaller number stayed undecided.
+    """
+
+    motion: EllipseMotion
+    proof: MotionProof
+    arcs: int
+    fewer_undecided: bool = False
+
+
+def step_of(first: Turning, last: Turning) -> int:
+    """Step between numbers of arcs of a way: 1 where the angle at a rest is free, else 2; 0 where there is no way.
+
+    Returns:
+        the step.
+    """
+    if first.is_same(last):
+        return 0
+    return 1 if first.rests or last.rests else 2
+
+
+def motion_between(amplitude: Amplitude, first: Turning, last: Turning, arcs: int, turns: float) -> EllipseMotion:
+    """Way from one ellipse to another one, and turns on that.
+
+    Args:
+        amplitude: law of the way.
+        arcs: half turns of the way, begun or whole; of no account on one and the same ellipse.
+        turns: on the last ellipse.
+
+    Returns:
+        the motion; of a way to rest, its end may have any angle.
+    """
+    step, full = step_of(first, last), 2.0 * math.pi
+    start, end = first.frequency or last.frequency, last.frequency or first.frequency
+    between = (last.phase - first.phase) % full
+    if step == 1:
+        swept = math.pi * arcs
+    else:
+        swept = between if step == 0 else (between or full) + math.pi * (arcs - 2)
+    phase = last.phase - swept if first.rests else first.phase
+    mean = start + (end - start) * float(integral(amplitude).at(1.0))
+    way, rest = (swept / mean if step else 0.0), turns * full / end + (0.0 if step else swept / end)
+    law = with_turns(amplitude, way / (way + rest) if step else 0.0)
+    frequencies = leaf([start, end])
+    return EllipseMotion(first.ellipse, last.ellipse, frequencies, leaf(phase), law, integral(law), leaf(way + rest))
+
+
+def least_way(
+    problem: Problem, first: Turning, last: Turning, turns: float, scene: Scene | None, *, arcs: int, max_arcs: int
+) -> Way:
+    """The way with the least number of arcs that is proved, with the turns behind it.
+
+    Args:
+        turns: on the last ellipse.
+        arcs: fixed number of arcs; 0: free.
+        max_arcs: largest number of arcs tried.
+
+    Returns:
+        the way; without a proof the one whose smallest slack is the largest.
+    """
+    step = step_of(first, last)
+    numbers = [arcs] if arcs or not step else range(step, max_arcs + 1, step)
+    best: Way | None = None
+    undecided: Way | None = None
+    reached = -np.inf
+    for number in numbers:
+        motion = motion_between(problem.amplitude, first, last, number, turns)
+        proof = sampled_proof(problem, motion, scene, FEW)
+        if not proof.broken.any():
+            proof = proof_of(problem, motion, scene)
+            if not proof.verdict:
+                return Way(motion, proof, number, undecided is not None)
+            if not proof.broken.any():
+                undecided = undecided or Way(motion, proof, number)
+        slack = float((proof.proof.high / proof.scales).min())
+        if best is None or slack > reached:
+            best, reached = Way(motion, proof, number), slack
+    chosen = undecided or best
+    if chosen is None:
+        raise ValueError("no number of arcs")
+    # What samples have refuted is bounded for its causes.
+    return chosen._replace(proof=proof_of(problem, chosen.motion, scene))
