@@ -5,6 +5,9 @@ from cspr_jax.api.beziers import bezier_durations as bezier_durations
 from cspr_jax.api.beziers import bezier_verdicts as bezier_verdicts
 from cspr_jax.api.beziers import launch_range as launch_range
 from cspr_jax.api.checks import check as check
+from cspr_jax.api.ellipses import ellipse as ellipse
+from cspr_jax.api.ellipses import ellipse_frequencies as ellipse_frequencies
+from cspr_jax.api.ellipses import ellipse_margins as ellipse_margins
 from cspr_jax.api.imports import ImportedRobot as ImportedRobot
 from cspr_jax.api.imports import import_robot as import_robot
 from cspr_jax.api.lines import least_time as least_time

@@ -159,6 +159,7 @@ _STARTS = real("finite numbers of shape (3,) or (n, 3), at most 1e6 m", (3,), (A
 _STARTS_OR_NONE = real(
     "None, or finite numbers of shape (3,) or (n, 3), at most 1e6 m", (3,), (ANY, 3), none=True, **LENGTHS
 )
+_AXES = real("finite numbers of shape (3,) or (n, 3), at most 1e6 m", (3,), (ANY, 3), traced=True, **LENGTHS)
 _GEOMETRY = real("finite numbers of shape (n, 3), one row a cable, at most 1e6 m", (ANY, 3), traced=True, **LENGTHS)
 DEPTH: dict[str, Any] = {"least": 0.0, "above": True, "largest": LARGEST_LENGTH}
 DEPTH_WORDS = "a number > 0, at most 1e6 m"
@@ -171,6 +172,7 @@ _WORKERS = integer(-MOST, MOST, none=True)
 
 # Rules by the names of arguments, for all functions with an argument of this name.
 ARGUMENTS: dict[str, Rule] = {
+    "a": _AXES,
     "acceleration": real("a number >= 0, in m/s^2, or None", (), least=0.0, none=True),
     "acceleration_time": _TIME,
     "accelerations": _POINTS_OR_NONE,
@@ -179,6 +181,7 @@ ARGUMENTS: dict[str, Rule] = {
     "anyway": _FLAG,
     "arcs": real("a whole number from 1 on", (), least=1.0, largest=MOST, traced=True),
     "at": _coordinates,
+    "b": _AXES,
     "base_points": _GEOMETRY,
     "best": _names,
     "beta_hat": choice(
@@ -189,7 +192,9 @@ ARGUMENTS: dict[str, Rule] = {
     "cable_set": _TEXT_OR_NONE,
     "capacity_length": real("a number > 0, in m, or None", (), least=0.0, above=True, none=True),
     "cells": many(_coordinates, "a list of coordinates by axis"),
+    "centre": _POINT,
     "centre_of_mass": real("three coordinates, at most 1e6 m, or None", (3,), none=True, **LENGTHS),
+    "centres": _POINTS,
     "condition": _TEXT,
     "control_point": _POINT,
     "control_points": _POINTS_OR_NONE,
@@ -209,6 +214,13 @@ ARGUMENTS: dict[str, Rule] = {
     "fine": _FLAG,
     "folder": _PATH,
     "font_size": _NUMBER_OR_NONE,
+    "frequencies": real("numbers > 0, rad/s", (), (ANY,), least=0.0, above=True),
+    "frequency": choice(
+        real(
+            'a number > 0, rad/s, or "natural", "best", "fastest" or "slowest"', (), least=0.0, above=True, traced=True
+        ),
+        *("natural", "best", "fastest", "slowest"),
+    ),
     "given": _FILE,
     "gravity": _POSITIVE,
     "inertia": real("three rows of three finite numbers, kg m^2", (3, 3), traced=True),
@@ -232,6 +244,7 @@ ARGUMENTS: dict[str, Rule] = {
     "output": _PATH_OR_NONE,
     "path": _PATH,
     "pattern": _TEXT_OR_NONE,
+    "phase": real("a finite number, rad", (), traced=True),
     "place": real("three finite numbers, at most 1e6 m", (3,), **LENGTHS),
     "plan": _PATH_OR_NONE,
     "planar": _FLAG,
@@ -276,6 +289,7 @@ ARGUMENTS: dict[str, Rule] = {
     "times": _instants,
     "title": _FLAG,
     "trajectories": integer(-MOST, MOST),
+    "turns": real("a number > 0", (), least=0.0, above=True, largest=MOST, traced=True),
     "values": integer(1, MOST, none=True),
     "velocities": _POINTS_OR_NONE,
     "variable": _FLAG,

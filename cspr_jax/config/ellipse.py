@@ -10,7 +10,6 @@ from cspr_jax.config.trajectory import Angle
 from cspr_jax.config.wording import fault
 
 
-
 class Hertz(Table):
     """A frequency in turns a second."""
 

@@ -7,19 +7,19 @@ samples of one turn; a verdict is the proof of the motion that results.
 import math
 from collections.abc import Callable
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.arithmetic.affine_bounds import constant
 from cspr_jax.ellipses import harmonics
 from cspr_jax.ellipses.harmonics import Ellipse
-from cspr_jax.ellipses.hull import Hull
+from cspr_jax.ellipses.hull import formula_hull
 from cspr_jax.errors import InputError
 from cspr_jax.motions.block_slacks import block_slacks
 from cspr_jax.motions.criteria import criteria
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.clearance import Scene
+from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.state_bounds import StateBounds
 
 # Angles of a turn, frequencies of a first look, halvings that follow, and the share by which an end is kept off.
@@ -28,11 +28,10 @@ ANGLES, LOOKS, HALVINGS, INSIDE = 128, 65, 40, 1e-6
 WIDEST = 100.0
 
 
-def chosen_frequency(problem: Problem, hull: Hull | None, ellipse: Ellipse, rule: str, scene: Scene | None) -> float:
+def chosen_frequency(problem: Problem, ellipse: Ellipse, rule: str, scene: Scene | None = None) -> float:
     """Frequency by a rule.
 
     Args:
-        hull: of the spools; None: no formula holds for the robot.
         ellipse: leaves (3,).
         rule: "natural", "best", "fastest" or "slowest".
         scene: bodies that can meet.
@@ -43,7 +42,7 @@ def chosen_frequency(problem: Problem, hull: Hull | None, ellipse: Ellipse, rule
     Raises:
         InputError: a centre that is not below the spools, or nothing that bounds the frequency.
     """
-    natural = natural_frequency(problem, ellipse)
+    natural, hull = natural_frequency(problem, ellipse), formula_hull(problem.robot)
     if rule == "natural":
         return natural
     if rule == "best" and hull is not None:
@@ -75,16 +74,10 @@ def natural_frequency(problem: Problem, ellipse: Ellipse) -> float:
     Raises:
         InputError: a centre that is not below the spools.
     """
-    depth = float(np.asarray(ellipse.centre) @ np.asarray(_normal(problem.robot)))
+    depth = float(np.asarray(ellipse.centre) @ np.asarray(plane_normal(problem.robot)))
     if not depth > 0.0:
         raise InputError("frequency", "natural", "a number: the centre is not below the spools")
     return math.sqrt(float(problem.robot.gravity) / depth)
-
-
-def _normal(robot) -> np.ndarray:
-    from cspr_jax.robots.point_mass import plane_normal
-
-    return np.asarray(plane_normal(robot))
 
 
 def _row(ellipse: Ellipse) -> Ellipse:

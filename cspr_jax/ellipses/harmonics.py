@@ -21,7 +21,6 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches
@@ -92,6 +91,19 @@ def harmonic_margins(hull: Hull, ellipse: Ellipse, frequency: Array) -> Array:
     is_below = terms.depth > 0.0
     depth = jnp.where(is_below, 1.0 - terms.swing / terms.depth, -1.0)
     return jnp.concatenate([jnp.where(is_below, slack, -jnp.inf), depth[None]])
+
+
+def least_margin(hull: Hull, ellipse: Ellipse, frequency: Array) -> Array:
+    """Smallest of the margins along an ellipse.
+
+    Args:
+        ellipse: leaves (3,).
+        frequency: () rad/s.
+
+    Returns:
+        () positive exactly if it is feasible.
+    """
+    return jnp.min(harmonic_margins(hull, ellipse, frequency))
 
 
 def _roots(terms: _Terms) -> tuple[Array, Array]:
@@ -169,16 +181,3 @@ def of_many(function, hull: Hull, *items):
         its results, NumPy leaves (n, ...).
     """
     return in_batches(partial(_each, function, hull), items, size=BATCH)
-
-
-def natural_frequency(hull: Hull, centre: np.ndarray) -> np.ndarray:
-    """Natural frequency sqrt(g / D) of a pendulum below the plane of the spools.
-
-    Args:
-        centre: (..., 3) m.
-
-    Returns:
-        (...) rad/s; NaN above the plane.
-    """
-    depth = np.asarray(centre) @ np.asarray(hull.normal)
-    return np.sqrt(float(hull.gravity) / np.where(depth > 0.0, depth, np.nan))

@@ -49,6 +49,21 @@ def hull_of(robot: PointMassRobot) -> Hull:
     return Hull(leaf(edges), leaf(normal), leaf(robot.gravity))
 
 
+def formula_hull(robot: PointMassRobot) -> Hull | None:
+    """Hull of the spools of a robot for which formulas hold.
+
+    Args:
+        robot: centred.
+
+    Returns:
+        the hull; None for a robot that `hull_of` refuses.
+    """
+    try:
+        return hull_of(robot)
+    except InputError:
+        return None
+
+
 def _ends(points: np.ndarray, dof: int) -> np.ndarray:
     # Spools at the ends of each edge, (n_edges, dof - 1); in a vertical plane an edge is a point.
     count = len(points)

@@ -12,7 +12,7 @@ from cspr_jax.config.plan import Pose
 from cspr_jax.ellipses import harmonics
 from cspr_jax.ellipses.frequencies import chosen_frequency
 from cspr_jax.ellipses.harmonics import Ellipse
-from cspr_jax.ellipses.hull import Hull, hull_of
+from cspr_jax.ellipses.hull import Hull, formula_hull
 from cspr_jax.ellipses.ways import Turning, Way, least_way, step_of
 from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.motions.answers import Answers
@@ -62,15 +62,14 @@ class Ellipses(Leg):
         """Join the poses; see `Leg.join`."""
         stops = self.stops
         scene = scene_of(problem.robot, stops.robot_file, stops.frame, stops.keys, stops.path)
-        hull = _hull_of(problem)
-        turnings = self._turnings(problem, hull, z0, scene)
+        turnings = self._turnings(problem, z0, scene)
         ways: list[Way] = []
         place = turnings[0]
         for i, last in enumerate(turnings[1:], start=1):
             ways.append(self._way(problem, i, place, last, scene))
             turns = self._turns(i, place, last)
             place = dataclasses.replace(last, phase=last.phase + 2.0 * math.pi * turns)
-        return self._answers(problem, hull, turnings, ways, scene), [way.motion for way in ways]
+        return self._answers(problem, turnings, ways, scene), [way.motion for way in ways]
 
     def _check_pose(self, i: int, pose: Pose) -> None:
         stops, name = self.stops, self.stops.name(i)
@@ -89,7 +88,7 @@ class Ellipses(Leg):
         if pose.rest and before is not None and before.rest:
             raise ConfigError(stops.path, f"{name}.rest = true: must follow an ellipse, not another rest")
 
-    def _turnings(self, problem: Problem, hull: Hull | None, z0: float, scene: Scene) -> list[Turning]:
+    def _turnings(self, problem: Problem, z0: float, scene: Scene) -> list[Turning]:
         # Of all poses, each at the angle at which it is reached.
         turnings: list[Turning] = []
         places = self.stops.points(z0)
@@ -101,7 +100,7 @@ class Ellipses(Leg):
                 turnings.append(self._continued(turnings[i - 1], i))
             else:
                 ellipse = self._ellipse(pose.ellipse)
-                frequency = self._frequency(problem, hull, ellipse, i, scene)
+                frequency = self._frequency(problem, ellipse, i, scene)
                 turnings.append(Turning(ellipse, frequency, pose.ellipse.phase))
         return turnings
 
@@ -118,7 +117,7 @@ class Ellipses(Leg):
             a, b = circle_axes(table.radius or 0.0, table.normal, is_planar=self.stops.robot_file.is_planar)
         return Ellipse(frame.inward(table.centre), frame.turned(a), frame.turned(b))
 
-    def _frequency(self, problem: Problem, hull: Hull | None, ellipse: Ellipse, i: int, scene: Scene) -> float:
+    def _frequency(self, problem: Problem, ellipse: Ellipse, i: int, scene: Scene) -> float:
         table = self.stops.poses[i].ellipse
         rule = "natural" if table is None else table.frequency
         if isinstance(rule, Hertz):
@@ -126,7 +125,7 @@ class Ellipses(Leg):
         if isinstance(rule, float):
             return rule
         try:
-            return chosen_frequency(problem, hull, ellipse, rule, scene)
+            return chosen_frequency(problem, ellipse, rule, scene)
         except InputError as error:
             raise ConfigError(self.stops.path, f"{self.stops.name(i)}.ellipse.{error}") from error
 
@@ -146,9 +145,8 @@ class Ellipses(Leg):
             raise ConfigError(stops.path, f"{stops.name(i)}.turns = 0: must be above 0 on one and the same ellipse")
         return least_way(problem, first, last, turns, scene, arcs=arcs, max_arcs=stops.max_arcs)
 
-    def _answers(
-        self, problem: Problem, hull: Hull | None, turnings: list[Turning], ways: list[Way], scene: Scene
-    ) -> EllipseAnswers:
+    def _answers(self, problem: Problem, turnings: list[Turning], ways: list[Way], scene: Scene) -> EllipseAnswers:
+        hull = formula_hull(problem.robot)
         motions = [way.motion for way in ways]
         plain = answers_of([way.proof for way in ways], np.array([float(motion.duration()) for motion in motions]))
         judge_all_robots(problem, plain, motions, scene)
@@ -186,13 +184,6 @@ def circle_axes(radius: float, normal: Any, *, is_planar: bool) -> tuple[np.ndar
     a = nearest - (nearest @ axis) * axis
     a *= radius / np.linalg.norm(a)
     return a, np.cross(axis, a)
-
-
-def _hull_of(problem: Problem) -> Hull | None:
-    try:
-        return hull_of(problem.robot)
-    except InputError:
-        return None
 
 
 def _details(hull: Hull | None, turning: Turning) -> dict[str, Any]:

@@ -11,6 +11,7 @@ of the ellipses. Rest is an ellipse whose axes are zero; a law that is constant,
 import dataclasses
 import math
 from functools import partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -21,7 +22,7 @@ from cspr_jax.arithmetic.affine_bounds import AffineBounds, sincospi
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.ellipses.harmonics import Ellipse
 from cspr_jax.motions.amplitude_bounds import TimeBounds, time_bounds
-from cspr_jax.motions.amplitudes import Amplitude, derivatives, from_pieces
+from cspr_jax.motions.amplitudes import Amplitude, derivatives, from_pieces, named
 from cspr_jax.robots.state import State
 from cspr_jax.robots.state_bounds import StateBounds
 
@@ -117,6 +118,22 @@ def _bounds(motion: EllipseMotion, blocks: tuple[TimeBounds, AffineBounds]) -> S
         return StateBounds(*_kinematics(motion, (s, s1 * (1.0 / time), s2 * (1.0 / time**2)), (cosine, sine), rates))
 
     return jax.vmap(one)(blocks)
+
+
+def turning(ellipse: Ellipse, frequency: Array, phase: Array, turns: Any) -> EllipseMotion:
+    """Turns on one ellipse.
+
+    Args:
+        ellipse: leaves (3,).
+        frequency: () rad/s.
+        phase: () angle at the start, rad.
+        turns: () number of turns.
+
+    Returns:
+        the motion.
+    """
+    law, time = with_turns(named("quintic"), 0.0), 2.0 * math.pi * jnp.asarray(turns, float) / frequency
+    return EllipseMotion(ellipse, ellipse, jnp.stack([frequency, frequency]), phase, law, integral(law), time)
 
 
 def with_turns(amplitude: Amplitude, share: float) -> Amplitude:
