@@ -5,6 +5,7 @@ import numpy as np
 from cspr_jax.arithmetic.frames import IDENTITY, Frame
 from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE, cylindrical_frames, from_tilt_torsion
 from cspr_jax.errors import ConfigError, shown
+from cspr_jax.motions.waypoints import Waypoints
 
 
 def orientations(frame: Frame, points: np.ndarray, angles: np.ndarray) -> np.ndarray:
@@ -40,3 +41,24 @@ def given_quaternion(quaternion: list[float] | None, key: str, file: object) -> 
     if abs(size - 1.0) > UNIT_TOLERANCE:
         raise ConfigError(file, f"{key} = {shown(quaternion)}: must have length 1 (it has {size:.7g})")
     return unit_quaternion / size
+
+
+def pose_quaternions(stops: Waypoints, points: np.ndarray) -> np.ndarray:
+    """Orientations of way-points, by their quaternions or by tilt and torsion, in the kernels' axes.
+
+    Args:
+        points: (n_poses, 3) their places, from the centroid of the spools, z down, m.
+
+    Returns:
+        (n_poses, 4) unit quaternions from the reference orientation, scalar first.
+
+    Raises:
+        ConfigError: a quaternion that is not of unit length.
+    """
+    frame, poses = stops.frame, stops.poses
+    units = [
+        given_quaternion(pose.quaternion, f"{stops.name(i)}.quaternion", stops.path) for i, pose in enumerate(poses)
+    ]
+    angles = np.array([pose.tilt_torsion or [0.0] * 3 for pose in poses])
+    is_tilted = np.array([pose.tilt_torsion is not None for pose in poses])
+    return np.where(is_tilted[:, None], orientations(frame, points, angles), frame.turned_quaternions(np.array(units)))

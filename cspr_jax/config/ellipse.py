@@ -30,6 +30,20 @@ Frequency = Annotated[
 ]
 
 
+class OscillationTable(Table):
+    """Oscillation of a platform about its orientation, once a turn."""
+
+    axis: Point = Field(description="direction [x, y, z] of the axis, fixed axes")
+    angle: Angle = Field(description="largest angle, rad")
+    phase: Angle = Field(0.0, description="angle of the ellipse at which it is reached, rad")
+
+    @model_validator(mode="after")
+    def _has_axis(self) -> "OscillationTable":
+        if not any(self.axis):
+            raise fault("axis", self.axis, "a direction that is not zero")
+        return self
+
+
 class EllipseTable(Table):
     """Harmonic ellipse: centre + a cos(angle) + b sin(angle), with an angle that grows with the frequency."""
 
@@ -48,6 +62,9 @@ class EllipseTable(Table):
         '"best" (the largest margin), "fastest" or "slowest" (within all limits)',
     )
     phase: Angle = Field(0.0, description="angle at which the ellipse is reached, rad; 0: at centre + a")
+    oscillation: OscillationTable | None = Field(
+        None, description="platforms: oscillation about the orientation of the pose; absent: none"
+    )
 
     @model_validator(mode="after")
     def _one_shape(self) -> "EllipseTable":

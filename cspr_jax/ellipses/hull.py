@@ -8,6 +8,7 @@ from scipy.spatial import ConvexHull
 
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.errors import InputError
+from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.point_mass import SPATIAL, PointMassRobot, plane_normal, spool_radius
 
 # Spools count as in one plane within this part of the size of the robot.
@@ -28,7 +29,7 @@ class Hull(NamedTuple):
     gravity: Array
 
 
-def hull_of(robot: PointMassRobot) -> Hull:
+def hull_of(robot: AnyRobot) -> Hull:
     """Hull of the spools of a robot.
 
     Args:
@@ -38,8 +39,10 @@ def hull_of(robot: PointMassRobot) -> Hull:
         the hull; on as many cables as degrees of freedom its edges are in the order of the cables opposite to them.
 
     Raises:
-        InputError: pulleys, or spools that are not in one plane.
+        InputError: a platform, pulleys, or spools that are not in one plane.
     """
+    if not isinstance(robot, PointMassRobot):
+        raise InputError("robot", robot.name, "a point mass, for a formula of the frequencies")
     normal, points = np.asarray(plane_normal(robot)), np.asarray(robot.base_points)
     if robot.pulleys is not None:
         raise InputError("pulley_radius", np.asarray(robot.pulleys.radius).tolist(), "absent: formulas know no pulleys")
@@ -49,7 +52,7 @@ def hull_of(robot: PointMassRobot) -> Hull:
     return Hull(leaf(edges), leaf(normal), leaf(robot.gravity))
 
 
-def formula_hull(robot: PointMassRobot) -> Hull | None:
+def formula_hull(robot: AnyRobot) -> Hull | None:
     """Hull of the spools of a robot for which formulas hold.
 
     Args:

@@ -4,8 +4,12 @@ import dataclasses
 import math
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 
+from cspr_jax.arithmetic import rotations
+from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.build.orientations import pose_quaternions
 from cspr_jax.build.scenes import scene_of
 from cspr_jax.config.ellipse import EllipseTable, Hertz
 from cspr_jax.config.plan import Pose
@@ -13,6 +17,7 @@ from cspr_jax.ellipses import harmonics
 from cspr_jax.ellipses.frequencies import chosen_frequency
 from cspr_jax.ellipses.harmonics import Ellipse
 from cspr_jax.ellipses.hull import Hull, formula_hull
+from cspr_jax.ellipses.rotation_frequencies import rotation_frequencies
 from cspr_jax.ellipses.ways import Turning, Way, least_way, step_of
 from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.motions.answers import Answers
@@ -22,9 +27,8 @@ from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import ProvedAnswers, answers_of, judge_all_robots
 from cspr_jax.motions.waypoints import Waypoints
 from cspr_jax.robots.clearance import Scene
+from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.schema.verdicts import FLAGS, Verdict
-
-_OTHERS = ("beta_hat", "tilt_torsion", "quaternion")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,9 +77,11 @@ class Ellipses(Leg):
 
     def _check_pose(self, i: int, pose: Pose) -> None:
         stops, name = self.stops, self.stops.name(i)
-        for key in _OTHERS:
-            if getattr(pose, key) is not None:
-                raise ConfigError(stops.path, f'{name}.{key}: must be absent with family = "ellipse"')
+        if pose.beta_hat is not None and i:
+            raise ConfigError(stops.path, f'{name}.beta_hat: must be absent with family = "ellipse"')
+        has_oscillation = pose.ellipse is not None and pose.ellipse.oscillation is not None
+        if has_oscillation and not stops.robot_file.is_platform:
+            raise ConfigError(stops.path, f"{name}.ellipse.oscillation: must be absent for {stops.robot_file.kind}")
         if pose.rest and pose.ellipse is not None:
             raise ConfigError(stops.path, f"{name}.ellipse: must be absent at rest")
         if pose.rest and pose.turns is not None and i:
@@ -90,19 +96,39 @@ class Ellipses(Leg):
 
     def _turnings(self, problem: Problem, z0: float, scene: Scene) -> list[Turning]:
         # Of all poses, each at the angle at which it is reached.
-        turnings: list[Turning] = []
-        places = self.stops.points(z0)
-        for i, pose in enumerate(self.stops.poses):
+        stops, turnings = self.stops, list[Turning]()
+        centres = stops.points(z0)
+        for i, pose in enumerate(stops.poses):
+            if pose.ellipse is not None:
+                centres[i] = stops.frame.inward(pose.ellipse.centre)
+        is_platform = isinstance(problem.robot, PlatformRobot)
+        quaternions = pose_quaternions(stops, centres) if is_platform else [None] * len(centres)
+        for i, (pose, quaternion) in enumerate(zip(stops.poses, quaternions, strict=True)):
             if pose.rest:
                 nothing = np.zeros(3)
-                turnings.append(Turning(Ellipse(places[i], nothing, nothing)))
+                turnings.append(Turning(Ellipse(centres[i], nothing, nothing), quaternion=quaternion))
             elif pose.ellipse is None:
                 turnings.append(self._continued(turnings[i - 1], i))
             else:
                 ellipse = self._ellipse(pose.ellipse)
-                frequency = self._frequency(problem, ellipse, i, scene)
-                turnings.append(Turning(ellipse, frequency, pose.ellipse.phase))
+                frequency, phase = self._frequency(problem, ellipse, i, scene), pose.ellipse.phase
+                turnings.append(Turning(ellipse, frequency, phase, quaternion, **self._oscillation(pose.ellipse)))
+            self._check_axes(turnings, i)
         return turnings
+
+    def _oscillation(self, table: EllipseTable) -> dict[str, np.ndarray]:
+        if table.oscillation is None:
+            return {}
+        axis, phase = self.stops.frame.turned(table.oscillation.axis), table.oscillation.phase
+        parts = table.oscillation.angle * np.array([math.cos(phase), math.sin(phase)])
+        return {"axis": axis / np.linalg.norm(axis), "oscillation": parts}
+
+    def _check_axes(self, turnings: list[Turning], i: int) -> None:
+        # Between two oscillations about one axis the angles go over into each other.
+        before, after = turnings[max(i - 1, 0)], turnings[i]
+        if before.oscillation.any() and after.oscillation.any() and not np.allclose(before.axis, after.axis):
+            key = f"{self.stops.name(i)}.ellipse.oscillation.axis"
+            raise ConfigError(self.stops.path, f"{key}: must be that of {self.stops.name(i - 1)}, or rest between")
 
     def _continued(self, before: Turning, i: int) -> Turning:
         turns = self.stops.poses[i - 1].turns if i > 1 else None
@@ -159,7 +185,7 @@ class Ellipses(Leg):
         verdict[doubtful] |= Verdict.FEWER_ARCS_UNDECIDED.value
         details = np.empty(len(ways), object)
         details[:] = [
-            _details(hull, first if last.rests else last)
+            _details(problem, hull, first if last.rests else last, self.stops.frame)
             for first, last in zip(turnings[:-1], turnings[1:], strict=True)
         ]
         changed = {"arcs": np.where(is_feasible, arcs, 0), "tried_arcs": arcs, "verdict": verdict}
@@ -186,12 +212,17 @@ def circle_axes(radius: float, normal: Any, *, is_planar: bool) -> tuple[np.ndar
     return a, np.cross(axis, a)
 
 
-def _details(hull: Hull | None, turning: Turning) -> dict[str, Any]:
+def _details(problem: Problem, hull: Hull | None, turning: Turning, frame: Frame) -> dict[str, Any]:
     details: dict[str, Any] = {"frequency": turning.frequency}
+    if turning.quaternion is not None:
+        rotation = np.asarray(rotations.matrix(jnp.asarray(turning.quaternion)))
+        natural = rotation_frequencies(problem, turning.ellipse.centre, rotation)
+        axes = frame.turned(natural.axes).tolist()
+        details |= {"rotation_frequencies": natural.frequencies.tolist(), "rotation_axes": axes}
     if hull is None:
         return details
     row = Ellipse(*(np.asarray(leaf)[None] for leaf in turning.ellipse))
     low, high = (float(x[0]) for x in harmonics.of_many(harmonics.frequency_interval, hull, row))
-    margins = harmonics.of_many(harmonics.harmonic_margins, hull, row, np.array([turning.frequency]))[0]
+    margins = harmonics.of_many(harmonics.least_margin, hull, row, np.array([turning.frequency]))
     intervals = [] if math.isnan(low) else [[low, high]]
-    return details | {"frequency_intervals": intervals, "pseudotension_margin": float(margins.min())}
+    return details | {"frequency_intervals": intervals, "pseudotension_margin": float(margins[0])}

@@ -21,6 +21,7 @@ from jax import Array
 from cspr_jax.arithmetic.affine_bounds import AffineBounds, sincospi
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.ellipses.harmonics import Ellipse
+from cspr_jax.ellipses.rotation import Rotation, rotation_bounds, rotation_state
 from cspr_jax.motions.amplitude_bounds import TimeBounds, time_bounds
 from cspr_jax.motions.amplitudes import Amplitude, derivatives, from_pieces, named
 from cspr_jax.robots.state import State
@@ -43,6 +44,7 @@ class EllipseMotion:
         law: s over normalised time.
         progress: integral of the law from the start on.
         time: () duration, s.
+        rotation: of a platform; None for a point mass.
     """
 
     first: Ellipse
@@ -52,6 +54,7 @@ class EllipseMotion:
     law: Amplitude
     progress: Amplitude
     time: Array
+    rotation: Rotation | None = None
 
     @property
     def z0(self) -> Array:
@@ -69,8 +72,14 @@ class EllipseMotion:
         start, change = self.frequencies[0], self.frequencies[1] - self.frequencies[0]
         angle = self.phase + self.time * (start * tau + change * derivatives(self.progress, tau, order=0)[0])
         rates = (start + change * s[0], change * s[1] / self.time)
+        in_time = (s[0], s[1] / self.time, s[2] / self.time**2)
         turns = (jnp.cos(angle), jnp.sin(angle))
-        return State(*_kinematics(self, (s[0], s[1] / self.time, s[2] / self.time**2), turns, rates))
+        place = _kinematics(self.first, self.last, in_time, turns, rates)
+        if self.rotation is None:
+            return State(*place)
+        return State(
+            *place, *rotation_state(self.rotation, in_time, _oscillation(self.rotation, in_time, turns, rates))
+        )
 
     def breaks(self) -> Array:
         """Knots of the law; see `Motion.breaks`."""
@@ -85,10 +94,9 @@ class EllipseMotion:
         return in_batches(partial(_bounds, self), blocks, size=BATCH)
 
 
-def _kinematics(motion: EllipseMotion, s: tuple, turns: tuple, rates: tuple):
+def _kinematics(first: Ellipse, last: Ellipse, s: tuple, turns: tuple, rates: tuple) -> tuple:
     # Position, velocity and acceleration from s and its two derivatives in time, from cosine and sine of the angle, and
     # from its two derivatives; of numbers or of their bounds.
-    first, last = motion.first, motion.last
     spans = [after - before for before, after in zip(first, last, strict=True)]
     cosine, sine = turns
     a, b = (s[0] * span + start for span, start in zip(spans[1:], first[1:], strict=True))
@@ -103,6 +111,12 @@ def _kinematics(motion: EllipseMotion, s: tuple, turns: tuple, rates: tuple):
     return place, pace, pull
 
 
+def _oscillation(rotation: Rotation, s: tuple, turns: tuple, rates: tuple) -> tuple:
+    # The angle of the oscillation runs along a line as places run along an ellipse.
+    first, last = (Ellipse(jnp.zeros_like(parts[0]), parts[0], parts[1]) for parts in (rotation.first, rotation.last))
+    return _kinematics(first, last, s, turns, rates)
+
+
 @jax.jit
 def _bounds(motion: EllipseMotion, blocks: tuple[TimeBounds, AffineBounds]) -> StateBounds:
     start, change = motion.frequencies[0], motion.frequencies[1] - motion.frequencies[0]
@@ -115,7 +129,12 @@ def _bounds(motion: EllipseMotion, blocks: tuple[TimeBounds, AffineBounds]) -> S
         angle = (tau * start + progress * change) * (time / math.pi) + motion.phase / math.pi
         sine, cosine = sincospi(angle)
         rates = (s * change + start, s1 * (change / time))
-        return StateBounds(*_kinematics(motion, (s, s1 * (1.0 / time), s2 * (1.0 / time**2)), (cosine, sine), rates))
+        in_time, turns = (s, s1 * (1.0 / time), s2 * (1.0 / time**2)), (cosine, sine)
+        place = _kinematics(motion.first, motion.last, in_time, turns, rates)
+        if motion.rotation is None:
+            return StateBounds(*place)
+        oscillation = _oscillation(motion.rotation, in_time, turns, rates)
+        return StateBounds(*place, *rotation_bounds(motion.rotation, in_time, oscillation))
 
     return jax.vmap(one)(blocks)
 

@@ -9,6 +9,7 @@ import numpy as np
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.ellipses.harmonics import Ellipse
 from cspr_jax.ellipses.motion import EllipseMotion, integral, with_turns
+from cspr_jax.ellipses.rotation import Rotation, turn_between
 from cspr_jax.motions.amplitudes import Amplitude
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import MotionProof, proof_of, sampled_proof
@@ -20,17 +21,23 @@ FEW = 256
 
 @dataclasses.dataclass(frozen=True)
 class Turning:
-    """Ellipse with a frequency and an angle.
+    """Ellipse with a frequency and an angle, and the orientation of a platform on it.
 
     Fields:
         ellipse: leaves (3,); a rest has no axes.
         frequency: rad/s; 0 for a rest, which takes that of the other end of a way.
         phase: angle, rad.
+        quaternion: (4,) mean orientation; None for a point mass.
+        axis: (3,) unit vector of the oscillation.
+        oscillation: (2,) angles p and q of `rotation`, rad.
     """
 
     ellipse: Ellipse
     frequency: float = 0.0
     phase: float = 0.0
+    quaternion: np.ndarray | None = None
+    axis: np.ndarray = dataclasses.field(default_factory=lambda: np.eye(3)[0])
+    oscillation: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(2))
 
     @property
     def rests(self) -> bool:
@@ -43,8 +50,12 @@ class Turning:
         Returns:
             whether it is.
         """
-        pairs = zip(self.ellipse, other.ellipse, strict=True)
-        return self.frequency == other.frequency and all(np.array_equal(a, b) for a, b in pairs)
+        return all(np.array_equal(a, b) for a, b in zip(self._parts, other._parts, strict=True))
+
+    @property
+    def _parts(self) -> tuple:
+        turning = () if self.quaternion is None else (self.quaternion, self.axis, self.oscillation)
+        return (*self.ellipse, self.frequency, *turning)
 
 
 class Way(NamedTuple):
@@ -97,7 +108,17 @@ def motion_between(amplitude: Amplitude, first: Turning, last: Turning, arcs: in
     way, rest = (swept / mean if step else 0.0), turns * full / end + (0.0 if step else swept / end)
     law = with_turns(amplitude, way / (way + rest) if step else 0.0)
     frequencies = leaf([start, end])
-    return EllipseMotion(first.ellipse, last.ellipse, frequencies, leaf(phase), law, integral(law), leaf(way + rest))
+    whole = leaf(way + rest)
+    rotation = _rotation(first, last)
+    return EllipseMotion(first.ellipse, last.ellipse, frequencies, leaf(phase), law, integral(law), whole, rotation)
+
+
+def _rotation(first: Turning, last: Turning) -> Rotation | None:
+    if first.quaternion is None or last.quaternion is None:
+        return None
+    axis = last.axis if last.oscillation.any() else first.axis
+    turn = turn_between(first.quaternion, last.quaternion)
+    return Rotation(leaf(first.quaternion), turn, leaf(axis), leaf(first.oscillation), leaf(last.oscillation))
 
 
 def least_way(

@@ -69,6 +69,11 @@ _OF_SOME = (
     "taut_durations",
     "margin_unit",
     "failing",
+    "frequency",
+    "frequency_intervals",
+    "pseudotension_margin",
+    "rotation_frequencies",
+    "rotation_axes",
 )
 
 

@@ -135,9 +135,9 @@ _ROWS = (
     Family(
         "ellipse",
         "turns on harmonic ellipses, circles and lines, and the ways from one to another, from rest and to rest",
-        dict.fromkeys(("2T", "3T"), "cspr_jax.ellipses.leg:Ellipses"),
+        dict.fromkeys(("2T", "3T", "3R3T"), "cspr_jax.ellipses.leg:Ellipses"),
         rests_anywhere=True,
-        any_cables=("2T", "3T"),
+        any_cables=("2T", "3T", "3R3T"),
         knows_uncertainty=True,
         uncertain_redundancy=True,
         knows_obstacles=True,

@@ -94,6 +94,21 @@ SEGMENT = {
         "Splines: intervals of time in which the segment fails, since its start; of other families those in which it "
         "meets a body, over pulleys in which it fails; null elsewhere.",
     ),
+    "frequency": ("rad s-1", "Ellipses: frequency of the ellipse on which the segment ends; to rest, starts."),
+    "frequency_intervals": (
+        "rad s-1",
+        "Ellipses, point masses on spools in one plane: frequencies at which all cables stay taut on that ellipse, "
+        "[low, high] each; null: without end.",
+    ),
+    "pseudotension_margin": (
+        "1",
+        "Likewise: smallest normalised pseudotension, or depth over that of the centre, on the ellipse itself.",
+    ),
+    "rotation_frequencies": (
+        "rad s-1",
+        "Ellipses of platforms: the three natural frequencies of rotation at rest in its centre; null: not stable.",
+    ),
+    "rotation_axes": ("", "Ellipses of platforms: the axis of each of these."),
 }
 LAUNCH = {
     "segment": ("1", "Number of the segment on which the object is released, from 0 on."),

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.arithmetic.frames import IDENTITY
-from cspr_jax.build.orientations import given_quaternion, orientations
+from cspr_jax.build.orientations import pose_quaternions
 from cspr_jax.build.robots import build_robot
 from cspr_jax.build.scenes import scene_of
 from cspr_jax.config.motions.hints import unit_hints
@@ -187,7 +187,7 @@ class Splines(Leg):
             return interpolated(
                 np.array([pose.time or 0.0 for pose in poses]),
                 points[chosen],
-                self._quaternions(points)[chosen] if isinstance(problem.robot, PlatformRobot) else None,
+                pose_quaternions(stops, points)[chosen] if isinstance(problem.robot, PlatformRobot) else None,
                 interpolation=interpolation,
                 ends=keys.ends or "rest",
                 **derivatives,
@@ -199,15 +199,3 @@ class Splines(Leg):
         # A pose at rest has neither velocity nor acceleration.
         value = getattr(pose, name)
         return value if value is not None else [0.0 if pose.rest else np.nan] * 3
-
-    def _quaternions(self, points: np.ndarray) -> np.ndarray:
-        # Orientations (n_poses, 4) from the reference one, in the kernels' axes.
-        stops, frame = self.stops, self.stops.frame
-        units = [
-            given_quaternion(p.quaternion, f"{stops.name(i)}.quaternion", stops.path) for i, p in enumerate(stops.poses)
-        ]
-        angles = np.array([pose.tilt_torsion or [0.0] * 3 for pose in stops.poses])
-        is_tilted = np.array([pose.tilt_torsion is not None for pose in stops.poses])
-        return np.where(
-            is_tilted[:, None], orientations(frame, points, angles), frame.turned_quaternions(np.array(units))
-        )
