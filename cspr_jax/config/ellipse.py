@@ -54,7 +54,7 @@ class EllipseTable(Table):
     radius: Positive | None = Field(None, description="of a circle, in place of half_axes, m")
     normal: Point | None = Field(
         None,
-        description="direction [x, y, z] about which the circle turns; absent: z of the robot file, of a planar robot y",
+        description="direction [x, y, z] about which the circle turns; absent: z of the file, of a planar robot y",
     )
     frequency: Frequency = Field(
         "natural",

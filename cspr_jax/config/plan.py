@@ -257,7 +257,16 @@ class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys):
         rest = {name: value for name, value in data.items() if name not in flat}
         if flat:
             rest["ellipse"] = flat | data.get("ellipse", {})
-        return rest | {"pose": [{"ellipse": rest["ellipse"]}, {"turns": data.get("turns", 1.0)}]}
+        return rest | {"pose": [{}, {}]}
+
+    @model_validator(mode="after")
+    def _on_one_ellipse(self) -> "PlanFile":
+        if self.ellipse is None:
+            return self
+        if len(self.pose) != 2 or any(pose.model_fields_set for pose in self.pose):
+            raise fault("ellipse", "{...}", "absent beside [[pose]] tables, which have ellipses of their own")
+        pose = [Pose(ellipse=self.ellipse), Pose(turns=1.0 if self.turns is None else self.turns)]
+        return self.model_copy(update={"pose": pose})
 
     @model_validator(mode="after")
     def _first_family(self) -> "PlanFile":

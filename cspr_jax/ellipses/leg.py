@@ -1,6 +1,7 @@
 """Leg of ellipses: poses on ellipses and at rest, joined by ways from one to another and by turns."""
 
 import dataclasses
+import itertools
 import math
 from typing import Any
 
@@ -18,7 +19,7 @@ from cspr_jax.ellipses.frequencies import chosen_frequency
 from cspr_jax.ellipses.harmonics import Ellipse
 from cspr_jax.ellipses.hull import Hull, formula_hull
 from cspr_jax.ellipses.rotation_frequencies import rotation_frequencies
-from cspr_jax.ellipses.ways import Turning, Way, least_way, step_of
+from cspr_jax.ellipses.ways import Turning, Way, between, least_way, step_of
 from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.leg import Leg
@@ -81,7 +82,10 @@ class Ellipses(Leg):
             raise ConfigError(stops.path, f'{name}.beta_hat: must be absent with family = "ellipse"')
         has_oscillation = pose.ellipse is not None and pose.ellipse.oscillation is not None
         if has_oscillation and not stops.robot_file.is_platform:
-            raise ConfigError(stops.path, f"{name}.ellipse.oscillation: must be absent for {stops.robot_file.kind}")
+            key = self._key(i, "oscillation")
+            raise ConfigError(stops.path, f"{key}: must be absent for {stops.robot_file.kind}")
+        if pose.ellipse is not None and stops.robot_file.is_planar:
+            self._check_plane(i, pose.ellipse)
         if pose.rest and pose.ellipse is not None:
             raise ConfigError(stops.path, f"{name}.ellipse: must be absent at rest")
         if pose.rest and pose.turns is not None and i:
@@ -93,6 +97,20 @@ class Ellipses(Leg):
             raise ConfigError(stops.path, f"{name}.ellipse is missing: the ellipse, or rest = true")
         if pose.rest and before is not None and before.rest:
             raise ConfigError(stops.path, f"{name}.rest = true: must follow an ellipse, not another rest")
+
+    def _key(self, i: int, name: str) -> str:
+        # Name of a key of an ellipse in messages.
+        return f"ellipse.{name}" if self.stops.keys.ellipse is not None else f"{self.stops.name(i)}.ellipse.{name}"
+
+    def _check_plane(self, i: int, table: EllipseTable) -> None:
+        axes = table.half_axes or []
+        for key, vectors in (("centre", [table.centre]), ("half_axes", axes)):
+            if any(vector[1] != 0.0 for vector in vectors):
+                value = shown(getattr(table, key))
+                raise ConfigError(self.stops.path, f"{self._key(i, key)} = {value}: must have y = 0: a planar robot")
+        if table.normal is not None and (table.normal[0] != 0.0 or table.normal[2] != 0.0):
+            value = shown(table.normal)
+            raise ConfigError(self.stops.path, f"{self._key(i, 'normal')} = {value}: must be along y: a planar robot")
 
     def _turnings(self, problem: Problem, z0: float, scene: Scene) -> list[Turning]:
         # Of all poses, each at the angle at which it is reached.
@@ -127,7 +145,7 @@ class Ellipses(Leg):
         # Between two oscillations about one axis the angles go over into each other.
         before, after = turnings[max(i - 1, 0)], turnings[i]
         if before.oscillation.any() and after.oscillation.any() and not np.allclose(before.axis, after.axis):
-            key = f"{self.stops.name(i)}.ellipse.oscillation.axis"
+            key = self._key(i, "oscillation.axis")
             raise ConfigError(self.stops.path, f"{key}: must be that of {self.stops.name(i - 1)}, or rest between")
 
     def _continued(self, before: Turning, i: int) -> Turning:
@@ -153,7 +171,7 @@ class Ellipses(Leg):
         try:
             return chosen_frequency(problem, ellipse, rule, scene)
         except InputError as error:
-            raise ConfigError(self.stops.path, f"{self.stops.name(i)}.ellipse.{error}") from error
+            raise ConfigError(self.stops.path, f"{self._key(i, '')}{error}") from error
 
     def _turns(self, i: int, first: Turning, last: Turning) -> float:
         pose = self.stops.poses[i]
@@ -167,8 +185,9 @@ class Ellipses(Leg):
         if arcs % max(step, 1) or (arcs and not step):
             allowed = "absent on one and the same ellipse" if not step else "even between two ellipses"
             raise ConfigError(stops.path, f"{stops.name(i)}.arcs = {arcs}: must be {allowed}")
-        if not step and not turns and first.phase % (2.0 * math.pi) == last.phase % (2.0 * math.pi):
-            raise ConfigError(stops.path, f"{stops.name(i)}.turns = 0: must be above 0 on one and the same ellipse")
+        if not step and not turns and not between(first, last):
+            key = "turns" if stops.keys.ellipse is not None else f"{stops.name(i)}.turns"
+            raise ConfigError(stops.path, f"{key} = 0: must be above 0 on one and the same ellipse")
         return least_way(problem, first, last, turns, scene, arcs=arcs, max_arcs=stops.max_arcs)
 
     def _answers(self, problem: Problem, turnings: list[Turning], ways: list[Way], scene: Scene) -> EllipseAnswers:
@@ -186,7 +205,7 @@ class Ellipses(Leg):
         details = np.empty(len(ways), object)
         details[:] = [
             _details(problem, hull, first if last.rests else last, self.stops.frame)
-            for first, last in zip(turnings[:-1], turnings[1:], strict=True)
+            for first, last in itertools.pairwise(turnings)
         ]
         changed = {"arcs": np.where(is_feasible, arcs, 0), "tried_arcs": arcs, "verdict": verdict}
         columns = {field.name: getattr(plain, field.name) for field in dataclasses.fields(plain)}

@@ -1,4 +1,4 @@
-"""Ways between ellipses: the least number of arcs, half turns, whose motion is proved; samples refute before a proof."""
+"""Ways between ellipses: the least number of arcs, half turns, whose motion is proved; samples refute most others."""
 
 import dataclasses
 import math
@@ -17,6 +17,8 @@ from cspr_jax.robots.clearance import Scene
 
 # Intervals of the samples that refute most motions before a proof is tried.
 FEW = 256
+# Angles that differ by less are the same, rad.
+SAME_ANGLE = 1e-9
 
 
 @dataclasses.dataclass(frozen=True)
@@ -85,6 +87,17 @@ def step_of(first: Turning, last: Turning) -> int:
     return 1 if first.rests or last.rests else 2
 
 
+def between(first: Turning, last: Turning) -> float:
+    """Angle from the one to the other, the shortest in the direction of the motion.
+
+    Returns:
+        rad, from 0 to less than a turn.
+    """
+    full = 2.0 * math.pi
+    angle = (last.phase - first.phase) % full
+    return 0.0 if min(angle, full - angle) < SAME_ANGLE else angle
+
+
 def motion_between(amplitude: Amplitude, first: Turning, last: Turning, arcs: int, turns: float) -> EllipseMotion:
     """Way from one ellipse to another one, and turns on that.
 
@@ -98,17 +111,13 @@ def motion_between(amplitude: Amplitude, first: Turning, last: Turning, arcs: in
     """
     step, full = step_of(first, last), 2.0 * math.pi
     start, end = first.frequency or last.frequency, last.frequency or first.frequency
-    between = (last.phase - first.phase) % full
-    if step == 1:
-        swept = math.pi * arcs
-    else:
-        swept = between if step == 0 else (between or full) + math.pi * (arcs - 2)
+    rest = between(first, last)
+    swept = (rest, math.pi * arcs, (rest or full) + math.pi * (arcs - 2))[step]
     phase = last.phase - swept if first.rests else first.phase
     mean = start + (end - start) * float(integral(amplitude).at(1.0))
-    way, rest = (swept / mean if step else 0.0), turns * full / end + (0.0 if step else swept / end)
-    law = with_turns(amplitude, way / (way + rest) if step else 0.0)
-    frequencies = leaf([start, end])
-    whole = leaf(way + rest)
+    way, after = (swept / mean if step else 0.0), turns * full / end + (0.0 if step else swept / end)
+    law = with_turns(amplitude, way / (way + after) if step else 0.0)
+    frequencies, whole = leaf([start, end]), leaf(way + after)
     rotation = _rotation(first, last)
     return EllipseMotion(first.ellipse, last.ellipse, frequencies, leaf(phase), law, integral(law), whole, rotation)
 
