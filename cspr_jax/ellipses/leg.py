@@ -236,8 +236,8 @@ def _details(problem: Problem, hull: Hull | None, turning: Turning, frame: Frame
     if turning.quaternion is not None:
         rotation = np.asarray(rotations.matrix(jnp.asarray(turning.quaternion)))
         natural = rotation_frequencies(problem, turning.ellipse.centre, rotation)
-        axes = frame.turned(natural.axes).tolist()
-        details |= {"rotation_frequencies": natural.frequencies.tolist(), "rotation_axes": axes}
+        modes = frame.turned(natural.modes.reshape(3, 2, 3)).reshape(3, 6).tolist()
+        details |= {"rotation_frequencies": natural.frequencies.tolist(), "rotation_modes": modes}
     if hull is None:
         return details
     row = Ellipse(*(np.asarray(leaf)[None] for leaf in turning.ellipse))

@@ -73,7 +73,7 @@ _OF_SOME = (
     "frequency_intervals",
     "pseudotension_margin",
     "rotation_frequencies",
-    "rotation_axes",
+    "rotation_modes",
 )
 
 

@@ -108,7 +108,10 @@ SEGMENT = {
         "rad s-1",
         "Ellipses of platforms: the three natural frequencies of rotation at rest in its centre; null: not stable.",
     ),
-    "rotation_axes": ("", "Ellipses of platforms: the axis of each of these."),
+    "rotation_modes": (
+        "",
+        "Ellipses of platforms: of each of these the displacement of the mass centre beside a rotation of length 1, six numbers, m and rad.",
+    ),
 }
 LAUNCH = {
     "segment": ("1", "Number of the segment on which the object is released, from 0 on."),
