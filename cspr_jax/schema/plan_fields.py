@@ -110,7 +110,8 @@ SEGMENT = {
     ),
     "rotation_modes": (
         "",
-        "Ellipses of platforms: of each of these the displacement of the mass centre beside a rotation of length 1, six numbers, m and rad.",
+        "Ellipses of platforms: for each of these the displacement of the mass centre, m, beside a rotation of length "
+        "1, rad; six numbers.",
     ),
 }
 LAUNCH = {
