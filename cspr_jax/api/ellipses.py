@@ -10,7 +10,7 @@ from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.ellipses import harmonics
 from cspr_jax.ellipses.frequencies import chosen_frequency
 from cspr_jax.ellipses.harmonics import Ellipse
-from cspr_jax.ellipses.hull import Hull, hull_of
+from cspr_jax.ellipses.hull import SpoolHull, hull_of
 from cspr_jax.ellipses.motion import EllipseMotion, turning
 from cspr_jax.errors import InputError
 from cspr_jax.motions.amplitudes import named
@@ -118,7 +118,7 @@ def ellipse_margins(
         return harmonics.of_many(harmonics.least_margin, hull, items, rates)
 
 
-def _many(robot: PointMassRobot, centres, a, b) -> tuple[Hull, Ellipse]:
+def _many(robot: PointMassRobot, centres, a, b) -> tuple[SpoolHull, Ellipse]:
     check_point_mass(robot)
     prepared_robot, frame = prepared(robot, pulleys=True)
     places, count = np.asarray(centres, float), len(centres)

@@ -24,7 +24,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.ellipses.hull import Hull
+from cspr_jax.ellipses.hull import SpoolHull
 
 BATCH = 16384
 # Halvings that narrow e to the last bit.
@@ -55,7 +55,7 @@ class _Terms(NamedTuple):
     swing: Array
 
 
-def _terms(hull: Hull, ellipse: Ellipse) -> _Terms:
+def _terms(hull: SpoolHull, ellipse: Ellipse) -> _Terms:
     def flat(vector: Array) -> Array:
         return hull.edges[:, 0] * vector[0] + hull.edges[:, 1] * vector[1]
 
@@ -75,7 +75,7 @@ def _slack(terms: _Terms, e: Array) -> Array:
     return terms.constant - jnp.hypot(harmonic[:, 0], harmonic[:, 1])
 
 
-def harmonic_margins(hull: Hull, ellipse: Ellipse, frequency: Array) -> Array:
+def harmonic_margins(hull: SpoolHull, ellipse: Ellipse, frequency: Array) -> Array:
     """Smallest values along an ellipse, all positive exactly if it is feasible.
 
     Args:
@@ -93,7 +93,7 @@ def harmonic_margins(hull: Hull, ellipse: Ellipse, frequency: Array) -> Array:
     return jnp.concatenate([jnp.where(is_below, slack, -jnp.inf), depth[None]])
 
 
-def least_margin(hull: Hull, ellipse: Ellipse, frequency: Array) -> Array:
+def least_margin(hull: SpoolHull, ellipse: Ellipse, frequency: Array) -> Array:
     """Smallest of the margins along an ellipse.
 
     Args:
@@ -111,7 +111,7 @@ def _roots(terms: _Terms) -> tuple[Array, Array]:
     square = jnp.sum(terms.pulling**2, axis=1)
     mixed = jnp.sum(terms.tilting * terms.pulling, axis=1)
     rest = terms.constant**2 - jnp.sum(terms.tilting**2, axis=1)
-    # Of the two roots the one in which nothing cancels gives the other by their product.
+    # The root in which nothing cancels gives the other one by their product.
     far = -(mixed + jnp.copysign(jnp.sqrt(mixed**2 + square * jnp.maximum(rest, 0.0)), mixed))
     ends = far / square, -rest / far
     has_ends = square > 0.0
@@ -119,7 +119,7 @@ def _roots(terms: _Terms) -> tuple[Array, Array]:
     return low, jnp.where(has_ends, jnp.maximum(*ends), jnp.inf)
 
 
-def frequency_interval(hull: Hull, ellipse: Ellipse) -> tuple[Array, Array]:
+def frequency_interval(hull: SpoolHull, ellipse: Ellipse) -> tuple[Array, Array]:
     """Frequencies at which an ellipse is feasible: between two ends, which are not.
 
     Args:
@@ -138,7 +138,7 @@ def frequency_interval(hull: Hull, ellipse: Ellipse) -> tuple[Array, Array]:
     return first, last
 
 
-def best_frequency(hull: Hull, ellipse: Ellipse) -> Array:
+def best_frequency(hull: SpoolHull, ellipse: Ellipse) -> Array:
     """Frequency with the largest margin.
 
     Args:
@@ -167,11 +167,11 @@ def best_frequency(hull: Hull, ellipse: Ellipse) -> Array:
 
 
 @partial(jax.jit, static_argnums=0)
-def _each(function, hull: Hull, items):
+def _each(function, hull: SpoolHull, items):
     return jax.vmap(partial(function, hull))(*items)
 
 
-def of_many(function, hull: Hull, *items):
+def of_many(function, hull: SpoolHull, *items):
     """One of the functions above for many ellipses.
 
     Args:

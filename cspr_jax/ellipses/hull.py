@@ -15,7 +15,7 @@ from cspr_jax.robots.point_mass import SPATIAL, PointMassRobot, plane_normal, sp
 IN_PLANE = 1e-9
 
 
-class Hull(NamedTuple):
+class SpoolHull(NamedTuple):
     """Hull of the spools, and the plane that they lie in.
 
     Fields:
@@ -29,7 +29,7 @@ class Hull(NamedTuple):
     gravity: Array
 
 
-def hull_of(robot: AnyRobot) -> Hull:
+def hull_of(robot: AnyRobot) -> SpoolHull:
     """Hull of the spools of a robot.
 
     Args:
@@ -49,10 +49,10 @@ def hull_of(robot: AnyRobot) -> Hull:
     if not np.abs(points @ normal).max() <= IN_PLANE * float(spool_radius(robot)):
         raise InputError("base_points", points.tolist(), "spools in one plane, for a formula of the frequencies")
     edges = np.stack([_gradient(points[:, :2][ends], robot.dof) for ends in _ends(points, robot.dof)])
-    return Hull(leaf(edges), leaf(normal), leaf(robot.gravity))
+    return SpoolHull(leaf(edges), leaf(normal), leaf(robot.gravity))
 
 
-def formula_hull(robot: AnyRobot) -> Hull | None:
+def formula_hull(robot: AnyRobot) -> SpoolHull | None:
     """Hull of the spools of a robot for which formulas hold.
 
     Args:

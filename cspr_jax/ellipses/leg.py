@@ -17,7 +17,7 @@ from cspr_jax.config.plan import Pose
 from cspr_jax.ellipses import harmonics
 from cspr_jax.ellipses.frequencies import chosen_frequency
 from cspr_jax.ellipses.harmonics import Ellipse
-from cspr_jax.ellipses.hull import Hull, formula_hull
+from cspr_jax.ellipses.hull import SpoolHull, formula_hull
 from cspr_jax.ellipses.rotation_frequencies import rotation_frequencies
 from cspr_jax.ellipses.ways import Turning, Way, between, least_way, step_of
 from cspr_jax.errors import ConfigError, InputError, shown
@@ -113,7 +113,7 @@ class Ellipses(Leg):
             raise ConfigError(self.stops.path, f"{self._key(i, 'normal')} = {value}: must be along y: a planar robot")
 
     def _turnings(self, problem: Problem, z0: float, scene: Scene) -> list[Turning]:
-        # Of all poses, each at the angle at which it is reached.
+        # Return the ellipse of each pose, at the angle at which it is reached.
         stops, turnings = self.stops, list[Turning]()
         centres = stops.points(z0)
         for i, pose in enumerate(stops.poses):
@@ -231,7 +231,7 @@ def circle_axes(radius: float, normal: Any, *, is_planar: bool) -> tuple[np.ndar
     return a, np.cross(axis, a)
 
 
-def _details(problem: Problem, hull: Hull | None, turning: Turning, frame: Frame) -> dict[str, Any]:
+def _details(problem: Problem, hull: SpoolHull | None, turning: Turning, frame: Frame) -> dict[str, Any]:
     details: dict[str, Any] = {"frequency": turning.frequency}
     if turning.quaternion is not None:
         rotation = np.asarray(rotations.matrix(jnp.asarray(turning.quaternion)))

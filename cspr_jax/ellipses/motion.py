@@ -159,7 +159,7 @@ def with_turns(amplitude: Amplitude, share: float) -> Amplitude:
     """Law of a way that takes a share of the time, and of turns for the rest.
 
     Args:
-        amplitude: law of the way.
+        amplitude: law of the way, from 0 to 1.
         share: from 0, no way, to 1, no turns.
 
     Returns:

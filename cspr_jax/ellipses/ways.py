@@ -43,7 +43,7 @@ class Turning:
 
     @property
     def rests(self) -> bool:
-        """Whether it is a rest."""
+        """Tell whether it is a rest."""
         return self.frequency == 0.0
 
     def is_same(self, other: "Turning") -> bool:
@@ -163,5 +163,5 @@ def least_way(
     chosen = undecided or best
     if chosen is None:
         raise ValueError("no number of arcs")
-    # What samples have refuted is bounded for its causes.
+    # A motion that samples have refuted is bounded for its causes.
     return chosen._replace(proof=proof_of(problem, chosen.motion, scene))

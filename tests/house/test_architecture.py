@@ -22,7 +22,7 @@ FLOORS = (
     ("build",),
     ("maps",),
     ("workspaces",),
-    ("swings", "lines", "beziers", "platforms", "splines"),
+    ("swings", "lines", "beziers", "platforms", "splines", "ellipses"),
     ("plans", "sweep", "bench"),
     ("outputs",),
     ("published", "outputs.plots"),
@@ -32,7 +32,7 @@ FLOORS = (
 )
 ROOMS = [room for floor in FLOORS for room in floor]
 # Families import nothing of each other: what two of them need lies below. Poses at rest are asked about by platforms.
-FAMILIES = ("swings", "lines", "beziers", "platforms", "splines")
+FAMILIES = ("swings", "lines", "beziers", "platforms", "splines", "ellipses")
 KERNELS = ("errors", "arithmetic", "schema", "robots", "motions", "workspaces", *FAMILIES)
 # What a room is about, what it rests on, and its files in the order in which they are read, stand in its guide.
 GUIDES = ("motions", "workspaces", *FAMILIES)

@@ -59,7 +59,8 @@ def test_fences_are_seen():
 
 
 @pytest.mark.parametrize(
-    "name", ["README.md", pytest.param("docs/usage.md", marks=pytest.mark.thorough), "docs/get_started.md"]
+    "name",
+    ["README.md", pytest.param("docs/usage.md", marks=pytest.mark.thorough), "docs/get_started.md", "docs/ellipses.md"],
 )
 def test_python_of_the_first_pages_runs(name, checkout, capsys):
     namespace: dict[str, object] = {"__name__": "first"}
