@@ -12,7 +12,7 @@ __version__ = "0.2.0"
 # The module below the package that holds each public name.
 _MODULES = {
     "ImportedRobot": "api.imports",
-    "LaunchErrors": "beziers.landings",
+    "LaunchErrors": "motions.landings",
     "Limits": "robots.limits",
     "Replay": "api.replays",
     "Uncertainty": "robots.limits",

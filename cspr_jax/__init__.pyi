@@ -58,7 +58,7 @@ from cspr_jax.api.workspaces import available_accelerations as available_acceler
 from cspr_jax.api.workspaces import encoder_error as encoder_error
 from cspr_jax.api.workspaces import sensitivity as sensitivity
 from cspr_jax.api.workspaces import workspace as workspace
-from cspr_jax.beziers.landings import LaunchErrors as LaunchErrors
+from cspr_jax.motions.landings import LaunchErrors as LaunchErrors
 from cspr_jax.outputs.volumes import WorkspaceVolume as WorkspaceVolume
 from cspr_jax.robots.limits import Limits as Limits
 from cspr_jax.robots.limits import Uncertainty as Uncertainty
