@@ -7,7 +7,6 @@ landings, and the derivatives of the landing with respect to all errors the cova
 """
 
 import dataclasses
-import itertools
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -117,12 +116,17 @@ def state_at(throw: Throw, late: Array) -> State:
     Returns:
         the state.
     """
-    time = throw.release + late
-    state = throw.motions[0].state(jnp.clip(time / throw.motions[0].duration(), 0.0, 1.0))
-    for before, motion in itertools.pairwise(throw.motions):
-        time = time - before.duration()
-        later = motion.state(jnp.clip(time / motion.duration(), 0.0, 1.0))
-        state = jax.tree.map(partial(jnp.where, time > 0.0), later, state)
+    # Between two motions nothing is clipped: a clip would halve the derivative of a release there.
+    time = jnp.maximum(throw.release + late, 0.0)
+    *others, last = throw.motions
+    states, starts = [], []
+    for motion in others:
+        states.append(motion.state(time / motion.duration()))
+        time = time - motion.duration()
+        starts.append(time)
+    state = last.state(jnp.minimum(time / last.duration(), 1.0))
+    for before, since in zip(reversed(states), reversed(starts), strict=True):
+        state = jax.tree.map(partial(jnp.where, since > 0.0), state, before)
     return state
 
 
