@@ -66,6 +66,7 @@ _MODULES = {
     "spline": "api.motions",
     "status": "api.sweeps",
     "straight_line": "api.lines",
+    "swing_range": "api.swing_ranges",
     "table": "api.published",
     "tensions": "api.motions",
     "three_cable_equivalent": "api.robots",

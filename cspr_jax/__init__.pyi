@@ -54,6 +54,7 @@ from cspr_jax.api.sweeps import run as run
 from cspr_jax.api.sweeps import status as status
 from cspr_jax.api.sweeps import verify as verify
 from cspr_jax.api.sweeps import workspace_volume as workspace_volume
+from cspr_jax.api.swing_ranges import swing_range as swing_range
 from cspr_jax.api.workspaces import available_accelerations as available_accelerations
 from cspr_jax.api.workspaces import encoder_error as encoder_error
 from cspr_jax.api.workspaces import sensitivity as sensitivity

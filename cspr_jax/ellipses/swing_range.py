@@ -20,6 +20,8 @@ from cspr_jax.ellipses import harmonics
 from cspr_jax.ellipses.harmonics import Ellipse
 from cspr_jax.ellipses.hull import hull_of
 from cspr_jax.maps.release_box import ReleaseBox
+from cspr_jax.motions.limits import limits_set
+from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.verdicts import FLAGS, Verdict
@@ -62,6 +64,11 @@ class SwingRange(Columns):
     release_z: np.ndarray
 
     @property
+    def feasible(self) -> np.ndarray:
+        """Tell whether a launch to each place was found, (n,)."""
+        return self.verdict == 0
+
+    @property
     def releases(self) -> np.ndarray:
         """Places of the releases, (n, 3) m."""
         return np.stack([self.release_x, self.release_y, self.release_z], axis=1)
@@ -74,6 +81,16 @@ class SwingRange(Columns):
         """
         x, y, z = frame.outward(self.releases).T
         return dataclasses.replace(self, release_x=x, release_y=y, release_z=z)
+
+
+def other_limit(limits: Limits) -> str | None:
+    """Name of a limit other than a floor, which no formula here knows.
+
+    Returns:
+        the first one; None: there is none.
+    """
+    names = [row.name for row in limits_set(limits) if row.name != "floor"]
+    return next(iter([*names, *(["uncertainty"] if limits.uncertainty is not None else [])]), None)
 
 
 class _Cells(NamedTuple):

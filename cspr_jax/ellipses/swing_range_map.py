@@ -6,11 +6,10 @@ from cspr_jax.config.launch import LaunchSearch
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.ellipses.hull import hull_of
-from cspr_jax.ellipses.swing_range import swing_range
+from cspr_jax.ellipses.swing_range import other_limit, swing_range
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.maps.from_places import FromPlacesMap
 from cspr_jax.maps.release_box import box_of
-from cspr_jax.motions.limits import limits_set
 from cspr_jax.schema.tiles import Grid
 
 _START = ("from_x", "from_y", "from_z", "z")
@@ -25,14 +24,13 @@ class SwingRangeMap(FromPlacesMap):
     def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
         """Refuse limits and keys of searches that formulas do not know."""
         super().__init__(robot_file, keys, file)
-        search, limits = keys.launch or LaunchSearch(), self._problem.limits
+        search = keys.launch or LaunchSearch()
         for name in ("max_duration", "population"):
             if name in search.model_fields_set:
                 raise ConfigError(file, f'launch.{name}: must be absent in this map; it is for map = "launch-range"')
-        names = [row.name for row in limits_set(limits) if row.name != "floor"]
-        names += ["uncertainty"] if limits.uncertainty is not None else []
-        if names:
-            raise ConfigError(file, f"limits.{names[0]}: must be absent in this map, which knows a floor alone")
+        limit = other_limit(self._problem.limits)
+        if limit is not None:
+            raise ConfigError(file, f"limits.{limit}: must be absent in this map, which knows a floor alone")
         try:
             hull_of(self._problem.robot)
         except InputError as error:

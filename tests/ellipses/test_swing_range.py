@@ -8,6 +8,7 @@ from support.commands import cspr
 import cspr_jax
 from cspr_jax.ellipses.swing_range import swing_range
 from cspr_jax.ellipses.swing_range_map import SwingRangeMap
+from cspr_jax.errors import InputError
 from cspr_jax.maps.release_box import ReleaseBox
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.sweep.definition import read_sweep
@@ -186,6 +187,34 @@ def test_a_plan_says_the_same(result, tmp_path):
     assert plan.feasible
     speed = np.linalg.norm(plan.to_dict()["launch"]["release"]["velocity"])
     np.testing.assert_allclose(speed, data["release_speed"][i], rtol=1e-9)
+
+
+def test_python_says_what_the_map_says(result):
+    places, data = throws_of(result)
+    own = {"start": CENTRE, "release_x": [-1.5, 1.0], "release_z": [1.2, 2.4]}
+    found = cspr_jax.swing_range(cspr_jax.load_robot("prototype"), places, **own)
+    assert found.feasible.all()
+    for name in ("release_speed", "flight_time", "swing_amplitude", "release_x"):
+        np.testing.assert_allclose(getattr(found, name), data[name], rtol=1e-12, atol=1e-15)
+    table = found.to_xarray({"target": np.arange(len(places))})
+    assert table["swing_amplitude"].attrs["units"] == "m"
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"targets": [[0.0, 0.0]]}, "targets"),
+        ({"start": np.zeros((3, 3))}, "start"),
+        ({"release_y": [0.2, 0.1]}, "release_y"),
+        ({"limits": cspr_jax.Limits(tension_max=5.0)}, 'limits = "tension_max": must be a floor alone'),
+        ({"robot": "launch-robot"}, "a point mass"),
+    ],
+)
+def test_bad_arguments(given, words):
+    robot = cspr_jax.load_robot(given.get("robot", "prototype"))
+    asked = {"targets": [[0.0, 0.0, 3.0]], "start": [0.0, 0.0, 1.0]} | given | {"robot": robot}
+    with pytest.raises(InputError, match=words):
+        cspr_jax.swing_range(asked.pop("robot"), asked.pop("targets"), **asked)
 
 
 def test_tiles_change_no_bit(result, tmp_path):
