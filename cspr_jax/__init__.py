@@ -12,7 +12,7 @@ __version__ = "0.2.0"
 # The module below the package that holds each public name.
 _MODULES = {
     "ImportedRobot": "api.imports",
-    "LaunchErrors": "beziers.landings",
+    "LaunchErrors": "motions.landings",
     "Limits": "robots.limits",
     "Replay": "api.replays",
     "Uncertainty": "robots.limits",
@@ -66,6 +66,7 @@ _MODULES = {
     "spline": "api.motions",
     "status": "api.sweeps",
     "straight_line": "api.lines",
+    "swing_range": "api.swing_ranges",
     "table": "api.published",
     "tensions": "api.motions",
     "three_cable_equivalent": "api.robots",

@@ -54,11 +54,12 @@ from cspr_jax.api.sweeps import run as run
 from cspr_jax.api.sweeps import status as status
 from cspr_jax.api.sweeps import verify as verify
 from cspr_jax.api.sweeps import workspace_volume as workspace_volume
+from cspr_jax.api.swing_ranges import swing_range as swing_range
 from cspr_jax.api.workspaces import available_accelerations as available_accelerations
 from cspr_jax.api.workspaces import encoder_error as encoder_error
 from cspr_jax.api.workspaces import sensitivity as sensitivity
 from cspr_jax.api.workspaces import workspace as workspace
-from cspr_jax.beziers.landings import LaunchErrors as LaunchErrors
+from cspr_jax.motions.landings import LaunchErrors as LaunchErrors
 from cspr_jax.outputs.volumes import WorkspaceVolume as WorkspaceVolume
 from cspr_jax.robots.limits import Limits as Limits
 from cspr_jax.robots.limits import Uncertainty as Uncertainty

@@ -80,6 +80,12 @@ PAGES = {
         "Where can an object be thrown to, by one Bezier segment from rest, and with which least speed of release? "
         "A launch that is found is proved feasible; finding none proves nothing.",
     ),
+    "swing-range": MapPage(
+        "swing_range",
+        "Where can an object be thrown to from an ellipse about a place of rest, `trajectory.from`, at its natural "
+        "frequency, and with which least speed of release? No static workspace limits such throws; `swing_amplitude` "
+        "says how far the effector swings.",
+    ),
     "sensitivity": MapPage(
         "launch_sensitivity",
         "By how much do errors of the cable lengths displace and turn the effector, at worst? The robot is a point "

@@ -160,6 +160,9 @@ IMAGES = {
     "launch_sensitivity": Image(
         "Largest displacement of the launch robot over the largest error of a cable; infinite on z = 0.", 10
     ),
+    "swing_range": Image(
+        "Where the prototype can throw to from a swing about its place of rest, and the least speed of the release.", 20
+    ),
     "launch_range": Image(
         "Where the launch robot can throw to, 1.675 m below its spools, and the least speed of the release.", 40
     ),

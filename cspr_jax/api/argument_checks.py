@@ -344,6 +344,7 @@ OF_FUNCTIONS: dict[str, Rule] = {
     "spline.positions": _POINTS,
     "spline.times": real("instants (n,), s", (ANY,)),
     "straight_line.start": _POINT,
+    "swing_range.start": _STARTS,
     "table.amplitude": _TEXT_OR_NONE,
     "table.definition": _TEXT_OR_NONE,
     "table.name": _TEXT_OR_NONE,

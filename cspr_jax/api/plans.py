@@ -9,11 +9,11 @@ import numpy as np
 
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.beziers.landings import LaunchErrors, Scatter
-from cspr_jax.beziers.launch_outcome import LaunchOutcome
 from cspr_jax.config.mappings import plain, text_of
 from cspr_jax.config.plan import plan_keys
 from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.motions.landings import LaunchErrors, Scatter
+from cspr_jax.motions.launch_outcome import LaunchOutcome
 from cspr_jax.outputs import motion_files, plan_report
 from cspr_jax.outputs.mjcf import write_mjcf
 from cspr_jax.outputs.mujoco_motion import STEP

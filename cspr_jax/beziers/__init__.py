@@ -17,12 +17,10 @@ Files, each importing only from those above it:
     durations           intervals of durations that keep every cable taut; the least under limits
     sequences           least sum of the durations of a sequence
     segments            answers for segments one after the other
-    launch              free flight, and the segment through a release
+    launch              the segment through a release
     launches            launches to a target, with all that is left open chosen
     release_bounds      bounds within which a release is looked for
     launch_range        releases for many landing places
-    landings            scatter of landings
-    launch_outcome      release and flight of a launch, in the axes of the robot file
     leg                 Bezier segments in a plan
     launch_range_map    maps of launches
 """

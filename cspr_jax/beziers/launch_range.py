@@ -15,12 +15,13 @@ from jax import Array
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.differential_evolution import evolved
 from cspr_jax.arithmetic.frames import Frame
-from cspr_jax.beziers.launch import aimed, through
+from cspr_jax.beziers.launch import through
 from cspr_jax.beziers.margins import depths_of
 from cspr_jax.beziers.motion import Bezier
 from cspr_jax.beziers.release_bounds import ReleaseBounds
 from cspr_jax.beziers.sequences import margins_of
 from cspr_jax.beziers.verdicts import BATCH, verdicts
+from cspr_jax.motions.flight import aimed
 from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.point_mass import spool_radius

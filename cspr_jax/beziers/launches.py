@@ -12,8 +12,9 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.constrained_minima import least
-from cspr_jax.beziers.launch import aimed, flown, through
+from cspr_jax.beziers.launch import through
 from cspr_jax.beziers.sequences import Anchored, duration_bounds, judged, margins_of, segments_of
+from cspr_jax.motions.flight import aimed, flown
 from cspr_jax.motions.problem import Problem
 
 # Parts of the duration of its segment between which a release is looked for.

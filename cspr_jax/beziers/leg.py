@@ -1,16 +1,12 @@
 """Leg of Bezier segments, at rest in every pose; an object may be released on one of them."""
 
 import dataclasses
-from pathlib import Path
 from typing import NamedTuple, cast
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from cspr_jax.beziers.landings import LaunchErrors, Throw
-from cspr_jax.beziers.launch import flown
-from cspr_jax.beziers.launch_outcome import LaunchOutcome
 from cspr_jax.beziers.launches import Launch, launched
 from cspr_jax.beziers.margins import depths_of
 from cspr_jax.beziers.motion import Bezier, end_acceleration
@@ -19,16 +15,17 @@ from cspr_jax.beziers.sequences import Anchored, least_total, segments_of
 from cspr_jax.config.launch import LaunchTable
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.motions.answers import Answers
+from cspr_jax.motions.landings import Throw
+from cspr_jax.motions.launch_outcome import LaunchOutcome, launch_outcome
 from cspr_jax.motions.leg import JoinedLeg, Leg, each
 from cspr_jax.motions.motion import Motion
+from cspr_jax.motions.parabola import parabola_of
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.waypoints import Waypoints
 from cspr_jax.robots.point_mass import AT_P0, spool_radius
 
 # Accelerations that count as none, over gravity.
 AT_REST = 1e-9
-# A place of release counts as on a parabola that it misses by less than this part of its distance from the target.
-ON_PARABOLA = 1e-6
 
 
 class _Chosen(NamedTuple):
@@ -77,27 +74,18 @@ class Beziers(Leg):
         table, frame, answers = self.stops.keys.launch, self.stops.frame, cast(BezierAnswers, joined.answers)
         if table is None or self._at is None:
             return None
-        at, robot = self._at - self.stops.first, problem.robot
-        motion = cast(Bezier, joined.motions[at])
-        release, flight_time = float(answers.release[at]), float(answers.flight_time[at])
-        state = motion.state(jnp.asarray(release / float(motion.time)))
-        landing, _ = flown(state.position, state.velocity, robot.gravity, flight_time)
-        launch = LaunchOutcome(
-            segment=table.segment,
-            position=np.asarray(frame.outward(np.asarray(state.position))),
-            velocity=np.asarray(frame.turned(np.asarray(state.velocity))),
+        at = self._at - self.stops.first
+        motion, release = cast(Bezier, joined.motions[at]), float(answers.release[at])
+        return launch_outcome(
+            table,
+            frame,
+            problem.robot,
+            Throw((motion,), np.asarray(release), np.asarray(frame.inward(table.target))),
             time=start + float(answers.duration[:at].sum()) + release,
-            control_points=answers.control_points[at],
-            landing=np.asarray(frame.outward(np.asarray(landing))),
-            flight_time=flight_time,
+            flight_time=float(answers.flight_time[at]),
             tension_min=float(tension_min[at]),
-            throw=Throw(motion, np.asarray(answers.release[at]), np.asarray(frame.inward(table.target))),
-            robot=robot,
-            frame=frame,
+            control_points=answers.control_points[at],
         )
-        if table.errors is None:
-            return launch
-        return dataclasses.replace(launch, scatter=launch.scatter_of(LaunchErrors(**vars(table.errors))))
 
     def _chosen(self, problem: Problem, points: np.ndarray, depth: float) -> _Chosen:
         stops, durations, launch = self.stops, self._durations, self.stops.keys.launch
@@ -151,13 +139,7 @@ class Beziers(Leg):
 
 def _question(stops: Waypoints, table: LaunchTable, points: np.ndarray, depth: float, gravity: float) -> Launch:
     # Ask what the [launch] table asks; depth is that at which slacks are normalised.
-    frame = stops.frame
-    target = np.asarray(frame.inward(table.target))
-    point = None if table.point is None else np.asarray(frame.inward(table.point))
-    velocity = None if table.velocity is None else np.asarray(frame.turned(np.asarray(table.velocity)))
-    time = table.time
-    if point is not None and velocity is not None:
-        time, velocity = _flight_time(stops.path, table, point, target, velocity, gravity), None
+    parabola = parabola_of(table, stops.frame, gravity, stops.path)
     duration = stops.poses[table.segment - stops.first + 1].duration
     if table.release is not None and isinstance(duration, float) and not table.release < duration:
         raise ConfigError(
@@ -165,26 +147,4 @@ def _question(stops: Waypoints, table: LaunchTable, points: np.ndarray, depth: f
             f"launch.release = {shown(table.release)}: must be below the duration of the segment, {shown(duration)} s",
         )
     at = np.asarray(table.segment - stops.first)
-    return Launch(points, at, target, point, velocity, time, table.release, np.asarray(depth))
-
-
-def _flight_time(
-    path: Path, table: LaunchTable, point: np.ndarray, target: np.ndarray, velocity: np.ndarray, gravity: float
-) -> float:
-    # Find the time of flight on the parabola through the target, from the roots at which it is nearest to the point.
-    down = 0.5 * gravity * np.array([0.0, 0.0, 1.0])
-    way = target - point
-    # |way - velocity t + down t^2|^2, by powers of t, the highest first.
-    square = [down @ down, -2.0 * down @ velocity, velocity @ velocity + 2.0 * way @ down, -2.0 * way @ velocity]
-    roots = np.roots(np.array(square) * [4.0, 3.0, 2.0, 1.0])
-    times = roots.real[(np.abs(roots.imag) < 1e-6 * np.abs(roots)) & (roots.real > 0.0)]
-    apart = [float(np.linalg.norm(way - velocity * t + down * t**2)) for t in times]
-    size = max(float(np.linalg.norm(way)), 1e-300)
-    if not apart or not min(apart) <= ON_PARABOLA * size:
-        nearest = f"which passes it by {min(apart):.3g} m" if apart else "which never comes near it before the target"
-        raise ConfigError(
-            path,
-            f"launch.point = {shown(table.point)}: must lie on the parabola that "
-            f"reaches the target with launch.velocity, {nearest}",
-        )
-    return float(times[int(np.argmin(apart))])
+    return Launch(points, at, *parabola, table.release, np.asarray(depth))

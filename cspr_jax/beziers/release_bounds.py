@@ -8,15 +8,11 @@ import numpy as np
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.beziers.sequences import duration_bounds
 from cspr_jax.errors import InputError, shown
+from cspr_jax.maps.release_box import Range, box_of
 from cspr_jax.motions.problem import Problem
-from cspr_jax.robots.point_mass import PLANAR, spool_radius
 
-# Reach over the size of the robot: to each side of the central vertical, and down from the centroid of the spools.
-ASIDE, DEEP = 2.0, 4.0
 # Parts of the duration of the segment between which a release is looked for.
 EARLIEST, LATEST = 0.01, 0.99
-
-Range = Sequence[float] | None
 
 
 class ReleaseBounds(NamedTuple):
@@ -38,8 +34,7 @@ def bounds_of(
 
     Args:
         problem: gives the size of the robot.
-        releases: least and largest x, y and z of the release, in the axes of the robot file, m; None: as far aside as
-            `ASIDE`, and as deep as `DEEP`, times the size of the robot.
+        releases: least and largest x, y and z of the release, as `box_of` takes them.
         longest: largest duration of the segment, s; None: that of all searches.
 
     Returns:
@@ -48,17 +43,9 @@ def bounds_of(
     Raises:
         InputError: a planar robot whose y is not 0, or a largest duration below the smallest one.
     """
-    size = float(spool_radius(problem.robot))
-    aside = 0.0 if problem.robot.dof == PLANAR else ASIDE * size
-    corners = frame.outward([[-ASIDE * size, -aside, 0.0], [ASIDE * size, aside, DEEP * size]])
-    for i, ends in enumerate(releases):
-        if ends is not None:
-            corners[:, i] = ends
-    inner = np.sort(frame.inward(corners), axis=0)
-    if problem.robot.dof == PLANAR and inner[:, 1].any():
-        raise InputError("release_y", releases[1], "[0, 0], or absent: a planar robot")
+    box = box_of(problem.robot, frame, releases)
     short, long = duration_bounds(problem, np.zeros((2, 3)))
     if longest is not None and not np.log(longest) > short:
         raise InputError("max_duration", longest, f"above {shown(float(np.exp(short)))} s, for a robot of this size")
     last = long if longest is None else min(np.log(longest), long)
-    return ReleaseBounds(np.array([*inner[0], short, short, EARLIEST]), np.array([*inner[1], long, last, LATEST]))
+    return ReleaseBounds(np.array([*box.low, short, short, EARLIEST]), np.array([*box.high, long, last, LATEST]))

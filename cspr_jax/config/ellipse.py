@@ -49,7 +49,9 @@ class EllipseTable(Table):
 
     centre: Point = Field(description="centre [x, y, z], m")
     half_axes: Annotated[list[Point], Field(min_length=1, max_length=2)] | None = Field(
-        None, description="[a, b], vectors [x, y, z] each, m; [a] alone: to and fro along a line"
+        None,
+        description="[a, b], vectors [x, y, z] each, m; [a] alone: to and fro along a line; absent, like radius, where "
+        "a launch determines them",
     )
     radius: Positive | None = Field(None, description="of a circle, in place of half_axes, m")
     normal: Point | None = Field(
@@ -68,7 +70,7 @@ class EllipseTable(Table):
 
     @model_validator(mode="after")
     def _one_shape(self) -> "EllipseTable":
-        if (self.half_axes is None) == (self.radius is None):
+        if self.half_axes is not None and self.radius is not None:
             raise fault("radius", self.radius, "half_axes, or the radius of a circle: one of them")
         if self.half_axes is not None:
             if self.normal is not None:

@@ -1,4 +1,4 @@
-"""The [launch] tables: of a plan, where an object is released on a Bezier segment, and of maps of such launches."""
+"""The [launch] tables: of a plan, where an object is released on its way, and of maps of such launches."""
 
 from typing import Annotated, Literal
 
@@ -29,8 +29,9 @@ class LaunchTable(Table):
     """Launch of an object."""
 
     segment: Annotated[int, Field(ge=0)] = Field(
-        description="number, from 0 on, of the pose at which the segment of the release starts; the next pose has no "
-        "position, since the launch determines it"
+        description="number, from 0 on, of the pose at which the segment of the release starts. bezier: the next pose "
+        "has no position, since the launch determines it; ellipse: the object leaves at the end of the segment, and "
+        "the next pose has an ellipse without axes, which the launch determines"
     )
     target: Point = Field(description="where the object is to arrive, [x, y, z], m")
     point: Point | None = Field(None, description="place of the release, [x, y, z], m; absent: velocity determines it")
@@ -45,7 +46,7 @@ class LaunchTable(Table):
         "landing, by search",
     )
     release: Seconds | None = Field(
-        None, description="time of the release after the start of the segment, s; absent: chosen by search"
+        None, description="bezier: time of the release after the start of the segment, s; absent: chosen by search"
     )
 
     errors: ErrorTable | None = Field(None, description="[launch.errors], errors whose scatter is computed")

@@ -159,7 +159,7 @@ class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys):
         "stand in the plan itself",
     )
     turns: Turns | None = Field(None, description="ellipse: turns on the ellipse of the plan (default 1)")
-    launch: LaunchTable | None = Field(None, description="bezier: [launch] of an object that is released on a segment")
+    launch: LaunchTable | None = Field(None, description="bezier, ellipse: [launch] of an object that is released")
     stretch: Annotated[float, Field(ge=1e-6, le=1e9)] | None = Field(
         None, description="spline: factor by which all durations grow (default 1)"
     )
@@ -279,17 +279,20 @@ class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys):
         if self.launch is None:
             return self
         last = len(self.pose) - 2
-        if self.launch.segment > last or self.family_of(self.launch.segment) != "bezier":
-            allowed = f'from 0 to {last}, a pose from which family = "bezier" leads on'
+        family = None if self.launch.segment > last else self.family_of(self.launch.segment)
+        if family not in ("bezier", "ellipse"):
+            allowed = f'from 0 to {last}, a pose from which family = "bezier" or "ellipse" leads on'
             raise fault("launch.segment", self.launch.segment, allowed)
         end, after = self.pose[self.launch.segment + 1], self.launch.segment + 1
-        if after <= last and self.family_of(after) != "bezier":
-            allowed = '"bezier": behind the segment of the launch the acceleration goes on'
-            raise fault(f"pose[{after + 1}].family", shown(self.family_of(after)), allowed)
         for key, value in (("position", end.position), ("rest", end.rest or None)):
             if value is not None:
                 name = f"pose[{self.launch.segment + 1}].{key}"
                 raise fault(name, value, "absent: the segment of the launch ends where it follows from the launch")
+        if family == "ellipse":
+            return self
+        if after <= last and self.family_of(after) != "bezier":
+            allowed = '"bezier": behind the segment of the launch the acceleration goes on'
+            raise fault(f"pose[{after + 1}].family", shown(self.family_of(after)), allowed)
         if self.first_control_point is not None or self.least == "each":
             key = "least" if self.first_control_point is None else "first_control_point"
             raise fault(
@@ -298,6 +301,32 @@ class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys):
                 "cannot be combined with [launch], from which accelerations and durations follow",
             )
         return self
+
+    @model_validator(mode="after")
+    def _on_ellipses(self) -> "PlanFile":
+        # A launch from an ellipse determines the axes of that ellipse; all others have axes.
+        of_launch = -1 if self.launch is None else self.launch.segment + 1
+        if of_launch > 0 and self.family_of(of_launch - 1) == "ellipse":
+            self._check_launch_ellipse(of_launch)
+        else:
+            of_launch = -1
+        tables = {f"pose[{i}].ellipse": pose.ellipse for i, pose in enumerate(self.pose) if i != of_launch}
+        for name, table in ({"ellipse": self.ellipse} | tables).items():
+            if table is not None and table.half_axes is None and table.radius is None:
+                raise fault(f"{name}.radius", None, "half_axes, or the radius of a circle: one of them")
+        return self
+
+    def _check_launch_ellipse(self, i: int) -> None:
+        table = self.pose[i].ellipse
+        if table is None:
+            raise fault(f"pose[{i}].ellipse", None, "{ centre = [x, y, z] }, whose axes the launch determines")
+        for key in ("half_axes", "radius", "normal", "phase"):
+            if key in table.model_fields_set:
+                value = getattr(table, key)
+                raise fault(f"pose[{i}].ellipse.{key}", value, "absent: the launch determines the ellipse")
+        if self.launch is not None and self.launch.release is not None:
+            allowed = "absent: the object leaves an ellipse at the end of the segment"
+            raise fault("launch.release", self.launch.release, allowed)
 
     @model_validator(mode="after")
     def _one_place(self) -> "PlanFile":

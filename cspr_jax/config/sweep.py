@@ -193,7 +193,8 @@ class SweepFile(Table):
     )
     launch: LaunchSearch | None = Field(
         None,
-        description="[launch] of launch-range: bounds within which releases are searched, and effort of the search",
+        description="[launch] of launch-range, swing-range: bounds within which releases are searched, and effort of "
+        "the search",
     )
     workspace: WorkspaceTable | None = Field(
         None, description='[workspace] of map = "workspace": conditions, orientation, wrenches'

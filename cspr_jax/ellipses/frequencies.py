@@ -58,8 +58,27 @@ def chosen_frequency(problem: Problem, ellipse: Ellipse, rule: str, scene: Scene
         low, high = max(low, first), min(high, last)
 
     def slack(frequencies: np.ndarray) -> np.ndarray:
-        return _sampled(problem, ellipse, frequencies, scene)
+        return sampled_slacks(problem, ellipse, frequencies, scene)
 
+    return searched_frequency(slack, low, high, natural, rule)
+
+
+def searched_frequency(slack: Callable, low: float, high: float, natural: float, rule: str) -> float:
+    """Frequency by a rule, from slacks of frequencies.
+
+    Args:
+        slack: slacks (n,) at frequencies (n,) rad/s.
+        low: the smallest frequency, rad/s.
+        high: the largest one.
+        natural: the frequency where none is feasible.
+        rule: "best", "fastest" or "slowest".
+
+    Returns:
+        rad/s.
+
+    Raises:
+        InputError: nothing that bounds the frequency.
+    """
     if rule == "best":
         return _largest(slack, low, high, natural)
     return _outermost(slack, low, high, natural, rule)
@@ -84,8 +103,17 @@ def _row(ellipse: Ellipse) -> Ellipse:
     return Ellipse(*(np.asarray(leaf)[None] for leaf in ellipse))
 
 
-def _sampled(problem: Problem, ellipse: Ellipse, frequencies: np.ndarray, scene: Scene | None) -> np.ndarray:
-    # Smallest slack, over the scale of its unit, of one turn at each frequency, (n,).
+def sampled_slacks(problem: Problem, ellipse: Ellipse, frequencies: np.ndarray, scene: Scene | None) -> np.ndarray:
+    """Smallest slacks at samples of one turn.
+
+    Args:
+        ellipse: leaves (3,), or (n, 1, 3) of an ellipse for each frequency.
+        frequencies: (n,) rad/s.
+        scene: bodies that can meet.
+
+    Returns:
+        (n,) in the units of their criteria.
+    """
     angle = np.linspace(0.0, 2.0 * math.pi, ANGLES, endpoint=False)[:, None]
     cosine, sine = np.cos(angle), np.sin(angle)
     outward = ellipse.cosine * cosine + ellipse.sine * sine

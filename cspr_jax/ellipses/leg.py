@@ -3,12 +3,13 @@
 import dataclasses
 import itertools
 import math
-from typing import Any
+from typing import Any, cast
 
 import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.arithmetic import rotations
+from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.build.orientations import pose_quaternions
 from cspr_jax.build.scenes import scene_of
@@ -18,12 +19,17 @@ from cspr_jax.ellipses import harmonics
 from cspr_jax.ellipses.frequencies import chosen_frequency
 from cspr_jax.ellipses.harmonics import Ellipse
 from cspr_jax.ellipses.hull import SpoolHull, formula_hull
+from cspr_jax.ellipses.motion import EllipseMotion, turning
+from cspr_jax.ellipses.releases import Release, ReleaseRequirement, chosen_release
 from cspr_jax.ellipses.rotation_frequencies import rotation_frequencies
 from cspr_jax.ellipses.ways import Turning, Way, between, least_way, step_of
 from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.motions.answers import Answers
-from cspr_jax.motions.leg import Leg
+from cspr_jax.motions.landings import Throw
+from cspr_jax.motions.launch_outcome import LaunchOutcome, launch_outcome
+from cspr_jax.motions.leg import JoinedLeg, Leg
 from cspr_jax.motions.motion import Motion
+from cspr_jax.motions.parabola import parabola_of
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import ProvedAnswers, answers_of, judge_all_robots
 from cspr_jax.motions.waypoints import Waypoints
@@ -38,9 +44,11 @@ class EllipseAnswers(ProvedAnswers):
 
     Fields:
         of_ellipses: (n,) details of the ellipse on which each segment ends; of one that ends at rest, starts.
+        flight_time: (n,) time of the flight of an object that is released at the end of each segment, s; NaN without.
     """
 
     of_ellipses: np.ndarray
+    flight_time: np.ndarray
 
     @property
     def feasible(self) -> np.ndarray:
@@ -62,6 +70,12 @@ class Ellipses(Leg):
         super().__init__(stops)
         for i, pose in enumerate(stops.poses):
             self._check_pose(i, pose)
+        launch, count = stops.keys.launch, len(stops)
+        # Number of the pose of the release, if it is one of these.
+        of_launch = 0 if launch is None else launch.segment - stops.first + 1
+        self._of_launch = of_launch if 0 < of_launch <= count else None
+        if self._of_launch and stops.robot_file.is_platform:
+            raise ConfigError(stops.path, f"launch: must be absent for {stops.robot_file.kind}")
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the poses; see `Leg.join`."""
@@ -75,6 +89,44 @@ class Ellipses(Leg):
             turns = self._turns(i, place, last)
             place = dataclasses.replace(last, phase=last.phase + 2.0 * math.pi * turns)
         return self._answers(problem, turnings, ways, scene), [way.motion for way in ways]
+
+    def outcome(
+        self, problem: Problem, joined: JoinedLeg, tension_min: np.ndarray, start: float
+    ) -> LaunchOutcome | None:
+        """Release at the end of a segment, and flight of the object; see `Leg.outcome`."""
+        table, frame = self.stops.keys.launch, self.stops.frame
+        if table is None or self._of_launch is None:
+            return None
+        at, answers = self._of_launch - 1, cast(EllipseAnswers, joined.answers)
+        way = cast(EllipseMotion, joined.motions[at])
+        # Late objects are released behind the segment: on the next one, else on the same ellipse.
+        after = joined.motions[at + 1] if at + 1 < len(self) else turning(way.last, way.frequencies[1], leaf(0.0), 1.0)
+        return launch_outcome(
+            table,
+            frame,
+            problem.robot,
+            Throw((way, after), np.asarray(way.time), np.asarray(frame.inward(table.target))),
+            time=start + float(answers.duration[: at + 1].sum()),
+            flight_time=float(answers.flight_time[at]),
+            tension_min=float(tension_min[at]),
+        )
+
+    def _release(self, problem: Problem, before: Turning, scene: Scene) -> Release:
+        stops, table, i = self.stops, self.stops.keys.launch, self._of_launch or 0
+        ellipse = stops.poses[i].ellipse
+        if table is None or ellipse is None:
+            raise ValueError("no launch")
+        gravity, centre = float(problem.robot.gravity), np.asarray(stops.frame.inward(ellipse.centre))
+        parabola = parabola_of(table, stops.frame, gravity, stops.path)
+        requirement = ReleaseRequirement(problem, scene, parabola, centre, stops.poses[i].turns or 0.0)
+        fixed, step = int(stops.arcs[i - 1]), 1 if before.rests else 2
+        arcs = range(fixed, fixed + 1) if fixed else range(step, stops.max_arcs + 1, step)
+        rule = ellipse.frequency
+        rule = 2.0 * math.pi * rule.hertz if isinstance(rule, Hertz) else rule
+        try:
+            return chosen_release(requirement, before, rule, table.choose, arcs)
+        except InputError as error:
+            raise ConfigError(stops.path, f"{stops.name(i)}.ellipse.{error}") from error
 
     def _check_pose(self, i: int, pose: Pose) -> None:
         stops, name = self.stops, self.stops.name(i)
@@ -127,6 +179,8 @@ class Ellipses(Leg):
                 turnings.append(Turning(Ellipse(centres[i], nothing, nothing), quaternion=quaternion))
             elif pose.ellipse is None:
                 turnings.append(self._continued(turnings[i - 1], i))
+            elif i == self._of_launch:
+                turnings.append(self._release(problem, turnings[i - 1], scene))
             else:
                 ellipse = self._ellipse(pose.ellipse)
                 frequency, phase = self._frequency(problem, ellipse, i, scene), pose.ellipse.phase
@@ -209,7 +263,8 @@ class Ellipses(Leg):
         ]
         changed = {"arcs": np.where(is_feasible, arcs, 0), "tried_arcs": arcs, "verdict": verdict}
         columns = {field.name: getattr(plain, field.name) for field in dataclasses.fields(plain)}
-        return EllipseAnswers(**columns | changed, of_ellipses=details)
+        flights = np.array([turn.flight_time if isinstance(turn, Release) else np.nan for turn in turnings[1:]])
+        return EllipseAnswers(**columns | changed, of_ellipses=details, flight_time=flights)
 
 
 def circle_axes(radius: float, normal: Any, *, is_planar: bool) -> tuple[np.ndarray, np.ndarray]:

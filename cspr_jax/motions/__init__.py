@@ -40,5 +40,9 @@ Files, each importing only from those above it:
     proved              summaries of proofs of motions
     waypoints           consecutive poses of a plan, as points of the kernels
     outcome             what comes of a leg beyond its motion
+    flight              free flight of a released object
+    parabola            flight that a [launch] table asks for
+    landings            scatter of the landings of launches
+    launch_outcome      release and flight of a launch, in the axes of the robot file
     leg                 consecutive poses that one family joins
 """

@@ -29,4 +29,8 @@ OF_LAUNCHES = (
     *("verdict", "release_speed", "largest_margin", "duration", "release_time", "flight_time"),
     *("release_x", "release_y", "release_z"),
 )
+OF_SWINGS = (
+    *("verdict", "release_speed", "largest_margin", "swing_amplitude", "flight_time"),
+    *("release_x", "release_y", "release_z"),
+)
 OF_LENGTHS = ("sigma_p", "sigma_r")

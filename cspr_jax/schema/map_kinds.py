@@ -287,6 +287,22 @@ MAP_KINDS: dict[str, MapKind] = {
             cells=1024,
         ),
         MapKind(
+            name="swing-range",
+            title="Range of throws from swings",
+            description="least speed with which an object, released from an ellipse about `trajectory.from` at its "
+            "natural frequency, reaches each landing place",
+            implementation="cspr_jax.ellipses.swing_range_map:SwingRangeMap",
+            cost=CellCost(seconds=3e-3),
+            quantities=columns.OF_SWINGS,
+            stored=columns.OF_SWINGS,
+            pictured=("release_speed",),
+            families=("ellipse",),
+            patterns=("2T", "3T"),
+            start="point",
+            takes=("axes.from_x", "axes.from_y", "axes.from_z", "launch", "limits"),
+            cells=1024,
+        ),
+        MapKind(
             name="sensitivity",
             title="Sensitivity to errors of the cable lengths",
             description="largest displacement, and turn of a platform, that errors of the cable lengths cause",

@@ -710,6 +710,13 @@ QUANTITIES = {
             better="smaller",
         ),
         Quantity(
+            "swing_amplitude",
+            "m",
+            "amplitude of the swing",
+            "Largest distance from its centre of the ellipse of the slowest release.",
+            better="smaller",
+        ),
+        Quantity(
             "release_time",
             "s",
             "time of the release",

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import cspr_jax
-from cspr_jax.beziers import launch_outcome
+from cspr_jax.motions import launch_outcome
 
 PLAN = {
     "schema": 1,

@@ -12,9 +12,9 @@ from scipy.optimize import fsolve
 from support.commands import cspr, plan, planned
 
 import cspr_jax
-from cspr_jax.beziers.landings import LaunchErrors, Throw, scatter
 from cspr_jax.beziers.launch import through
 from cspr_jax.beziers.motion import Bezier
+from cspr_jax.motions.landings import LaunchErrors, Throw, scatter
 
 GRAVITY = 9.80665
 PLACES = [[0, 0, -0.5], [-0.05, -0.05, -0.7], [0.1, 0.15, -0.8], [-0.1, -0.3, -1.2]]
@@ -186,7 +186,7 @@ def throw():
     start, place, velocity = np.array([-0.1, -0.3, 1.2]), np.array([0.0, -0.15, 0.8]), np.array([0.3, 0.4, -0.7])
     middle, end = (np.asarray(x) for x in jax.jit(through)(start, place, velocity, 0.59 / 1.6, 1.6))
     motion = Bezier(start, middle, end, np.asarray(1.6), np.asarray(1.0))
-    return robot, Throw(motion, np.asarray(0.59), np.array([0.15, 0.05, 1.675]))
+    return robot, Throw((motion,), np.asarray(0.59), np.array([0.15, 0.05, 1.675]))
 
 
 def test_landings_are_those_of_another_solver(throw):
@@ -197,7 +197,7 @@ def test_landings_are_those_of_another_solver(throw):
     random = np.random.default_rng(3)
     instants = random.normal(size=(20, 1)) * 0.02
     lengths, rates = random.normal(size=(20, 3)) * 0.01, random.normal(size=(20, 3)) * 0.05
-    motion = planned_throw.motion
+    (motion,) = planned_throw.motions
     for own, (late,), more, faster in zip(found, instants, lengths, rates, strict=True):
         share = 0.59 + late
         p, v, a = (x[-1] for x in halfway([motion.start, motion.middle, motion.end], 1.6, share))

@@ -4,10 +4,13 @@ import dataclasses
 import math
 from typing import Any, ClassVar
 
+import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.arithmetic.frames import Frame
-from cspr_jax.beziers.landings import LaunchErrors, Scatter, Throw, scatter
+from cspr_jax.config.launch import LaunchTable
+from cspr_jax.motions.flight import flown
+from cspr_jax.motions.landings import LaunchErrors, Scatter, Throw, scatter, state_at
 from cspr_jax.motions.outcome import LegOutcome
 from cspr_jax.robots.point_mass import PointMassRobot
 
@@ -19,15 +22,15 @@ class LaunchOutcome(LegOutcome):
     """Release of an object and its flight, in the axes of the robot file.
 
     Fields:
-        segment: number of the segment, from 0 on.
+        segment: number of the segment on which, or at whose end, the object is released, from 0 on.
         position: (3,) at the release, m.
         velocity: (3,) likewise, m/s.
         time: of the release, since the start of the plan, s.
-        control_points: (3, 3) of the segment, m.
+        control_points: (3, 3) of a Bezier segment, m; None of others.
         landing: (3,) where the flight ends, m.
         flight_time: s.
         tension_min: smallest tension on the segment, N.
-        throw: the release and its segment, for errors.
+        throw: the release and its motions, for errors.
         robot: centred, z down.
         frame: of the robot file.
         scatter: of the landings, of a plan that names errors.
@@ -37,7 +40,7 @@ class LaunchOutcome(LegOutcome):
     position: np.ndarray
     velocity: np.ndarray
     time: float
-    control_points: np.ndarray
+    control_points: np.ndarray | None
     landing: np.ndarray
     flight_time: float
     tension_min: float
@@ -53,7 +56,7 @@ class LaunchOutcome(LegOutcome):
         table = {
             "segment": self.segment,
             "release": {"position": self.position.tolist(), "velocity": self.velocity.tolist(), "time": self.time},
-            "control_points": self.control_points.tolist(),
+            "control_points": None if self.control_points is None else self.control_points.tolist(),
             "landing": self.landing.tolist(),
             "flight_time": self.flight_time,
             "tension_min": self.tension_min,
@@ -104,3 +107,46 @@ class LaunchOutcome(LegOutcome):
         both = np.outer(signs, signs)
         landings, covariance, first_order = dataclasses.astuple(kernel_scatter)
         return Scatter(landings * signs, covariance * both, first_order * both)
+
+
+def launch_outcome(
+    table: LaunchTable,
+    frame: Frame,
+    robot: PointMassRobot,
+    throw: Throw,
+    *,
+    time: float,
+    flight_time: float,
+    tension_min: float,
+    control_points: np.ndarray | None = None,
+) -> LaunchOutcome:
+    """Outcome of a planned release, with the scatter that its table asks for.
+
+    Args:
+        robot: centred, z down.
+        time: of the release, since the start of the plan, s.
+        flight_time: s.
+        tension_min: smallest tension on the segment, N.
+        control_points: (3, 3) of a Bezier segment, m.
+
+    Returns:
+        the outcome.
+    """
+    state = state_at(throw, jnp.asarray(0.0))
+    landing, _ = flown(state.position, state.velocity, robot.gravity, flight_time)
+    launch = LaunchOutcome(
+        segment=table.segment,
+        position=np.asarray(frame.outward(np.asarray(state.position))),
+        velocity=np.asarray(frame.turned(np.asarray(state.velocity))),
+        time=time,
+        control_points=control_points,
+        landing=np.asarray(frame.outward(np.asarray(landing))),
+        flight_time=flight_time,
+        tension_min=tension_min,
+        throw=throw,
+        robot=robot,
+        frame=frame,
+    )
+    if table.errors is None:
+        return launch
+    return dataclasses.replace(launch, scatter=launch.scatter_of(LaunchErrors(**vars(table.errors))))

@@ -1,7 +1,8 @@
 """Scatter of landings: errors of the winches and of the instant of release, by a random sample and to first order.
 
 At the release the cables have lengths and rates that miss the plan's; the effector is where the lengths are, and moves
-as the rates say. From there the object flies to the height of its target. A random sample of errors gives a sample of
+as the rates say; on redundant cables, whose errors contradict each other, where the sum of the squares of what is left
+is least. From there the object flies to the height of its target. A random sample of errors gives a sample of
 landings, and the derivatives of the landing with respect to all errors the covariance for small errors.
 """
 
@@ -16,10 +17,11 @@ from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.elementary import solved
-from cspr_jax.beziers.launch import flown
-from cspr_jax.beziers.motion import Bezier
+from cspr_jax.motions.flight import flown
+from cspr_jax.motions.motion import Motion
 from cspr_jax.robots.force_balance import cable_motion
 from cspr_jax.robots.point_mass import PointMassRobot, is_planar
+from cspr_jax.robots.state import State
 from cspr_jax.schema.given_numbers import Numbers, whole
 
 BATCH, NEWTON = 1024, 12
@@ -31,12 +33,12 @@ class Throw(NamedTuple):
     """Planned release.
 
     Fields:
-        motion: segment on which the object is released, z down.
-        release: () time after the start of the segment, s.
+        motions: consecutive motions, z down; of one of them the object is released, at its end or before.
+        release: () time after the start of the first one, s.
         target: (3,) m; landings are looked for at its height.
     """
 
-    motion: Bezier
+    motions: tuple[Motion, ...]
     release: Any
     target: Any
 
@@ -105,20 +107,41 @@ class Scatter:
         }
 
 
+def state_at(throw: Throw, late: Array) -> State:
+    """State of the effector some time after the planned release; before and after all motions it rests at an end.
+
+    Args:
+        late: () s; negative before it.
+
+    Returns:
+        the state.
+    """
+    # Between two motions nothing is clipped: a clip would halve the derivative of a release there.
+    time = jnp.maximum(throw.release + late, 0.0)
+    *others, last = throw.motions
+    states, starts = [], []
+    for motion in others:
+        states.append(motion.state(time / motion.duration()))
+        time = time - motion.duration()
+        starts.append(time)
+    state = last.state(jnp.minimum(time / last.duration(), 1.0))
+    for before, since in zip(reversed(states), reversed(starts), strict=True):
+        state = jax.tree.map(partial(jnp.where, since > 0.0), state, before)
+    return state
+
+
 def landing(robot: PointMassRobot, throw: Throw, errors: Array) -> Array:
     """Landing of one throw.
 
     Args:
-        robot: a point mass on as many cables as it has degrees of freedom; centred.
+        robot: a point mass; centred.
         errors: (1 + 2 n_cables,) of the instant, s, of the lengths, m, and of their rates, m/s.
 
     Returns:
         (2,) x and y over those of the target, m; NaN where the object never comes to its height.
     """
     count = robot.n_cables
-    # Before the segment and after it the effector rests at an end.
-    share = jnp.clip((throw.release + errors[0]) / throw.motion.time, 0.0, 1.0)
-    state = throw.motion.state(share)
+    state = state_at(throw, errors[0])
     lengths, rates, _ = cable_motion(robot, *state[:3])
     position = _placed(robot, state.position, lengths + errors[1 : count + 1])
     velocity = _moving(robot, position, rates + errors[count + 1 :])
@@ -137,12 +160,15 @@ def _placed(robot: PointMassRobot, start: Array, lengths: Array) -> Array:
 
 
 def _moving(robot: PointMassRobot, place: Array, rates: Array) -> Array:
-    # Return the velocity at which the lengths have these rates.
-    rays = place[None] - robot.base_points
-    units = rays / jnp.linalg.norm(rays, axis=1, keepdims=True)
+    # Return the velocity at which the lengths have these rates; on redundant cables the one that comes nearest.
+    units = jax.jacfwd(lambda velocity: cable_motion(robot, place, velocity, velocity * 0.0)[1])(place * 0.0)
+    units = units[:, np.array([0, 2])] if is_planar(robot) else units
+    if robot.n_cables > robot.dof:
+        units, rates = units.T @ units, units.T @ rates
+    velocity = solved(units, rates[:, None])[0][:, 0]
     if not is_planar(robot):
-        return solved(units, rates[:, None])[0][:, 0]
-    x, z = solved(units[:, np.array([0, 2])], rates[:, None])[0][:, 0]
+        return velocity
+    x, z = velocity
     return jnp.stack([x, jnp.zeros_like(x), z])
 
 
@@ -160,7 +186,7 @@ def scatter(robot: PointMassRobot, throw: Throw, errors: LaunchErrors) -> Scatte
     """Scatter of the landings of a launch.
 
     Args:
-        robot: a point mass on as many cables as it has degrees of freedom; centred.
+        robot: a point mass; centred.
 
     Returns:
         the scatter, in the axes of the kernels.

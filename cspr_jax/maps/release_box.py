@@ -1,0 +1,53 @@
+"""Places within which maps of launches look for a release."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.errors import InputError
+from cspr_jax.robots.point_mass import PLANAR, PointMassRobot, spool_radius
+
+# Reach over the size of the robot: to each side of the central vertical, and down from the centroid of the spools.
+ASIDE, DEEP = 2.0, 4.0
+
+Range = Sequence[float] | None
+
+
+class ReleaseBox(NamedTuple):
+    """Bounds of places of release, from the centroid of the spools, z down.
+
+    Fields:
+        low: (3,) m.
+        high: (3,) m.
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+
+
+def box_of(robot: PointMassRobot, frame: Frame, releases: Sequence[Range] = (None, None, None)) -> ReleaseBox:
+    """Bounds of places of release.
+
+    Args:
+        robot: centred.
+        releases: least and largest x, y and z of the release, in the axes of the robot file, m; None: as far aside as
+            `ASIDE`, and as deep as `DEEP`, times the size of the robot.
+
+    Returns:
+        the bounds.
+
+    Raises:
+        InputError: a planar robot whose y is not 0.
+    """
+    size = float(spool_radius(robot))
+    aside = 0.0 if robot.dof == PLANAR else ASIDE * size
+    corners = frame.outward([[-ASIDE * size, -aside, 0.0], [ASIDE * size, aside, DEEP * size]])
+    for i, ends in enumerate(releases):
+        if ends is not None:
+            corners[:, i] = ends
+    inner = np.sort(frame.inward(corners), axis=0)
+    if robot.dof == PLANAR and inner[:, 1].any():
+        raise InputError("release_y", releases[1], "[0, 0], or absent: a planar robot")
+    return ReleaseBox(*inner)
