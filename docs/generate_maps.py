@@ -80,6 +80,14 @@ PAGES = {
         "Where can an object be thrown to, by one Bezier segment from rest, and with which least speed of release? "
         "A launch that is found is proved feasible; finding none proves nothing.",
     ),
+    "ellipse": MapPage(
+        "ellipse_frequencies",
+        "At which frequencies can a point mass turn on an ellipse, a circle or to and fro on a line about each centre, "
+        "however large it is? Without limits the frequencies, the margin and the cable that gets slack first are "
+        "formulas; with limits the verdict at each frequency is proved. Over one axis, such as the radius of circles, "
+        "a picture shows the band of feasible frequencies, the natural frequency in it, and the static limit, beyond "
+        "which the mass cannot go slowly.",
+    ),
     "sensitivity": MapPage(
         "launch_sensitivity",
         "By how much do errors of the cable lengths displace and turn the effector, at worst? The robot is a point "
