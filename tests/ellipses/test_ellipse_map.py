@@ -396,3 +396,52 @@ def test_spools_in_several_planes_have_no_best_frequency():
     words = 'ellipse.frequency = "best": must be a number or "natural", or axes.frequency: no formula'
     with pytest.raises(ConfigError, match=words):
         mapped(robot=BENT, axes={"x": [0.2], "y": [0.1], "z": [-1.5], "circle_radius": [0.4]})
+
+
+def test_the_section_over_frequencies_shows_their_ends(tmp_path, figures):
+    path = written(tmp_path, x=[0.0], y=[0.0], axes=f"{RADII}\nfrequency = [1.0, 2.0, 4.0]")
+    assert cspr("run", path, "-o", tmp_path / "run")[0] == 0
+    assert cspr("plot", tmp_path / "run", "-o", tmp_path / "s.png")[0] == 0
+    panel = figures[0].axes[0]
+    assert panel.get_ylabel() == "frequency (rad/s)" and panel.get_ylim()[1] < 6.0
+    ends = [line.get_ydata()[-1] for line in panel.lines if line.get_color() == "black"]
+    np.testing.assert_allclose(ends, 9.81**0.5 * np.sqrt([1.0 - 0.13 / 0.6, 1.0 + 0.13 / 0.6, 1.0]), rtol=1e-9)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("seed", range(8))
+def test_plans_say_what_the_cells_say_of_random_robots(seed):
+    """Three or four level, tilted or uneven spools anywhere, either z axis; limits on tension, speed and floor."""
+    draw = np.random.default_rng(seed)
+    count, up = 3 + seed % 2, seed % 3 == 0
+    around = 2.0 * np.pi * (np.arange(count) + draw.uniform(-0.2, 0.2, count)) / count
+    level = np.stack([np.cos(around), np.sin(around)], axis=1) * draw.uniform(0.7, 1.3, (count, 1))
+    heights = level @ draw.normal(0.0, 0.1, 2) + (draw.normal(0.0, 0.1, count) if seed >= 6 else 0.0)
+    origin, sign = draw.normal(0.0, 3.0, 3), -1.0 if up else 1.0
+    spools = np.c_[level, heights] + origin
+    robot = {"name": "random", "base_points": spools.tolist(), "mass": 1.3, "z_axis": "up" if up else "down"}
+    middle = spools.mean(0) + np.array([*draw.normal(0.0, 0.15, 2), sign * 1.6])
+    result = mapped(
+        robot=robot,
+        axes={"x": [middle[0], middle[0] + 0.4], "y": [middle[1]], "z": [middle[2]], "scale": [0.4, 1.2]}
+        | {"tilt": [0.0, 0.35], "tilt_azimuth": [float(draw.uniform(0.0, 6.0))], "frequency": [1.5, 2.4, 3.0]},
+        ellipse={"half_axes": [[0.8, 0.1, 0.0], [0.0, 0.5, 0.2]]},
+        limits={
+            "tension_min": 0.3,
+            "tension_max": 12.0,
+            "cable_speed_max": 1.6,
+            "floor": float(middle[2] + sign * 0.4),
+        },
+    )
+    settings, verdicts = json.loads(result.attrs["settings"]), set()
+    for place, values in cells_of(result):
+        planned = cspr_jax.plan(cell_plan(settings, place, values))
+        segment = planned.to_dict()["segments"][0]
+        verdicts.add(planned.feasible)
+        assert planned.feasible == (values["verdict"] == 0), (place, segment["verdict"])
+        if np.isfinite(values["tension_margin"]):
+            assert segment["verdict"] == Verdict(int(values["verdict"])).text
+            assert segment["margin"] == pytest.approx(values["tension_margin"], rel=1e-2, abs=2e-3)
+        if np.isfinite(values["margin"]):
+            assert segment["pseudotension_margin"] == pytest.approx(values["margin"], rel=1e-9, abs=1e-12)
+    assert verdicts == {True, False}

@@ -11,7 +11,7 @@ from cspr_jax.outputs.plots.comparison import Compared, comparison_figure
 from cspr_jax.outputs.plots.conditions import excluded, is_workspace, said, shown_first
 from cspr_jax.outputs.plots.envelope import AXES, envelope_figure
 from cspr_jax.outputs.plots.fixed_axes import first_of, notes
-from cspr_jax.outputs.plots.frequencies import SHOWN, frequencies_figure, has_frequencies, turns_in_words
+from cspr_jax.outputs.plots.frequencies import SHOWN, frequencies_figure, has_frequencies, mark_ends, turns_in_words
 from cspr_jax.outputs.plots.labels import PANELS, chosen, heading, robot_name, values
 from cspr_jax.outputs.plots.lines import PlottedLine, line_figure, lines_of, names_of, overlaid
 from cspr_jax.outputs.plots.motion_comparison import motion_comparison_figure
@@ -198,7 +198,11 @@ def _map_figure(result: Result, quantity: str | None, at: dict[str, float], line
     if not panels:
         data, hatched, says = data[..., None], hatched[..., None], None if says is None else says[..., None]
     section = Section(view.name, view.across[:2], panels, view.place, _constant(result, view), hatched)
-    return section_figure(result, section, data, says)
+    figure = section_figure(result, section, data, says)
+    if view.across[1:] == ["frequency"] and set(SHOWN) <= set(result.data):
+        first = at | {"frequency": float(result.axes["frequency"][0])}
+        mark_ends(figure, result, view.across[0], {name: _view(result, name, first).data for name in SHOWN})
+    return figure
 
 
 def _constant(result: Result, view: MapView, name: str | None = None) -> list[str]:

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from cspr_jax.outputs.plots.fixed_axes import table
 from cspr_jax.outputs.plots.labels import COLOURS, as_drawn, axis_label, is_angle, robot_name
@@ -76,6 +77,27 @@ def frequencies_figure(result: Result, across: str, data: dict[str, np.ndarray],
     panel.legend(frameon=True, framealpha=0.9, fontsize="small")
     figure.suptitle("\n".join([f"{robot_name(result)}: feasible frequencies", ", ".join(fixed)]).strip())
     return figure
+
+
+def mark_ends(figure: Figure, result: Result, across: str, data: dict[str, np.ndarray]) -> None:
+    """Draw the ends of the feasible frequencies, and the natural ones, into a section over frequencies.
+
+    Args:
+        figure: its first panel has frequencies upward.
+        data: as for `frequencies_figure`.
+    """
+    panel = figure.axes[0]
+    order = np.argsort(result.axes[across], kind="stable")
+    points = as_drawn(result, across, result.axes[across][order])
+    ranges = panel.get_xlim(), panel.get_ylim()
+    for name, look in (("lowest_frequency", "-"), ("highest_frequency", "-"), ("natural_frequency", "--")):
+        values = np.minimum(data[name][order], HIGHEST_SHOWN)
+        for colour, width in (("white", 3.2), ("black", 1.2)):
+            panel.plot(points, values, color=colour, linewidth=width, linestyle=look if width < 2.0 else "-")
+    panel.set(xlim=ranges[0], ylim=ranges[1])
+    handles = [Line2D([], [], color="black", linewidth=1.2, linestyle=look) for look in ("-", "--")]
+    words = ["ends of the feasible frequencies", "natural frequency"]
+    figure.legend(handles, words, loc="outside lower center", ncols=2)
 
 
 def turns_in_words(result: Result, name: str) -> list[str]:
