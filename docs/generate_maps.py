@@ -86,6 +86,14 @@ PAGES = {
         "frequency, and with which least speed of release? No static workspace limits such throws; `swing_amplitude` "
         "says how far the effector swings.",
     ),
+    "ellipse": MapPage(
+        "ellipse_frequencies",
+        "At which frequencies can a point mass turn on an ellipse, a circle or to and fro on a line about each centre, "
+        "however large it is? Without limits the frequencies, the margin and the cable that gets slack first are "
+        "formulas; with limits the verdict at each frequency is proved. Over one axis, such as the radius of circles, "
+        "a picture shows the band of feasible frequencies, the natural frequency in it, and the static limit, beyond "
+        "which the mass cannot go slowly.",
+    ),
     "sensitivity": MapPage(
         "launch_sensitivity",
         "By how much do errors of the cable lengths displace and turn the effector, at worst? The robot is a point "

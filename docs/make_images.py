@@ -166,6 +166,12 @@ IMAGES = {
     "launch_range": Image(
         "Where the launch robot can throw to, 1.675 m below its spools, and the least speed of the release.", 40
     ),
+    "ellipse_frequencies": Image(
+        "Frequencies at which the prototype can turn on level circles of any radius about P0, with taut cables.", 6
+    ),
+    "ellipse": Image(
+        "Largest margin of turns on circles of radius 0.5 m about centres below the spools, level and inclined.", 8
+    ),
     "concepts": Image("From start to target in five arcs, and the pseudotensions.", 8, command="draw"),
 }
 

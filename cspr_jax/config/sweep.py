@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
+from cspr_jax.config.ellipse import SweepEllipse
 from cspr_jax.config.launch import LaunchSearch
 from cspr_jax.config.limits import Coordinate, LimitTable, Point
 from cspr_jax.config.reading import Table
@@ -71,16 +72,25 @@ class Axes(Table):
         None, description="direction of the targets seen from the vertical through the centroid, from x to y, rad"
     )
     z: Axis = Field(description=_OF_TARGETS.format("z"))
-    tilt_azimuth: Axis | None = Field(
-        None, description="poses, workspace: angle phi of tilt and torsion, rad; absent: 0"
+    circle_radius: Axis | None = Field(None, description="ellipse: radius of circles, m; all >= 0")
+    scale: Axis | None = Field(
+        None, description="ellipse: factor of the half-axes, or of the radius, of [ellipse]; all >= 0; absent: 1"
     )
-    tilt: Axis | None = Field(None, description="poses, workspace: angle theta of tilt and torsion, rad; absent: 0")
+    tilt_azimuth: Axis | None = Field(
+        None, description="poses, workspace, ellipse: angle phi of tilt and torsion, rad; absent: 0"
+    )
+    tilt: Axis | None = Field(
+        None, description="poses, workspace, ellipse: angle theta of tilt and torsion, rad; absent: 0"
+    )
     torsion: Axis | None = Field(None, description="poses, workspace: angle sigma of tilt and torsion, rad; absent: 0")
     z0: Axis | None = Field(None, description="depth of P0 below the centroid of the spools, m; all > 0")
     inclination: Axis | None = Field(None, description="inclination v of transitions, in place of z0; all in ]-1, 1[")
     tau: Axis | None = Field(None, description="instants of transition-envelopes, normalised time in [0, 1]")
     cable: Axis | None = Field(
         None, description="cables of transition-envelopes, from 1 on; absent: the worst cable at each instant"
+    )
+    frequency: Axis | None = Field(
+        None, description="ellipse: frequencies of verdicts and margins, rad/s; all > 0; absent: ellipse.frequency"
     )
     from_x: Axis | None = Field(None, description=_OF_STARTS.format("x"))
     from_y: Axis | None = Field(None, description=_OF_STARTS.format("y"))
@@ -195,6 +205,11 @@ class SweepFile(Table):
         None,
         description="[launch] of launch-range, swing-range: bounds within which releases are searched, and effort of "
         "the search",
+    )
+    ellipse: SweepEllipse | None = Field(
+        None,
+        description='[ellipse] of map = "ellipse": half_axes or radius, unless axes.circle_radius has radii; normal, '
+        "frequency",
     )
     workspace: WorkspaceTable | None = Field(
         None, description='[workspace] of map = "workspace": conditions, orientation, wrenches'

@@ -18,5 +18,9 @@ Files, each importing only from those above it:
     frequencies             frequencies that a plan leaves open
     rotation_frequencies    natural frequencies of rotation of a platform at rest
     ways                    least numbers of arcs between two ellipses
+    releases                ellipses from which an object is released
     leg                     ellipses in a plan
+    map                     maps of feasible frequencies and margins
+    swing_range             least speeds of throws from ellipses
+    swing_range_map         maps of these
 """

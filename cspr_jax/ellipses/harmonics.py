@@ -154,7 +154,9 @@ def best_frequency(hull: SpoolHull, ellipse: Ellipse) -> Array:
     def halved(_, ends: tuple[Array, Array]) -> tuple[Array, Array]:
         middle = 0.5 * (ends[0] + ends[1])
         active = jnp.argmin(_slack(terms, middle))
-        rises = jnp.sum((terms.tilting + middle * terms.pulling)[active] * terms.pulling[active]) < 0.0
+        fall = jnp.sum((terms.tilting + middle * terms.pulling)[active] * terms.pulling[active])
+        # A level slack, as without axes, is best taken at the frequency nearest to the natural one.
+        rises = (fall < 0.0) | ((fall == 0.0) & (middle < 0.0))
         return jnp.where(rises, middle, ends[0]), jnp.where(rises, ends[1], middle)
 
     # Beside the natural frequency, e = 0, nothing helps an edge whose slack e does not change.

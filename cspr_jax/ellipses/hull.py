@@ -48,7 +48,7 @@ def hull_of(robot: AnyRobot) -> SpoolHull:
         raise InputError("pulley_radius", np.asarray(robot.pulleys.radius).tolist(), "absent: formulas know no pulleys")
     if not np.abs(points @ normal).max() <= IN_PLANE * float(spool_radius(robot)):
         raise InputError("base_points", points.tolist(), "spools in one plane, for a formula of the frequencies")
-    edges = np.stack([_gradient(points[:, :2][ends], robot.dof) for ends in _ends(points, robot.dof)])
+    edges = np.stack([_gradient(points[:, :2][ends], robot.dof) for ends in edge_ends(points, robot.dof)])
     return SpoolHull(leaf(edges), leaf(normal), leaf(robot.gravity))
 
 
@@ -67,8 +67,16 @@ def formula_hull(robot: AnyRobot) -> SpoolHull | None:
         return None
 
 
-def _ends(points: np.ndarray, dof: int) -> np.ndarray:
-    # Spools at the ends of each edge, (n_edges, dof - 1); in a vertical plane an edge is a point.
+def edge_ends(points: np.ndarray, dof: int) -> np.ndarray:
+    """Spools at the ends of the edges of the hull.
+
+    Args:
+        points: (n_cables, 3) m.
+        dof: 3, or 2 of a robot in a vertical plane, where an edge is a point.
+
+    Returns:
+        (n_edges, dof - 1) numbers from 0 on.
+    """
     count = len(points)
     if count == dof:
         return np.array([[i for i in range(count) if i != cable] for cable in range(count)])

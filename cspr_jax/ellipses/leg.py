@@ -208,11 +208,7 @@ class Ellipses(Leg):
 
     def _ellipse(self, table: EllipseTable) -> Ellipse:
         frame = self.stops.frame
-        if table.half_axes is not None:
-            axes = [np.asarray(axis) for axis in table.half_axes]
-            a, b = axes[0], axes[1] if len(axes) > 1 else np.zeros(3)
-        else:
-            a, b = circle_axes(table.radius or 0.0, table.normal, is_planar=self.stops.robot_file.is_planar)
+        a, b = table.axes(is_planar=self.stops.robot_file.is_planar)
         return Ellipse(frame.inward(table.centre), frame.turned(a), frame.turned(b))
 
     def _frequency(self, problem: Problem, ellipse: Ellipse, i: int, scene: Scene) -> float:
@@ -265,25 +261,6 @@ class Ellipses(Leg):
         columns = {field.name: getattr(plain, field.name) for field in dataclasses.fields(plain)}
         flights = np.array([turn.flight_time if isinstance(turn, Release) else np.nan for turn in turnings[1:]])
         return EllipseAnswers(**columns | changed, of_ellipses=details, flight_time=flights)
-
-
-def circle_axes(radius: float, normal: Any, *, is_planar: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Half-axes of a circle: the first as near to x, or y, as the normal allows.
-
-    Args:
-        radius: m.
-        normal: (3,) about which it turns by the rule of the right hand; None: z, of a planar robot y.
-
-    Returns:
-        (3,) each, m.
-    """
-    default = np.eye(3)[1 if is_planar else 2]
-    axis = default if normal is None else np.asarray(normal, float)
-    axis = axis / np.linalg.norm(axis)
-    nearest = np.eye(3)[0 if abs(axis[0]) < 0.9 else 1]
-    a = nearest - (nearest @ axis) * axis
-    a *= radius / np.linalg.norm(a)
-    return a, np.cross(axis, a)
 
 
 def _details(problem: Problem, hull: SpoolHull | None, turning: Turning, frame: Frame) -> dict[str, Any]:

@@ -25,7 +25,7 @@ from cspr_jax.store.disk import Disk
 from cspr_jax.store.publishing import make_folders
 
 # Keys that are tables of their own; one of them is an array of tables.
-TABLES = ("axes", "trajectory", "orientations", "launch", "workspace", "limits", "run", "pose")
+TABLES = ("axes", "trajectory", "orientations", "launch", "ellipse", "workspace", "limits", "run", "pose")
 MANY = "pose"
 WIDTH = 100
 # Every robot has these, whatever else its file holds.

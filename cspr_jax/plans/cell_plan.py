@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.arithmetic.frames import frame_of
+from cspr_jax.config.ellipse import SweepEllipse, cell_axes
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.schema.map_kinds import MAP_KINDS
@@ -28,7 +29,8 @@ def cell_plan(
             of the target.
 
     Returns:
-        what a plan file holds; None of a kind of map whose cells are no motions from pose to pose.
+        what a plan file holds; None of a kind of map whose cells are no motions from pose to pose, and of a cell
+        without a motion: an ellipse without a size, or without a frequency.
     """
     kind = MAP_KINDS[settings["map"]]
     if not kind.planned:
@@ -36,6 +38,10 @@ def cell_plan(
     shared = TrajectoryKeys.model_fields.keys() & PlanFile.model_fields.keys()
     trajectory = settings.get("trajectory", {})
     trajectory_keys = {name: value for name, value in trajectory.items() if name in shared}
+    if settings.get("limits"):
+        trajectory_keys["limits"] = settings["limits"]
+    if "ellipse" in kind.takes:
+        return _turn(settings, place, values, {"samples": samples, **trajectory_keys})
     depth = {name: place[name] for name in ("z0", "inclination") if name in place}
     used = float(values.get("used_inclination", np.nan))
     if trajectory_keys.get("inclination") == "best" and np.isfinite(used):
@@ -54,9 +60,26 @@ def cell_plan(
         target["arcs"] = count
     plan = {"schema": 1, "robot": settings["robot"], "samples": samples, **trajectory_keys, **depth}
     plan["pose"] = [_start(settings, place), target]
-    if settings.get("limits"):
-        plan["limits"] = settings["limits"]
     return plan
+
+
+def _turn(
+    settings: Mapping[str, Any], place: Mapping[str, float], values: Mapping[str, Any], keys: Mapping[str, Any]
+) -> dict[str, Any] | None:
+    # One turn on the ellipse of a cell.
+    table = SweepEllipse.model_validate(settings.get("ellipse") or {})
+    robot = settings["robot"]
+    axes = cell_axes(table, place, is_planar=bool(robot.get("planar")) or robot.get("pattern") == "2T")
+    rule = table.model_dump(mode="json", exclude_none=True)["frequency"]
+    frequency = values.get("used_frequency", place.get("frequency", rule))
+    if not isinstance(frequency, str | dict):
+        frequency = float(frequency)
+        if not (np.isfinite(frequency) and frequency > 0.0):
+            return None
+    if not np.any(axes):
+        return None
+    ellipse = {"centre": _target(settings, place), "half_axes": [axis.tolist() for axis in axes]}
+    return {"schema": 1, "robot": robot, **keys, "ellipse": {**ellipse, "frequency": frequency}, "turns": 1.0}
 
 
 def _start(settings: Mapping[str, Any], place: Mapping[str, float]) -> dict[str, Any]:

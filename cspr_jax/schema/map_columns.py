@@ -6,6 +6,14 @@ TOLERATED = ("tolerated", "not_tolerated")
 UNCERTAIN = (("limits.uncertainty", TOLERATED),)
 COMMON = ("verdict", "duration", "margin", "margin_bound", "limit_margin", "feasible_at_infinity")
 OF_TRANSITIONS = ("least_oscillations", "inclination_gain", "used_inclination", "used_z0")
+OF_OSCILLATIONS = (
+    *("oscillations", "tried_oscillations", "envelope_oscillations", *OF_TRANSITIONS),
+    *(*COMMON, *TOLERATED),
+)
+OSCILLATIONS_STORED = (
+    *("oscillations", "envelope_oscillations", "least_oscillations", "verdict", "duration", "margin"),
+    *("inclination_gain", "used_inclination", "used_z0"),
+)
 OF_INSTANTS = ("squared_oscillations", "lower_envelope", "least_oscillations", "used_inclination", "used_z0")
 OF_POSES = (
     *("arcs", "tried_arcs", "verdict", "duration", "margin", "margin_bound", "det_margin", "cable_distance"),
@@ -32,5 +40,14 @@ OF_LAUNCHES = (
 OF_SWINGS = (
     *("verdict", "release_speed", "largest_margin", "swing_amplitude", "flight_time"),
     *("release_x", "release_y", "release_z"),
+)
+OF_ELLIPSES = (
+    *("verdict", "margin", "used_frequency", "lowest_frequency", "highest_frequency", "natural_frequency"),
+    *("binding_cable", "duration", "tension_margin", "limit_margin"),
+)
+ELLIPSES_STORED, OF_LIMITED_ELLIPSES = OF_ELLIPSES[:-2], OF_ELLIPSES[-2:]
+ELLIPSE_KEYS = (
+    *("axes.circle_radius", "axes.scale", "axes.tilt_azimuth", "axes.tilt", "axes.frequency"),
+    *("ellipse", "limits"),
 )
 OF_LENGTHS = ("sigma_p", "sigma_r")

@@ -15,7 +15,7 @@ from typing import Any, Literal
 from cspr_jax.errors import InputError
 from cspr_jax.schema import map_columns as columns
 from cspr_jax.schema import workspace_columns as of_workspaces
-from cspr_jax.schema.quantities import EVERY, POSE_VERDICT, QUANTITIES, Quantity
+from cspr_jax.schema.quantities import EVERY, OF_ELLIPSES, POSE_VERDICT, QUANTITIES, Quantity
 from cspr_jax.schema.quantities import register as register_quantity
 from cspr_jax.schema.tiles import LARGEST_TILE, ORDINARY_COST, CellCost
 
@@ -133,20 +133,8 @@ MAP_KINDS: dict[str, MapKind] = {
             description="smallest number of oscillations of a transition from rest to each target",
             implementation="cspr_jax.swings.oscillations_map:MinimumOscillationsMap",
             cost=CellCost(seconds=1e-4, limits=0.3),
-            quantities=(
-                *(
-                    "oscillations",
-                    "tried_oscillations",
-                    "envelope_oscillations",
-                    *columns.OF_TRANSITIONS,
-                    *columns.COMMON,
-                ),
-                *columns.TOLERATED,
-            ),
-            stored=(
-                *("oscillations", "envelope_oscillations", "least_oscillations", "verdict", "duration", "margin"),
-                *("inclination_gain", "used_inclination", "used_z0"),
-            ),
+            quantities=columns.OF_OSCILLATIONS,
+            stored=columns.OSCILLATIONS_STORED,
             pictured=("oscillations",),
             families=("transition",),
             planned=True,
@@ -301,6 +289,23 @@ MAP_KINDS: dict[str, MapKind] = {
             start="point",
             takes=("axes.from_x", "axes.from_y", "axes.from_z", "launch", "limits"),
             cells=1024,
+        ),
+        MapKind(
+            name="ellipse",
+            title="Feasible frequencies of ellipses",
+            description="frequencies, margins and verdicts of turns on an ellipse about each centre",
+            implementation="cspr_jax.ellipses.map:EllipseMap",
+            cost=CellCost(seconds=2e-6, limits=1.0),
+            quantities=columns.OF_ELLIPSES,
+            stored=columns.ELLIPSES_STORED,
+            stored_with=(("limits", columns.OF_LIMITED_ELLIPSES),),
+            rows=OF_ELLIPSES,
+            pictured=("margin", "verdict"),
+            motionless=columns.OF_ELLIPSES,
+            families=("ellipse",),
+            planned=True,
+            patterns=("2T", "3T"),
+            takes=columns.ELLIPSE_KEYS,
         ),
         MapKind(
             name="sensitivity",

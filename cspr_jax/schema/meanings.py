@@ -28,6 +28,26 @@ def line_bounds(settings: Mapping[str, Any]) -> tuple[str, ...]:
     return ("none", *("cables " + ", ".join(map(str, row)) for row in chosen), "max_acceleration", *moving)
 
 
+def slack_cables(settings: Mapping[str, Any]) -> tuple[str, ...]:
+    """Cables that get slack first on an ellipse.
+
+    Args:
+        settings: of a sweep, as for `line_bounds`.
+
+    Returns:
+        the words of 0, 1, 2, ...
+    """
+    robot = settings["robot"]
+    count = 3 if robot.get("translation_only") else len(robot["base_points"])
+    dof = 2 if robot.get("planar") or robot.get("pattern") == "2T" else 3
+    if count == dof:
+        cables = [f"cable {k + 1}" for k in range(count)]
+    else:
+        pairs = itertools.combinations(range(1, count + 1), dof - 1)
+        cables = [f"all but {', '.join(map(str, pair))}" for pair in pairs]
+    return ("unknown", *cables, "depth")
+
+
 CELL_SIDES = ("not decided", "inside", "outside")
 
 
@@ -63,6 +83,7 @@ MOST = 1000
 # By the name that a quantity's row gives: words of 0, 1, 2, ... for the settings of a sweep.
 MEANINGS: dict[str, Callable[[Mapping[str, Any]], tuple[str, ...]]] = {
     "line-bounds": line_bounds,
+    "slack-cables": slack_cables,
     "cell-sides": cell_sides,
     "nearest-bodies": nearest_bodies,
 }

@@ -67,13 +67,22 @@ AXES = {
             "Direction of the target seen from the vertical through the centroid, from x to y.",
         ),
         Quantity("z", "m", "z of the target", "Vertical coordinate of the target; see z_axis."),
+        Quantity("circle_radius", "m", "radius of the circle", "Radius of the circle about the target."),
+        Quantity("scale", "1", "scale of the ellipse", "Factor of the half-axes that the sweep gives."),
         Quantity(
             "tilt_azimuth",
             "rad",
             "azimuth phi of the tilt",
-            "Angle phi of tilt and torsion, from the direction of the target; in maps of workspaces, from x.",
+            "Angle phi of tilt and torsion, from the direction of the target; in maps of workspaces and ellipses, "
+            "from x.",
         ),
-        Quantity("tilt", "rad", "tilt theta", "Angle between the platform's normal and the vertical."),
+        Quantity(
+            "tilt",
+            "rad",
+            "tilt theta",
+            "Angle between the platform's normal and the vertical; of ellipses, by which they are turned about the "
+            "level line in the direction phi.",
+        ),
         Quantity("torsion", "rad", "torsion sigma", "Angle sigma of tilt and torsion, Z_phi X_theta Z_(sigma - phi)."),
         Quantity(
             "z0",
@@ -89,6 +98,7 @@ AXES = {
         ),
         Quantity("tau", "1", "normalised time", "Time since the start of the segment over its duration."),
         Quantity("cable", "1", "cable", "Number of a cable, in cable order from 1 on."),
+        Quantity("frequency", "rad s-1", "frequency", "Frequency of the turns on the ellipse."),
         Quantity("from_x", "m", "x of the start point", "Horizontal coordinate of the start point."),
         Quantity("from_y", "m", "y of the start point", "Horizontal coordinate of the start point."),
         Quantity("from_z", "m", "z of the start point", "Vertical coordinate of the start point."),
@@ -286,6 +296,33 @@ POSE_VERDICT = Quantity(
     "Bit flags of the reasons why the robot cannot rest there under all conditions; 0: it can.",
     "uint32",
     unflagged="inside",
+)
+# Maps of ellipses have these rows in place of those of motions between poses.
+OF_ELLIPSES = (
+    Quantity(
+        "verdict",
+        "1",
+        "verdict",
+        f"Bit flags of the verdict of turns on the ellipse at `used_frequency`{HOW}; 0: feasible.",
+        "uint32",
+        unflagged="feasible",
+    ),
+    Quantity(
+        "margin",
+        "1",
+        "smallest normalised pseudotension",
+        "Smallest pseudotension along the ellipse at `used_frequency`, 1 at rest below the centroid of the spools, or "
+        "smallest depth below the spools over that of the centre, whichever is less; NaN for spools in several planes.",
+        better="larger",
+    ),
+    Quantity("duration", "s", "duration of a turn", "Duration of one turn at `used_frequency`."),
+    Quantity(
+        "limit_margin",
+        "1",
+        "smallest slack of the limits",
+        "Smallest slack of the limits beside tensions, over what they allow, of the floor over the robot's size; "
+        "infinite without such limits, NaN where only formulas are used.",
+    ),
 )
 # Why accessible orientations are not attained, by the best candidate's flags.
 REFUSALS = {
@@ -750,6 +787,50 @@ QUANTITIES = {
             "point masses.",
         ),
         Quantity("used_z0", "m", "depth of P0 below the centroid", "Depth of P0 that the inclination requires."),
+        Quantity(
+            "used_frequency",
+            "rad s-1",
+            "frequency of the margin",
+            "Frequency at which verdict and margin hold; 0, where slower is always better: the limit of slow turns; "
+            "NaN: there is none.",
+        ),
+        Quantity(
+            "lowest_frequency",
+            "rad s-1",
+            "lowest feasible frequency",
+            "Lower end of the frequencies at which all cables stay taut, other limits aside; 0 where every slow turn "
+            "is feasible, NaN where no frequency is, or spools in several planes allow no formula.",
+        ),
+        Quantity(
+            "highest_frequency",
+            "rad s-1",
+            "highest feasible frequency",
+            "Upper end, likewise; infinite where nothing bounds it.",
+        ),
+        Quantity(
+            "natural_frequency",
+            "rad s-1",
+            "natural frequency",
+            "Of a pendulum from the plane of the spools to the centre; NaN where the centre is not below the spools.",
+        ),
+        Quantity(
+            "binding_cable",
+            "1",
+            "cable that gets slack first",
+            "Number of the cable whose pseudotension is the smallest of all at its smallest, at `used_frequency`; on "
+            "redundant cables that of the two cables that alone keep their tension, in the order 1 2, 1 3, ...; the "
+            "last number: the depth below the spools; 0: unknown.",
+            "int16",
+            meanings="slack-cables",
+        ),
+        Quantity(
+            "tension_margin",
+            "N",
+            "smallest distance of a tension from its limits",
+            "Smallest along a turn, of redundant cables that of the tensions that keep it largest; negative where they "
+            "break a limit; NaN where only formulas are used.",
+            signed=True,
+        ),
     )
 }
 EVERY = ChainMap(AXES, QUANTITIES, BEST, TRAJECTORY, SEGMENTS, FLIGHT, FAILURES)

@@ -20,7 +20,7 @@ _SPECIAL = (
     *(f"axes.{name}" for name in Axes.model_fields if name not in _TARGETS),
     *("trajectory.inclination", "trajectory.beta_hat", "trajectory.beat"),
     *("trajectory.max_acceleration", "trajectory.rule"),
-    *("limits", "limits.uncertainty", "orientations", "orientations.values", "launch", "workspace"),
+    *("limits", "limits.uncertainty", "orientations", "orientations.values", "launch", "workspace", "ellipse"),
 )
 # A hint names at most so many kinds.
 _FEW = 3
@@ -73,6 +73,9 @@ def check_points(axes: dict[str, np.ndarray], path: Path) -> None:
         ("radius", lambda p: p >= 0.0, "a number >= 0"),
         ("inclination", lambda p: np.abs(p) < 1.0, "a number in ]-1, 1["),
         ("tau", lambda p: (p >= 0.0) & (p <= 1.0), "a number in [0, 1]"),
+        ("circle_radius", lambda p: p >= 0.0, "a number >= 0"),
+        ("scale", lambda p: p >= 0.0, "a number >= 0"),
+        ("frequency", lambda p: p > 0.0, "a number > 0"),
         ("cable", lambda p: (p >= 1.0) & (p == np.round(p)), "a whole number from 1 on"),
     ):
         points = axes.get(name, np.empty(0))

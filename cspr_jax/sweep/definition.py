@@ -223,7 +223,8 @@ def attributes(sweep: Sweep) -> dict[str, Any]:
     robot, words = sweep.robot, [sweep.kind.title, f"robot {sweep.robot.name}"]
     if "workspace" in sweep.kind.takes:
         words += (sweep.keys.workspace or WorkspaceTable()).conditions
-    if sweep.kind.families and sweep.keys.trajectory.takes_amplitude:
+    # Turns on one ellipse have no amplitude function.
+    if sweep.kind.families and sweep.keys.trajectory.takes_amplitude and "ellipse" not in sweep.kind.takes:
         words.append(f"amplitude {sweep.settings['trajectory']['amplitude']}")
     return {
         "Conventions": "CF-1.11",

@@ -11,6 +11,7 @@ from cspr_jax.outputs.plots.comparison import Compared, comparison_figure
 from cspr_jax.outputs.plots.conditions import excluded, is_workspace, said, shown_first
 from cspr_jax.outputs.plots.envelope import AXES, envelope_figure
 from cspr_jax.outputs.plots.fixed_axes import first_of, notes
+from cspr_jax.outputs.plots.frequencies import SHOWN, frequencies_figure, has_frequencies, mark_ends, turns_in_words
 from cspr_jax.outputs.plots.labels import PANELS, chosen, heading, robot_name, values
 from cspr_jax.outputs.plots.lines import PlottedLine, line_figure, lines_of, names_of, overlaid
 from cspr_jax.outputs.plots.motion_comparison import motion_comparison_figure
@@ -181,6 +182,11 @@ def _map_figure(result: Result, quantity: str | None, at: dict[str, float], line
     view = _view(result, quantity, at)
     if lines is not None:
         return _lines_figure(result, view, lines)
+    if quantity is None and has_frequencies(result, view.across):
+        ends = {name: _view(result, name, at).data for name in SHOWN}
+        return frequencies_figure(
+            result, view.across[0], ends, _constant(result, view._replace(name="lowest_frequency"))
+        )
     if len(view.across) == 1:
         axis = view.across[0]
         only = {"": [PlottedLine(result.axes[axis], view.data, excluded=view.excluded)]}
@@ -192,12 +198,16 @@ def _map_figure(result: Result, quantity: str | None, at: dict[str, float], line
     if not panels:
         data, hatched, says = data[..., None], hatched[..., None], None if says is None else says[..., None]
     section = Section(view.name, view.across[:2], panels, view.place, _constant(result, view), hatched)
-    return section_figure(result, section, data, says)
+    figure = section_figure(result, section, data, says)
+    if view.across[1:] == ["frequency"] and set(SHOWN) <= set(result.data):
+        first = at | {"frequency": float(result.axes["frequency"][0])}
+        mark_ends(figure, result, view.across[0], {name: _view(result, name, first).data for name in SHOWN})
+    return figure
 
 
 def _constant(result: Result, view: MapView, name: str | None = None) -> list[str]:
     fixed = notes(result, view.name if name is None else name, view.fixed, [*view.across, *view.place])
-    return [*said(result), *fixed]
+    return [*said(result), *turns_in_words(result, view.name), *fixed]
 
 
 def _telling_cells(result: Result, at: dict[str, float], order: list[str]) -> np.ndarray:

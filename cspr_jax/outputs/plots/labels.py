@@ -11,6 +11,8 @@ from cspr_jax.store.result import Result
 # Axes whose names in files are no words.
 WORDS = {
     "tilt_azimuth": "azimuth of the tilt",
+    "circle_radius": "radius of the circle",
+    "scale": "scale of the ellipse",
     "tau": "normalised time",
     "inclination": "inclination v",
     "from_x": "x of the start",
