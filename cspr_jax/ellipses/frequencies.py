@@ -108,11 +108,10 @@ def _outermost(slack: Callable, low: float, high: float, natural: float, rule: s
     if not len(feasible):
         return natural
     first = int(feasible[0])
-    if first == 0:
-        if (high >= natural * WIDEST) if rule == "fastest" else (low <= natural / WIDEST):
-            raise InputError("frequency", rule, "a number: nothing bounds the frequency")
-        return float(order[0])
-    inside, outside = float(order[first]), float(order[first - 1])
+    inside = float(order[first])
+    if first == 0 and ((high >= natural * WIDEST) if rule == "fastest" else (low <= natural / WIDEST)):
+        raise InputError("frequency", rule, "a number: nothing bounds the frequency")
+    outside = float(order[max(first - 1, 0)])
     for _ in range(HALVINGS):
         middle = 0.5 * (inside + outside)
         inside, outside = (middle, outside) if slack(np.array([middle]))[0] > 0.0 else (inside, middle)
