@@ -25,6 +25,7 @@ from cspr_jax.motions.motion import Placed
 from cspr_jax.motions.proved_answers import MotionProof, proof_of
 from cspr_jax.motions.stretching import SLOWEST, least_stretching
 from cspr_jax.outputs import check_report
+from cspr_jax.outputs.limits_touched import TouchedLimit, limits_touched
 from cspr_jax.plans import planning
 from cspr_jax.plans.long_motions import long_plan
 from cspr_jax.robots.cables import AnyRobot
@@ -47,7 +48,8 @@ class Check:
     @cached_property
     def _object(self) -> dict[str, Any]:
         with double_precision():
-            return check_report.check_object(self.plan)
+            touched = [row.to_dict() for row in self._touched]
+            return check_report.check_object(self.plan) | {"on_limit": touched}
 
     def to_dict(self) -> dict[str, Any]:
         """The check as plain values, for JSON.
@@ -71,7 +73,7 @@ class Check:
         Returns:
             the lines that `cspr check` prints above its table.
         """
-        return check_report.check_lines(self.plan)
+        return check_report.check_lines(self.plan) + [row.text for row in self._touched]
 
     @property
     def verdict(self) -> str:
@@ -112,6 +114,11 @@ class Check:
     def demands(self) -> dict[str, dict[str, Any]]:
         """Largest demand on each limit: value, proved bound, what is allowed, cable and instant."""
         return self._object["demands"]
+
+    @cached_property
+    def _touched(self) -> list[TouchedLimit]:
+        with double_precision():
+            return limits_touched(self.plan, self._proof)
 
     @property
     def _proof(self) -> MotionProof:

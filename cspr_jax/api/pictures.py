@@ -13,7 +13,7 @@ from cspr_jax.outputs.plots.selection import result_at
 from cspr_jax.outputs.plots.style import Style, in_style, laid_out, rendered, style_of
 from cspr_jax.runtime.stages import stage
 from cspr_jax.store.disk import Disk
-from cspr_jax.store.publishing import publish
+from cspr_jax.store.publishing import check_place, publish
 from cspr_jax.store.result import Result, open_result
 
 
@@ -68,6 +68,7 @@ def plot(  # noqa: PLR0913
     if not sources:
         raise ConfigError("results", "[]: must be one result, or more")
     style = style_of(size, dpi, font_size, preset, title=title)
+    check_place(None if output is None else Path(output))
     stage("reading")
     files = [one if isinstance(one, Result) else result_at(Path(one)) for one in sources]
     loaded = [one if isinstance(one, Result) else open_result(one) for one in files]

@@ -25,7 +25,7 @@ from cspr_jax.plans.cell_plan import cell_plan
 from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.store.disk import Disk
-from cspr_jax.store.publishing import publish
+from cspr_jax.store.publishing import check_place, publish
 from cspr_jax.store.result import Result, open_result
 
 # Motions of cells where nobody says how many, and at most; rows a second of a plan's motion.
@@ -69,6 +69,7 @@ def report(
     output = Path(output)
     if output.suffix != ".html":
         raise ConfigError("-o", f"{output}: must end in .html")
+    check_place(output)
     if not 0 <= trajectories <= MOST:
         raise ConfigError("--trajectories", f"{trajectories}: must be an integer from 0 to {MOST}")
     try:

@@ -19,6 +19,7 @@ from cspr_jax.cli.command import (
 from cspr_jax.errors import ConfigError, ExitCode
 from cspr_jax.outputs.plots.options import add_look
 from cspr_jax.runtime.progress import waiting
+from cspr_jax.store.publishing import check_place
 
 _STEP = "longest step of MuJoCo, s (default 0.0005)"
 
@@ -59,6 +60,7 @@ def check_files(options: argparse.Namespace) -> None:
 
     Raises:
         ConfigError: an ending, a number or a combination that is not allowed.
+        StoreError: a folder that does not exist.
     """
     if options.output is not None and options.output.suffix not in (".csv", ".h5"):
         raise ConfigError("-o", f"{options.output}: must end in .csv or .h5")
@@ -79,6 +81,8 @@ def check_files(options: argparse.Namespace) -> None:
     _check_step(options)
     if options.anyway and options.output is None and options.mjcf is None and options.animate is None:
         raise ConfigError("--anyway", "must be absent without -o, --mjcf or --animate")
+    for path in (options.output, options.mjcf, options.animate):
+        check_place(path)
 
 
 def _check_step(options: argparse.Namespace) -> None:
@@ -151,6 +155,7 @@ def _replay(options: argparse.Namespace) -> int:
     if options.output is not None and not options.output.suffix:
         raise ConfigError("-o", f"{options.output}: must end in .png, .pdf, .svg or another picture format")
     _check_step(options)
+    check_place(options.output)
     from cspr_jax.outputs.plots.style import style_of
     from cspr_jax.outputs.replay import need_mujoco
 

@@ -87,10 +87,10 @@ class MotionProof(NamedTuple):
         """
         order = np.argsort(self.proof.high / self.scales).tolist()
         if not self.broken.any():
-            return (dataclasses.replace(_cause(self, order[0], frame), criterion=Verdict.UNDECIDED.text),)
+            return (dataclasses.replace(cause_of(self, order[0], frame), criterion=Verdict.UNDECIDED.text),)
         order = [k for k in order if self.broken[k]]
         flags = [self.criteria[k].flag for k in order]
-        return tuple(_cause(self, k, frame) for j, k in enumerate(order) if flags.index(flags[j]) == j)
+        return tuple(cause_of(self, k, frame) for j, k in enumerate(order) if flags.index(flags[j]) == j)
 
 
 def united(intervals: np.ndarray) -> np.ndarray:
@@ -138,7 +138,16 @@ class ProvedAnswers(Answers):
         return self.proof[i].causes(frame)
 
 
-def _cause(case: MotionProof, k: int, frame: Frame) -> Cause:
+def cause_of(case: MotionProof, k: int, frame: Frame) -> Cause:
+    """A criterion of a proof as a cause.
+
+    Args:
+        k: its number.
+        frame: of the robot file, in whose axes causes are.
+
+    Returns:
+        the cause, where its slack is smallest.
+    """
     row, proof = case.criteria[k], case.proof
     needed, allowed = row.value(float(proof.high[k])), row.allowed
     if row.flag == Verdict.BELOW_FLOOR:

@@ -3,7 +3,7 @@
 import dataclasses
 from collections.abc import Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from cspr_jax.motions.time_proof import TimeProof
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.robots.limits import NO_LIMITS
 from cspr_jax.schema.families import FAMILIES
-from cspr_jax.splines.files import kept_to, placed_inward, reference_of
+from cspr_jax.splines.files import centre_from, kept_to, placed_inward, reference_of
 from cspr_jax.splines.motion import Spline
 from cspr_jax.splines.reading import window_splines
 from cspr_jax.store.motion_samples import motion_windows
@@ -84,7 +84,7 @@ def _judged(
     axes, limits = reference_of(build_robot(robot_file, keys, path)), problem.limits
     limits = limits if problem.robot.n_cables > problem.robot.dof else NO_LIMITS
     tables = motion_windows(path)
-    says: dict[str, object] = {}
+    says: dict[str, Any] = {}
 
     def noted():
         for window in tables:
@@ -96,8 +96,7 @@ def _judged(
     settings = {"z_axis": robot_file.z_axis, "interpolation": keys.interpolation, "ends": keys.ends}
     for start, curve in window_splines(noted(), **settings):
         reference = np.array(IDENTITY) if says["is_written"] else axes
-        is_origin = (keys.point or says["point"]) == "origin" and robot_file.centre_of_mass is not None
-        centre = np.asarray(robot_file.centre_of_mass) if is_origin else None
+        centre = centre_from(robot_file, keys.point or says["point"])
         curve = kept_to(robot_file.own_pattern, curve, is_planar=bool(says["is_planar"]))
         motion: Spline = placed_inward(curve, frame, reference, centre)
         extremes = demands(problem.robot, [motion], [SAMPLES + 1], limits, keys.tension_rule)

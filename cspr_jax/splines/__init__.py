@@ -13,6 +13,7 @@ Files, each importing only from those above it:
     motion              positions and rotations over time
     several             blocks of several motions together
     interpolation       cubic, quintic and Hermite curves through samples
+    thinned             curves through every second sample
     reading             tables and pieces that were read, curves of SciPy, tables window by window
     noise               noise of recorded samples, and smoothing
     files               motions of files and arrays, in the axes of the kernels

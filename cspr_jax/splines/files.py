@@ -12,6 +12,7 @@ from cspr_jax.arithmetic.frames import IDENTITY, Frame
 from cspr_jax.arithmetic.rotations import products
 from cspr_jax.config.motions.table import MotionPieces, MotionTable
 from cspr_jax.config.motions.text import LONGEST, SHORTEST
+from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import InputError
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.kernel_axes import centred
@@ -25,6 +26,7 @@ from cspr_jax.splines.reading import pieces_of, spline_of
 MANY, MOVING = 30, 0.2
 STILL = 1e-6  # m/s; slower samples are at rest but for rounding
 BESIDE = 1e-9  # share of the size of a motion by which rounding takes it off the plane or the guide of a robot
+JOINT_STAYS = 1e-6  # m; by which the joint of a robot moves in a table of six decimals
 BACK = np.array([1.0, -1.0, -1.0, -1.0])
 
 
@@ -105,7 +107,8 @@ def kept_to(pattern: str, spline: Spline, *, is_planar: bool) -> Spline:
         the motion.
 
     Raises:
-        InputError: a motion that leaves the plane or the guide of the robot, or one without y of a robot in space.
+        InputError: a motion that leaves the plane or the guide of the robot, that moves the joint about which the robot
+            turns, or one without y of a robot in space.
     """
     row, position = PATTERNS[pattern], np.array(spline.position)
     turning = None if spline.quaternion is None else np.array(spline.quaternion)
@@ -123,6 +126,12 @@ def kept_to(pattern: str, spline: Spline, *, is_planar: bool) -> Spline:
             turning[:, :, [1, 3]] = 0.0
     if row.name == "1T" and np.ptp(position[:, :, :2], axis=(0, 1)).max() > size:
         raise InputError("positions", None, "must be the same everywhere on a vertical guide", fault="x and y")
+    if row.is_jointed:
+        moved = float(np.ptp(position, axis=(0, 1)).max())
+        if not moved <= JOINT_STAYS:
+            allowed = "must be those of the joint about which the robot turns, the same everywhere"
+            raise InputError("positions", None, allowed, fault=f"they differ by {moved:.3g} m")
+        position[:] = position[0, 0]
     return dataclasses.replace(spline, position=leaf(position), quaternion=None if turning is None else leaf(turning))
 
 
@@ -175,6 +184,20 @@ def placed_inward(spline: Spline, frame: Frame, reference: np.ndarray, centre: n
     if centre is None or not np.any(centre) or turning is None:
         return moved
     return dataclasses.replace(moved, offset=leaf(_rotation(reference).apply(frame.turned(centre))))
+
+
+def centre_from(robot_file: RobotFile, point: str | None) -> np.ndarray | None:
+    """Mass centre of a platform from the point whose positions a motion has.
+
+    Args:
+        point: "mass-centre", "origin" of the platform's axes, or None.
+
+    Returns:
+        (3,) in the axes of the platform in the file, m; None: the motion has the positions that kernels take, those of
+        the mass centre, or of the joint about which the robot turns.
+    """
+    centre, is_jointed = robot_file.centre_of_mass, PATTERNS[robot_file.own_pattern].is_jointed
+    return None if centre is None or is_jointed or point != "origin" else np.asarray(centre)
 
 
 def reference_of(robot: AnyRobot) -> np.ndarray:

@@ -17,8 +17,9 @@ from cspr_jax.motions.motion import Motion, Placed
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import proved_answers
 from cspr_jax.motions.waypoints import Waypoints
+from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.splines.files import kept_to, moving_ends, placed_inward, reference_of, source_spline
+from cspr_jax.splines.files import centre_from, kept_to, moving_ends, placed_inward, reference_of, source_spline
 from cspr_jax.splines.interpolation import interpolated
 from cspr_jax.splines.motion import Spline, part
 from cspr_jax.splines.noise import noise_notes, smoothed
@@ -109,15 +110,16 @@ class Splines(Leg):
         reference = np.array(IDENTITY)
         if not getattr(source, "from_reference", False):
             reference = reference_of(build_robot(stops.robot_file, stops.keys, stops.path))
-        centre = stops.robot_file.centre_of_mass if self._point(name, source) == "origin" else None
-        return placed_inward(curve, stops.frame, reference, None if centre is None else np.asarray(centre))
+        return placed_inward(curve, stops.frame, reference, centre_from(stops.robot_file, self._point(name, source)))
 
     def _point(self, name: str, source: Any) -> str:
-        point, centre = self.stops.keys.point or getattr(source, "point", None), self.stops.robot_file.centre_of_mass
-        if point is None and centre is not None and any(centre):
+        point, centre = self.stops.keys.point or getattr(source, "point", None), None
+        if point is None:
+            centre = centre_from(self.stops.robot_file, "origin")
+        if centre is not None and centre.any():
             self._notes.append(
-                f"{name}: hint: positions are taken as those of the mass centre, {list(centre)} m from the origin of "
-                'the platform\'s axes; if they are those of the origin, say point = "origin"'
+                f"{name}: hint: positions are taken as those of the mass centre, {centre.tolist()} m from the origin "
+                'of the platform\'s axes; if they are those of the origin, say point = "origin"'
             )
         return point or "mass-centre"
 
@@ -184,7 +186,7 @@ class Splines(Leg):
         else:
             derivatives = {"end_velocities": velocities[[0, -1]], "end_accelerations": accelerations[[0, -1]]}
         try:
-            return interpolated(
+            curve = interpolated(
                 np.array([pose.time or 0.0 for pose in poses]),
                 points[chosen],
                 pose_quaternions(stops, points)[chosen] if isinstance(problem.robot, PlatformRobot) else None,
@@ -192,6 +194,8 @@ class Splines(Leg):
                 ends=keys.ends or "rest",
                 **derivatives,
             )
+            pattern = stops.robot_file.own_pattern
+            return kept_to(pattern, curve, is_planar=False) if PATTERNS[pattern].is_jointed else curve
         except InputError as error:
             raise ConfigError(stops.path, f"{stops.name(first)} to {stops.name(last)}: {error}") from error
 

@@ -6,8 +6,8 @@ from pathlib import Path
 from cspr_jax.config.formats.xml_text import LONGEST_FAULT
 from cspr_jax.config.motions import caspr, text
 from cspr_jax.config.motions.table import MotionPieces, MotionTable
-from cspr_jax.errors import ConfigError
-from cspr_jax.store.result import Result, open_result
+from cspr_jax.errors import ConfigError, StoreError, printable
+from cspr_jax.store.result import open_result
 
 HDF5 = (".h5", ".hdf5", ".nc")
 XML = ".xml"
@@ -24,8 +24,7 @@ def read_motion(path: Path, trajectory: str | None = None) -> MotionTable | Moti
         samples, or polynomial pieces.
 
     Raises:
-        ConfigError: a mistake in the file.
-        StoreError: an HDF5 file that is damaged or not of this program.
+        ConfigError: a mistake in the file, or an HDF5 file that is damaged or not of this program.
     """
     path, ending = Path(path), Path(path).suffix.lower()
     if ending == XML:
@@ -34,7 +33,7 @@ def read_motion(path: Path, trajectory: str | None = None) -> MotionTable | Moti
         raise ConfigError(
             path, f"trajectory = {trajectory!r}: must be absent: only files of CASPR have several"[:LONGEST_FAULT]
         )
-    return _samples(path, open_result(path)) if ending in HDF5 else text.read(path)
+    return _samples(path) if ending in HDF5 else text.read(path)
 
 
 def motion_windows(path: Path, rows: int = text.WINDOW) -> Iterator[text.MotionWindow]:
@@ -48,7 +47,6 @@ def motion_windows(path: Path, rows: int = text.WINDOW) -> Iterator[text.MotionW
 
     Raises:
         ConfigError: as `read_motion`, and for trajectories of CASPR, which are polynomial pieces.
-        StoreError: as `read_motion`.
     """
     path, ending = Path(path), Path(path).suffix.lower()
     if ending == XML:
@@ -56,11 +54,15 @@ def motion_windows(path: Path, rows: int = text.WINDOW) -> Iterator[text.MotionW
     if ending not in HDF5:
         yield from text.windows(path, rows)
         return
-    table = _samples(path, open_result(path))
+    table = _samples(path)
     yield text.MotionWindow(table, 0, len(table.times) - 1, is_last=True)
 
 
-def _samples(path: Path, result: Result) -> MotionTable:
+def _samples(path: Path) -> MotionTable:
+    try:
+        result = open_result(path)
+    except StoreError as error:  # it is the user's input, as a table of text is
+        raise ConfigError(path, str(error).removeprefix(f"{printable(path)}: ")) from error
     if "position" not in result.data or len(result.axes.get("t", ())) < 2:
         raise ConfigError(path, "is a map, or a plan without a motion: must be a motion of `cspr plan -o`")
     data = result.data

@@ -35,7 +35,7 @@ def read_table(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
         with path.open(encoding="utf-8-sig", newline=None) as file:
             heads = file.readline(LARGEST_HEADER).rstrip("\n").split(",")
             places = _places(heads)
-            table = np.loadtxt(_whole(file), delimiter=",", comments=None, ndmin=2)
+            table = np.loadtxt(_rows(file), delimiter=",", comments=None, ndmin=2)
     except OSError as error:
         raise unreadable(path, error) from error
     except ValueError as error:  # of a number, a row or a letter that is none
@@ -52,14 +52,16 @@ def read_table(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     return attributes, arrays
 
 
-def _whole(file):
-    # The lines of the table; each ends in a line break, the last one too.
-    line = None
+def _rows(file):
+    # The lines of the table behind the comments below its header; each ends in a line break, the last one too.
+    line, has_rows = "", False
     for line in file:
         if not line.endswith("\n"):
             raise DamagedError("its last line is cut off")
-        yield line
-    if line is None:
+        has_rows = has_rows or not line.startswith("#")
+        if has_rows:
+            yield line
+    if not has_rows:
         raise DamagedError("it has no rows")
 
 

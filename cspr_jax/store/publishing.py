@@ -5,6 +5,7 @@ folder, flushed, renamed, and the folder flushed. A crash leaves the old state o
 """
 
 import contextlib
+import errno
 import os
 import secrets
 from collections.abc import Iterator
@@ -24,6 +25,34 @@ def part_of(path: Path) -> Path:
         the name, in the same folder.
     """
     return path.with_name(f".{path.name}.{secrets.token_hex(6)}.part")
+
+
+def check_place(path: Path | None) -> None:
+    """Refuse a file that cannot be written where it is to be, before the work of which it is the end.
+
+    Args:
+        path: of the file; None: none is to be written.
+
+    Raises:
+        StoreError: its folder does not exist or takes no files, or it is a folder itself.
+    """
+    if path is None:
+        return
+    number = next(
+        (
+            number
+            for number, is_so in (
+                (errno.EISDIR, path.is_dir()),
+                (errno.ENOENT, not path.parent.exists()),
+                (errno.ENOTDIR, not path.parent.is_dir()),
+                (errno.EACCES, not os.access(path.parent, os.W_OK | os.X_OK)),
+            )
+            if is_so
+        ),
+        None,
+    )
+    if number is not None:
+        raise refusal(path, OSError(number, os.strerror(number)))
 
 
 @contextlib.contextmanager

@@ -164,3 +164,27 @@ def test_positions_of_the_origin_of_a_platform():
     assert other.margin != pytest.approx(by_centre.margin, rel=1e-2) and "mass centre" in other.plan.warnings[0]
     rows = by_origin.plan.rows()
     np.testing.assert_allclose(rows["position"][0], origin[0] + centre, atol=1e-9)
+
+
+@pytest.mark.parametrize("share", [-1e-7, 1e-7])
+def test_a_motion_on_its_limit_says_so(share):
+    """A plumb swing that falls as fast as it can, by a ten-millionth slower or faster: its rows tell no more.
+
+    Its acceleration changes least where it is largest, so that pieces between rows hardly miss that.
+    """
+    rate, times = 4.0, np.linspace(0.0, 4.0, 101)
+    size = 9.81 * (1.0 + share) / rate**2
+
+    def check(times):
+        phase = rate * times
+        heights = np.stack([1.5 - size * np.cos(phase), rate * size * np.sin(phase), rate**2 * size * np.cos(phase)])
+        columns = np.zeros((3, len(times), 3))
+        columns[:, :, 2] = heights
+        return cspr_jax.check("prototype", times, columns[0], velocities=columns[1], accelerations=columns[2])
+
+    coarse, fine = check(times), check(np.linspace(0.0, 4.0, 3201))
+    assert fine.feasible == (share < 0.0)
+    (row,) = coarse.to_dict()["on_limit"]
+    assert row["criterion"] == "slack_cable" and abs(row["needed"]) < 1e-7 < row["tolerance"] < 1e-5
+    assert any(line.startswith("on its limit") for line in coarse.lines())
+    assert fine.to_dict()["on_limit"] == [] and not any(line.startswith("on its limit") for line in fine.lines())

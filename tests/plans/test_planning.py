@@ -53,7 +53,7 @@ def free(tmp_path_factory):
 
 def columns(path: Path) -> dict[str, np.ndarray]:
     """A motion file by name: t (n,), the rest (n, 3)."""
-    heads, *rows = csv.reader(path.read_text("utf-8").splitlines())
+    heads, *rows = csv.reader(line for line in path.read_text("utf-8").splitlines() if line[0] != "#")
     names = ("position", "velocity", "acceleration", "length", "rate", "tension")
     assert heads == ["t", *(f"{n}_{k}" for n in names for k in ("xyz" if n in names[:3] else "123"))]
     table = np.array(rows, float)

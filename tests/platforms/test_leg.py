@@ -364,7 +364,8 @@ def test_the_motion(tmp_path):
     code, out, err = plan(tmp_path, SHORT, "--json", "-o", tmp_path / "motion.csv")
     found = json.loads(out)
     assert (code, err) == (0, "") and [s["cable_interference"] for s in found["segments"]] == [False, False]
-    heads, *rows = csv.reader((tmp_path / "motion.csv").read_text().splitlines())
+    lines = (tmp_path / "motion.csv").read_text().splitlines()
+    heads, *rows = csv.reader(line for line in lines if line[0] != "#")
     vectors = [f"{n}_{k}" for n in ("position", "velocity", "acceleration") for k in "xyz"]
     turns = [*(f"quaternion_{k}" for k in "wxyz"), *(f"{n}_{k}" for n in ("omega", "omega_dot") for k in "xyz")]
     assert heads == ["t", *vectors, *turns, *(f"{n}_{k}" for n in ("length", "rate", "tension") for k in range(1, 7))]

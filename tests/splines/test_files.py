@@ -29,6 +29,7 @@ PITCHES = np.stack([np.cos(0.1 * TIMES), 0.0 * TIMES, np.sin(0.1 * TIMES), 0.0 *
         ("1R2T", PLACES, PITCHES[:, [0, 2, 1, 3]], False, "must turn about y alone"),
         ("1R2T", PLACES, PITCHES[:, [0, 1, 3, 2]], False, "must turn about y alone"),
         ("1T", PLACES, None, False, "positions: x and y: must be the same everywhere on a vertical guide"),
+        ("3R", PLACES * 1e-5, PITCHES, False, "positions: they differ by 1e-05 m: must be those of the joint"),
         ("3T", PLACES, None, True, "positions: x and z alone: must have y too, but for planar robots"),
         ("3R3T", PLACES, PITCHES, True, "positions: x and z alone"),
     ],
@@ -46,6 +47,8 @@ def test_rounding_leaves_no_pattern():
     kept = kept_to("1R2T", spline, is_planar=False)
     assert not kept.position[:, :, 1].any() and not kept.quaternion[:, :, [1, 3]].any()
     np.testing.assert_array_equal(kept.position[:, :, [0, 2]], spline.position[:, :, [0, 2]])
+    still = spline_of(MotionTable(TIMES, 1e5 * off + [0.1, 0.2, 0.3], PITCHES))
+    assert np.ptp(kept_to("3R", still, is_planar=False).position, axis=(0, 1)).max() == 0.0
     upward = spline_of(MotionTable(TIMES, PLACES * [0.0, 0.0, 1.0] + [3.0, 1.0, 0.0]))
     np.testing.assert_array_equal(kept_to("1T", upward, is_planar=False).position, upward.position)
 

@@ -8,6 +8,7 @@ from scipy.interpolate import CubicSpline, make_interp_spline
 from support.commands import plan, planned
 
 import cspr_jax
+from cspr_jax.errors import ConfigError
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.schema.families import ANY_PATTERN
 
@@ -151,3 +152,25 @@ def test_infeasible_segments_name_the_cable(tmp_path):
     assert cause["criterion"] == "cable_too_fast" and cause["needed"] > cause["allowed"] == 0.05
     start, end = segment["failing"][0]
     assert start <= cause["t"] <= end
+
+
+def test_a_joint_stays(tmp_path):
+    """Poses and tables that move the joint of a robot are refused; elsewhere its place is what positions are."""
+    ends = np.array([[0.3, 0.0, 0.2], [0.0, 0.3, 0.2], [-0.3, -0.3, 0.2], [0.2, -0.3, 0.2]])
+    robot = {"name": "joint", "pattern": "3R", "z_axis": "up", "mass": 1.0, "inertia": (0.1 * np.eye(3)).tolist()}
+    robot |= {"base_points": (2.0 * ends).tolist(), "platform_points": ends.tolist(), "centre_of_mass": [0.1, 0.0, 0.3]}
+    keys = as_dictionary(robot=robot)
+    with pytest.raises(ConfigError, match=r"pose\[0\] to pose\[2\]: positions: they differ by 0.2"):
+        cspr_jax.plan(keys)
+    turns = [[1.0, 0.0, 0.0, 0.0], [0.96, 0.28, 0.0, 0.0], [0.96, 0.0, 0.28, 0.0]]
+    keys["pose"] = [
+        pose | {"position": [0.0, 0.1, 0.2], "quaternion": turn} for pose, turn in zip(keys["pose"], turns, strict=True)
+    ]
+    place, path = np.array([0.0, 0.1, 0.2]), tmp_path / "own.csv"
+    table = np.column_stack([TIMES, np.zeros((3, 3)) + place, turns])
+    np.savetxt(path, table, delimiter=",", header="t,x,y,z,qw,qx,qy,qz", comments="")
+    files = [{**keys, "pose": [], "motion": str(path), "point": point} for point in ("origin", "mass-centre")]
+    for each in (keys, *files):
+        found = cspr_jax.plan({key: value for key, value in each.items() if value != []})
+        rows = found.rows()["position"]
+        np.testing.assert_allclose(rows, place + 0.0 * rows, atol=1e-12)

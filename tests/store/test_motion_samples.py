@@ -7,7 +7,7 @@ from plans.test_planning import SHORT
 from support.commands import plan
 
 import cspr_jax
-from cspr_jax.errors import ConfigError, StoreError
+from cspr_jax.errors import ConfigError
 from cspr_jax.splines.reading import spline_of
 from cspr_jax.store.motion_samples import motion_windows, read_motion
 
@@ -29,7 +29,7 @@ def test_motions_of_this_program(folder):
     table, file = (read_motion(folder / f"motion.{ending}") for ending in ("csv", "h5"))
     rows = cspr_jax.open_result(folder / "motion.h5")
     assert table.notes == () and table.interpolation == file.interpolation == "hermite"
-    assert (table.z_axis, file.z_axis) == (None, rows.attributes["z_axis"])
+    assert table.z_axis == file.z_axis == rows.attributes["z_axis"]
     for name in ("times", "positions", "velocities", "accelerations"):
         np.testing.assert_array_equal(getattr(table, name), getattr(file, name))
     with jax.enable_x64(True):
@@ -56,6 +56,21 @@ def test_windows_of_this_program(folder):
     np.testing.assert_array_equal(np.concatenate([cores[0], *(core[1:] for core in cores[1:])]), whole.times)
 
 
+def test_axes_and_units_of_a_table(folder):
+    """A robot with the other axis gets the table turned; tables of earlier versions, without comments, are read."""
+    lines = (folder / "motion.csv").read_text().splitlines()
+    table = read_motion(folder / "motion.csv")
+    (folder / "earlier.csv").write_text("\n".join([lines[0], *lines[3:]]))
+    earlier = read_motion(folder / "earlier.csv")
+    assert earlier.z_axis is None
+    np.testing.assert_array_equal(earlier.positions, table.positions)
+    np.testing.assert_array_equal(table.in_axes("up").positions, table.positions * [1.0, -1.0, -1.0])
+    (folder / "sheet.csv").write_text("\n".join([lines[0], "# z: up,,", "# units: mm rad s,,,", *lines[3:]]))
+    sheet = read_motion(folder / "sheet.csv")
+    assert sheet.z_axis == "up"
+    np.testing.assert_allclose(sheet.accelerations, 1e-3 * table.accelerations)
+
+
 @pytest.mark.parametrize("name", ["positions", "velocities"])
 def test_legs_that_do_not_meet(folder, name):
     lines = (folder / "motion.csv").read_text().splitlines()
@@ -75,9 +90,15 @@ def test_legs_that_do_not_meet(folder, name):
 def test_faults(folder, tmp_path):
     with pytest.raises(ConfigError, match="must be absent: only files of CASPR"):
         read_motion(folder / "motion.csv", "one")
-    (tmp_path / "other.h5").write_bytes(b"not HDF5")
-    with pytest.raises(StoreError, match="cannot be read as a result"):
-        read_motion(tmp_path / "other.h5")
+    whole = (folder / "motion.h5").read_bytes()
+    for content in (b"not HDF5", b"", whole[: len(whole) // 2]):
+        (tmp_path / "other.h5").write_bytes(content)
+        with pytest.raises(ConfigError, match=r"^\S*/other\.h5: cannot be read as a result"):
+            read_motion(tmp_path / "other.h5")
+    for name in ("folder.h5", "folder.csv", "folder.xml"):
+        (tmp_path / name).mkdir()
+        with pytest.raises(ConfigError, match="is not a file"):
+            read_motion(tmp_path / name)
     (tmp_path / "a_trajectories.xml").write_text("<x/>")
     with pytest.raises(ConfigError, match="must be <trajectories>"):
         read_motion(tmp_path / "a_trajectories.xml")

@@ -56,7 +56,9 @@ def test_columns_come_back_as_they_were(folder):
 
 
 def test_other_tools_read_the_same_table(folder):
-    """No line is a comment, and the header is one line."""
+    """The first line names the columns, and comments below it say units and axes."""
+    lines = (folder / "motion.csv").read_text().splitlines()
+    assert lines[0].startswith("t,position_x") and lines[1:3] == ["# z: down", "# units: m rad s"]
     own = np.genfromtxt(folder / "motion.csv", delimiter=",", names=True)
     np.testing.assert_array_equal(own["tension_2"], cspr_jax.open_result(folder / "motion.csv").data["tension"][:, 1])
 

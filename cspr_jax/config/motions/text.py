@@ -148,10 +148,14 @@ class _Reader:
     def _begin(self, text: str) -> tuple[int, str]:
         # Read comments and header of the first block; return the number of the next line, and the text from there on.
         rows = text.split("\n")
-        line = next(number for number, row in enumerate(rows, 1) if _has_content(row))
-        comments = [(number, row.strip().lstrip("# ")) for number, row in enumerate(rows[: line - 1], 1) if row.strip()]
+        filled = [number for number, row in enumerate(rows, 1) if _has_content(row)]
+        line = filled[0]
         content = rows[line - 1].strip()
-        self.directives = directives(comments, self.path)
+        # Comments of this program stand between the names of the columns and the first row.
+        head = rows[: filled[1] - 1] if len(filled) > 1 else rows
+        # Spreadsheets fill them with empty cells.
+        texts = [(number, row.strip(",;\t ").lstrip("# ")) for number, row in enumerate(head, 1) if number != line]
+        self.directives = directives([pair for pair in texts if pair[1]], self.path)
         self.delimiter = next((mark for mark in ";\t," if mark in content), None)
         self.has_tail = self.delimiter is not None and content.endswith(self.delimiter)
         heads = self._cells(content)

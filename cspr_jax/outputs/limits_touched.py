@@ -1,0 +1,101 @@
+"""Criteria of a checked motion that lie on their limits, as far as its samples tell.
+
+A motion that touches a limit, such as the fastest one, passes or fails between its samples by less than pieces through
+these differ from it. How much that may be is estimated from pieces through every second sample.
+"""
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cspr_jax.build.scenes import scene_of
+from cspr_jax.motions.block_slacks import block_slacks
+from cspr_jax.motions.cause import Cause
+from cspr_jax.motions.motion_tolerances import instant_states
+from cspr_jax.motions.proved_answers import MotionProof, cause_of
+from cspr_jax.plans.planning import PlannedMotions
+from cspr_jax.splines.motion import Spline
+from cspr_jax.splines.thinned import thinned
+
+# Share of its scale within which the smallest slack of a criterion is compared with what samples leave open.
+NEAR = 1e-3
+# Instants in each piece, and pieces at most, at which motions are compared.
+INSTANTS, MOST_PIECES = 8, 256
+
+
+class TouchedLimit(NamedTuple):
+    """A criterion that a motion meets or misses by less than its samples tell.
+
+    Fields:
+        cause: by how much, where and when, in words too.
+        tolerance: that its samples leave, in the unit of the cause.
+    """
+
+    cause: Cause
+    tolerance: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """The criterion as the JSON of a check has it.
+
+        Returns:
+            plain values.
+        """
+        return self.cause.to_dict() | {"tolerance": self.tolerance}
+
+    @property
+    def text(self) -> str:
+        """The criterion in words."""
+        return (
+            f"on its limit, as far as its rows tell: {self.cause.text}; the motion through every second row differs "
+            f"by {self.tolerance:.2g} {self.cause.unit} there"
+        )
+
+
+def limits_touched(plan: PlannedMotions, case: MotionProof) -> list[TouchedLimit]:
+    """Criteria that lie on their limits, as far as samples of positions and their rates tell.
+
+    Args:
+        plan: of a single motion, of which the case is the proof.
+
+    Returns:
+        the worst of each criterion, the worst one first; none of other motions than those of Hermite pieces.
+    """
+    motion = plan.legs[0].motions[0] if plan.legs[0].motions else None
+    if not isinstance(motion, Spline) or motion.interpolation != "hermite" or len(motion.knots) < 4:
+        return []
+    rows: list[TouchedLimit] = []
+    for k in np.argsort(case.proof.high / case.scales).tolist():
+        if abs(case.proof.high[k]) > NEAR * case.scales[k] or case.criteria[k].flag.text in [
+            row.cause.criterion for row in rows
+        ]:
+            continue
+        slack, tolerance = _compared(plan, motion, case, k)
+        if abs(slack) <= tolerance:
+            rows.append(TouchedLimit(cause_of(case, k, plan.frame), tolerance))
+    return rows
+
+
+def _compared(plan: PlannedMotions, motion: Spline, case: MotionProof, k: int) -> tuple[float, float]:
+    # The smallest slack of a criterion about where it fails or is smallest, and what every second sample changes there.
+    taus = _instants(np.asarray(motion.knots), case.proof.failing[k], float(case.proof.when[k]))
+    scene = scene_of(plan.problem.robot, plan.robot_file, plan.frame, plan.keys, Path("motion"))
+
+    def slacks(curve: Spline) -> np.ndarray:
+        states = instant_states(curve, taus)
+        return block_slacks(plan.problem.robot, plan.problem.limits, lambda *_: states, taus, taus, scene).high[:, k]
+
+    fine = slacks(motion)
+    away = np.min([np.abs(slacks(thinned(motion, first)) - fine) for first in (1, 2)], axis=0)
+    return min(float(fine.min()), float(case.proof.high[k])), float(away.max())
+
+
+def _instants(knots: np.ndarray, failing: np.ndarray, when: float) -> np.ndarray:
+    # Normalised times within the pieces in which a criterion fails, or is smallest, and within their neighbours.
+    spans = np.concatenate([failing, [[when, when]]])
+    first, last = (np.searchsorted(knots, side) for side in spans.T)
+    pieces = np.unique(np.concatenate([np.arange(i - 2, j + 2) for i, j in zip(first, last, strict=True)]))
+    pieces = pieces[(pieces >= 0) & (pieces < len(knots) - 1)]
+    pieces = pieces[np.unique(np.linspace(0, len(pieces) - 1, MOST_PIECES).astype(int))]
+    shares = (np.arange(INSTANTS) + 0.5) / INSTANTS
+    return (knots[pieces, None] + np.diff(knots)[pieces, None] * shares).ravel() / knots[-1]
