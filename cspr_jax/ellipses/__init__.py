@@ -20,6 +20,8 @@ Files, each importing only from those above it:
     ways                    least numbers of arcs between two ellipses
     releases                ellipses from which an object is released
     leg                     ellipses in a plan
+    turns                   proofs of turns on many ellipses at once
+    cells                   answers of turns on many ellipses
     map                     maps of feasible frequencies and margins
     swing_range             least speeds of throws from ellipses
     swing_range_map         maps of these

@@ -7,13 +7,16 @@ samples of one turn; a verdict is the proof of the motion that results.
 import math
 from collections.abc import Callable
 
+import jax
 import jax.numpy as jnp
 import numpy as np
+from jax import Array
 
 from cspr_jax.arithmetic.affine_bounds import constant
 from cspr_jax.ellipses import harmonics
 from cspr_jax.ellipses.harmonics import Ellipse
 from cspr_jax.ellipses.hull import formula_hull
+from cspr_jax.ellipses.rotation import Rotation, rotation_state
 from cspr_jax.errors import InputError
 from cspr_jax.motions.block_slacks import block_slacks
 from cspr_jax.motions.criteria import criteria
@@ -22,19 +25,24 @@ from cspr_jax.robots.clearance import Scene
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.state_bounds import StateBounds
 
-# Angles of a turn, frequencies of a first look, halvings that follow, and the share by which an end is kept off.
-ANGLES, LOOKS, HALVINGS, INSIDE = 128, 65, 40, 1e-6
+# Angles of a turn where there are many frequencies, and for one alone; frequencies of a first look, halvings that
+# follow, and the share by which an end is kept off.
+ANGLES, FINE, LOOKS, HALVINGS, INSIDE = 128, 4096, 65, 40, 1e-5
 # Factors of the natural frequency between which a frequency is sought where no formula bounds it.
 WIDEST = 100.0
+SLOWER = "a number: the slower this ellipse, the larger the margin"
 
 
-def chosen_frequency(problem: Problem, ellipse: Ellipse, rule: str, scene: Scene | None = None) -> float:
+def chosen_frequency(
+    problem: Problem, ellipse: Ellipse, rule: str, scene: Scene | None = None, rotation: Rotation | None = None
+) -> float:
     """Frequency by a rule.
 
     Args:
         ellipse: leaves (3,).
         rule: "natural", "best", "fastest" or "slowest".
         scene: bodies that can meet.
+        rotation: of a platform on this ellipse.
 
     Returns:
         rad/s; the natural one where no frequency is feasible, so that its verdict says why.
@@ -48,7 +56,7 @@ def chosen_frequency(problem: Problem, ellipse: Ellipse, rule: str, scene: Scene
     if rule == "best" and hull is not None:
         best = float(harmonics.of_many(harmonics.best_frequency, hull, _row(ellipse))[0])
         if best == 0.0:
-            raise InputError("frequency", rule, "a number: the slower this ellipse, the larger the margin")
+            raise InputError("frequency", rule, SLOWER)
         return natural if math.isnan(best) else best
     low, high = natural / WIDEST, natural * WIDEST
     if hull is not None:
@@ -58,7 +66,7 @@ def chosen_frequency(problem: Problem, ellipse: Ellipse, rule: str, scene: Scene
         low, high = max(low, first), min(high, last)
 
     def slack(frequencies: np.ndarray) -> np.ndarray:
-        return sampled_slacks(problem, ellipse, frequencies, scene)
+        return sampled_slacks(problem, ellipse, frequencies, scene, rotation)
 
     return searched_frequency(slack, low, high, natural, rule)
 
@@ -103,29 +111,54 @@ def _row(ellipse: Ellipse) -> Ellipse:
     return Ellipse(*(np.asarray(leaf)[None] for leaf in ellipse))
 
 
-def sampled_slacks(problem: Problem, ellipse: Ellipse, frequencies: np.ndarray, scene: Scene | None) -> np.ndarray:
+def sampled_slacks(
+    problem: Problem,
+    ellipse: Ellipse,
+    frequencies: np.ndarray,
+    scene: Scene | None,
+    rotation: Rotation | None = None,
+) -> np.ndarray:
     """Smallest slacks at samples of one turn.
 
     Args:
         ellipse: leaves (3,), or (n, 1, 3) of an ellipse for each frequency.
         frequencies: (n,) rad/s.
         scene: bodies that can meet.
+        rotation: of a platform, which oscillates as on the last of its ellipses.
 
     Returns:
         (n,) in the units of their criteria.
     """
-    angle = np.linspace(0.0, 2.0 * math.pi, ANGLES, endpoint=False)[:, None]
+    count = ANGLES if len(frequencies) > 1 else FINE
+    angle = np.linspace(0.0, 2.0 * math.pi, count, endpoint=False)[:, None]
     cosine, sine = np.cos(angle), np.sin(angle)
     outward = ellipse.cosine * cosine + ellipse.sine * sine
     forward = ellipse.sine * cosine - ellipse.cosine * sine
     rate = frequencies[:, None, None]
-    place = np.broadcast_to(ellipse.centre + outward, (len(frequencies), ANGLES, 3))
-    states = [place, rate * forward, -(rate**2) * outward]
-    bounds = StateBounds(*(constant(jnp.asarray(x.reshape(-1, 3))) for x in states))
-    tau = np.zeros(len(frequencies) * ANGLES)
+    place = np.broadcast_to(ellipse.centre + outward, (len(frequencies), count, 3))
+    states = [x.reshape(-1, 3) for x in np.broadcast_arrays(place, rate * forward, -(rate**2) * outward)]
+    if rotation is not None:
+        angles = np.tile(angle[:, 0], len(frequencies)), np.repeat(frequencies, count)
+        states += [np.asarray(x) for x in _rotations(rotation, *map(jnp.asarray, angles))]
+    bounds = StateBounds(*(constant(jnp.asarray(x)) for x in states))
+    tau = np.zeros(len(frequencies) * count)
     high = block_slacks(problem.robot, problem.limits, lambda start, end: bounds, tau, tau, scene).high
-    least = high[:, -len(criteria(problem.robot, problem.limits, scene)) :].reshape(len(frequencies), ANGLES, -1)
+    least = high[:, -len(criteria(problem.robot, problem.limits, scene)) :].reshape(len(frequencies), count, -1)
     return least.min((1, 2))
+
+
+@jax.jit
+def _rotations(rotation: Rotation, angles: Array, rates: Array) -> tuple[Array, ...]:
+    # Rotations, angular velocities and accelerations at angles of turns with rates, leaves (n, ...).
+    still = (jnp.ones(()), jnp.zeros(()), jnp.zeros(()))
+
+    def one(angle: Array, rate: Array) -> tuple[Array, ...]:
+        p, q = rotation.last
+        cosine, sine = jnp.cos(angle), jnp.sin(angle)
+        psi = p * cosine + q * sine
+        return rotation_state(rotation, still, (psi, rate * (q * cosine - p * sine), -(rate**2) * psi))[:3]
+
+    return jax.vmap(one)(angles, rates)
 
 
 def _outermost(slack: Callable, low: float, high: float, natural: float, rule: str) -> float:
@@ -149,8 +182,13 @@ def _outermost(slack: Callable, low: float, high: float, natural: float, rule: s
 def _largest(slack: Callable, low: float, high: float, natural: float) -> float:
     # The frequency whose smallest sampled slack is the largest: a grid that is narrowed about its best point.
     looks = np.geomspace(low, high, LOOKS)
+    values = slack(looks)
+    if not values.max() > 0.0:
+        return natural
+    if values.argmax() == 0 and low <= natural / WIDEST:
+        raise InputError("frequency", "best", SLOWER)
     for _ in range(HALVINGS // 4):
-        values = slack(looks)
         best = int(values.argmax())
         looks = np.linspace(looks[max(best - 1, 0)], looks[min(best + 1, LOOKS - 1)], LOOKS)
-    return float(looks[LOOKS // 2]) if values[best] > 0.0 else natural
+        values = slack(looks)
+    return float(looks[values.argmax()])

@@ -22,7 +22,7 @@ from cspr_jax.ellipses.hull import SpoolHull, formula_hull
 from cspr_jax.ellipses.motion import EllipseMotion, turning
 from cspr_jax.ellipses.releases import Release, ReleaseRequirement, chosen_release
 from cspr_jax.ellipses.rotation_frequencies import rotation_frequencies
-from cspr_jax.ellipses.ways import Turning, Way, between, least_way, step_of
+from cspr_jax.ellipses.ways import Turning, Way, between, least_way, rotation_between, step_of
 from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.landings import Throw
@@ -183,8 +183,8 @@ class Ellipses(Leg):
                 turnings.append(self._release(problem, turnings[i - 1], scene))
             else:
                 ellipse = self._ellipse(pose.ellipse)
-                frequency, phase = self._frequency(problem, ellipse, i, scene), pose.ellipse.phase
-                turnings.append(Turning(ellipse, frequency, phase, quaternion, **self._oscillation(pose.ellipse)))
+                turn = Turning(ellipse, 1.0, pose.ellipse.phase, quaternion, **self._oscillation(pose.ellipse))
+                turnings.append(dataclasses.replace(turn, frequency=self._frequency(problem, turn, i, scene)))
             self._check_axes(turnings, i)
         return turnings
 
@@ -211,7 +211,7 @@ class Ellipses(Leg):
         a, b = table.axes(is_planar=self.stops.robot_file.is_planar)
         return Ellipse(frame.inward(table.centre), frame.turned(a), frame.turned(b))
 
-    def _frequency(self, problem: Problem, ellipse: Ellipse, i: int, scene: Scene) -> float:
+    def _frequency(self, problem: Problem, turning: Turning, i: int, scene: Scene) -> float:
         table = self.stops.poses[i].ellipse
         rule = "natural" if table is None else table.frequency
         if isinstance(rule, Hertz):
@@ -219,7 +219,7 @@ class Ellipses(Leg):
         if isinstance(rule, float):
             return rule
         try:
-            return chosen_frequency(problem, ellipse, rule, scene)
+            return chosen_frequency(problem, turning.ellipse, rule, scene, rotation_between(turning, turning))
         except InputError as error:
             raise ConfigError(self.stops.path, f"{self._key(i, '')}{error}") from error
 

@@ -118,11 +118,16 @@ def motion_between(amplitude: Amplitude, first: Turning, last: Turning, arcs: in
     way, after = (swept / mean if step else 0.0), turns * full / end + (0.0 if step else swept / end)
     law = with_turns(amplitude, way / (way + after) if step else 0.0)
     frequencies, whole = leaf([start, end]), leaf(way + after)
-    rotation = _rotation(first, last)
+    rotation = rotation_between(first, last)
     return EllipseMotion(first.ellipse, last.ellipse, frequencies, leaf(phase), law, integral(law), whole, rotation)
 
 
-def _rotation(first: Turning, last: Turning) -> Rotation | None:
+def rotation_between(first: Turning, last: Turning) -> Rotation | None:
+    """Rotation of a platform on the way from one ellipse to another.
+
+    Returns:
+        the rotation; None for a point mass.
+    """
     if first.quaternion is None or last.quaternion is None:
         return None
     axis = last.axis if last.oscillation.any() else first.axis
