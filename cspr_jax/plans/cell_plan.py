@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.arithmetic.frames import frame_of
+from cspr_jax.config.obstacles import SurroundingsKeys
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.schema.map_kinds import MAP_KINDS
@@ -56,7 +57,7 @@ def cell_plan(
     plan["pose"] = [_start(settings, place), target]
     if settings.get("limits"):
         plan["limits"] = settings["limits"]
-    return plan
+    return plan | {name: settings[name] for name in SurroundingsKeys.model_fields if name in settings}
 
 
 def _start(settings: Mapping[str, Any], place: Mapping[str, float]) -> dict[str, Any]:
