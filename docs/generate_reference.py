@@ -53,7 +53,7 @@ FILES = {
         ("[orientations]", Orientations),
         ("[launch]", LaunchSearch),
         ("[workspace]", WorkspaceTable),
-        ("[[workspace.obstacle]]", ObstacleTable),
+        ("[[obstacle]] and [[workspace.obstacle]]", ObstacleTable),
         ("[limits]", LimitTable),
         ("[run]", RunTable),
     ],

@@ -137,7 +137,7 @@ class Check:
             if not hasattr(motion, "stretched") or not hasattr(motion, "bounds"):
                 raise InputError("motion", type(motion).__name__, "a spline or a file: of others nothing is proved")
             plan = self.plan
-            scene = scene_of(plan.problem.robot, plan.robot_file, plan.frame, plan.keys, NAME)
+            scene = scene_of(plan.problem.robot, plan.robot_file, plan.frame, plan.keys, NAME, trajectory=plan.keys)
             least = least_stretching(lambda factor: proof_of(plan.problem, motion.stretched(factor), scene))
             if not np.isfinite(least.factor):
                 return Stretched(np.nan, least.is_static, None)

@@ -109,7 +109,7 @@ def check_many(
                 motions.append(placed_inward(curve, axes, reference))
             except InputError as error:
                 raise InputError(f"motion {i}, {error.key}", error.value, error.allowed, fault=error.fault) from error
-        several, scene = SeveralSplines(motions), scene_of(problem.robot, file, axes, keys, NAME)
+        several, scene = SeveralSplines(motions), scene_of(problem.robot, file, axes, keys, NAME, trajectory=keys)
         proofs = proofs_of(problem, several.bounds, several.durations, scene, several.jumps)
         answers = answers_of(proofs, several.durations)
         judge_all_robots(problem, answers, motions, scene)

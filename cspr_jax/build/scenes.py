@@ -1,10 +1,11 @@
-"""Scenes of plans: what workspaces take, of a robot whose platform has its reference axes."""
+"""Scenes of motions: what workspaces take, of a robot whose platform has its reference axes."""
 
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.build.robots import build_robot
 from cspr_jax.build.surroundings import build_scene
-from cspr_jax.config.plan import PlanFile
+from cspr_jax.config.obstacles import SurroundingsKeys
 from cspr_jax.config.robot import RobotFile
+from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.clearance import Scene
 from cspr_jax.robots.kernel_axes import centred
@@ -12,12 +13,22 @@ from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.reference_pose import aligned
 
 
-def scene_of(robot: AnyRobot, robot_file: RobotFile, frame: Frame, keys: PlanFile, file: object) -> Scene:
+def scene_of(
+    robot: AnyRobot,
+    robot_file: RobotFile,
+    frame: Frame,
+    keys: SurroundingsKeys,
+    file: object,
+    *,
+    trajectory: TrajectoryKeys,
+) -> Scene:
     """Scene of the robot of a problem, whose platform has its reference axes; see `build_scene`.
 
     Args:
         frame: axes of the robot file.
+        keys: of the plan or sweep.
         file: named in errors.
+        trajectory: of the plan or sweep.
 
     Returns:
         the scene in the kernels' coordinates.
@@ -25,6 +36,6 @@ def scene_of(robot: AnyRobot, robot_file: RobotFile, frame: Frame, keys: PlanFil
     Raises:
         ConfigError: as `build_scene`.
     """
-    written = centred(build_robot(robot_file, keys, file))[0]
+    written = centred(build_robot(robot_file, trajectory, file))[0]
     rotation = aligned(written)[1] if isinstance(written, PlatformRobot) else None
     return build_scene(robot, robot_file, frame, keys, file, rotation=rotation)

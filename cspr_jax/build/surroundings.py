@@ -63,9 +63,13 @@ def build_scene(
         the scene in the kernels' coordinates.
 
     Raises:
-        ConfigError: a shape of a robot that has none, or the hull of points that lie in a plane.
+        ConfigError: a shape of a robot that has none, the hull of points that lie in a plane, or surroundings of a
+            point mass that stands for a platform.
     """
     row = PATTERNS[robot.pattern]
+    for name in keys.surroundings if robot_file.pairs is not None else ():
+        why = "a point mass on three cables moves in place of the platform, and touches other bodies"
+        raise ConfigError(file, f'{at}{name}: must be absent, but in plans with family = "spline": here {why}')
     for name in ("platform_box", "platform_hull"):
         if getattr(keys, name) is not None and not row.is_body:
             raise ConfigError(file, f"{at}{name}: must be absent: {robot_file.kind} has no shape")

@@ -8,6 +8,7 @@ from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 from cspr_jax.config.ellipse import SweepEllipse
 from cspr_jax.config.launch import LaunchSearch
 from cspr_jax.config.limits import Coordinate, LimitTable, Point
+from cspr_jax.config.obstacles import Obstacles, SurroundingsKeys
 from cspr_jax.config.reading import Table
 from cspr_jax.config.trajectory import BetaHat, Quaternion, TiltTorsion, TrajectoryKeys
 from cspr_jax.config.wording import either, name_of
@@ -183,8 +184,8 @@ class RunTable(Table):
         return names
 
 
-class SweepFile(Table):
-    """A sweep."""
+class _SweepKeys(Table):
+    # Keys of a sweep but those of its surroundings, which are written behind them.
 
     format_version: Literal[1] = Field(alias="schema", description="version of this format: 1")
     map: Annotated[str, name_of(lambda: MAP_KINDS)] = Field(description=f"kind of map: {either(MAP_KINDS)}")
@@ -216,3 +217,13 @@ class SweepFile(Table):
     )
     limits: LimitTable = Field(default_factory=LimitTable, description="[limits] of all motions of the file")
     run: RunTable = Field(default_factory=RunTable, description="[run] dtype, tile, store")
+
+
+class SweepFile(SurroundingsKeys, _SweepKeys):
+    """A sweep."""
+
+    obstacle: Obstacles | None = Field(
+        None,
+        description="maps of arcs: [[obstacle]], bodies fixed in space that no motion may meet; workspaces have "
+        "[[workspace.obstacle]]",
+    )

@@ -1,7 +1,7 @@
 """Base of all maps of a sweep: robot, limits, amplitude function, and the targets of a grid."""
 
 import abc
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -56,6 +56,15 @@ class GridMap(abc.ABC):
             for_bounds=for_bounds,
             any_cables=self.any_cables,
         )
+
+    def _surroundings(self, robot_file: RobotFile) -> Any:
+        # Return the scene of the sweep; None: it has neither obstacles nor a shape of the platform.
+        if not self._keys.surroundings:
+            return None
+        from cspr_jax.build.scenes import scene_of  # with the geometry of bodies, which other sweeps need not
+
+        keys, frame = self._keys, self._frame
+        return scene_of(self._problem.robot, robot_file, frame, keys, self._file, trajectory=keys.trajectory)
 
     @abc.abstractmethod
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -156,6 +165,7 @@ class PlatformMap(GridMap):
             "a margin below its proved bound": answers["margin_bound"] > margin + ROUNDING * (1.0 + np.abs(margin)),
             "an infeasible cell whose verdict is 0": ~feasible & (answers["verdict"] == 0),
             "a feasible cell without a duration": feasible & ~(answers["duration"] > 0.0),
+            "a feasible cell that touches an obstacle": feasible & (answers.get("clearance", margin) <= -ROUNDING),
         }
 
 
@@ -191,4 +201,5 @@ class PointMassMap(GridMap):
             "an infeasible cell whose verdict is 0": ~feasible & (verdict == 0),
             "a margin below its proved bound": answers["margin_bound"] > margin + ROUNDING * (1.0 + np.abs(margin)),
             "a feasible cell without a duration": feasible & ~lasts,
+            "a feasible cell that touches an obstacle": feasible & (answers.get("clearance", margin) <= -ROUNDING),
         }

@@ -9,6 +9,7 @@ Files, each importing only from those above it:
     motion              the protocol: duration, state, breaks; motions reversed and placed
     amplitudes          amplitude functions A(tau), with bounds of their derivatives
     amplitude_bounds    bounds of amplitude functions over blocks of time
+    several             several motions of one family, bounded together
     swing_plane         the plane in which an effector swings between two points
     swing_bounds        bounds of swings about P0 over a block of time
     platform_kind       kinds of motions of platforms, known when a function is compiled
@@ -36,6 +37,7 @@ Files, each importing only from those above it:
     uncertain_slacks    slacks of all robots within an uncertainty over blocks of time, from bounds of states
     motion_tolerances   the largest multiple of an uncertainty that a motion with such bounds tolerates
     proved_answers      answers of motions that give bounds of their states
+    judged              motions of families that know neither surroundings nor pulleys, judged with both
     stretching          the least uniform stretching of time that is feasible
     proved              summaries of proofs of motions
     waypoints           consecutive poses of a plan, as points of the kernels

@@ -26,14 +26,14 @@ def normalised(duration: Any, start: np.ndarray, end: np.ndarray) -> AffineBound
     """Bounds of the normalised time over blocks.
 
     Args:
-        duration: () s.
+        duration: () or (k,) s.
         start: (k,) s.
         end: (k,) s, later than `start`.
 
     Returns:
         (k,).
     """
-    first, last = (np.clip(np.asarray(x) / float(duration), 0.0, 1.0) for x in (start, end))
+    first, last = (np.clip(np.asarray(x) / np.asarray(duration, float), 0.0, 1.0) for x in (start, end))
     return AffineBounds(0.5 * (first + last), 0.5 * (last - first), np.full(len(first), ROUNDING))
 
 
@@ -43,7 +43,7 @@ def time_bounds(
     """Bounds of an amplitude function over blocks of time.
 
     Args:
-        duration: () of the motion, s.
+        duration: () of the motion, or (k,) of the motion of each block, s.
         start: (k,) s.
         end: (k,) s, later than `start`.
         orders: how many functions: A, and its derivatives below this order.

@@ -46,6 +46,17 @@ class Answers(Columns):
         """Tell whether each segment is proved feasible, (n,)."""
         return self.arcs > 0
 
+    def rows(self: AnyAnswers, index: np.ndarray) -> AnyAnswers:
+        """Some of the answers.
+
+        Args:
+            index: (m,) their numbers, or a mask (n,).
+
+        Returns:
+            the answers.
+        """
+        return type(self)(**{name: values[index] for name, values in vars(self).items()})
+
     def details(self, i: int) -> dict[str, Any]:
         """Details of a segment that only this kind of answers has, by their names in a plan's JSON.
 
@@ -80,3 +91,20 @@ def joined(parts: list[AnyAnswers]) -> AnyAnswers:
         the answers, those of one part after the other.
     """
     return type(parts[0])(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])})
+
+
+def replaced(answers: AnyAnswers, rows: np.ndarray, others: Answers, chosen: np.ndarray) -> AnyAnswers:
+    """Answers, some of which others replace.
+
+    Args:
+        rows: (m,) numbers of the answers that are replaced.
+        others: have at least the same columns.
+        chosen: (m,) numbers of the others in their place.
+
+    Returns:
+        the answers.
+    """
+    columns = {name: np.array(values) for name, values in vars(answers).items()}
+    for name, values in columns.items():
+        values[rows] = getattr(others, name)[chosen]
+    return type(answers)(**columns)

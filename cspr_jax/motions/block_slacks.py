@@ -16,7 +16,7 @@ from jax import Array
 from cspr_jax.arithmetic.affine_bounds import AffineBounds, dot
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.determinant_bounds import changes_sign, determinant, size_range
-from cspr_jax.motions.criteria import AT_INSTANTS, criteria, judged_poses
+from cspr_jax.motions.criteria import AT_INSTANTS, contact_criteria, criteria, judged_poses
 from cspr_jax.motions.limits import limits_set
 from cspr_jax.robots.cables import AnyRobot, wrench_units
 from cspr_jax.robots.clearance import Scene
@@ -65,17 +65,6 @@ class BlockSlacks(NamedTuple):
         rises = (np.zeros_like(self.low) if rise is None else rise for rise in (self.low_rise, self.high_rise))
         return BlockSlacks(self.low, self.high, *rises)
 
-    def last(self, count: int) -> "BlockSlacks":
-        """The bounds of the last criteria.
-
-        Args:
-            count: number of these.
-
-        Returns:
-            the bounds, (k, count) each.
-        """
-        return BlockSlacks(*(side[:, side.shape[1] - count :] for side in self.complete()))
-
 
 def _lines(below: Pair, above: Pair) -> Part:
     # Fields of `BlockSlacks` from values of a line below and of a line above, at the start and at the end of a block.
@@ -88,9 +77,14 @@ def _edges(slack: AffineBounds) -> tuple[Pair, Pair]:
     return below, above
 
 
-@partial(jax.jit, static_argnames="passes")
+@partial(jax.jit, static_argnames=("passes", "contacts_alone"))
 def _kernel(
-    robot: AnyRobot, limits: Limits, bodies: Bodies, states: StateBounds, passes: bool = False
+    robot: AnyRobot,
+    limits: Limits,
+    bodies: Bodies,
+    states: StateBounds,
+    passes: bool = False,
+    contacts_alone: bool = False,
 ) -> tuple[Array, ...] | Array:
     # Bound the slacks, or tell which of them are proved to vanish at an instant.
     def one(state: StateBounds) -> tuple[Array, ...] | Array:
@@ -100,8 +94,11 @@ def _kernel(
         matrix, wrench = matrix * unit[:, None], wrench * unit
         if passes:
             return _passes(robot, bodies, matrix, state, cables)
-        parts = [*tension_slacks(robot, limits, matrix, wrench), *limit_slacks(limits, state, cables)]
-        parts += [*_of_pose(robot, matrix, state), contact_bounds(robot, bodies, state, cables)]
+        parts: list[Part] = []
+        if not contacts_alone:
+            parts += [*tension_slacks(robot, limits, matrix, wrench), *limit_slacks(limits, state, cables)]
+            parts += _of_pose(robot, matrix, state)
+        parts.append(contact_bounds(robot, bodies, state, cables))
         if limits.floor is not None and bodies.body is not None:
             heights = -corner_depths(bodies.body, state) + limits.floor
             parts.append((jnp.min(heights.low(), keepdims=True), jnp.min(heights.high(), keepdims=True)))
@@ -190,6 +187,8 @@ def block_slacks(
     start: np.ndarray,
     end: np.ndarray,
     scene: Scene | None = None,
+    *,
+    contacts_alone: bool = False,
 ) -> BlockSlacks:
     """Bounds of the slacks of a motion over blocks of time.
 
@@ -199,13 +198,15 @@ def block_slacks(
         start: (k,) s.
         end: (k,) s.
         scene: bodies that can meet, in the robot's axes; None: the cables of a platform alone.
+        contacts_alone: whether the slacks are those of `criteria.contact_criteria` alone.
 
     Returns:
         the bounds.
     """
     bodies = bodies_of(robot, scene or default_scene(robot))
-    low, high, *rises = in_batches(partial(_kernel, robot, limits, bodies), bounds(start, end), size=BATCH)
-    rows = criteria(robot, limits, scene)
+    slacks = partial(_kernel, robot, limits, bodies, contacts_alone=contacts_alone)
+    low, high, *rises = in_batches(slacks, bounds(start, end), size=BATCH)
+    rows = (contact_criteria if contacts_alone else criteria)(robot, limits, scene)
     at_instants = np.array([row.flag in AT_INSTANTS for row in rows])
     is_open = ~((low > 0.0) | (high < 0.0))[:, at_instants]
     # An event at the border of two blocks is within the second one and the end of the first.

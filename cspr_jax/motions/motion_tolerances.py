@@ -33,6 +33,7 @@ class _StatePool:
     problem: Problem
     bodies: Bodies
     motion: BoundedMotion
+    contacts_alone: bool
     blocks: Blocks
     states: StateBounds
     instants: StateBounds
@@ -45,7 +46,8 @@ class _StatePool:
         )
 
     def halves(self, rows: np.ndarray) -> "_StatePool":
-        return _pool(self.problem, self.bodies, self.motion, self.blocks.part(rows).halves())
+        blocks = self.blocks.part(rows).halves()
+        return _pool(self.problem, self.bodies, self.motion, blocks, contacts_alone=self.contacts_alone)
 
     def middles(self) -> "_StatePool":
         return dataclasses.replace(self, states=self.instants)
@@ -59,7 +61,12 @@ class _StatePool:
     def _batched(self, kernel: Any, *cases: Any) -> np.ndarray:
         if not len(self.blocks.row):
             return np.zeros(0, bool)
-        return in_batches(partial(kernel, self.problem.robot, self.problem.limits, self.bodies), cases, size=BATCH)
+        return _batched(kernel, self.problem, self.bodies, cases, contacts_alone=self.contacts_alone)
+
+
+def _batched(kernel: Any, problem: Problem, bodies: Bodies, cases: Any, *, contacts_alone: bool) -> np.ndarray:
+    function = partial(kernel, problem.robot, problem.limits, bodies, contacts_alone=contacts_alone)
+    return in_batches(function, cases, size=BATCH)
 
 
 def _share(problem: Problem, multiple: np.ndarray) -> Share:
@@ -70,13 +77,15 @@ def _share(problem: Problem, multiple: np.ndarray) -> Share:
     return Share(spools, centre, factor)
 
 
-def _pool(problem: Problem, bodies: Bodies, motion: BoundedMotion, blocks: Blocks) -> _StatePool:
+def _pool(
+    problem: Problem, bodies: Bodies, motion: BoundedMotion, blocks: Blocks, *, contacts_alone: bool
+) -> _StatePool:
     middle = 0.5 * (blocks.start + blocks.stop)
     each = motion.bounds(blocks.start, blocks.stop), instant_states(motion, middle / float(motion.duration()))
     states, instants = (jax.tree.map(np.asarray, bounds) for bounds in each)
     cases = (instants, _share(problem, np.ones(len(middle))))
-    ways = in_batches(partial(worst_ways, problem.robot, problem.limits, bodies), cases, size=BATCH)
-    return _StatePool(problem, bodies, motion, blocks, states, instants, ways)
+    ways = _batched(worst_ways, problem, bodies, cases, contacts_alone=contacts_alone)
+    return _StatePool(problem, bodies, motion, contacts_alone, blocks, states, instants, ways)
 
 
 @partial(jax.jit, static_argnums=0)
@@ -99,13 +108,16 @@ def instant_states(motion: Motion, tau: np.ndarray) -> StateBounds:
     return in_batches(partial(_instants, structure, leaves), tau, size=INSTANTS)
 
 
-def motion_tolerances(problem: Problem, motion: BoundedMotion, scene: Scene | None = None) -> Tolerated:
+def motion_tolerances(
+    problem: Problem, motion: BoundedMotion, scene: Scene | None = None, *, contacts_alone: bool = False
+) -> Tolerated:
     """Multiples of the uncertainty that a motion tolerates.
 
     Args:
         problem: robot without pulleys, limits with an uncertainty.
         motion: feasible as planned, from the centroid of the spools, z down.
         scene: bodies that can meet; None: the cables of a platform alone.
+        contacts_alone: whether the multiples are of contacts alone.
 
     Returns:
         the multiples, () each in arrays (1,).
@@ -117,5 +129,5 @@ def motion_tolerances(problem: Problem, motion: BoundedMotion, scene: Scene | No
     )
     blocks = Blocks(np.zeros(len(edges) - 1, int), edges[:-1], edges[1:])
     bodies = bodies_of(problem.robot, scene or default_scene(problem.robot))
-    pool = _pool(problem, bodies, motion, blocks)
+    pool = _pool(problem, bodies, motion, blocks, contacts_alone=contacts_alone)
     return tolerated_by(pool, np.array([len(blocks.row) / FIRST]))

@@ -191,7 +191,12 @@ def judge_all_robots(
 
 
 def proof_of(
-    problem: Problem, motion: BoundedMotion, scene: Scene | None = None, *, contacts_alone: bool = False
+    problem: Problem,
+    motion: BoundedMotion,
+    scene: Scene | None = None,
+    *,
+    contacts_alone: bool = False,
+    intervals: bool = True,
 ) -> MotionProof:
     """Proof of one motion.
 
@@ -199,6 +204,7 @@ def proof_of(
         motion: from the centroid of the spools, z down.
         scene: as for `proved_answers`.
         contacts_alone: as for `proofs_of`.
+        intervals: as for `time_proofs`.
 
     Returns:
         the proof.
@@ -209,7 +215,8 @@ def proof_of(
     def bounds(_: np.ndarray, start: np.ndarray, end: np.ndarray) -> StateBounds:
         return motion.bounds(start, end)
 
-    return proofs_of(problem, bounds, durations, scene, jumps, contacts_alone=contacts_alone)[0]
+    kind = {"contacts_alone": contacts_alone, "intervals": intervals}
+    return proofs_of(problem, bounds, durations, scene, jumps, **kind)[0]
 
 
 def proofs_of(
@@ -220,6 +227,7 @@ def proofs_of(
     jumps: Sequence[np.ndarray] = (),
     *,
     contacts_alone: bool = False,
+    intervals: bool = True,
 ) -> list[MotionProof]:
     """Proofs of several motions at once.
 
@@ -229,6 +237,7 @@ def proofs_of(
         scene: as for `proved_answers`.
         jumps: for each motion the instants at which its acceleration jumps, s; empty: nowhere.
         contacts_alone: whether the proofs are of `criteria.contact_criteria` alone, since others are proved elsewhere.
+        intervals: as for `time_proofs`.
 
     Returns:
         n proofs.
@@ -236,13 +245,13 @@ def proofs_of(
     rows = _criteria(problem, scene, contacts_alone)
 
     def slacks(motion: np.ndarray, start: np.ndarray, end: np.ndarray) -> BlockSlacks:
-        of_all = block_slacks(problem.robot, problem.limits, partial(bounds, motion), start, end, scene)
-        return of_all.last(len(rows))
+        of_motion = partial(bounds, motion)
+        return block_slacks(problem.robot, problem.limits, of_motion, start, end, scene, contacts_alone=contacts_alone)
 
     # Answers tell the nearest contact of each kind alone.
     names = [(row.flag, () if row.flag in AT_INSTANTS else row.cables) for row in rows]
     groups = np.array([names.index(name) for name in names])
-    proofs = time_proofs(slacks, durations, jumps=jumps, groups=groups)
+    proofs = time_proofs(slacks, durations, jumps=jumps, groups=groups, intervals=intervals)
     return [_proof(problem, rows, proof, scene) for proof in proofs]
 
 
@@ -307,8 +316,9 @@ def sampled_proof(
     # A block without a length has the slacks of its instant.
     states = instant_states(motion, tau)
     rows = _criteria(problem, scene, contacts_alone)
-    slacks = block_slacks(problem.robot, problem.limits, lambda start, end: states, tau, tau, scene)
-    high = slacks.last(len(rows)).high
+    high = block_slacks(
+        problem.robot, problem.limits, lambda start, end: states, tau, tau, scene, contacts_alone=contacts_alone
+    ).high
     times = tau * float(motion.duration())
     failing = [_runs(times, column < 0.0) for column in high.T]
     whole = np.array([[0.0, times[-1]]])

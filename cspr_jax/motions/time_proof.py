@@ -72,6 +72,8 @@ def time_proofs(
     resolution: float = 5e-7,
     jumps: Sequence[np.ndarray] = (),
     groups: np.ndarray | None = None,
+    *,
+    intervals: bool = True,
 ) -> list[TimeProof]:
     """Decide criteria over several whole motions at once.
 
@@ -83,6 +85,8 @@ def time_proofs(
         jumps: for each motion the instants at which its acceleration jumps, increasing, s; empty: it jumps nowhere.
         groups: (n_criteria,) numbers, from 0 on, of groups of criteria of which the smallest slack alone is narrowed;
             None: that of each criterion.
+        intervals: whether all intervals of failure are found, to the resolution; else of a motion that fails only the
+            smallest slacks are.
 
     Returns:
         one proof a motion, the same as it has alone.
@@ -93,11 +97,14 @@ def time_proofs(
     edges = np.asarray(durations, float)[:, None] * np.linspace(0.0, 1.0, FIRST + 1)
     places = np.repeat(np.arange(count), FIRST), edges[:, :-1].ravel(), edges[:, 1:].ravel()
     start = blocks = _bounded(slacks, *places, whole=None)
-    totals, leaves = np.full(count, FIRST), []
+    totals, leaves, fails = np.full(count, FIRST), [], np.zeros(count, bool)
     at_jumps = np.concatenate([np.empty(0, complex), *(i + 1j * np.asarray(row) for i, row in enumerate(jumps))])
     while len(blocks.start):
         undecided = blocks.undecided()
         is_open = undecided.any(1) & (blocks.end - blocks.start > resolution)
+        if not intervals:
+            fails |= np.bincount(blocks.motion, (blocks.slacks.high < 0.0).any(1), count) > 0.0
+            is_open &= ~fails[blocks.motion]
         is_open &= (totals + 2 * np.bincount(blocks.motion[is_open], minlength=count))[blocks.motion] <= MOST
         leaves.append(blocks.taken(~is_open))
         first, last = blocks.rest(np.zeros(1), undecided, has_upper=True)

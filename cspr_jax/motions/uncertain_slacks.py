@@ -9,6 +9,7 @@ What is refuted rests on the slacks of single robots at instants, displaced alon
 """
 
 import dataclasses
+from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -43,25 +44,24 @@ class Share(NamedTuple):
     factor: Array
 
 
-@jax.jit
-def blocks_hold(robot: AnyRobot, limits: Limits, bodies: Bodies, cases: tuple[StateBounds, Share]) -> Array:
+@partial(jax.jit, static_argnames="contacts_alone")
+def blocks_hold(
+    robot: AnyRobot, limits: Limits, bodies: Bodies, cases: tuple[StateBounds, Share], *, contacts_alone: bool = False
+) -> Array:
     """Prove that all robots keep taut cables, limits and distances throughout blocks.
 
     Args:
         robot: without pulleys.
         cases: bounds of k states, and shares (k,).
+        contacts_alone: whether only distances are asked about.
 
     Returns:
         (k,).
     """
 
     def one(state: StateBounds, share: Share) -> Array:
-        cables, (low, high) = cable_bounds(robot, state), tension_range(robot, limits)
-        is_met = _cables_hold(robot, limits, state, cables, share.spools)
-        for ratio in (1.0 / share.factor, share.factor):
-            heavy = with_mass(robot, ratio)
-            tensions = uncertain_tensions(heavy, state, cables, (low, high), (share.spools, share.centre))
-            is_met &= ((tensions.low > low) & (tensions.high < high)).all()
+        cables = cable_bounds(robot, state)
+        is_met = jnp.ones((), bool) if contacts_alone else _cables_hold(robot, limits, state, cables, share)
         turn = jnp.arcsin(share.spools / cables.length.low())
         wide = cables._replace(
             exit=_wider(cables.exit, share.spools),
@@ -78,9 +78,14 @@ def _wider(bounds: AffineBounds, radius: Array) -> AffineBounds:
     return bounds._replace(radius=bounds.radius + radius)
 
 
-def _cables_hold(robot: AnyRobot, limits: Limits, state: StateBounds, cables: CableBounds, spools: Array) -> Array:
-    # Prove the limits of lengths, speeds and accelerations, with the unit vectors u' of cables at most `turn` from u.
-    is_met = jnp.ones((), bool)
+def _cables_hold(robot: AnyRobot, limits: Limits, state: StateBounds, cables: CableBounds, share: Share) -> Array:
+    # Prove tensions, and the limits of lengths, speeds and accelerations, with the unit vectors u' of cables at most
+    # `turn` from u.
+    (low, high), is_met, spools = tension_range(robot, limits), jnp.ones((), bool), share.spools
+    for ratio in (1.0 / share.factor, share.factor):
+        heavy = with_mass(robot, ratio)
+        tensions = uncertain_tensions(heavy, state, cables, (low, high), (spools, share.centre))
+        is_met &= ((tensions.low > low) & (tensions.high < high)).all()
     if limits.cable_length_max is not None:
         is_met &= (cables.length.high() + spools < limits.cable_length_max).all()
     if limits.cable_speed_max is None and limits.cable_acceleration_max is None:
@@ -103,26 +108,38 @@ def _cables_hold(robot: AnyRobot, limits: Limits, state: StateBounds, cables: Ca
 
 
 def _upper_slacks(
-    robot: AnyRobot, limits: Limits, bodies: Bodies, state: StateBounds, moved: Array, ratio: Array
+    robot: AnyRobot,
+    limits: Limits,
+    bodies: Bodies,
+    state: StateBounds,
+    moved: Array,
+    ratio: Array,
+    *,
+    contacts_alone: bool,
 ) -> Array:
     # Upper bounds of slacks of a robot whose spools and mass centre are moved, (n_cables + 1, 3) m, (n_slacks,).
     other = with_mass(dataclasses.replace(robot, base_points=robot.base_points + moved[:-1]), ratio)
     cables, unit = cable_bounds(other, state), 1.0 / wrench_units(robot)
-    matrix, wrench = balance_bounds(other, state, cables)
-    wrench = wrench + centre_wrench(other, state, moved[-1])
-    parts = tension_slacks(other, limits, matrix * unit[:, None], wrench * unit)
-    parts += [*limit_slacks(limits, state, cables), contact_bounds(other, bodies, state, cables)]
+    parts = [contact_bounds(other, bodies, state, cables)]
+    if not contacts_alone:
+        matrix, wrench = balance_bounds(other, state, cables)
+        wrench = wrench + centre_wrench(other, state, moved[-1])
+        parts += tension_slacks(other, limits, matrix * unit[:, None], wrench * unit)
+        parts += limit_slacks(limits, state, cables)
     high = jnp.concatenate([part[1] for part in parts])
     return jnp.where(jnp.isnan(high), jnp.inf, high)
 
 
-@jax.jit
-def worst_ways(robot: AnyRobot, limits: Limits, bodies: Bodies, cases: tuple[StateBounds, Share]) -> Array:
+@partial(jax.jit, static_argnames="contacts_alone")
+def worst_ways(
+    robot: AnyRobot, limits: Limits, bodies: Bodies, cases: tuple[StateBounds, Share], *, contacts_alone: bool = False
+) -> Array:
     """Unit displacements that are worst, to first order, for the criteria that an uncertainty breaks first.
 
     Args:
         robot: without pulleys.
         cases: states at k instants, and the uncertainty (k,).
+        contacts_alone: as for `blocks_hold`.
 
     Returns:
         (k, 2, n_cables + 1, 3) of the spools and of the mass centre.
@@ -132,8 +149,8 @@ def worst_ways(robot: AnyRobot, limits: Limits, bodies: Bodies, cases: tuple[Sta
         shape, ratio = (robot.n_cables + 1, 3), jnp.ones(())
         step = STEP * jnp.max(cable_bounds(robot, state).length.middle)
         moves = step * jnp.eye(shape[0] * shape[1]).reshape(-1, *shape)
-        planned = _upper_slacks(robot, limits, bodies, state, jnp.zeros(shape), ratio)
-        others = jax.vmap(lambda moved: _upper_slacks(robot, limits, bodies, state, moved, ratio))(moves)
+        slacks = partial(_upper_slacks, robot, limits, bodies, state, ratio=ratio, contacts_alone=contacts_alone)
+        planned, others = slacks(jnp.zeros(shape)), jax.vmap(slacks)(moves)
         slopes = ((others - planned[None]) / step).T.reshape(-1, *shape)
         slopes = jnp.where(jnp.isfinite(slopes), slopes, 0.0)
         sizes = jnp.sqrt(jnp.sum(slopes**2, axis=2))
@@ -145,13 +162,21 @@ def worst_ways(robot: AnyRobot, limits: Limits, bodies: Bodies, cases: tuple[Sta
     return jax.vmap(one)(*cases)
 
 
-@jax.jit
-def instants_fail(robot: AnyRobot, limits: Limits, bodies: Bodies, cases: tuple[StateBounds, Share, Array]) -> Array:
+@partial(jax.jit, static_argnames="contacts_alone")
+def instants_fail(
+    robot: AnyRobot,
+    limits: Limits,
+    bodies: Bodies,
+    cases: tuple[StateBounds, Share, Array],
+    *,
+    contacts_alone: bool = False,
+) -> Array:
     """Tell at which instants a robot that is displaced, light or heavy, breaks a criterion.
 
     Args:
         robot: without pulleys.
         cases: states at k instants, shares (k,), and unit displacements as of `worst_ways`.
+        contacts_alone: as for `blocks_hold`.
 
     Returns:
         (k,).
@@ -160,9 +185,8 @@ def instants_fail(robot: AnyRobot, limits: Limits, bodies: Bodies, cases: tuple[
     def one(state: StateBounds, share: Share, ways: Array) -> Array:
         radii = jnp.append(jnp.full(robot.n_cables, share.spools), share.centre)[:, None]
         masses = jnp.stack([1.0 / share.factor, share.factor])
-        high = jax.vmap(
-            lambda way: jax.vmap(lambda ratio: _upper_slacks(robot, limits, bodies, state, radii * way, ratio))(masses)
-        )(ways)
+        slacks = partial(_upper_slacks, robot, limits, bodies, state, contacts_alone=contacts_alone)
+        high = jax.vmap(lambda way: jax.vmap(lambda ratio: slacks(radii * way, ratio))(masses))(ways)
         return (high < 0.0).any()
 
     return jax.vmap(one)(*cases)

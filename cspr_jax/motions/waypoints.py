@@ -24,7 +24,8 @@ class Waypoints:
         family: name of the family that joins them.
         first: number, in the plan, of the first pose.
         last: number, in the plan, of the last pose.
-        fixed: (n_segments,) numbers of arcs in place of those of the poses; None: those of the poses.
+        fixed: (n_segments,) numbers of arcs in place of those of the poses, -m where they are free from m on; None:
+            those of the poses.
     """
 
     robot_file: RobotFile
@@ -47,7 +48,7 @@ class Waypoints:
 
     @property
     def arcs(self) -> np.ndarray:
-        """Number of arcs that is fixed for each segment, (n_segments,); 0 where it is free."""
+        """Number of arcs that is fixed for each segment, (n_segments,); 0 where it is free; see `fixed`."""
         return np.array([pose.arcs or 0 for pose in self.poses[1:]]) if self.fixed is None else self.fixed
 
     @property

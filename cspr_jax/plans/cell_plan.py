@@ -7,6 +7,7 @@ import numpy as np
 
 from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.config.ellipse import SweepEllipse, cell_axes
+from cspr_jax.config.obstacles import SurroundingsKeys
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.schema.map_kinds import MAP_KINDS
@@ -60,7 +61,7 @@ def cell_plan(
         target["arcs"] = count
     plan = {"schema": 1, "robot": settings["robot"], "samples": samples, **trajectory_keys, **depth}
     plan["pose"] = [_start(settings, place), target]
-    return plan
+    return plan | {name: settings[name] for name in SurroundingsKeys.model_fields if name in settings}
 
 
 def _turn(

@@ -1,32 +1,28 @@
 """Legs of families that know neither surroundings nor pulleys: each motion is judged with both once it is made.
 
-The family makes its motions as for cables from points and without surroundings. Among obstacles, or with the shape of a
-platform, contacts alone are then proved, since the family has proved the rest; over pulleys, everything is. Where
-numbers of arcs are free, point masses on as many cables as degrees of freedom take the smallest number that is proved.
+See `motions.judged`. Where numbers of arcs are free, point masses take the smallest number that is proved, over pulleys
+only those on as many cables as degrees of freedom. Without pulleys platforms on six cables do so in legs of one
+segment. Others keep the number that their family chooses.
 """
 
 import copy
 import dataclasses
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.build.scenes import scene_of
-from cspr_jax.errors import ConfigError
 from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.cause import Cause
+from cspr_jax.motions.judged import Judge
 from cspr_jax.motions.leg import JoinedLeg, Leg
 from cspr_jax.motions.motion import Motion
 from cspr_jax.motions.outcome import LegOutcome
 from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.proved_answers import TENSIONS, MotionProof, proof_of, sampled_proof
-from cspr_jax.robots.clearance import Scene
+from cspr_jax.motions.proved_answers import TENSIONS, MotionProof
 from cspr_jax.schema.families import FAMILIES
-from cspr_jax.schema.verdicts import FLAGS, Verdict
 
-# Intervals of the samples that refute most motions before a proof is tried.
-FEW = 200
 # Details of segments that hold for cables from points alone.
 FROM_POINTS = (
     "det_margin",
@@ -50,7 +46,7 @@ class JudgedAnswers(Answers):
     """
 
     plain: Answers
-    proofs: tuple[MotionProof | None, ...]
+    proofs: list[MotionProof | None]
 
     @property
     def feasible(self) -> np.ndarray:
@@ -63,9 +59,9 @@ class JudgedAnswers(Answers):
         return details if proof is None else details | {"failing": proof.failing.tolist()}
 
     def proved_causes(self, i: int, frame: Frame) -> tuple[Cause, ...] | None:
-        """Causes by the proof, where there is one; see `Answers.proved_causes`."""
+        """Causes by the proof, unless it says nothing against the motion; see `Answers.proved_causes`."""
         proof = self.proofs[i]
-        return self.plain.proved_causes(i, frame) if proof is None else proof.causes(frame)
+        return proof.causes(frame) if proof is not None and proof.verdict else self.plain.proved_causes(i, frame)
 
 
 class PulleyAnswers(JudgedAnswers):
@@ -77,25 +73,6 @@ class PulleyAnswers(JudgedAnswers):
         return details | {"margin_unit": "N"}
 
 
-class _Judge(NamedTuple):
-    # Robot with its pulleys, and the bodies that can meet.
-    problem: Problem
-    scene: Scene
-
-    @property
-    def has_pulleys(self) -> bool:
-        return self.problem.robot.pulleys is not None
-
-    def proof(self, motion: Any) -> MotionProof:
-        prove = proof_of if hasattr(motion, "bounds") else sampled_proof
-        return prove(self.problem, motion, self.scene, contacts_alone=not self.has_pulleys)
-
-    def is_refuted(self, motion: Motion) -> bool:
-        # A few samples may refute it.
-        proof = sampled_proof(self.problem, motion, self.scene, FEW, contacts_alone=not self.has_pulleys)
-        return bool(proof.broken.any())
-
-
 class JudgedLeg(Leg):
     """Leg of a family, its motions judged with surroundings and pulleys; see `Leg`."""
 
@@ -105,14 +82,7 @@ class JudgedLeg(Leg):
         self._leg = leg
 
     def check(self, problem: Problem) -> None:
-        """Refuse surroundings where they are not those of the robot that moves, or not certain; see `Leg.check`."""
-        keys, path = self.stops.keys, self.stops.path
-        for key in keys.surroundings[:1]:
-            if problem.limits.uncertainty is not None:
-                raise ConfigError(path, f"{key}: must be absent with an uncertainty: contacts are not proved for it")
-            if self.stops.robot_file.pairs is not None:
-                why = "here a point mass on three cables moves in place of the platform, and touches other bodies"
-                raise ConfigError(path, f'{key}: must be absent but with family = "spline": {why}')
+        """Ask the family; see `Leg.check`."""
         self._leg.check(_from_points(problem))
 
     def answers(self, problem: Problem, depths: np.ndarray) -> Answers:
@@ -130,60 +100,34 @@ class JudgedLeg(Leg):
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the poses by motions that are proved, if there are such; see `Leg.join`."""
-        stops = self.stops
-        scene = scene_of(problem.robot, stops.robot_file, stops.frame, stops.keys, stops.path)
-        judge, plain = _Judge(problem, scene), _from_points(problem)
-        robot, arcs = problem.robot, self.stops.arcs
-        doubtful, none = np.zeros(len(self), bool), np.zeros(len(self), bool)
-        if self._leg.step and robot.n_cables == robot.dof and not stops.robot_file.is_platform:
-            arcs, doubtful, none = self._searched(judge, plain, z0)
-        answers, motions = self._with(arcs).join(plain, z0)
-        is_judged = np.isfinite(answers.duration) & (judge.has_pulleys | answers.feasible)
-        proofs = tuple(judge.proof(motion) if known else None for motion, known in zip(motions, is_judged, strict=True))
-        verdict = np.array(answers.verdict, FLAGS)
-        for i, proof in enumerate(proofs):
-            if proof is None:
-                continue
-            if proof.verdict:
-                flags = proof.verdict | (Verdict.NO_ARCS if none[i] else Verdict.FEASIBLE)
-                verdict[i] = (Verdict.UNDECIDED if none[i] and doubtful[i] else flags).value
-            else:
-                # The family has refuted smaller numbers for cables from points.
-                is_free = judge.has_pulleys and arcs[i] == 0 and answers.tried_arcs[i] > max(self._leg.step, 1)
-                before = Verdict(int(verdict[i])) & Verdict.FEWER_ARCS_UNDECIDED
-                verdict[i] = Verdict.FEWER_ARCS_UNDECIDED if doubtful[i] or is_free else before
-        return _judged(answers, verdict, proofs, has_pulleys=judge.has_pulleys), motions
+        stops, plain, prescribed = self.stops, _from_points(problem), self.stops.arcs
+        judge = Judge(
+            problem,
+            scene_of(problem.robot, stops.robot_file, stops.frame, stops.keys, stops.path, trajectory=stops.keys),
+        )
+        robot, motions = problem.robot, list[Motion]()
+
+        def join(rows: np.ndarray, arcs: np.ndarray) -> tuple[Answers, list[Motion]]:
+            whole = prescribed.copy()
+            whole[rows] = arcs
+            answers, motions[:] = self._with(whole).join(plain, z0)
+            if len(rows) == len(self):  # answers of lines have no rows
+                return answers, list(motions)
+            return answers.rows(rows), [motions[i] for i in rows]
+
+        is_determined, has_pulleys = robot.n_cables == robot.dof, judge.has_pulleys
+        is_searched = is_determined or not has_pulleys
+        if stops.robot_file.is_platform:  # whose motion depends on those before and behind it
+            is_searched = is_determined and not has_pulleys and len(self) == 1
+        most = stops.max_arcs if is_searched else 0
+        judged = judge.smallest(join, prescribed, step=self._leg.step, max_arcs=most)
+        join(np.arange(len(self)), judged.arcs)
+        return _answers(judged.answers, judged.proofs, has_pulleys=has_pulleys), motions
 
     def _with(self, arcs: np.ndarray) -> Leg:
         leg = copy.copy(self._leg)
         leg.stops = dataclasses.replace(self.stops, fixed=arcs)
         return leg
-
-    def _searched(self, judge: _Judge, plain: Problem, z0: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        # Find numbers of arcs (0: the family's choice) whose motions are proved; tell where smaller ones, or all, stay
-        # undecided, and where there are none.
-        prescribed, step = self.stops.arcs, self._leg.step
-        # Over pulleys the family's choice says nothing.
-        arcs = np.where(prescribed > 0, prescribed, step if judge.has_pulleys else 0)
-        is_open, doubtful, none = prescribed == 0, np.zeros(len(self), bool), np.zeros(len(self), bool)
-        while is_open.any():
-            answers, motions = self._with(arcs).join(plain, z0)
-            for i in np.flatnonzero(is_open).tolist():
-                tried, verdict = int(answers.tried_arcs[i]), Verdict.FEASIBLE
-                doubtful[i] |= bool(answers.verdict[i] & (Verdict.UNDECIDED | Verdict.FEWER_ARCS_UNDECIDED).value)
-                if not judge.has_pulleys and not answers.feasible[i]:
-                    is_open[i] = arcs[i] > 0  # of a free number the family says itself that there is none
-                elif not np.isfinite(answers.duration[i]) or judge.is_refuted(motions[i]):
-                    pass
-                else:
-                    verdict = judge.proof(motions[i]).verdict
-                    is_open[i] = bool(verdict)
-                    doubtful[i] |= verdict == Verdict.UNDECIDED
-                    arcs[i] = arcs[i] if verdict else tried
-                if is_open[i]:
-                    none[i] = tried + step > self.stops.max_arcs
-                    is_open[i], arcs[i] = not none[i], 0 if none[i] else tried + step
-        return arcs, doubtful, none
 
 
 def judged(leg: Leg, *, surroundings: bool, pulleys: bool) -> Leg:
@@ -207,15 +151,11 @@ def _from_points(problem: Problem) -> Problem:
     return problem._replace(robot=dataclasses.replace(problem.robot, pulleys=None))
 
 
-def _judged(
-    answers: Answers, verdict: np.ndarray, proofs: tuple[MotionProof | None, ...], *, has_pulleys: bool
-) -> JudgedAnswers:
-    is_feasible = (verdict & ~np.array(Verdict.FEWER_ARCS_UNDECIDED.value, FLAGS)) == 0
-    plain = dataclasses.replace(answers, verdict=verdict, arcs=np.where(is_feasible, answers.tried_arcs, 0))
+def _answers(plain: Answers, proofs: list[MotionProof | None], *, has_pulleys: bool) -> JudgedAnswers:
     columns = {field.name: getattr(plain, field.name) for field in dataclasses.fields(Answers)}
     if not has_pulleys:
         return JudgedAnswers(**columns, plain=plain, proofs=proofs)
-    nothing = np.full(len(verdict), np.nan)
+    nothing = np.full(len(proofs), np.nan)
     columns |= dict.fromkeys(("margin", "margin_bound", "limit_margin", "feasible_at_infinity"), nothing)
     for name, side, others in (("margin", "high", 0), ("margin_bound", "low", 0), ("limit_margin", "high", 1)):
         columns[name] = np.array(

@@ -80,7 +80,7 @@ def long_plan(keys: PlanFile, path: Path) -> PlannedMotions:
 def _judged(
     problem: Problem, robot_file: RobotFile, frame: Frame, keys: PlanFile, path: Path, notes: dict[str, None]
 ) -> Iterator[_Window]:
-    scene = scene_of(problem.robot, robot_file, frame, keys, path)
+    scene = scene_of(problem.robot, robot_file, frame, keys, path, trajectory=keys)
     axes, limits = reference_of(build_robot(robot_file, keys, path)), problem.limits
     limits = limits if problem.robot.n_cables > problem.robot.dof else NO_LIMITS
     tables = motion_windows(path)

@@ -58,10 +58,6 @@ class PlatformMotionAnswers(Answers):
             "beta_hat": [float(value) for value in self.beta_hat[i]],
         }
 
-    def rows(self, index: np.ndarray) -> "PlatformMotionAnswers":
-        """Answers chosen by indices, or by a mask (n,)."""
-        return PlatformMotionAnswers(**{name: values[index] for name, values in vars(self).items()})
-
 
 def settled(
     checker: MotionChecker,
@@ -81,7 +77,7 @@ def settled(
         smallest: numbers of arcs of the candidates; its checks are completed here.
         refused: numbers of arcs at which only limits refuse the candidates.
         max_arcs: largest number tried.
-        fixed: (n,) a fixed number of arcs, 0 where free; None: all free.
+        fixed: as for `smallest_arcs`.
         margins: whether motions without a number of arcs get margins, and not only reasons.
         is_final: whether these answers are shown: then motions that passed checks without a proof are proved.
 
@@ -90,7 +86,7 @@ def settled(
     """
     tried = np.where(smallest.arcs > 0, smallest.arcs, refused.arcs)
     if fixed is not None:
-        tried = np.where(tried > 0, tried, fixed)
+        tried = np.where(tried > 0, tried, np.maximum(fixed, 0))
     none = np.flatnonzero(tried == 0)
     tried[none] = best_candidates(checker, candidates.rows(none), max_arcs=max_arcs)
     segments, checks = segments_with(checker.problem.robot, candidates, tried), smallest.checks
@@ -198,6 +194,7 @@ def reached(
     max_arcs: int,
     same: bool = False,
     margins: bool = True,
+    fixed: np.ndarray | None = None,
 ) -> PlatformMotionAnswers:
     """Smallest numbers of arcs of motions, each with several values of beta-hat at its end.
 
@@ -206,12 +203,13 @@ def reached(
         values: (n, n_values) in the order in which they are tried; NaN for none.
         max_arcs: largest number tried.
         same: whether the value at the end holds at the start too.
+        fixed: as for `smallest_arcs`.
 
     Returns:
         the answers; where no value is feasible, the answer with the first value, or with the value at rest.
     """
     cell, trial = trials(motions, values, same=same)
-    of_trials = smallest_arcs(checker, trial, max_arcs=max_arcs, margins=margins)
+    of_trials = smallest_arcs(checker, trial, max_arcs=max_arcs, fixed=fixed, margins=margins)
     arcs, undecided, checks = np.zeros(len(values), int), np.full(len(values), NEVER), checker.nothing(len(values))
     beta_hats = np.where(np.isnan(values[:, 0]), AT_REST, values[:, 0])
     # Several values of one motion may have passed: in reverse order, the one tried first is written last.
@@ -222,7 +220,7 @@ def reached(
     smallest = FewestArcs(arcs, np.where(undecided < NEVER, undecided, 0), checks)
     # A motion without an answer takes the value at which the fewest limits refuse it, if there is such a value.
     open_ones = np.flatnonzero(((arcs == 0) & (undecided == NEVER))[cell])
-    of_limits = refused_by_limits(checker, trial.rows(open_ones), max_arcs=max_arcs)
+    of_limits = refused_by_limits(checker, trial.rows(open_ones), max_arcs=max_arcs, fixed=fixed)
     refused = Refused(np.zeros(len(values), int), np.zeros((len(values), len(checker.flags)), bool))
     ranks = rank(checker.flags, of_limits.broken)
     best = np.lexsort((of_limits.arcs, ranks))[::-1]  # the fewest limits, then the fewest arcs, are written last
@@ -231,7 +229,7 @@ def reached(
     refused.arcs[cells], refused.broken[cells] = of_limits.arcs[best], of_limits.broken[best]
     beta_hats[cells] = trial.beta_hats[1][open_ones[best]]
     chosen = _with_ends(motions, beta_hats, same=same)
-    return settled(checker, chosen, smallest, refused=refused, max_arcs=max_arcs, margins=margins)[0]
+    return settled(checker, chosen, smallest, refused=refused, max_arcs=max_arcs, fixed=fixed, margins=margins)[0]
 
 
 def _with_ends(motions: Candidates, beta_hats: np.ndarray, *, same: bool) -> Candidates:

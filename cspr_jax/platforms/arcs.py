@@ -116,7 +116,7 @@ def smallest_arcs(
 
     Args:
         max_arcs: largest number tried.
-        fixed: (m,) a fixed number of arcs of each motion, 0 where free; None: all free.
+        fixed: (m,) a fixed number of arcs of each motion, -k where it is free from k on, 0 where free; None: all free.
         beyond: how many arcs beyond the smallest number of a motion are tried for its other candidates; -1: the first
             candidate that passes is enough.
         margins: whether the checks have more than verdicts.
@@ -135,7 +135,7 @@ def smallest_arcs(
         if not (last >= arcs).any():
             break
         stage(f"arcs {arcs} of {max_arcs}")
-        is_open = (last >= arcs) & ((only == 0) | (only == arcs))
+        is_open = (last >= arcs) & _is_tried(arcs, only)
         alive = np.flatnonzero((smallest == 0) & is_open[motion])
         alive = _sieved(checker, segments, arcs, alive, _instants(arcs, TELLING))
         first = np.unique(motion[alive], return_index=True)[1] if beyond < 0 else slice(None)
@@ -152,6 +152,10 @@ def smallest_arcs(
             undecided[unsure] = np.where(undecided[unsure] > 0, undecided[unsure], arcs)
             last[motion[passed]] = np.minimum(last[motion[passed]], arcs + beyond)
     return FewestArcs(smallest, undecided, checks)
+
+
+def _is_tried(arcs: int, only: np.ndarray) -> np.ndarray:
+    return np.where(only > 0, only == arcs, arcs >= -only)
 
 
 def _instants(arcs: int, before: np.ndarray) -> np.ndarray:
@@ -181,7 +185,7 @@ def refused_by_limits(
 
     Args:
         max_arcs: largest number tried.
-        fixed: (m,) a fixed number of arcs of each motion, 0 where free; None: all free.
+        fixed: as for `smallest_arcs`.
 
     Returns:
         the number and the broken limits of each candidate.
@@ -194,7 +198,7 @@ def refused_by_limits(
     segments = _Segments(checker.problem.robot, candidates)
     for arcs in range(1, max_arcs + 1):
         stage(f"why not, arcs {arcs} of {max_arcs}")
-        alive = np.flatnonzero(~fewest.is_best & ((only == 0) | (only == arcs))[motion])
+        alive = np.flatnonzero(~fewest.is_best & _is_tried(arcs, only)[motion])
         for tau in (TELLING, OTHERS):
             alive = _sieved(checker, segments, arcs, alive, _instants(arcs, tau), limits=False)
         if len(alive):
@@ -235,7 +239,7 @@ def unavoidable(
         candidates: n candidates, one of each motion.
         suspects: (n, n_criteria) mask of criteria that some number of arcs breaks.
         max_arcs: largest number tried.
-        fixed: (n,) a fixed number of arcs, 0 where free; None: all free.
+        fixed: as for `smallest_arcs`.
 
     Returns:
         (n, n_criteria): mask of criteria that, as far as the samples show, are broken with every number of arcs.
@@ -248,7 +252,7 @@ def unavoidable(
     certain = suspects & checker.breaks(checker.sampled(segments(2, np.arange(len(only))), 2, ends))
     suspects = suspects & ~certain
     for arcs in range(1, max_arcs + 1):
-        alive = np.flatnonzero(suspects.any(1) & ((only == 0) | (only == arcs)))
+        alive = np.flatnonzero(suspects.any(1) & _is_tried(arcs, only))
         if len(alive):
             tau = np.linspace(0.0, 1.0, COARSEST * arcs + 1)
             suspects[alive] &= checker.breaks(checker.sampled(segments(arcs, alive), arcs, tau))

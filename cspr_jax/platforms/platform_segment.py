@@ -254,13 +254,25 @@ class PlatformMotion:
 
 @partial(jax.jit, static_argnames="kind")
 def _bounds(segment: PlatformSegment, arcs: Array, blocks: TimeBounds, *, kind: PlatformMotionKind) -> StateBounds:
-    time = duration(segment, arcs)
+    return jax.vmap(partial(_block_bounds, kind, segment, arcs))(blocks)
 
-    def one(block: TimeBounds) -> StateBounds:
-        share = _share(segment, arcs)
-        translation = swing_bounds(segment, arcs, time, block, variable=kind.variable)
-        beats = beat_bounds(*_beta_hats(segment, share, kind), share, arcs, block.tau)
-        q, q1, q2 = orientation_bounds(segment.slerp, block.values, beats)
-        return StateBounds(*translation, *unit_rotation_bounds(q, q1 * (1.0 / time), q2 * (1.0 / time**2)))
 
-    return jax.vmap(one)(blocks)
+@partial(jax.jit, static_argnames="kind")
+def several_bounds(cases: tuple[PlatformSegment, Array, TimeBounds], *, kind: PlatformMotionKind) -> StateBounds:
+    """Bounds of the states of several motions, over one block of each.
+
+    Args:
+        cases: segments and numbers of arcs, and bounds of the amplitude function; leaves (k, ...).
+
+    Returns:
+        the bounds, leaves (k, ...).
+    """
+    return jax.vmap(partial(_block_bounds, kind))(*cases)
+
+
+def _block_bounds(kind: PlatformMotionKind, segment: PlatformSegment, arcs: Array, block: TimeBounds) -> StateBounds:
+    time, share = duration(segment, arcs), _share(segment, arcs)
+    translation = swing_bounds(segment, arcs, time, block, variable=kind.variable)
+    beats = beat_bounds(*_beta_hats(segment, share, kind), share, arcs, block.tau)
+    q, q1, q2 = orientation_bounds(segment.slerp, block.values, beats)
+    return StateBounds(*translation, *unit_rotation_bounds(q, q1 * (1.0 / time), q2 * (1.0 / time**2)))

@@ -55,6 +55,7 @@ def pose_arcs(
     beta_hat: float | Literal["preferred"] | None = None,
     beat: str | None = None,
     max_arcs: int = 30,
+    fixed: np.ndarray | None = None,
 ) -> PlatformMotionAnswers:
     """Smallest number of arcs of each motion.
 
@@ -63,6 +64,7 @@ def pose_arcs(
         beta_hat: at the ends: a number; "preferred" (3.91); or None: several values are tried, the preferred one first.
         beat: time function of the rotation; None: "beta_ff".
         max_arcs: largest number tried.
+        fixed: as for `platforms.arcs.smallest_arcs`.
 
     Returns:
         the answers.
@@ -78,6 +80,7 @@ def pose_arcs(
         elif isinstance(beta_hat, float):
             values = np.full((len(targets.z0), 1), beta_hat)
         values = np.where(can_end[:, None], values, np.nan)
-        return reached(checker, targets, values, max_arcs=max_arcs, same=beat not in _SEPARATE)
+        only = None if fixed is None else fixed[piece]
+        return reached(checker, targets, values, max_arcs=max_arcs, same=beat not in _SEPARATE, fixed=only)
 
     return joined(in_parts(part, len(motions.z0), CANDIDATES // (OPTIONS if beta_hat is None else 1)))

@@ -15,7 +15,7 @@ from typing import Any, Literal
 from cspr_jax.errors import InputError
 from cspr_jax.schema import map_columns as columns
 from cspr_jax.schema import workspace_columns as of_workspaces
-from cspr_jax.schema.quantities import EVERY, OF_ELLIPSES, POSE_VERDICT, QUANTITIES, Quantity
+from cspr_jax.schema.quantities import EVERY, MOTION_CLEARANCE, OF_ELLIPSES, POSE_VERDICT, QUANTITIES, Quantity
 from cspr_jax.schema.quantities import register as register_quantity
 from cspr_jax.schema.tiles import LARGEST_TILE, ORDINARY_COST, CellCost
 
@@ -116,7 +116,7 @@ MAP_KINDS: dict[str, MapKind] = {
             description="smallest number of arcs to each target",
             implementation="cspr_jax.swings.arcs_map:MinimumArcsMap",
             cost=CellCost(seconds=6e-5),
-            quantities=("arcs", "tried_arcs", *columns.COMMON, *columns.TOLERATED),
+            quantities=("arcs", "tried_arcs", *columns.COMMON, *columns.TOLERATED, "clearance"),
             stored=("arcs", "verdict", "duration", "margin", "feasible_at_infinity"),
             pictured=("arcs",),
             families=("hypocycloid-standard",),
@@ -124,8 +124,10 @@ MAP_KINDS: dict[str, MapKind] = {
             patterns=("3T",),
             start="point",
             needs=("axes.z0",),
-            takes=("axes.from_x", "axes.from_y", "axes.from_z", "limits", "limits.uncertainty"),
-            stored_with=columns.UNCERTAIN,
+            takes=("axes.from_x", "axes.from_y", "axes.from_z", "limits", "limits.uncertainty", "obstacle"),
+            stored_with=(*columns.UNCERTAIN, ("obstacle", ("clearance",))),
+            only_with=((("clearance",), ("obstacle",)),),
+            rows=(MOTION_CLEARANCE,),
         ),
         MapKind(
             name="minimum-oscillations",
@@ -164,7 +166,7 @@ MAP_KINDS: dict[str, MapKind] = {
             description="smallest number of arcs of a platform to each pose",
             implementation="cspr_jax.platforms.poses_map:PosesMap",
             cost=CellCost(seconds=1.5e-3, limits=5.0),
-            quantities=columns.OF_POSES,
+            quantities=(*columns.OF_POSES, "clearance"),
             stored=columns.POSES_STORED,
             pictured=("arcs",),
             families=_OF_PLATFORMS,
@@ -175,9 +177,11 @@ MAP_KINDS: dict[str, MapKind] = {
             needs=("axes.z0",),
             takes=(
                 *("axes.tilt_azimuth", "axes.tilt", "axes.torsion", "trajectory.beta_hat", "trajectory.beat"),
-                *("limits", "limits.uncertainty"),
+                *("limits", "limits.uncertainty", *columns.SURROUNDINGS),
             ),
-            stored_with=columns.UNCERTAIN,
+            stored_with=(*columns.UNCERTAIN, *((key, ("clearance",)) for key in columns.SURROUNDINGS)),
+            only_with=((("clearance",), columns.SURROUNDINGS),),
+            rows=(MOTION_CLEARANCE,),
         ),
         MapKind(
             name="orientations",

@@ -324,6 +324,16 @@ OF_ELLIPSES = (
         "infinite without such limits, NaN where only formulas are used.",
     ),
 )
+# Maps of motions among obstacles have this row in place of the clearance of poses.
+MOTION_CLEARANCE = Quantity(
+    "clearance",
+    "m",
+    "clearance of the motion",
+    "Smallest distance of cables, and of a platform of known shape, from obstacles and from each other, along the "
+    "motion of `tried_arcs`, less the cables' thickness; NaN where that motion is not feasible without them.",
+    signed=True,
+    better="larger",
+)
 # Why accessible orientations are not attained, by the best candidate's flags.
 REFUSALS = {
     "refused_slack": Verdict.SLACK_CABLE,

@@ -60,7 +60,7 @@ class Splines(Leg):
         if self.stops.keys.stretch is not None:
             motions = [motion.stretched(self.stops.keys.stretch) for motion in motions]
         stops = self.stops
-        scene = scene_of(problem.robot, stops.robot_file, stops.frame, stops.keys, stops.path)
+        scene = scene_of(problem.robot, stops.robot_file, stops.frame, stops.keys, stops.path, trajectory=stops.keys)
         return proved_answers(problem, motions, scene), list(motions)
 
     def warnings(self, problem: Problem) -> list[str]:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cspr_jax.config.obstacles import SurroundingsKeys
 from cspr_jax.config.reading import Table
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import Axes, SweepFile
@@ -21,6 +22,7 @@ _SPECIAL = (
     *("trajectory.inclination", "trajectory.beta_hat", "trajectory.beat"),
     *("trajectory.max_acceleration", "trajectory.rule"),
     *("limits", "limits.uncertainty", "orientations", "orientations.values", "launch", "workspace", "ellipse"),
+    *SurroundingsKeys.model_fields,
 )
 # A hint names at most so many kinds.
 _FEW = 3
@@ -111,7 +113,7 @@ def is_asked(keys: SweepFile, robot: RobotFile, name: str) -> bool:
         return last in (keys.workspace or WorkspaceTable()).conditions
     if table == "limits" and getattr(robot, last, None) is not None:
         return True
-    return is_given(keys, name) and getattr(getattr(keys, table), last) is not False
+    return is_given(keys, name) and getattr(getattr(keys, table) if table else keys, last) is not False
 
 
 def check_store(kind: MapKind, keys: SweepFile, robot: RobotFile, path: Path) -> None:

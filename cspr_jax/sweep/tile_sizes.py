@@ -28,6 +28,8 @@ LIMIT_SECONDS = {
 }
 # Likewise for a workspace, by what else is computed for each cell.
 WORKSPACE_SECONDS = {"prove": 2e-4, "obstacle": 5e-5, "platform_hull": 5e-5, "platform_box": 5e-5}
+# Likewise for motions among obstacles, by how many there are: each motion that is feasible without them is judged.
+JUDGED_SECONDS, OBSTACLE_SECONDS = 5e-3, 1e-3
 ARCS = 30
 
 
@@ -42,6 +44,8 @@ def cell_seconds(kind: MapKind, keys: SweepFile) -> float:
         LIMIT_SECONDS.get(name, max(LIMIT_SECONDS.values())) for name in names if is_given(keys, f"limits.{name}")
     )
     conditions = sum(cost for name, cost in WORKSPACE_SECONDS.items() if is_given(keys, f"workspace.{name}"))
+    if keys.surroundings:
+        conditions += JUDGED_SECONDS + OBSTACLE_SECONDS * len(keys.obstacle or ())
     divisions = (keys.orientations or Orientations()).divisions
     motion = (kind.cost.seconds + kind.cost.limits * limits) * (
         keys.trajectory.max_arcs / ARCS if kind.families else 1.0

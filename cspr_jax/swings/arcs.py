@@ -108,7 +108,7 @@ def arcs_and_segments(
         ends: (n, 3) likewise.
         z0: (n,) depth of p0 below the centroid of the spools, m; positive.
         max_arcs: largest number of arcs tried.
-        arcs: (n,) a fixed number of arcs for each segment, 0 where free; None: all free.
+        arcs: as for `swings.decide.only`.
         dtype: precision of the sieve, "float64" or "float32"; the verdicts are the same.
 
     Returns:

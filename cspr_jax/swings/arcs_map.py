@@ -6,8 +6,10 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
 from cspr_jax.maps.grid_map import PointMassMap
+from cspr_jax.motions.answers import Answers
 from cspr_jax.schema.tiles import Grid
-from cspr_jax.swings.arcs import minimum_arcs
+from cspr_jax.swings.arcs import arcs_and_segments, minimum_arcs
+from cspr_jax.swings.hypocycloid import Hypocycloid, several_bounds
 
 _OF_STARTS = ("from_x", "from_y", "from_z", "z0")
 
@@ -23,19 +25,23 @@ class MinimumArcsMap(PointMassMap):
         if robot_file.is_planar:
             raise ConfigError(file, f'robot "{robot_file.name}" is planar: must have three cables in this map')
         super().__init__(robot_file, keys, file)
+        self._scene = self._surroundings(robot_file)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
-        starts, ends = self._starts(cells), self._targets(cells)
-        answers = minimum_arcs(
-            self._problem,
-            starts,
-            ends,
-            cells["z0"],
-            max_arcs=self._keys.trajectory.max_arcs,
-            dtype=self._keys.run.dtype,
-        )
-        return vars(answers)
+        points, max_arcs = (self._starts(cells), self._targets(cells), cells["z0"]), self._keys.trajectory.max_arcs
+        settings = {"max_arcs": max_arcs, "dtype": self._keys.run.dtype}
+        if self._scene is None:
+            return vars(minimum_arcs(self._problem, *points, **settings))
+        from cspr_jax.maps.clear_motions import clear_motions  # with the proofs of any motion, as in `swings.arcs`
+        from cspr_jax.motions.several import SeveralMotions
+
+        def join(rows: np.ndarray, arcs: np.ndarray) -> tuple[Answers, SeveralMotions]:
+            answers, segments = arcs_and_segments(self._problem, *(x[rows] for x in points), arcs=arcs, **settings)
+            motions = Hypocycloid(segments, self._problem.amplitude, answers.tried_arcs.astype(float))
+            return answers, SeveralMotions(motions, answers.duration, several_bounds)
+
+        return clear_motions(self._problem, self._scene, join, len(cells["z0"]), max_arcs=max_arcs)
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse ends that are all out of reach; see `GridMap.refuse_hopeless`."""

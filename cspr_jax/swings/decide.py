@@ -69,7 +69,7 @@ def decided(
             where it is out of the question.
         at_ends: (n, n_criteria) of `end_slacks`.
         infinity: (n,) left-hand side of (2.55).
-        arcs: (n,) a fixed number of arcs for each segment, 0 where free; None: all free.
+        arcs: as for `only`.
         known: numbers of arcs that are proved already; None: none.
         measure: finds the margins, as `margins` does.
 
@@ -128,19 +128,19 @@ def end_slacks(problem: Problem, arcs: float, segments: Segment) -> jax.Array:
 
 
 def only(upper: np.ndarray, arcs) -> np.ndarray:
-    """Upper bounds, without those that a fixed number of arcs rules out.
+    """Upper bounds, without those that prescribed numbers of arcs rule out.
 
     Args:
         upper: (n, max_arcs).
-        arcs: (n,) a fixed number of arcs for each segment, 0 where free; None: all free.
+        arcs: (n,) a fixed number of arcs for each segment, -m where it is free from m on, 0 where free; None: all free.
 
     Returns:
-        (n, max_arcs), -inf at other numbers of arcs than a fixed one.
+        (n, max_arcs), -inf at numbers of arcs that are ruled out.
     """
     if arcs is None:
         return upper
-    fixed = np.asarray(arcs)[:, None]
-    return np.where((fixed == 0) | (fixed == np.arange(1, upper.shape[1] + 1)), upper, -np.inf)
+    fixed, number = np.asarray(arcs)[:, None], np.arange(1, upper.shape[1] + 1)
+    return np.where(np.where(fixed > 0, number == fixed, number >= -fixed), upper, -np.inf)
 
 
 class _Search(NamedTuple):

@@ -282,8 +282,24 @@ class Hypocycloid:
 
 @jax.jit
 def _bounds(segment: Segment, arcs: Array, blocks: TimeBounds) -> StateBounds:
-    time = duration(segment, arcs)
-    return jax.vmap(lambda block: StateBounds(*swing_bounds(segment, arcs, time, block)))(blocks)
+    return jax.vmap(partial(_block_bounds, segment, arcs))(blocks)
+
+
+@jax.jit
+def several_bounds(cases: tuple[Segment, Array, TimeBounds]) -> StateBounds:
+    """Bounds of the states of several motions, over one block of each.
+
+    Args:
+        cases: segments and numbers of arcs, and bounds of the amplitude function; leaves (k, ...).
+
+    Returns:
+        the bounds, leaves (k, ...).
+    """
+    return jax.vmap(_block_bounds)(*cases)
+
+
+def _block_bounds(segment: Segment, arcs: Array, block: TimeBounds) -> StateBounds:
+    return StateBounds(*swing_bounds(segment, arcs, duration(segment, arcs), block))
 
 
 def feasibility_at_infinity(segment: Segment, amplitude: Amplitude) -> Array:

@@ -178,7 +178,7 @@ def minimum_oscillations(
         segments: as `transitions_to` gives them, leaves (n, ...).
         z0: (n,) depth of p0 below the centroid of the spools, m; positive.
         max_arcs: twice the largest number of oscillations tried, at least 2.
-        arcs: (n,) a fixed, even number of arcs for each transition, 0 where free; None: all free.
+        arcs: even, as for `swings.decide.only`.
         steady: (n,) whether the segment is no transition but the swing of constant size that one ends in; None:
             nowhere.
 

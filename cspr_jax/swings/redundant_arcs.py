@@ -77,7 +77,7 @@ def redundant_arcs(
         parities: the segments for even (key 0) and odd (key 1) numbers of arcs, leaves (n, ...).
         infinity: (n,) left-hand side of (2.55).
         max_arcs: largest number of arcs tried.
-        arcs: (n,) a fixed number of arcs for each segment, 0 where free; None: all free.
+        arcs: as for `swings.decide.only`.
         step: 2 where numbers of arcs must be even.
 
     Returns:
@@ -87,9 +87,9 @@ def redundant_arcs(
     only = np.zeros(count, int) if arcs is None else np.asarray(arcs)
     nothing = np.full(count, np.nan)
     trials = _Trials(np.zeros(count, int), np.zeros(count, int), nothing.copy(), only.copy(), np.full(count, -np.inf))
-    trials.best[only == 0] = step
+    trials.best[only <= 0] = np.maximum(-only, step)[only <= 0]
     for number in range(step, max(max_arcs, int(only.max(initial=0))) + 1, step):
-        is_tried = np.where(only == 0, number <= max_arcs, only == number) & (trials.arcs == 0)
+        is_tried = np.where(only > 0, only == number, (-only <= number) & (number <= max_arcs)) & (trials.arcs == 0)
         if is_tried.any():
             stage(f"arcs {number} of {max_arcs}")
             _try(problem, parities, np.flatnonzero(is_tried), number, trials)

@@ -6,7 +6,10 @@ import h5py
 import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from matplotlib.colors import to_hex
+from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
+from mpl_toolkits.mplot3d.proj3d import proj_transform
+from scipy.spatial import ConvexHull
 
 import cspr_jax
 from cspr_jax.config.plan import plan_keys
@@ -14,6 +17,7 @@ from cspr_jax.config.robot import resolve_robot
 from cspr_jax.outputs.motion_files import failures
 from cspr_jax.outputs.plots import film as films
 from cspr_jax.outputs.plots.bodies_in_space import lines_on
+from cspr_jax.outputs.plots.obstacles import COLOUR, points_of
 from cspr_jax.outputs.plots.robot_along import moving
 from cspr_jax.outputs.plots.style import Style, in_style
 from cspr_jax.robots import shapes
@@ -28,6 +32,7 @@ POSES = [
     {"position": [0.1, 0.05, 0.9], "time": 0.6},
     {"position": [-0.05, 0.1, 1.1], "time": 1.2},
 ]
+BALL, BOX = shapes.sphere([0.4, 0.2, 1.5], 0.1), shapes.box([0.0, 0.5, 1.2], [0.3, 0.1, 0.2], [0.8, 0.6, 0.0, 0.0])
 PLAN = {"schema": 1, "robot": "prototype", "family": "spline", "pose": POSES, "samples": 40}
 LIMIT = 0.2  # m/s of cables
 
@@ -35,6 +40,24 @@ LIMIT = 0.2  # m/s of cables
 def first_face(area: Poly3DCollection) -> np.ndarray:
     """Corners of the first face; versions of matplotlib keep them under different names."""
     return np.array(area._faces[0]) if hasattr(area, "_faces") else area._vec[:3, area._segslices[0]].T
+
+
+def assert_bodies_are_shown(space):
+    """Each body covers the area of its corners in the picture, and has its lines in space."""
+
+    def seen(points):
+        return np.stack(proj_transform(*points.T, space.get_proj())[:2], axis=1)
+
+    areas = [area for area in space.collections if isinstance(area, Poly3DCollection)]
+    lines = [part for part in space.collections if isinstance(part, Line3DCollection)]
+    lines = [part for part in lines if to_hex(part.get_color()[0]) == COLOUR]
+    assert len(areas) == len(lines) == 2
+    for body, area, drawn in zip((BALL, BOX), areas, lines, strict=True):
+        face, whole = seen(first_face(area)), seen(points_of(body))
+        sizes = [ConvexHull(points).volume for points in (face, whole, np.concatenate([face, whole]))]
+        np.testing.assert_allclose(sizes, sizes[0], rtol=1e-3)
+        for line, expected in zip(drawn._segments3d, lines_on(body), strict=True):
+            np.testing.assert_allclose(line, expected)
 
 
 @pytest.fixture(scope="module")
@@ -70,8 +93,15 @@ def test_other_files_have_no_such_intervals(tmp_path):
 
 
 def shaded(panel):
+    """Intervals of time that are shaded over the whole height of a panel, behind its lines."""
     areas = [area for area in panel.collections if isinstance(area, PolyCollection) and area.get_label() == "fails"]
-    return np.array([path.vertices[:4, 0][[0, 2]] for area in areas for path in area.get_paths()])
+    for area in areas:
+        assert area.get_transform() == panel.get_xaxis_transform() and area.get_visible()
+        assert area.get_facecolor()[0][3] > 0.1 and area.get_zorder() < min(line.get_zorder() for line in panel.lines)
+    bands = np.array([path.vertices[:4] for area in areas for path in area.get_paths()])
+    np.testing.assert_array_equal(np.sort(bands[..., 1], axis=1), np.tile([0.0, 0.0, 1.0, 1.0], (len(bands), 1)))
+    assert (np.ptp(bands[..., 0], axis=1) > 0.0).all()
+    return np.stack([bands[..., 0].min(1), bands[..., 0].max(1)], axis=1)
 
 
 @pytest.mark.parametrize("quantity", [None, "tensions", "summary"])
@@ -89,12 +119,9 @@ def test_pictures_over_time_shade_them(plan, file, quantity):
 def test_pictures_in_space_have_the_obstacles(file, quantity):
     figure = cspr_jax.plot(file, quantity=quantity)
     space = next(panel for panel in figure.axes if panel.name == "3d")
-    sphere, box = (first_face(area) for area in space.collections if isinstance(area, Poly3DCollection))
-    centre, radius = OBSTACLES[0]["centre"], OBSTACLES[0]["radius"]
-    np.testing.assert_allclose(np.linalg.norm(sphere - centre, axis=1), radius, rtol=0.01)
-    # The area of a box is that of its corners in the picture, and all of it lies within the axes.
-    for points in (sphere, box):
-        for axis, values in zip("xyz", points.T, strict=True):
+    assert_bodies_are_shown(space)
+    for body in (BALL, BOX):
+        for axis, values in zip("xyz", points_of(body).T, strict=True):
             low, high = sorted(getattr(space, f"get_{axis}lim")())
             assert low < values.min() and values.max() < high
     assert "obstacles" in [text.get_text() for text in figure.legends[0].get_texts()]
@@ -105,10 +132,14 @@ def test_lines_lie_on_the_surfaces():
     assert len(lines_on(ball)) == 3 and len(lines_on(stick)) == 2
     for line in lines_on(ball):
         np.testing.assert_allclose(np.linalg.norm(line - ball.centre, axis=1), 0.5)
+    flat = [np.ptp(line, axis=0).argmin() for line in lines_on(ball)]
+    assert sorted(flat) == [0, 1, 2] and all(np.ptp(line, axis=0).min() < 1e-12 for line in lines_on(ball))
     for line, end in zip(lines_on(stick), (stick.start, stick.end), strict=True):
         np.testing.assert_allclose(np.linalg.norm(line - end, axis=1), 0.25)
         np.testing.assert_allclose((line - end) @ (stick.end - stick.start), 0.0, atol=1e-12)
-    assert len(lines_on(shapes.box([0.0, 0.0, 0.0], [1.0, 2.0, 3.0]))) == 12
+    edges = np.diff(lines_on(shapes.box([0.0, 0.0, 0.0], [1.0, 2.0, 3.0])), axis=1)[:, 0]
+    np.testing.assert_allclose(np.sort(np.abs(edges).sum(1)), [1.0] * 4 + [2.0] * 4 + [3.0] * 4)
+    assert ((edges != 0.0).sum(1) == 1).all()
 
 
 def test_films_have_both(plan):
@@ -117,7 +148,7 @@ def test_films_have_both(plan):
         picture = films._Picture("film", columns, plan.robot_file, plan.keys, np.arange(2))
     space = picture.figure.axes[0]
     over_time = next(panel for panel in picture.figure.axes if panel.get_xlabel() == "time (s)")
-    assert sum(isinstance(area, Poly3DCollection) for area in space.collections) == 2
+    assert_bodies_are_shown(space)
     np.testing.assert_allclose(shaded(over_time), failures(plan)["failing"])
 
 

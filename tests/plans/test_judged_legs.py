@@ -6,13 +6,13 @@ from oracles.pulleys import length
 from support.commands import cspr
 
 import cspr_jax
-from cspr_jax.errors import ConfigError
 from cspr_jax.schema.verdicts import Verdict
 
 SPOOLS = [[0.22516660498395405, -0.13, 0.0], [-0.22516660498395405, -0.13, 0.0], [0.0, 0.26, 0.0]]
 ROBOT = {"name": "three", "mass": 0.198, "z_axis": "down", "base_points": SPOOLS}
 FROM, TO = [0.1, 0.05, 1.5], [-0.1, 0.05, 1.5]
 SWING = {"family": "hypocycloid-standard", "z0": 1.7, "pose": [{"position": FROM}, {"position": TO}]}
+TRANSITION = {"family": "transition", "z0": 1.7, "pose": [{"rest": True}, {"position": FROM}]}
 LINE = {"family": "s-curve", "pose": [{"position": FROM}, {"position": TO}]}
 BEZIER = {"family": "bezier", "pose": [{"position": FROM}, {"position": TO, "duration": 2.0}]}
 # On the way of the swing of one arc.
@@ -63,12 +63,11 @@ def test_swings_that_all_touch_an_obstacle():
 
 def test_transitions_and_lines_among_obstacles():
     """Lines in the least time have no room left in their own criteria, and are proved all the same."""
-    transition = {"family": "transition", "z0": 1.7, "pose": [{"rest": True}, {"position": FROM}]}
     place = [0.05, 0.025, 1.6]
-    wall = planned(transition, 0.2, place, max_arcs=4)
+    wall = planned(TRANSITION, 0.2, place, max_arcs=4)
     segment = wall.to_dict()["segments"][0]
     assert (segment["oscillations"], segment["verdict"]) == (None, "no_arcs+obstacle")
-    assert planned(transition, 0.001, [0.2, 0.2, 1.6]).answers.arcs[0] == 2
+    assert planned(TRANSITION, 0.001, [0.2, 0.2, 1.6]).answers.arcs[0] == 2
     for keys in (LINE, BEZIER):
         plain, near = planned(keys), planned(keys, 0.01, [0.0, 0.05, 1.515])
         assert near.feasible and near.answers.margin[0] == plain.answers.margin[0]
@@ -100,10 +99,49 @@ def test_motions_over_pulleys(keys):
         assert not segment["fewer_arcs_undecided"]
 
 
+def worst_clearance(plan, place, radius, size):
+    """Least distance of the ball from a cable whose spool, `size` off its place, is as bad as can be."""
+    ends, base = plan.rows()["position"][:, None], np.array(SPOOLS)
+    # Towards the ball and across the cable.
+    ways = (ends - base) / np.linalg.norm(ends - base, axis=2, keepdims=True)
+    across = place - base - ((place - base) * ways).sum(2)[..., None] * ways
+    moved = base + size * across / np.linalg.norm(across, axis=2, keepdims=True)
+    along = np.clip(((place - moved) * (ends - moved)).sum(2) / ((ends - moved) ** 2).sum(2), 0.0, 1.0)
+    return (np.linalg.norm(moved + along[..., None] * (ends - moved) - place, axis=2) - radius).min()
+
+
+@pytest.mark.parametrize("keys", [SWING, pytest.param(TRANSITION, marks=pytest.mark.thorough)])
+def test_robots_within_an_uncertainty_keep_clear(keys):
+    """Of a ball beside a cable, halfway up, of which displaced spools come nearer than they make cables slack."""
+    place, size = [0.11, -0.1, 0.75], 0.004
+    off = {"limits": {"uncertainty": {"spool_positions": size}}}
+    plain = planned(keys, samples=2001, **off)
+    radius = clearances(plain, place, 0.004).min()  # 4 mm from the cable as planned
+    beside = planned(keys, radius, place, samples=2001, **off)
+    proved, refuted = beside.answers.tolerated[0], beside.answers.not_tolerated[0]
+    assert beside.feasible and 1.0 < proved < refuted < 0.7 * plain.answers.tolerated[0]
+    assert worst_clearance(beside, place, radius, size * proved) > 0.0
+    assert worst_clearance(beside, place, radius, 1.02 * size * refuted) < 0.0 and proved > 0.9 * refuted
+    # Random ones among these robots are no worse.
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        way = rng.normal(size=(3, 3))
+        moved = np.array(SPOOLS) + proved * size * way / np.linalg.norm(way, axis=1, keepdims=True)
+        ends = beside.rows()["position"][:, None]
+        along = np.clip(((place - moved) * (ends - moved)).sum(2) / ((ends - moved) ** 2).sum(2), 0.0, 1.0)
+        assert np.linalg.norm(moved + along[..., None] * (ends - moved) - place, axis=2).min() > radius
+    fixed = keys | {"pose": [*keys["pose"][:-1], keys["pose"][-1] | {"arcs": int(plain.answers.arcs[0])}]}
+    wide = {"limits": {"uncertainty": {"spool_positions": 1.05 * refuted * size}}}
+    met = planned(fixed, radius, place, **wide)
+    assert Verdict(int(met.answers.verdict[0])) == Verdict.UNCERTAINTY and not met.feasible
+    (cause,) = met.causes[0]
+    assert (cause.criterion, cause.needed) == ("uncertainty", 1.0) and cause.allowed < 1.0
+    heavy = planned(keys, radius, place, limits={"uncertainty": {"mass_factor": 1.01}})
+    light = planned(keys, limits={"uncertainty": {"mass_factor": 1.01}})
+    assert heavy.answers.tolerated[0] == light.answers.tolerated[0]  # the mass moves no cable
+
+
 def test_surroundings_that_are_refused(tmp_path):
-    uncertain = {"limits": {"uncertainty": {"mass_factor": 1.01}}}
-    with pytest.raises(ConfigError, match="obstacle: must be absent with an uncertainty"):
-        planned(SWING, 0.01, **uncertain)
     (tmp_path / "plan.toml").write_text(
         'schema = 1\nrobot = "prototype"\nfamily = "hypocycloid-standard"\nz0 = 1.7\n'
         "platform_box = [[-0.1, -0.1, 0.0], [0.1, 0.1, 0.1]]\n"

@@ -30,7 +30,8 @@ z = { start = 0.5, stop = 2.5, count = 3 }
 """
 FROM = "from = { position = [0.7, 0.7, 3.0] }"
 TILT = [[0.3, 0.05, -0.02], [-0.2, 0.25, 0.06], [-0.1, -0.3, 0.01]]
-QUANTITIES = {name: EVERY[name] for name in MAP_KINDS["minimum-arcs"].quantities}
+KIND = MAP_KINDS["minimum-arcs"]
+QUANTITIES = {name: EVERY[name] for name in KIND.quantities if not KIND.keys_of(name)}
 FLOATS = [name for name, quantity in QUANTITIES.items() if quantity.kind == "float"]
 COUNTS = [name for name in QUANTITIES if name not in FLOATS]
 

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Patch, Polygon
 
+from cspr_jax.config.obstacles import SurroundingsKeys
 from cspr_jax.outputs.plots.robot_at import hull_of, workspace_of
 from cspr_jax.robots.shapes import Box, Cylinder, Obstacle
 from cspr_jax.store.result import Result
@@ -21,14 +22,15 @@ CORNERS = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(-1, 3)
 
 
 def obstacles(result: Result) -> list[np.ndarray]:
-    """Obstacles of a map of a workspace; all are convex.
+    """Obstacles of a map of a workspace or of motions; all are convex.
 
     Returns:
-        for each (n, 3) points, in the axes of the file, whose hull it is, m; none of another map.
+        for each (n, 3) points, in the axes of the file, whose hull it is, m; none of another result.
     """
-    if result.attributes.get("map") != "workspace" or not result.settings:
+    if "map" not in result.attributes or not result.settings:
         return []
-    return [points_of(body) for body in workspace_of(result).bodies]
+    tables = SurroundingsKeys(obstacle=result.settings.get("obstacle"))
+    return [points_of(body) for body in (*workspace_of(result).bodies, *tables.bodies)]
 
 
 def points_of(shape: Obstacle) -> np.ndarray:

@@ -1,0 +1,28 @@
+"""Cells of maps whose motions keep clear of obstacles, as the plan of each cell says."""
+
+import numpy as np
+
+from cspr_jax.motions.judged import Join, Judge
+from cspr_jax.motions.problem import Problem
+from cspr_jax.robots.clearance import Scene
+
+
+def clear_motions(
+    problem: Problem, scene: Scene, join: Join, count: int, *, max_arcs: int, step: int = 1
+) -> dict[str, np.ndarray]:
+    """Columns of a map among obstacles.
+
+    Args:
+        scene: in the robot's axes.
+        join: gives answers without obstacles, and `SeveralMotions`, of some cells.
+        count: number of cells.
+        step: between numbers of arcs.
+
+    Returns:
+        (count, ...) each: those of the answers, and the smallest clearance, m, NaN of motions that are not feasible
+        without obstacles.
+    """
+    judge = Judge(problem, scene, intervals=False)
+    answers, proofs, _ = judge.smallest(join, np.zeros(count, int), step=step, max_arcs=max_arcs)
+    clearance = np.array([np.nan if proof is None else proof.proof.high.min() for proof in proofs])
+    return vars(answers) | {"clearance": clearance}
