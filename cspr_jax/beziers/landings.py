@@ -1,7 +1,8 @@
 """Scatter of landings: errors of the winches and of the instant of release, by a random sample and to first order.
 
 At the release the cables have lengths and rates that miss the plan's; the effector is where the lengths are, and moves
-as the rates say. From there the object flies to the height of its target. A random sample of errors gives a sample of
+as the rates say; on redundant cables, whose errors contradict each other, where the sum of the squares of what is left
+is least. From there the object flies to the height of its target. A random sample of errors gives a sample of
 landings, and the derivatives of the landing with respect to all errors the covariance for small errors.
 """
 
@@ -109,7 +110,7 @@ def landing(robot: PointMassRobot, throw: Throw, errors: Array) -> Array:
     """Landing of one throw.
 
     Args:
-        robot: a point mass on as many cables as it has degrees of freedom; centred.
+        robot: a point mass; centred.
         errors: (1 + 2 n_cables,) of the instant, s, of the lengths, m, and of their rates, m/s.
 
     Returns:
@@ -137,12 +138,16 @@ def _placed(robot: PointMassRobot, start: Array, lengths: Array) -> Array:
 
 
 def _moving(robot: PointMassRobot, place: Array, rates: Array) -> Array:
-    # Return the velocity at which the lengths have these rates.
+    # Return the velocity at which the lengths have these rates; on redundant cables the one that comes nearest.
     rays = place[None] - robot.base_points
     units = rays / jnp.linalg.norm(rays, axis=1, keepdims=True)
+    units = units[:, np.array([0, 2])] if is_planar(robot) else units
+    if robot.n_cables > robot.dof:
+        units, rates = units.T @ units, units.T @ rates
+    velocity = solved(units, rates[:, None])[0][:, 0]
     if not is_planar(robot):
-        return solved(units, rates[:, None])[0][:, 0]
-    x, z = solved(units[:, np.array([0, 2])], rates[:, None])[0][:, 0]
+        return velocity
+    x, z = velocity
     return jnp.stack([x, jnp.zeros_like(x), z])
 
 
@@ -160,7 +165,7 @@ def scatter(robot: PointMassRobot, throw: Throw, errors: LaunchErrors) -> Scatte
     """Scatter of the landings of a launch.
 
     Args:
-        robot: a point mass on as many cables as it has degrees of freedom; centred.
+        robot: a point mass; centred.
 
     Returns:
         the scatter, in the axes of the kernels.

@@ -26,14 +26,14 @@ def normalised(duration: Any, start: np.ndarray, end: np.ndarray) -> AffineBound
     """Bounds of the normalised time over blocks.
 
     Args:
-        duration: () s.
+        duration: () or (k,) s.
         start: (k,) s.
         end: (k,) s, later than `start`.
 
     Returns:
         (k,).
     """
-    first, last = (np.clip(np.asarray(x) / float(duration), 0.0, 1.0) for x in (start, end))
+    first, last = (np.clip(np.asarray(x) / np.asarray(duration, float), 0.0, 1.0) for x in (start, end))
     return AffineBounds(0.5 * (first + last), 0.5 * (last - first), np.full(len(first), ROUNDING))
 
 

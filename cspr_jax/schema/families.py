@@ -110,6 +110,7 @@ _ROWS = (
         "Bezier curves of the second order, at rest in every pose (launch paper)",
         dict.fromkeys(("2T", "3T"), "cspr_jax.beziers.leg:Beziers"),
         rests_anywhere=True,
+        any_cables=("2T", "3T"),
         keys=("first_control_point", "least"),
         pose_keys=("duration",),
     ),
