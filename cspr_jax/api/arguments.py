@@ -18,8 +18,9 @@ from cspr_jax.motions.motion import Placed
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.kernel_axes import prepared
 from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PLANAR, PointMassRobot
-from cspr_jax.robots.robot import check_determined
+from cspr_jax.robots.robot import check_determined, check_moved
 from cspr_jax.schema.given_numbers import ANY, Numbers
 
 POINTS = Numbers(POINTS_WORDS, ((ANY, 3),), **LENGTHS)
@@ -122,6 +123,7 @@ def kernel_problem(
     *,
     free_end: bool | None = False,
     families: tuple[str, ...] = (),
+    any_cables: bool = False,
 ) -> tuple[Problem, Frame]:
     """Robot, limits and amplitude function, as the kernels take them.
 
@@ -131,17 +133,22 @@ def kernel_problem(
         limits: override those of the robot; None: those of the robot.
         free_end: as in `amplitude_of`.
         families: as in `limits_over`.
+        any_cables: whether there may be more cables than degrees of freedom.
 
     Returns:
         the problem, and the frame of the robot.
 
     Raises:
-        InputError: more cables than degrees of freedom, or what `amplitude_of` and `limits_over` refuse.
+        InputError: more cables than degrees of freedom where they must not be, or what `amplitude_of` and `limits_over`
+            refuse.
     """
     function = amplitude_of(amplitude, free_end=free_end)
-    check_determined(robot)
+    (check_moved if any_cables else check_determined)(robot)
     prepared_robot, frame = prepared(robot)
-    return Problem(prepared_robot, limits_over(robot, limits, families=families), function), frame
+    # As `build.robots.is_redundant_platform` has it.
+    any_tensions = isinstance(robot, PlatformRobot) and robot.n_cables > robot.dof
+    limit_values = limits_over(robot, limits, any_tensions=any_tensions, families=families)
+    return Problem(prepared_robot, limit_values, function), frame
 
 
 def batched(kind, segments, problem: Problem, answers: Answers, frame: Frame, *more) -> Any:

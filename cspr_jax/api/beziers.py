@@ -22,7 +22,7 @@ from cspr_jax.motions.motion import Placed
 from cspr_jax.robots.kernel_axes import prepared
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PLANAR, PointMassRobot, plane_normal
-from cspr_jax.robots.robot import check_determined
+from cspr_jax.robots.robot import check_moved
 from cspr_jax.schema.columns import Columns
 
 
@@ -33,8 +33,10 @@ class BezierVerdicts(Columns):
     Fields:
         verdict: flags of `Verdict`; 0: proved feasible.
         margin: smallest pseudotension over its value at rest in P0, or smallest depth below the spools over the depth
-            of the start, whichever is less.
-        margin_bound: proved lower bound of the margin: the margin less its rounding error.
+            of the start, whichever is less; on more cables than degrees of freedom the smallest distance that all
+            tensions can keep from their limits, N.
+        margin_bound: proved lower bound of the margin: the margin less its rounding error, or by the proof of motions
+            of redundant cables.
         limit_margin: smallest slack of the limits on the segment, without a unit; inf without limits.
     """
 
@@ -78,10 +80,10 @@ def bezier(robot: PointMassRobot, start, control_point, end, *, duration) -> Pla
 def bezier_verdicts(
     robot: PointMassRobot, starts, control_points, ends, *, durations, limits: Limits | None = None
 ) -> BezierVerdicts:
-    """Verdicts of Bezier segments: exact for taut cables, proved for limits.
+    """Verdicts of Bezier segments: exact for taut cables, proved for limits and on redundant cables.
 
     Args:
-        robot: a point mass on three cables, or on two in a plane.
+        robot: a point mass on three cables, or on two in a plane; or on more.
         starts: (n, 3) first control points in the robot's axes, m.
         control_points: (n, 3) second control points, m.
         ends: (n, 3) third control points, m.
@@ -101,7 +103,7 @@ def bezier_verdicts(
     if times.shape != (len(points[0]),):
         raise InputError("durations", f"shape {times.shape}", f"finite numbers > 0 of shape ({len(points[0])},)")
     with double_precision():
-        problem, frame = kernel_problem(robot, "quintic", limits, free_end=None)
+        problem, frame = kernel_problem(robot, "quintic", limits, free_end=None, any_cables=True)
         first, middle, last = (np.asarray(frame.inward(x)) for x in points)
         answers = verdicts(problem, Bezier(first, middle, last, times, depths_of(problem.robot, first)))
         return BezierVerdicts(answers.verdict, answers.margin, answers.bound, answers.room)
@@ -113,23 +115,28 @@ def bezier_durations(
 ) -> list[np.ndarray]:
     """Durations of Bezier segments that keep every cable taut below the spools, by roots of polynomials.
 
+    On more cables than degrees of freedom the durations are one interval, whose ends are proved, wherever spools are.
+
     Args:
-        robot: a point mass on three cables, or on two in a plane.
+        robot: a point mass on three cables, or on two in a plane; or on more.
         starts: (n, 3) first control points in the robot's axes, m.
         ends: (n, 3) third control points, m.
         control_points: (n, 3) second control points, m; None: they follow from the accelerations, (15).
-        accelerations: (n, 3) accelerations at the starts, in the robot's axes, m/s^2; None: zero.
+        accelerations: (n, 3) accelerations at the starts, in the robot's axes, m/s^2; None: zero. On more cables than
+            degrees of freedom they must be zero: a curve that depends on its duration may have any set of durations.
 
     Returns:
         for each segment (n_intervals, 2) s: both ends of each interval of durations that are proved feasible; the last
-        end is inf where every longer duration is feasible.
+        end is inf where every longer duration is feasible, the first 0 where redundant cables give any acceleration.
 
     Raises:
-        InputError: the wrong kind of robot, shapes that do not fit, values that are not finite, or both control
-            points and accelerations.
+        InputError: the wrong kind of robot, shapes that do not fit, values that are not finite, both control points and
+            accelerations, or accelerations on redundant cables.
     """
     check_point_mass(robot)
-    check_determined(robot)
+    check_moved(robot)
+    if robot.n_cables > robot.dof and accelerations is not None and np.asarray(accelerations, float).any():
+        raise InputError("accelerations", "not 0", "absent, or 0, on more cables than degrees of freedom")
     if control_points is not None and accelerations is not None:
         raise InputError("accelerations", "given", "cannot be combined with control_points")
     arguments = {"starts": starts, "ends": ends}
@@ -141,7 +148,9 @@ def bezier_durations(
         first, last = (np.asarray(frame.inward(points[name])) for name in ("starts", "ends"))
         middle = first if control_points is None else np.asarray(frame.inward(points["control_points"]))
         vectors = np.zeros_like(first) if accelerations is None else np.asarray(frame.turned(points["accelerations"]))
-        return feasible_durations(prepared_robot, Ends(first, last, middle, vectors), depths_of(prepared_robot, first))
+        depth = depths_of(prepared_robot, first)
+        intervals = feasible_durations(prepared_robot, Ends(first, last, middle, vectors), depth)
+        return [durations for durations in intervals if durations is not None]
 
 
 @checked
@@ -160,7 +169,7 @@ def launch_range(
     """Launches of least speed to landing places, by one Bezier segment from rest, launch paper (26) and (29).
 
     Args:
-        robot: a point mass on three cables, or on two in a plane.
+        robot: a point mass on three cables, or on two in a plane; or on more.
         targets: (n, 3) landing places in the robot's axes, m.
         start: (3,) or (n, 3) places where the segments start at rest, in the robot's axes, m.
         release_x: least and largest x of the release, m; None: twice the robot's size to each side of the centroid of
@@ -176,8 +185,8 @@ def launch_range(
         the launches, in the robot's axes. Launches found are proved feasible; that there are no others is not proved.
 
     Raises:
-        InputError: the wrong kind of robot, more cables than degrees of freedom, limits that contradict each other,
-            shapes that do not fit, values that are not finite, or bounds that leave no release.
+        InputError: the wrong kind of robot, limits that contradict each other, shapes that do not fit, values that are
+            not finite, or bounds that leave no release.
     """
     starts, ends = starts_and_ends(robot, start, targets)
     ranges = {"release_x": release_x, "release_y": release_y, "release_z": release_z}
@@ -185,7 +194,7 @@ def launch_range(
         if values is not None and not values[0] <= values[1]:
             raise InputError(name, list(values), "[least, largest], the first not above the second, at most 1e6 m")
     with double_precision():
-        problem, frame = kernel_problem(robot, "quintic", limits, free_end=None)
+        problem, frame = kernel_problem(robot, "quintic", limits, free_end=None, any_cables=True)
         bounds = bounds_of(problem, frame, list(ranges.values()), max_duration)
         launches = search_launches(problem, frame.inward(starts), frame.inward(ends), bounds, int(population))
         return launches.placed(frame)

@@ -21,7 +21,7 @@ from cspr_jax.platforms.accessible import accessible as search_accessible
 from cspr_jax.platforms.answers import PlatformMotionAnswers
 from cspr_jax.platforms.arcs import Candidates, segments_with
 from cspr_jax.platforms.attainable import attainable as search_attainable
-from cspr_jax.platforms.checker import PlatformChecker
+from cspr_jax.platforms.checkers import pose_checker
 from cspr_jax.platforms.end_acceleration import AT_REST
 from cspr_jax.platforms.motion_checker import MANY
 from cspr_jax.platforms.platform_segment import PlatformMotion
@@ -53,7 +53,8 @@ def minimum_pose_arcs(  # noqa: PLR0913
     """Smallest number of arcs of a platform to each of many poses, thesis chapter 3.
 
     Args:
-        robot: a platform on six cables.
+        robot: a platform on six cables or more; on more the margin is the distance of all tensions from their limits
+            over the weight a cable, searches look at samples, and what they choose is proved.
         positions: (n, 3) positions of the mass centre in the robot's axes, m.
         orientations: (n, 4) unit quaternions in the robot's axes, scalar first, from the reference orientation; None:
             this one.
@@ -73,14 +74,14 @@ def minimum_pose_arcs(  # noqa: PLR0913
             at rest.
     """
     if not isinstance(robot, PlatformRobot):
-        raise InputError("robot", getattr(robot, "name", robot), "a platform on six cables")
+        raise InputError("robot", getattr(robot, "name", robot), "a rigid platform")
     places = points_of("positions", positions)
     depth, turns = depths(z0, len(places)), quaternions("orientations", orientations, len(places))
     with double_precision():
-        problem, frame = kernel_problem(robot, amplitude, limits, families=("hypocycloid",))
-        for each in np.unique(depth):
+        problem, frame = kernel_problem(robot, amplitude, limits, families=("hypocycloid",), any_cables=True)
+        for each in np.unique(depth if robot.n_cables == robot.dof else depth[:0]):
             reference_pose(problem.robot, float(each))
-        checker = PlatformChecker(problem, PlatformMotionKind(variable=variable, from_rest=start is None), batch=MANY)
+        checker = pose_checker(problem, PlatformMotionKind(variable=variable, from_rest=start is None), batch=MANY)
         ends = (frame.inward(places), frame.turned_quaternions(turns))
         if start is None:
             first, beta_hats = rest_poses(depth), np.full(len(depth), AT_REST)
@@ -111,7 +112,8 @@ def accessible(
     """Accessible orientations of a place, which free ways join with the reference orientation, section 3.11.
 
     Args:
-        robot: a platform on six cables.
+        robot: a rigid platform; on more than six cables orientations are accessible by steps of full rank without
+            contacts.
         place: (3,) place of the mass centre in the robot's axes, m.
         definition: how the set is sampled, as in [orientations] of a sweep file.
         divisions: number of steps in pi: the step of the angles is pi / divisions; even, 4 to 128.
@@ -143,7 +145,7 @@ def attainable(
     """Search the accessible orientations of a place that a motion from rest attains, section 3.12.3.
 
     Args:
-        robot: a platform on six cables.
+        robot: a rigid platform, as in `accessible`.
         place: (3,) place of the mass centre in the robot's axes, m.
         z0: depth of P0 below the centroid of the spools, m; None: the depth of the place.
         definition: as in `accessible`.
@@ -164,7 +166,7 @@ def attainable(
         count = len(inside.angles)
         if not count:
             raise InputError("place", np.asarray(place).tolist(), "a place where some orientation is accessible")
-        checker = PlatformChecker(problem, PlatformMotionKind(from_rest=True), batch=MANY)
+        checker = pose_checker(problem, PlatformMotionKind(from_rest=True), batch=MANY)
         depth = depths(where[2] if z0 is None else z0, count)
         places = np.tile(where, (count, 1))
         return inside, search_attainable(checker, places, inside.angles, depth, max_arcs=max_arcs)
@@ -174,11 +176,11 @@ def _of_place(
     robot: Any, place, definition: str, divisions: int, amplitude: str | Amplitude = "quintic", limits=None
 ) -> tuple[Problem, np.ndarray]:
     if not isinstance(robot, PlatformRobot):
-        raise InputError("robot", getattr(robot, "name", robot), "a platform on six cables")
+        raise InputError("robot", getattr(robot, "name", robot), "a rigid platform")
     if definition not in DEFINITIONS:
         raise InputError("definition", definition, f"one of {', '.join(DEFINITIONS)}")
     if divisions % 2 or not 4 <= divisions <= 128:
         raise InputError("divisions", divisions, "an even number from 4 to 128")
     where = points_of("place", [place])
-    problem, frame = kernel_problem(robot, amplitude, limits, families=("hypocycloid",))
+    problem, frame = kernel_problem(robot, amplitude, limits, families=("hypocycloid",), any_cables=True)
     return problem, frame.inward(where)[0]

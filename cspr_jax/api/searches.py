@@ -93,7 +93,8 @@ def minimum_arcs(
     """Smallest number of arcs to each of many targets, with duration, margin and verdict.
 
     Args:
-        robot: a point mass on three cables.
+        robot: a point mass on three cables or more; on more the margin is the distance of all tensions from their
+            limits over the weight a cable.
         targets: (n, 3) targets in the robot's axes, m.
         start: (3,) or (n, 3) start points in the robot's axes, m; None: at rest in P0. A start is also at rest in P0 if
             its distance from P0 is within 1e-9 of the robot's size (the largest distance of a spool from their
@@ -111,14 +112,15 @@ def minimum_arcs(
             max_arcs below 1, limits that contradict each other, or an amplitude function that breaks (2.49).
     """
     if not isinstance(robot, PointMassRobot) or robot.dof != 3:
-        raise InputError("robot", getattr(robot, "name", robot), "a point mass on three cables")
+        raise InputError("robot", getattr(robot, "name", robot), "a point mass on three cables or more")
     ends = points_of("targets", targets)
     depth = depths(z0, len(ends))
     start_points = None if start is None else np.asarray(start, float)
     if start_points is not None and start_points.shape not in ((3,), ends.shape):
         raise InputError("start", f"shape {start_points.shape}", f"finite numbers of shape (3,) or {ends.shape}")
     with double_precision():
-        problem, frame = kernel_problem(robot, amplitude or "quintic", limits, families=("hypocycloid-standard",))
+        families = ("hypocycloid-standard",)
+        problem, frame = kernel_problem(robot, amplitude or "quintic", limits, families=families, any_cables=True)
         starts = (
             rest_point(depth) if start_points is None else frame.inward(points_of("start", np.atleast_2d(start_points)))
         )
@@ -149,7 +151,7 @@ def minimum_oscillations(
     """Smallest number of oscillations of a transition from rest to each of many targets, thesis chapter 1.
 
     Args:
-        robot: a point mass on three cables, or on two in a plane.
+        robot: a point mass on three cables, or on two in a plane; or on more, as in `minimum_arcs`.
         targets: (n, 3) targets in the robot's axes, m.
         z0: () or (n,) depth of P0 below the centroid of the spools, m.
         amplitude: name of an amplitude function, or the function; it must meet (1.27) and (1.28).
@@ -157,7 +159,8 @@ def minimum_oscillations(
         max_arcs: twice the largest number of oscillations tried.
 
     Returns:
-        the answers, (n,) each, with numbers of oscillations by the envelopes and by the tensions themselves.
+        the answers, (n,) each, with numbers of oscillations by the envelopes and by the tensions themselves; on more
+        cables there are no envelopes.
 
     Raises:
         InputError: as `minimum_arcs` does.
@@ -166,7 +169,8 @@ def minimum_oscillations(
     ends = points_of("targets", targets)
     depth = depths(z0, len(ends))
     with double_precision():
-        problem, frame = kernel_problem(robot, amplitude, limits, free_end=True, families=("transition",))
+        families = ("transition",)
+        problem, frame = kernel_problem(robot, amplitude, limits, free_end=True, families=families, any_cables=True)
         segments = transitions_to(problem, frame.inward(ends), depth)
         answers = search_oscillations(problem, segments, depth, max_arcs=max_arcs)
     make = partial(_transitions, problem, frame, segments)

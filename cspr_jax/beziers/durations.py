@@ -53,17 +53,22 @@ def proved_margins(robot: PointMassRobot, ends: Ends, durations: np.ndarray, z0:
     return np.where(np.isfinite(margins), margins, -np.inf)
 
 
-def feasible_durations(robot: PointMassRobot, ends: Ends, z0: np.ndarray) -> list[np.ndarray]:
-    """Durations that keep every cable taut below the spools.
+def feasible_durations(robot: PointMassRobot, ends: Ends, z0: np.ndarray) -> list[np.ndarray | None]:
+    """Durations that keep every cable taut below the spools; on redundant cables, wherever they are.
 
     Args:
-        robot: a point mass on as many cables as it has degrees of freedom; centred.
+        robot: a point mass; centred.
         z0: (n,) m.
 
     Returns:
         for each segment (n_intervals, 2) s, both ends of each interval proved feasible; the last end is inf where any
-        longer duration is feasible.
+        longer duration is feasible. None on redundant cables where the curve depends on the duration.
     """
+    if robot.n_cables > robot.dof:
+        from cspr_jax.beziers.redundant_durations import taut_durations  # with proofs of any motion
+
+        each = [Ends(*(x[i : i + 1] for x in ends)) for i in range(len(z0))]
+        return [taut_durations(robot, one, float(z)) for one, z in zip(each, z0, strict=True)]
     rows, arms = (np.asarray(x) for x in jax.jit(adjugate)(robot))
     roots = critical_durations(rows, arms, np.asarray(plane_normal(robot)), float(robot.gravity), ends)
     segment, tests = _between(roots)
@@ -99,7 +104,7 @@ def _intervals(is_in_segment: np.ndarray, is_good: np.ndarray, changes: np.ndarr
     return np.array([*starts, *inside, *ends]).reshape(-1, 2)
 
 
-def least_duration(problem: Problem, ends: Ends, intervals: np.ndarray, z0: float) -> float:
+def least_duration(problem: Problem, ends: Ends, intervals: np.ndarray | None, z0: float) -> float:
     """Least feasible duration of one segment.
 
     Without limits it is the first one that keeps every cable taut. With limits, the first of many durations that meets
@@ -107,15 +112,19 @@ def least_duration(problem: Problem, ends: Ends, intervals: np.ndarray, z0: floa
 
     Args:
         ends: of the segment, leading dimension 1.
-        intervals: (n_intervals, 2) durations that keep every cable taut, s.
+        intervals: (n_intervals, 2) durations that keep every cable taut, s; None: not known.
         z0: m.
 
     Returns:
         s; if none is feasible, the tried duration that keeps every cable taut and breaks the fewest limits; if none
-        keeps them taut, the one with the largest margin.
+        keeps them taut, the one with the largest margin. Redundant cables: `redundant_durations.least_proved_duration`.
     """
-    if len(intervals) and not limits_set(problem.limits):
+    if intervals is not None and len(intervals) and not limits_set(problem.limits):
         return float(intervals[0, 0])
+    if intervals is None or problem.robot.n_cables > problem.robot.dof:
+        from cspr_jax.beziers.redundant_durations import least_proved_duration  # as above
+
+        return least_proved_duration(problem, ends, z0, slowest(problem, np.concatenate([ends.start, ends.end])))
 
     def judged(times: np.ndarray) -> Verdicts:
         many = Ends(*(np.repeat(x, len(times), axis=0) for x in ends))

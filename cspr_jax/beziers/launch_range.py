@@ -20,7 +20,7 @@ from cspr_jax.beziers.margins import depths_of
 from cspr_jax.beziers.motion import Bezier
 from cspr_jax.beziers.release_bounds import ReleaseBounds
 from cspr_jax.beziers.sequences import margins_of
-from cspr_jax.beziers.verdicts import BATCH, verdicts
+from cspr_jax.beziers.verdicts import BATCH, smallest_slacks, verdicts
 from cspr_jax.motions.flight import aimed
 from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
@@ -142,7 +142,7 @@ def launch_range(
     """Launches of least speed, and the largest margins, to landing places.
 
     Args:
-        problem: robot, a point mass on as many cables as it has degrees of freedom, centred, z down, and limits.
+        problem: robot, a point mass, centred, z down, and limits.
         starts: (n, 3) where the segments start at rest, m.
         targets: (n, 3) where the object is to land, m.
         bounds: within which a release is looked for.
@@ -191,6 +191,5 @@ def _judged(problem: Problem, motions: Bezier, shape: tuple[int, int]) -> tuple[
     parts = [slice(i, i + BATCH) for i in range(0, len(motions.time), BATCH)]
     judgements = [verdicts(problem, jax.tree.map(lambda x, s=chunk: x[s], motions)) for chunk in parts]
     verdict = np.concatenate([x.verdict for x in judgements])
-    # Above the spools the room under limits of tensions is not known, and the depth decides.
-    margin = np.concatenate([np.where(np.isneginf(x.room), x.margin, np.minimum(x.margin, x.room)) for x in judgements])
-    return verdict.reshape(shape), np.where(np.isnan(margin), -np.inf, margin).reshape(shape)
+    margin = np.concatenate([smallest_slacks(problem, x) for x in judgements])
+    return verdict.reshape(shape), margin.reshape(shape)

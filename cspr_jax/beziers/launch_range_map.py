@@ -20,6 +20,8 @@ _OF_LAUNCHES = ("duration", "release_time", "flight_time", "release_x", "release
 class LaunchRangeMap(FromPlacesMap):
     """The launch of least speed to each landing place; see `GridMap`."""
 
+    any_cables = True
+
     def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
         """Refuse bounds that leave no release."""
         super().__init__(robot_file, keys, file)

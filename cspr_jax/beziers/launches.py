@@ -110,7 +110,7 @@ def launched(problem: Problem, launch: Launch, durations: list[float | None], ch
     """The launch, with everything that is left open chosen.
 
     Args:
-        problem: robot, a point mass on as many cables as it has degrees of freedom, and limits.
+        problem: robot, a point mass, and limits.
         durations: of the n segments, s; None: to be chosen, for the least total.
         choose: the time of flight for the least kinetic energy at the release, "energy", or for the earliest landing,
             "time"; None where it is given.

@@ -11,7 +11,7 @@ from cspr_jax.beziers.launches import Launch, launched
 from cspr_jax.beziers.margins import depths_of
 from cspr_jax.beziers.motion import Bezier, end_acceleration
 from cspr_jax.beziers.segments import BezierAnswers, answers_of, joined_segments
-from cspr_jax.beziers.sequences import Anchored, least_total, segments_of
+from cspr_jax.beziers.sequences import Anchored, duration_bounds, least_total, segments_of
 from cspr_jax.config.launch import LaunchTable
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.motions.answers import Answers
@@ -26,6 +26,8 @@ from cspr_jax.robots.point_mass import AT_P0, spool_radius
 
 # Accelerations that count as none, over gravity.
 AT_REST = 1e-9
+# Durations of a search count as its shortest ones up to so many times them.
+ABOVE_SHORTEST = 1.0 + 1e-6
 
 
 class _Chosen(NamedTuple):
@@ -59,6 +61,7 @@ class Beziers(Leg):
         depth = z0 if np.isfinite(z0) else float(depths_of(problem.robot, points[:1])[0])
         chosen = self._chosen(problem, points, depth)
         segments = joined_segments(problem, chosen.points, chosen.durations, chosen.first, depth)
+        self._refuse_unbounded(problem, segments.motions.time, chosen.points)
         answers, motions = answers_of(problem, segments), segments.motions
         self._check_rests(problem, motions, chosen.first - points[0])
         if self._at is not None:
@@ -121,6 +124,20 @@ class Beziers(Leg):
                     "starts without acceleration",
                 )
         return points
+
+    def _refuse_unbounded(self, problem: Problem, times: np.ndarray, points: np.ndarray) -> None:
+        # Redundant cables without largest tensions may give any acceleration, so that no duration is the least.
+        if problem.robot.n_cables == problem.robot.dof:
+            return
+        is_searched = self.stops.keys.least == "total" or self._at is not None
+        shortest = np.exp(duration_bounds(problem, points)[0]) if is_searched else 0.0
+        is_free = np.array([time is None for time in self._durations])[: len(times)]
+        for i in np.flatnonzero(is_free & ~(times > shortest * ABOVE_SHORTEST)).tolist():
+            raise ConfigError(
+                self.stops.path,
+                f"{self.stops.name(i + 1)}.duration: must be a number without tension_max and limits of speeds, since "
+                "nothing bounds the acceleration of the segment",
+            )
 
     def _check_rests(self, problem: Problem, motions, first: np.ndarray) -> None:
         # A pose at rest has no acceleration.

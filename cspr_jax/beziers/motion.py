@@ -6,7 +6,6 @@ segments meet, both are the same (15).
 """
 
 import dataclasses
-from functools import partial
 from typing import Any
 
 import jax
@@ -63,12 +62,28 @@ class Bezier:
 
     def bounds(self, start: np.ndarray, end: np.ndarray) -> StateBounds:
         """Bounds of the states; see `BoundedMotion.bounds`."""
-        return in_batches(partial(_bounds, self), normalised(self.time, start, end), size=BATCH)
+        return many_bounds(jax.tree.map(lambda x: np.asarray(x)[None], self), np.zeros(len(start), int), start, end)
+
+
+def many_bounds(curves: Bezier, motion: np.ndarray, start: np.ndarray, end: np.ndarray) -> StateBounds:
+    """Bounds of the states of several segments over blocks of time.
+
+    Args:
+        curves: NumPy leaves with a leading dimension n.
+        motion: (k,) number of the segment of each block.
+        start: (k,) s.
+        end: (k,) s.
+
+    Returns:
+        the bounds, leaves (k, ...).
+    """
+    each = jax.tree.map(lambda x: x[motion], curves)
+    return in_batches(_bounds, (each, normalised(each.time, start, end)), size=BATCH)
 
 
 @jax.jit
-def _bounds(curve: Bezier, blocks: AffineBounds) -> StateBounds:
-    def one(tau: AffineBounds) -> StateBounds:
+def _bounds(blocks: tuple[Bezier, AffineBounds]) -> StateBounds:
+    def one(curve: Bezier, tau: AffineBounds) -> StateBounds:
         # 2 c^2 is 1 + cos(2 pi tau), 2 c sin(pi tau) is sin(2 pi tau).
         (sine, c), (sine2, c2) = sincospi(tau), sincospi(tau * 2.0)
         square, slope, rest = powers(curve.start, curve.middle, curve.end)
@@ -79,7 +94,7 @@ def _bounds(curve: Bezier, blocks: AffineBounds) -> StateBounds:
             (c * slope + c2 * (2.0 * square)) * -(w**2),
         )
 
-    return jax.vmap(one)(blocks)
+    return jax.vmap(one)(*blocks)
 
 
 def powers(start: Any, middle: Any, end: Any) -> tuple[Any, Any, Any]:

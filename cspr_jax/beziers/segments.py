@@ -6,11 +6,13 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
+from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.beziers.duration_roots import Ends
 from cspr_jax.beziers.durations import feasible_durations, least_duration
 from cspr_jax.beziers.motion import Bezier, end_acceleration
 from cspr_jax.beziers.verdicts import verdicts
 from cspr_jax.motions.answers import Answers
+from cspr_jax.motions.cause import Cause
 from cspr_jax.motions.problem import Problem
 
 
@@ -21,7 +23,7 @@ class BezierAnswers(Answers):
     Fields:
         control_points: (n, 3, 3) start, middle and end; m.
         taut_durations: (n,) for each segment, the durations that keep every cable taut, with the segments before it
-            unchanged: [[least, largest], ...] in s, inf where any longer duration does.
+            unchanged: [[least, largest], ...] in s, inf where any longer duration does; None where they are not known.
         release: (n,) time of the release of an object, after the start of the segment, s; NaN without a release.
         flight_time: (n,) time of the flight of the object, s; NaN likewise.
     """
@@ -38,7 +40,7 @@ class BezierAnswers(Answers):
 
     def details(self, i: int) -> dict[str, Any]:
         """Details of a segment; see `Answers.details`."""
-        durations = self.taut_durations[i].tolist()
+        durations = None if self.taut_durations[i] is None else self.taut_durations[i].tolist()
         return {
             "control_points": self.control_points[i].tolist(),
             "taut_durations": durations,
@@ -46,6 +48,26 @@ class BezierAnswers(Answers):
             "arcs": None,
             "tried_arcs": None,
         }
+
+
+@dataclasses.dataclass(frozen=True)
+class RedundantBezierAnswers(BezierAnswers):
+    """Answers of Bezier segments on more cables than degrees of freedom; margins in N.
+
+    Fields:
+        proof: (n,) `motions.proved_answers.MotionProof` of each.
+    """
+
+    proof: np.ndarray
+
+    def details(self, i: int) -> dict[str, Any]:
+        """Details, the unit of the margin, and intervals of failure; see `Answers.details`."""
+        proof = self.proof[i]
+        return super().details(i) | {"margin_unit": "N", "failing": None if proof is None else proof.failing.tolist()}
+
+    def proved_causes(self, i: int, frame: Frame) -> tuple[Cause, ...] | None:
+        """The criteria that fail, else the one nearest to it; see `Answers.proved_causes`."""
+        return None if self.proof[i] is None else self.proof[i].causes(frame)
 
 
 class Joined(NamedTuple):
@@ -57,7 +79,7 @@ class Joined(NamedTuple):
     """
 
     motions: Bezier
-    taut_durations: list[np.ndarray]
+    taut_durations: list[np.ndarray | None]
 
 
 def joined_segments(
@@ -70,14 +92,15 @@ def joined_segments(
     """Segments through points, at rest in each, with accelerations that go on from one to the next (15).
 
     Args:
-        problem: robot, a point mass on as many cables as it has degrees of freedom, and limits.
+        problem: robot, a point mass, and limits.
         points: (n + 1, 3) from the centroid of the spools, z down, m.
         durations: of the n segments, s; None: the least feasible one, with the segments before as they are.
         first_control_point: (3,) second control point of the first segment, m.
         z0: depth at which slacks are normalised, m.
 
     Returns:
-        the segments; where no duration is feasible, "least" is the one with the largest margin of those tried.
+        the segments; where no duration is feasible, "least" is the one with the largest margin of those tried. Where
+        there is no least one, since redundant cables give any acceleration, it is NaN, and the segment is the last one.
     """
     motions, intervals, depth = [], [], np.array([z0])
     # The first segment is given its control point, each of the next ones the acceleration at its start.
@@ -85,9 +108,12 @@ def joined_segments(
     for i, duration in enumerate(durations):
         taut_durations = feasible_durations(problem.robot, ends, depth)[0]
         time = least_duration(problem, ends, taut_durations, z0) if duration is None else duration
+        time = time if time > 0.0 else np.nan
         middle = ends.middles(np.array([time]))
         motions.append(Bezier(ends.start, middle, ends.end, np.array([time]), depth))
         intervals.append(taut_durations)
+        if np.isnan(time):
+            break
         if i + 1 < len(durations):
             acceleration = end_acceleration(middle, ends.end, time)
             ends = Ends(ends.end, points[i + 2 : i + 3], ends.end, acceleration)
@@ -104,11 +130,18 @@ def answers_of(problem: Problem, segments: Joined) -> BezierAnswers:
         the answers; control points from the centroid of the spools, z down.
     """
     motions = segments.motions
-    judgements, count = verdicts(problem, motions), len(motions.time)
+    count, proofs = len(motions.time), None
+    if problem.robot.n_cables > problem.robot.dof:
+        from cspr_jax.beziers.redundant_verdicts import verdicts_and_proofs  # with proofs of any motion
+
+        judgements, proofs = verdicts_and_proofs(problem, motions)
+    else:
+        judgements = verdicts(problem, motions)
     none, nothing = np.zeros(count, int), np.full(count, np.nan)
     intervals = np.empty(count, object)
-    intervals[:] = segments.taut_durations
-    return BezierAnswers(
+    for i, durations in enumerate(segments.taut_durations):
+        intervals[i] = durations
+    answers = BezierAnswers(
         none,
         none,
         judgements.verdict,
@@ -121,3 +154,4 @@ def answers_of(problem: Problem, segments: Joined) -> BezierAnswers:
         intervals,
         *(np.full(count, np.nan) for _ in range(2)),
     )
+    return answers if proofs is None else RedundantBezierAnswers(**vars(answers), proof=proofs)

@@ -15,7 +15,7 @@ from cspr_jax.arithmetic.constrained_minima import Judged, least
 from cspr_jax.beziers.durations import slowest
 from cspr_jax.beziers.margins import smallest_margins
 from cspr_jax.beziers.motion import Bezier
-from cspr_jax.beziers.verdicts import verdicts
+from cspr_jax.beziers.verdicts import smallest_slacks, verdicts
 from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.slacks import slacks
@@ -66,21 +66,28 @@ def segments_of(sequence: Anchored, durations: Array) -> Bezier:
 def margins_of(problem: Problem, segments: Bezier, samples: int = SAMPLES) -> Array:
     """Margins of segments for a search: exact ones of taut cables and of the depth, sampled ones of limits.
 
+    On redundant cables those of tensions are sampled, too.
+
     Args:
-        problem: robot, a point mass on as many cables as it has degrees of freedom, and limits.
+        problem: robot, a point mass, and limits.
         segments: leaves with a leading dimension n.
         samples: instants of a segment at which limits are sampled.
 
     Returns:
         (n * n_slacks,) without a unit.
     """
+    tau = jnp.linspace(0.0, 1.0, samples)
+    if problem.robot.n_cables > problem.robot.dof:
+        from cspr_jax.beziers.redundant_verdicts import instant_slacks  # with proofs of any motion
+
+        sampled = jax.vmap(lambda motion: jax.vmap(lambda t: instant_slacks(problem, motion, t))(tau).min(0))
+        return sampled(segments).ravel()
 
     def one(motion):
         exact = smallest_margins(problem.robot, motion)
         margins = jnp.append(exact.taut, exact.below)
         if not limits_set(problem.limits):
             return margins
-        tau = jnp.linspace(0.0, 1.0, samples)
         limits = jax.vmap(lambda t: slacks(problem, motion, t)[len(margins) :])(tau)
         return jnp.append(margins, jnp.min(limits, axis=0))
 
@@ -97,7 +104,7 @@ def judged(problem: Problem, segments: Bezier) -> Judged:
         whether all are feasible, and the smallest margin.
     """
     judgements = verdicts(problem, jax.tree.map(np.asarray, segments))
-    worst = np.nan_to_num(np.minimum(judgements.margin, judgements.room), nan=-np.inf).min()
+    worst = smallest_slacks(problem, judgements).min()
     return Judged(bool((judgements.verdict == 0).all()), float(worst))
 
 
@@ -126,7 +133,7 @@ def least_total(problem: Problem, sequence: Anchored, durations: list[float | No
     """Durations whose sum is least.
 
     Args:
-        problem: robot, a point mass on as many cables as it has degrees of freedom, and limits.
+        problem: robot, a point mass, and limits.
         durations: of the n segments, s; None: to be chosen.
 
     Returns:

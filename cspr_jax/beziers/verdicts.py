@@ -37,14 +37,18 @@ def _pseudotensions(robot, motions: Bezier):
 
 
 def verdicts(problem: Problem, motions: Bezier) -> Verdicts:
-    """Verdicts of Bezier segments: exact for taut cables, proved for limits.
+    """Verdicts of Bezier segments: exact for taut cables, proved for limits and on redundant cables.
 
     Args:
         motions: leaves with a leading dimension n.
 
     Returns:
-        the verdicts; margins without a unit.
+        the verdicts; margins without a unit, on redundant cables in N.
     """
+    if problem.robot.n_cables > problem.robot.dof:
+        from cspr_jax.beziers.redundant_verdicts import verdicts_and_proofs  # with proofs of any motion
+
+        return verdicts_and_proofs(problem, motions)[0]
     size = BATCH if len(motions.time) <= BATCH else MANY
     margins = in_batches(partial(_margins, problem.robot), motions, size=size)
     slack = np.concatenate([margins.taut, margins.below[:, None]], axis=1)
@@ -68,3 +72,17 @@ def verdicts(problem: Problem, motions: Bezier) -> Verdicts:
     verdict = np.where(broken > 0, broken, np.where(is_open, Verdict.UNDECIDED.value, 0))
     verdict = np.where(finite, verdict, Verdict.NOT_FINITE.value).astype(FLAGS)
     return Verdicts(verdict, slack.min(1), bound.min(1), room)
+
+
+def smallest_slacks(problem: Problem, judgements: Verdicts) -> np.ndarray:
+    """Smallest slack of each segment, of tensions and limits, without a unit.
+
+    Returns:
+        (n,); -inf where there is none.
+    """
+    robot, margin = problem.robot, judgements.margin
+    if robot.n_cables > robot.dof:
+        margin = margin * robot.n_cables / float(robot.mass * robot.gravity)
+    # Above the spools the room under limits of tensions is not known, and the depth decides.
+    least = np.where(np.isneginf(judgements.room), margin, np.minimum(margin, judgements.room))
+    return np.where(np.isnan(least), -np.inf, least)

@@ -151,16 +151,22 @@ class PlatformMap(GridMap):
         """Refuse a point mass."""
         if not robot_file.is_platform:
             raise ConfigError(
-                file, f'robot "{robot_file.name}" is {robot_file.kind}: must be a platform on six cables in this map'
+                file, f'robot "{robot_file.name}" is {robot_file.kind}: must be a rigid platform in this map'
             )
         super().__init__(robot_file, keys, file)
+
+    @property
+    def _is_redundant(self) -> bool:
+        # On more than six cables there is no determinant.
+        return self._problem.robot.n_cables > self._problem.robot.dof
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
         feasible = answers["arcs"] > 0
         margin = answers["margin"]
+        smallest = margin if self._is_redundant else np.minimum(margin, answers["det_margin"])
         return {
-            "a feasible cell with a margin below zero": feasible & ~(np.minimum(margin, answers["det_margin"]) > 0.0),
+            "a feasible cell with a margin below zero": feasible & ~(smallest > 0.0),
             "a feasible cell that breaks a limit": feasible & ~(answers["limit_margin"] > -TOUCHED),
             "a margin below its proved bound": answers["margin_bound"] > margin + ROUNDING * (1.0 + np.abs(margin)),
             "an infeasible cell whose verdict is 0": ~feasible & (answers["verdict"] == 0),

@@ -129,13 +129,9 @@ def _rests_anywhere(stops: Waypoints, i: int) -> bool:
 def _depth_of_inclination(problem: Problem, stops: Waypoints) -> float:
     targets, path, inclination = stops.targets, stops.path, stops.keys.inclination
     if inclination == "best":
-        if problem.robot.n_cables > problem.robot.dof:
-            raise ConfigError(path, 'inclination = "best": must be a number on more cables than degrees of freedom')
         if (targets != targets[0]).any():
             raise ConfigError(path, 'inclination = "best": must be a number in a plan with more than one target')
-        # The weights do not depend on the depth of P0.
-        one = transition(problem.robot, problem.amplitude, jnp.asarray(targets[0]), jnp.asarray(1.0))
-        v = float(best_inclination(problem.amplitude, weights(one))[0])
+        v = _best_inclination(problem, stops)
     else:
         v = float(inclination or 0.0)
     levels = [float(depth_for(problem.robot, jnp.asarray(target), jnp.asarray(v))) for target in targets]
@@ -148,6 +144,17 @@ def _depth_of_inclination(problem: Problem, stops: Waypoints) -> float:
         why = f"since the targets are not below the spool plane{hint}"
         raise ConfigError(path, f"inclination: must be replaced by z0, {why}")
     return levels[0]
+
+
+def _best_inclination(problem: Problem, stops: Waypoints) -> float:
+    target = stops.targets[0]
+    if problem.robot.n_cables > problem.robot.dof:
+        from cspr_jax.swings.oscillations import best_inclinations  # with proofs, which others need not
+
+        return float(best_inclinations(problem, target[None], max_arcs=stops.max_arcs)[0])
+    # The weights do not depend on the depth of P0.
+    one = transition(problem.robot, problem.amplitude, jnp.asarray(target), jnp.asarray(1.0))
+    return float(best_inclination(problem.amplitude, weights(one))[0])
 
 
 def _fastest_depth(problem: Problem, sequence: PlanLegs) -> float:

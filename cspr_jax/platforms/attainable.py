@@ -8,9 +8,8 @@ from cspr_jax.arithmetic.rotations import cylindrical_frames, from_tilt_torsion
 from cspr_jax.motions.answers import joined
 from cspr_jax.platforms.answers import PlatformMotionAnswers, reached, trials
 from cspr_jax.platforms.arcs import CANDIDATES, Candidates, smallest_arcs
-from cspr_jax.platforms.beta_hat import end_options
-from cspr_jax.platforms.checker import PlatformChecker
 from cspr_jax.platforms.end_acceleration import AT_REST
+from cspr_jax.platforms.motion_checker import MotionChecker
 from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.robots.symmetries import NONE, Symmetries, alike
 
@@ -24,7 +23,7 @@ LARGE, PART, MIXED = 4 * CANDIDATES, CANDIDATES // 4, 16
 
 
 def attainable(
-    checker: PlatformChecker,
+    checker: MotionChecker,
     places: np.ndarray,
     angles: np.ndarray,
     z0: np.ndarray,
@@ -59,7 +58,7 @@ def attainable(
 
 
 def attained(
-    checker: PlatformChecker,
+    checker: MotionChecker,
     places: np.ndarray,
     angles: np.ndarray,
     z0: np.ndarray,
@@ -122,19 +121,19 @@ def rounds(values: int = VALUES) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.array([0]), numbers[numbers % FEWER == 0], numbers[numbers % FEWER != 0]
 
 
-def _once(checker: PlatformChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, symmetry: Symmetries):
+def _once(checker: MotionChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, symmetry: Symmetries):
     # Find the orientations that represent all, and the place of each orientation's representative among them.
     representatives, inverse = np.unique(alike(symmetry, np.c_[places, z0], angles), return_inverse=True)
     return representatives, inverse.ravel()
 
 
 def _motions(
-    checker: PlatformChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, values: int
+    checker: MotionChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, values: int
 ) -> tuple[Candidates, np.ndarray]:
     # Return transitions from rest, and values (n, n_values) of beta-hat at their ends.
-    robot, count = checker.problem.robot, len(angles)
+    count = len(angles)
     ends = (places, from_tilt_torsion(angles + cylindrical_frames(places)))
-    beta_hats, can_end = end_options(robot, *ends, z0, values)
+    beta_hats, can_end = checker.end_options(*ends, z0, values)
     start = (rest_point(z0), np.tile(IDENTITY, (count, 1)))
     rest = np.full(count, AT_REST)
     return Candidates(start, ends, z0, np.arange(count), (rest, rest)), np.where(can_end[:, None], beta_hats, np.nan)

@@ -18,6 +18,7 @@ from cspr_jax.arithmetic.lanes import dot, smallest
 from cspr_jax.motions.platform_kind import USUAL, PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.tolerances import Tolerated
+from cspr_jax.platforms.beta_hat import end_options
 from cspr_jax.platforms.enclosures import Robustness
 from cspr_jax.platforms.end_acceleration import endpoint
 from cspr_jax.platforms.margins import Samples, narrowed
@@ -117,6 +118,12 @@ class PlatformChecker(MotionChecker):
         """Values of (3.91) and (3.92); see `MotionChecker.end_interval`."""
         end = _end(self.problem.robot, position, quaternion, jnp.asarray(z0))
         return float(end.preferred), float(end.lowest), float(end.highest)
+
+    def end_options(
+        self, positions: np.ndarray, quaternions: np.ndarray, z0: np.ndarray, count: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Values of beta-hat to try at poses; see `MotionChecker.end_options`."""
+        return end_options(self.problem.robot, positions, quaternions, z0, count)
 
     def breaks(self, slack: np.ndarray) -> np.ndarray:
         """Criteria that are broken for certain; see `MotionChecker.breaks`."""

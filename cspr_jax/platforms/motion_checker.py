@@ -235,3 +235,19 @@ class MotionChecker(abc.ABC):
         Returns:
             the preferred value; the lowest and the highest feasible value, in reverse order if there is none.
         """
+
+    @abc.abstractmethod
+    def end_options(
+        self, positions: np.ndarray, quaternions: np.ndarray, z0: np.ndarray, count: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Values of beta-hat to try at poses.
+
+        Args:
+            positions: (n, 3) m.
+            quaternions: (n, 4).
+            z0: (n,) m.
+            count: how many values for each.
+
+        Returns:
+            (n, count) of `beta_hat.options`; (n,) whether a motion can end there.
+        """

@@ -1,4 +1,8 @@
-"""Cables at still poses of a platform, and between neighbouring ones, thesis section 3.10.2."""
+"""Cables at still poses of a platform, and between neighbouring ones, thesis section 3.10.2.
+
+On more than six cables the wrench matrix has no determinant whose sign a path could change: a pose is regular where
+the rank is full, on either side of the spools, and the platform is met only where its attachment points lie in a plane.
+"""
 
 from functools import partial
 from typing import NamedTuple
@@ -8,14 +12,18 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.arithmetic import rotations
 from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.arithmetic.elementary import solved
 from cspr_jax.arithmetic.frames import IDENTITY
 from cspr_jax.arithmetic.lanes import rotation_matrix, stored
 from cspr_jax.robots import interference_lanes, wrench_lanes
+from cspr_jax.robots.cables import wrench_units
+from cspr_jax.robots.contact_bodies import default_scene, has_sectors
 from cspr_jax.robots.interference import Contacts, cables_cross, contacts, platform_hit
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal
-from cspr_jax.robots.wrench_balance import determinant_share, is_regular, normalised_determinant
+from cspr_jax.robots.wrench_balance import at_rest, determinant_share, is_regular, normalised_determinant
 from cspr_jax.robots.wrench_lanes import cable_lanes
 
 BATCH = 512
@@ -31,7 +39,8 @@ class OrientationSamples(NamedTuple):
 
     Fields:
         share: (n,) determinant over the determinant of the reference orientation at the same place; NaN where the
-            reference orientation is singular itself, or the place is not below the spools.
+            reference orientation is singular itself, or the place is not below the spools. On more than six cables the
+            root of the determinant of the matrix times its transpose.
         gaps: (n, n_pairs, 3) shortest vectors between cables, m.
         cable_directions: (n, n_cables, 3) cables seen from the platform, m.
     """
@@ -52,7 +61,17 @@ def _sampled(robot: PlatformRobot, poses: tuple[Array, Array], *, pairs: tuple) 
         interference_lanes.gaps(robot.base_points, pairs, cables),
         interference_lanes.cable_directions(cables, rotation),
     )
-    return wrench_lanes.normalised_determinant(robot, cables), *interference_lanes.as_arrays(apart, directions)
+    is_determined = robot.n_cables == robot.dof
+    size = wrench_lanes.normalised_determinant(robot, cables) if is_determined else _volumes(robot, places, quaternions)
+    return size, *interference_lanes.as_arrays(apart, directions)
+
+
+def _volumes(robot: PlatformRobot, places: Array, quaternions: Array) -> Array:
+    def one(place: Array, quaternion: Array) -> Array:
+        matrix = robot.wrench_matrix(at_rest(place, rotations.matrix(quaternion))) / wrench_units(robot)[:, None]
+        return jnp.sqrt(jnp.maximum(solved(matrix @ matrix.T, jnp.zeros((robot.dof, 0)))[1], 0.0))
+
+    return jax.vmap(one)(places, quaternions)
 
 
 def reference_share(robot: PlatformRobot, place: np.ndarray) -> float:
@@ -64,8 +83,10 @@ def reference_share(robot: PlatformRobot, place: np.ndarray) -> float:
 
     Returns:
         the value of `robots.wrench_balance.normalised_determinant`; NaN if its sign is another one, or the place is not
-        below the spools.
+        below the spools. 1 on more than six cables.
     """
+    if robot.n_cables > robot.dof:
+        return 1.0
     here, depth, share = _upright(robot, np.asarray(place, float))
     return float(here) if float(depth) > 0.0 and bool(is_regular(share)) else np.nan
 
@@ -89,6 +110,7 @@ class OrientationSteps:
         """Find which cables can meet each other or the platform."""
         self._robot, self._place = robot, np.asarray(place, float)
         self._contacts: Contacts = contacts(robot)
+        self._is_flat = robot.n_cables == robot.dof or has_sectors(robot, default_scene(robot))
         self._pairs = tuple((int(i), int(j)) for i, j in self._contacts.pairs)
         self._reference = reference_share(robot, self._place)
         self._size = float(np.linalg.norm(np.asarray(robot.platform_points), axis=1).max())
@@ -139,10 +161,10 @@ class OrientationSteps:
         free = np.zeros(len(first), bool)
         for chunk in np.array_split(ways, max(1, -(-len(ways) // STEPS))):
             one, two = first[chunk], last[chunk]
-            met = cables_cross(samples.gaps[one], samples.gaps[two]).any(1)
-            directions = samples.cable_directions
-            hit = platform_hit(self._contacts.sides, self._contacts.normal, directions[one], directions[two])
-            free[chunk] = ~met & ~hit.any(1)
+            free[chunk] = ~cables_cross(samples.gaps[one], samples.gaps[two]).any(1)
+            if self._is_flat:
+                directions = samples.cable_directions[one], samples.cable_directions[two]
+                free[chunk] &= ~platform_hit(self._contacts.sides, self._contacts.normal, *directions).any(1)
         return free
 
 

@@ -10,7 +10,7 @@ from cspr_jax.motions.limits import limits_set
 from cspr_jax.platforms.accessible import Accessible, accessible_sets
 from cspr_jax.platforms.answers import PlatformMotionAnswers
 from cspr_jax.platforms.attainable import VALUES, attainable
-from cspr_jax.platforms.checker import PlatformChecker
+from cspr_jax.platforms.checkers import pose_checker
 from cspr_jax.platforms.motion_checker import MANY
 from cspr_jax.robots.symmetries import NONE, folded, symmetries
 from cspr_jax.schema.quantities import REFUSALS
@@ -22,6 +22,8 @@ DIGITS = 12
 
 class OrientationWorkspaceMap(PlatformMap):
     """The accessible orientations of each place; see `GridMap`."""
+
+    any_cables = True
 
     def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
         """Find the robot's symmetries."""
@@ -68,7 +70,7 @@ class AttainabilityMap(OrientationWorkspaceMap):
         """Build the checker of motions from rest."""
         super().__init__(robot_file, keys, file)
         kind = motion_kind(keys.trajectory, from_rest=True)
-        self._checker = PlatformChecker(self._problem, kind, batch=MANY)
+        self._checker = pose_checker(self._problem, kind, batch=MANY)
 
     def _attainable(
         self, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, *, margins: bool

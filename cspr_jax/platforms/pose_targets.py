@@ -9,9 +9,9 @@ from cspr_jax.arithmetic.frames import IDENTITY
 from cspr_jax.motions.answers import joined
 from cspr_jax.platforms.answers import PlatformMotionAnswers, reached
 from cspr_jax.platforms.arcs import CANDIDATES, Candidates
-from cspr_jax.platforms.beta_hat import OPTIONS, end_options
-from cspr_jax.platforms.checker import PlatformChecker
+from cspr_jax.platforms.beta_hat import OPTIONS
 from cspr_jax.platforms.end_acceleration import AT_REST
+from cspr_jax.platforms.motion_checker import MotionChecker
 from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.schema.families import WITHOUT_BETA_HAT
 
@@ -32,8 +32,8 @@ def rest_poses(z0: np.ndarray) -> Poses:
     return rest_point(z0), np.tile(IDENTITY, (len(z0), 1))
 
 
-def start_beta_hat(checker: PlatformChecker, starts: Poses, z0: np.ndarray) -> np.ndarray:
-    """Beta-hat at starts beyond P0: the preferred one of (3.91), else that at rest.
+def start_beta_hat(checker: MotionChecker, starts: Poses, z0: np.ndarray) -> np.ndarray:
+    """Beta-hat at starts beyond P0: the preferred one, of (3.91) or of the largest margin, else that at rest.
 
     Args:
         starts: positions (n, 3) and quaternions (n, 4), from the centroid of the spools, z down.
@@ -42,14 +42,14 @@ def start_beta_hat(checker: PlatformChecker, starts: Poses, z0: np.ndarray) -> n
     Returns:
         (n,).
     """
-    # Starts are few, and end_options costs as much for each.
+    # Starts are few, and options cost as much for each.
     distinct, inverse = np.unique(np.c_[starts[0], starts[1], z0], axis=0, return_inverse=True)
-    values = end_options(checker.problem.robot, distinct[:, :3], distinct[:, 3:7], distinct[:, 7], 1)[0][:, 0]
+    values = checker.end_options(distinct[:, :3], distinct[:, 3:7], distinct[:, 7], 1)[0][:, 0]
     return np.where(np.isnan(values), AT_REST, values)[inverse.ravel()]
 
 
 def pose_arcs(
-    checker: PlatformChecker,
+    checker: MotionChecker,
     motions: Candidates,
     *,
     beta_hat: float | Literal["preferred"] | None = None,
@@ -72,9 +72,8 @@ def pose_arcs(
 
     def part(piece: slice) -> PlatformMotionAnswers:
         targets = motions.motions(np.arange(len(motions.z0))[piece])
-        values, can_end = end_options(
-            checker.problem.robot, *targets.end, targets.z0, 1 if beta_hat == "preferred" else OPTIONS
-        )
+        count = 1 if beta_hat == "preferred" else OPTIONS
+        values, can_end = checker.end_options(*targets.end, targets.z0, count)
         if beat in WITHOUT_BETA_HAT:
             values = np.zeros((len(targets.z0), 1))
         elif isinstance(beta_hat, float):

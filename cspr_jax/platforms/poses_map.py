@@ -13,7 +13,7 @@ from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.maps.grid_map import PlatformMap
 from cspr_jax.platforms.answers import PlatformMotionAnswers
 from cspr_jax.platforms.arcs import Candidates, segments_with
-from cspr_jax.platforms.checker import PlatformChecker
+from cspr_jax.platforms.checkers import pose_checker
 from cspr_jax.platforms.end_acceleration import AT_REST
 from cspr_jax.platforms.motion_checker import MANY
 from cspr_jax.platforms.platform_segment import PlatformMotion, several_bounds
@@ -27,6 +27,7 @@ class PosesMap(PlatformMap):
     """The smallest number of arcs to each pose; see `GridMap`."""
 
     proves = True
+    any_cables = True
 
     def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
         """Refuse a start whose quaternion is no orientation."""
@@ -36,7 +37,7 @@ class PosesMap(PlatformMap):
             None if start is None else start.quaternion, "trajectory.from.quaternion", file
         )
         from_rest = start is None or start.rest
-        self._checker = PlatformChecker(self._problem, motion_kind(keys.trajectory, from_rest=from_rest), batch=MANY)
+        self._checker = pose_checker(self._problem, motion_kind(keys.trajectory, from_rest=from_rest), batch=MANY)
         self._scene = self._surroundings(robot_file)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -93,6 +94,8 @@ class PosesMap(PlatformMap):
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse targets that are all out of reach, and a robot that hangs nowhere; see `GridMap.refuse_hopeless`."""
+        if self._is_redundant:  # neither the side of the spools nor a singular reference matters
+            return
         super().refuse_hopeless(grid)
         errors = []
         for z0 in grid.axes["z0"]:

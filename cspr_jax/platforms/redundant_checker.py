@@ -20,7 +20,7 @@ from cspr_jax.motions.limits import other_limits
 from cspr_jax.motions.platform_kind import USUAL, PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved import proved
-from cspr_jax.platforms.beta_hat import LARGEST
+from cspr_jax.platforms.beta_hat import LARGEST, options
 from cspr_jax.platforms.crossings import CableVectors, passed_over
 from cspr_jax.platforms.end_acceleration import AT_REST
 from cspr_jax.platforms.motion_checker import BASIC, BESIDE_KNOT, FEW, TOLERANCE, TOUCH, MotionChecker, PlatformChecks
@@ -142,6 +142,17 @@ class RedundantChecker(MotionChecker):
         is_held = (first[slope == 0.0] > 0.0).all()
         lowest, highest = zero[slope > 0.0].max(initial=-np.inf), zero[slope < 0.0].min(initial=np.inf)
         return 0.5 * (low + high), *((lowest, highest) if is_held else NONE)
+
+    def end_options(
+        self, positions: np.ndarray, quaternions: np.ndarray, z0: np.ndarray, count: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Values of beta-hat to try at poses, that of the largest margin first; see `MotionChecker.end_options`."""
+        # It stays where no value is feasible, so that its motion can say what is wrong.
+        poses = zip(positions, quaternions, z0.tolist(), strict=True)
+        ends = np.array([self.end_interval(*pose) for pose in poses]).reshape(-1, 3)
+        values = options(ends[:, 0], ends[:, 1], ends[:, 2], count)
+        values[:, 0] = np.where(np.isnan(values[:, 0]), ends[:, 0], values[:, 0])
+        return values, np.ones(len(ends), bool)
 
     def breaks(self, slack: np.ndarray) -> np.ndarray:
         """Criteria that are broken for certain; see `MotionChecker.breaks`."""

@@ -114,6 +114,7 @@ _ROWS = (
         dict.fromkeys(("2T", "3T"), "cspr_jax.beziers.leg:Beziers"),
         rests_anywhere=True,
         takes_amplitude=False,
+        any_cables=("2T", "3T"),
         keys=("first_control_point", "least"),
         pose_keys=("duration",),
     ),

@@ -30,6 +30,7 @@ Files, each importing only from those above it:
     parities                segments for even and for odd numbers of arcs
     refusals                limits that refuse every number of arcs
     redundant_arcs          smallest numbers of arcs on more cables than degrees of freedom
+    redundant_inclinations  inclinations that need the fewest oscillations there
     decide                  upper bounds -> answers: proofs first, margins after
     arcs                    smallest numbers of arcs of many segments
     oscillations            smallest numbers of oscillations of many transitions

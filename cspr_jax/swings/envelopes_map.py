@@ -45,6 +45,7 @@ class TransitionEnvelopesMap(MinimumOscillationsMap):
     """Squared oscillations and envelopes of each instant; see `GridMap`."""
 
     proves = False
+    any_cables = False  # envelopes are of pseudotensions, which the motion must determine
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""

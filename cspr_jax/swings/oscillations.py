@@ -91,16 +91,21 @@ def _best_inclinations(amplitude: Amplitude, weights: jax.Array) -> jax.Array:
     return jax.vmap(lambda w: counts.best_inclination(amplitude, w)[0])(weights)
 
 
-def best_inclinations(problem: Problem, targets: np.ndarray) -> np.ndarray:
+def best_inclinations(problem: Problem, targets: np.ndarray, *, max_arcs: int = 30) -> np.ndarray:
     """The inclination of each target that asks for the fewest oscillations.
 
     Args:
-        problem: gives the robot and the amplitude function.
+        problem: gives the robot and the amplitude function; on more cables than degrees of freedom its limits, too.
         targets: (n, 3) from the centroid of the spools, z down, m.
+        max_arcs: twice the largest number of oscillations tried, which counts on more cables alone.
 
     Returns:
         (n,) v.
     """
+    if problem.robot.n_cables > problem.robot.dof:
+        from cspr_jax.swings.redundant_inclinations import redundant_inclinations  # as in `swings.arcs`
+
+        return redundant_inclinations(problem, targets, transitions_to, max_arcs=max_arcs)
     # The weights depend on neither the depth of p0 nor that of the target.
     weights = transition.weights(transitions_to(problem, targets, np.ones(len(targets))))
     if not np.any(problem.amplitude.largest[2]):  # A = tau

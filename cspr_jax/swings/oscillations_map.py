@@ -21,10 +21,11 @@ class MinimumOscillationsMap(PointMassMap):
     """The smallest number of oscillations to each target; see `GridMap`."""
 
     proves = True
+    any_cables = True
 
     def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
-        """Build what all tiles share; an amplitude function for bounds is allowed."""
-        super().__init__(robot_file, keys, file, for_bounds=True)
+        """Build what all tiles share; an amplitude function for bounds is allowed where tensions have envelopes."""
+        super().__init__(robot_file, keys, file, for_bounds=len(robot_file.base_points) == robot_file.dof)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
@@ -42,7 +43,7 @@ class MinimumOscillationsMap(PointMassMap):
         elif isinstance(setting, float):
             inclination = np.full(len(targets), setting)
         else:
-            inclination = best_inclinations(self._problem, targets)
+            inclination = best_inclinations(self._problem, targets, max_arcs=self._keys.trajectory.max_arcs)
         points = (jnp.asarray(targets), jnp.asarray(inclination))
         z0 = np.asarray(jax.vmap(partial(depth_for, self._problem.robot))(*points))
         return np.where(z0 > 0.0, z0, _ANY_DEPTH)

@@ -96,7 +96,7 @@ def redundant_arcs(
     tried = np.where(trials.arcs > 0, trials.arcs, np.where(trials.undecided > 0, trials.undecided, trials.best))
     chosen = pick(parities, np.arange(count), tried)
     least = np.concatenate(
-        [_least(problem, chosen, np.array([i]), int(tried[i]), MANY, is_narrowed=True) for i in range(count)]
+        [least_slacks(problem, chosen, np.array([i]), int(tried[i]), MANY, is_narrowed=True) for i in range(count)]
     )
     flags = (Verdict.WRENCH_INFEASIBLE, Verdict.ABOVE_SPOOLS, *(row.flag for row in other_limits(problem.limits)))
     broken = np.bitwise_or.reduce(np.where(least <= 0.0, np.array([flag.value for flag in flags]), 0), axis=1)
@@ -122,7 +122,7 @@ def _try(problem: Problem, parities: dict[int, Segment], rows: np.ndarray, numbe
     # Try a number of arcs for some of the segments.
     segments = parities[number % 2]
     for samples in (FEW, MANY):
-        least = _least(problem, segments, rows, number, samples).min(1)
+        least = least_slacks(problem, segments, rows, number, samples).min(1)
         better = least > trials.reached[rows]
         trials.best[rows[better]], trials.reached[rows[better]] = number, least[better]
         rows = rows[least > 0.0]
@@ -141,10 +141,20 @@ def _motion(problem: Problem, segments: Segment, i: int, number: int) -> Hypocyc
     return Hypocycloid(jax.tree.map(lambda x: np.asarray(x)[i], segments), problem.amplitude, leaf(number))
 
 
-def _least(
+def least_slacks(
     problem: Problem, segments: Segment, rows: np.ndarray, number: int, samples: int, *, is_narrowed: bool = False
 ) -> np.ndarray:
-    # Return the smallest sampled slacks of segments with one number of arcs, (n, n_slacks).
+    """Smallest sampled slacks of segments with one number of arcs.
+
+    Args:
+        segments: leaves (n, ...).
+        rows: (m,) numbers of the segments that are looked at.
+        samples: instants an arc.
+        is_narrowed: whether minima between samples are looked for.
+
+    Returns:
+        (m, n_slacks) the margin of the tensions over the weight a cable, the depth over z0, limits; -inf for none.
+    """
     kernel, chosen = partial(_instants, problem), jax.tree.map(lambda x: np.asarray(x)[rows], segments)
 
     def at(tau: np.ndarray) -> np.ndarray:

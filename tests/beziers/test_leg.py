@@ -150,7 +150,6 @@ def test_it_joins_other_families(tmp_path):
         (('"bezier"', '"bezier"\nmax_acceleration = 2.0'), "max_acceleration"),
         (('"bezier"', '"quintic"\nleast = "total"'), "least"),
         (("[-0.05, -0.05, -0.7]", "[0, 0, -0.5]"), "pose[1].position"),
-        (('"launch-robot"', '"boralugoda-rectangle"'), "base_points"),
         (('"launch-robot"', '"laval-mssm"'), "parallel"),
     ],
 )

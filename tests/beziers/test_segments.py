@@ -251,8 +251,5 @@ def test_what_is_no_segment_is_refused():
         cspr_jax.bezier_verdicts(robot, one, np.vstack([one, one]), one, durations=[1.0])
     with pytest.raises(InputError, match="accelerations"):
         cspr_jax.bezier_durations(robot, one, one, control_points=one, accelerations=one)
-    with pytest.raises(InputError, match="cables"):
-        four = cspr_jax.point_mass(np.vstack([SPOOLS, [[0.0, 0.5, 0.0]]]), mass=1.0)
-        cspr_jax.bezier_verdicts(four, one, one, one, durations=[1.0])
     with pytest.raises(InputError, match="point mass"):
         cspr_jax.bezier_durations(cspr_jax.load_robot("laval-mssm"), one, one)

@@ -46,7 +46,20 @@ SWEEPS = {
         "axes": {"x": [3.0, 30.0], "y": [12.0], "z": [3.0, 12.0]},
         "trajectory": {"family": "s-curve", "max_acceleration": 10.0, "from": {"position": [1.0, 20.0, 7.0]}},
     },
+    "redundant arcs": {
+        "map": "minimum-arcs",
+        "robot": "boralugoda-rectangle",
+        "axes": {"x": [24.0, 50.0], "y": [18.0], "z": [8.0], "z0": [20.0]},
+        "trajectory": {"family": "hypocycloid-standard", "from": {"rest": True}, "max_arcs": 4},
+    },
+    "redundant oscillations": {
+        "map": "minimum-oscillations",
+        "robot": "boralugoda-planar-three",
+        "axes": {"x": [24.0, 80.0], "y": [0.0], "z": [5.0]},
+        "trajectory": {"family": "transition", "inclination": "best", "amplitude": "quintic", "max_arcs": 6},
+    },
 }
+THOROUGH = ("lines", "redundant arcs", "redundant oscillations")
 
 
 def cells_of(result):
@@ -60,7 +73,10 @@ def cells_of(result):
 @pytest.mark.parametrize(
     "sweep",
     [
-        *(pytest.param(own, marks=[pytest.mark.thorough] * (name == "lines"), id=name) for name, own in SWEEPS.items()),
+        *(
+            pytest.param(own, marks=[pytest.mark.thorough] * (name in THOROUGH), id=name)
+            for name, own in SWEEPS.items()
+        ),
         pytest.param(POSES, marks=pytest.mark.thorough, id="poses"),
     ],
 )
