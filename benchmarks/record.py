@@ -16,6 +16,7 @@ KEPT = (
     "checks_per_second",
     "three_cable",
     "workspaces",
+    "ellipses",
     "ratio_to_numpy",
     "cores",
     "device",

@@ -142,13 +142,14 @@ def figures(monkeypatch):
 @pytest.fixture
 def small_bench(monkeypatch):
     """Sizes with which `cspr bench` takes seconds."""
-    from cspr_jax.bench import six_cables, three_cables, timing, workspaces
+    from cspr_jax.bench import ellipses, six_cables, three_cables, timing, workspaces
 
     monkeypatch.setattr(timing, "REPEATS", 1)
     monkeypatch.setattr(timing, "SIDE", 8)
     monkeypatch.setattr(timing, "COPIED", 4096)
     monkeypatch.setattr(three_cables, "BATCHES", 1)
     monkeypatch.setattr(three_cables, "NUMPY_SEGMENTS", 2)
+    monkeypatch.setattr(ellipses, "COUNT", 256)
     monkeypatch.setattr(six_cables, "NUMPY_TRAJECTORIES", 2)
     monkeypatch.setattr(six_cables, "TRAJECTORIES", 400)
     monkeypatch.setattr(six_cables, "LANES", 64)

@@ -1,10 +1,11 @@
 """Harmonic ellipses of point masses from Python: one motion, and frequencies and margins of many by formulas."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.api.argument_checks import checked
-from cspr_jax.api.arguments import check_point_mass
+from cspr_jax.api.arguments import check_in_plane, check_point_mass
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.ellipses import harmonics
@@ -19,7 +20,7 @@ from cspr_jax.motions.motion import Placed
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.kernel_axes import prepared
 from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.point_mass import PointMassRobot
+from cspr_jax.robots.point_mass import PLANAR, PointMassRobot
 
 
 @checked
@@ -50,9 +51,9 @@ def ellipse(
         the motion, in the robot's axes; what jax traces may be all but a frequency in words.
 
     Raises:
-        InputError: the wrong kind of robot, or a word that no frequency answers to.
+        InputError: the wrong kind of robot, y not 0 on a planar one, or a word that no frequency answers to.
     """
-    check_point_mass(robot)
+    _check_robot(robot, centre=centre, a=a, b=b)
     prepared_robot, frame = prepared(robot, pulleys=True)
     if isinstance(frequency, str):
         with double_precision():
@@ -78,7 +79,8 @@ def ellipse_frequencies(robot: PointMassRobot, centres: np.ndarray, a: np.ndarra
         is inf where nothing bounds it.
 
     Raises:
-        InputError: the wrong kind of robot, spools in several planes, pulleys, or shapes that do not fit.
+        InputError: the wrong kind of robot, spools in several planes, pulleys, y not 0 on a planar robot, or shapes
+            that do not fit.
     """
     with double_precision():
         hull, items = _many(robot, centres, a, b)
@@ -118,8 +120,15 @@ def ellipse_margins(
         return harmonics.of_many(harmonics.least_margin, hull, items, rates)
 
 
-def _many(robot: PointMassRobot, centres, a, b) -> tuple[SpoolHull, Ellipse]:
+def _check_robot(robot: PointMassRobot, **vectors) -> None:
     check_point_mass(robot)
+    for key, vector in vectors.items():
+        if not isinstance(vector, jax.core.Tracer):
+            check_in_plane(key, np.reshape(vector, (-1, 3)), is_planar=robot.dof == PLANAR)
+
+
+def _many(robot: PointMassRobot, centres, a, b) -> tuple[SpoolHull, Ellipse]:
+    _check_robot(robot, centres=centres, a=a, b=b)
     prepared_robot, frame = prepared(robot, pulleys=True)
     places, count = np.asarray(centres, float), len(centres)
     return hull_of(prepared_robot), Ellipse(

@@ -50,7 +50,7 @@ def chosen_frequency(
     Raises:
         InputError: a centre that is not below the spools, or nothing that bounds the frequency.
     """
-    natural, hull = natural_frequency(problem, ellipse), formula_hull(problem.robot)
+    natural, hull = natural_frequency(problem, ellipse, rule), formula_hull(problem.robot)
     if rule == "natural":
         return natural
     if rule == "best" and hull is not None:
@@ -92,8 +92,11 @@ def searched_frequency(slack: Callable, low: float, high: float, natural: float,
     return _outermost(slack, low, high, natural, rule)
 
 
-def natural_frequency(problem: Problem, ellipse: Ellipse) -> float:
+def natural_frequency(problem: Problem, ellipse: Ellipse, rule: str = "natural") -> float:
     """Natural frequency of a pendulum from the plane of the spools to the centre of an ellipse.
+
+    Args:
+        rule: named in errors.
 
     Returns:
         rad/s.
@@ -103,7 +106,7 @@ def natural_frequency(problem: Problem, ellipse: Ellipse) -> float:
     """
     depth = float(np.asarray(ellipse.centre) @ np.asarray(plane_normal(problem.robot)))
     if not depth > 0.0:
-        raise InputError("frequency", "natural", "a number: the centre is not below the spools")
+        raise InputError("frequency", rule, "a number: the centre is not below the spools")
     return math.sqrt(float(problem.robot.gravity) / depth)
 
 

@@ -16,7 +16,7 @@ Source: Gosselin, Ren, Foucault, Dynamic trajectory planning of a two-DOF cable-
 Mottola, Gosselin, Carricato, J. Mechanisms and Robotics 10 (2018) 031004. The form above is derived in docs/theory.md.
 """
 
-from functools import partial
+from functools import partial, reduce
 from typing import NamedTuple
 
 import jax
@@ -45,34 +45,49 @@ class Ellipse(NamedTuple):
     sine: Array
 
 
-class _Terms(NamedTuple):
-    # kappa of each edge is `constant` and the harmonic `tilting` + e `pulling`, of cosine and sine (n_edges, 2); depth
-    # of the centre, () m, and the size of the harmonic of the depth, () m.
+class _Edge(NamedTuple):
+    # kappa of one edge is `constant` and the harmonic `tilting` + e `pulling`, of cosine and sine.
     constant: Array
-    tilting: Array
-    pulling: Array
+    tilting: tuple[Array, Array]
+    pulling: tuple[Array, Array]
+
+
+class _Terms(NamedTuple):
+    # Edge by edge, since XLA computes a stack once for each of its elements; depth of the centre, () m, and the size of
+    # the harmonic of the depth, () m.
+    edges: list[_Edge]
     depth: Array
     swing: Array
 
 
-def _terms(hull: SpoolHull, ellipse: Ellipse) -> _Terms:
-    def flat(vector: Array) -> Array:
-        return hull.edges[:, 0] * vector[0] + hull.edges[:, 1] * vector[1]
+def _size(pair: tuple[Array, Array]) -> Array:
+    return jnp.sqrt(pair[0] * pair[0] + pair[1] * pair[1])
 
+
+def _terms(hull: SpoolHull, ellipse: Ellipse) -> _Terms:
     def rise(vector: Array) -> Array:
         return hull.normal[0] * vector[0] + hull.normal[1] * vector[1] + vector[2]
 
-    constant, depth = 1.0 + flat(ellipse.centre), rise(ellipse.centre)
-    axes = (ellipse.cosine, ellipse.sine)
-    tilting = jnp.stack([constant * (rise(axis) / depth) for axis in axes], axis=1)
-    pulling = jnp.stack([flat(axis) for axis in axes], axis=1) - tilting
-    return _Terms(constant, tilting, pulling, depth, jnp.hypot(*(rise(axis) for axis in axes)))
+    depth, swing = rise(ellipse.centre), (rise(ellipse.cosine), rise(ellipse.sine))
+
+    def of_edge(gradient: Array) -> _Edge:
+        def flat(vector: Array) -> Array:
+            return gradient[0] * vector[0] + gradient[1] * vector[1]
+
+        constant = 1.0 + flat(ellipse.centre)
+        share = constant / depth
+        tilting = (share * swing[0], share * swing[1])
+        return _Edge(constant, tilting, (flat(ellipse.cosine) - tilting[0], flat(ellipse.sine) - tilting[1]))
+
+    return _Terms([of_edge(gradient) for gradient in hull.edges], depth, _size(swing))
 
 
-def _slack(terms: _Terms, e: Array) -> Array:
-    # Smallest kappa of each edge, (n_edges,).
-    harmonic = terms.tilting + e * terms.pulling
-    return terms.constant - jnp.hypot(harmonic[:, 0], harmonic[:, 1])
+def _slacks(terms: _Terms, e: Array) -> list[Array]:
+    # Smallest kappa of each edge.
+    return [
+        constant - _size((tilting[0] + e * pulling[0], tilting[1] + e * pulling[1]))
+        for constant, tilting, pulling in terms.edges
+    ]
 
 
 def harmonic_margins(hull: SpoolHull, ellipse: Ellipse, frequency: Array) -> Array:
@@ -85,12 +100,16 @@ def harmonic_margins(hull: SpoolHull, ellipse: Ellipse, frequency: Array) -> Arr
     Returns:
         (n_edges + 1,) of kappa for each edge, 1 at rest below the centroid; of the depth, over that of the centre.
     """
+    return jnp.stack(_margins(hull, ellipse, frequency))
+
+
+def _margins(hull: SpoolHull, ellipse: Ellipse, frequency: Array) -> list[Array]:
     terms = _terms(hull, ellipse)
-    slack = _slack(terms, 1.0 - frequency**2 * terms.depth / hull.gravity)
+    slacks = _slacks(terms, 1.0 - frequency**2 * terms.depth / hull.gravity)
     # Above the spools no cable pulls upwards, whatever the quotients say.
     is_below = terms.depth > 0.0
     depth = jnp.where(is_below, 1.0 - terms.swing / terms.depth, -1.0)
-    return jnp.concatenate([jnp.where(is_below, slack, -jnp.inf), depth[None]])
+    return [*(jnp.where(is_below, slack, -jnp.inf) for slack in slacks), depth]
 
 
 def least_margin(hull: SpoolHull, ellipse: Ellipse, frequency: Array) -> Array:
@@ -103,20 +122,31 @@ def least_margin(hull: SpoolHull, ellipse: Ellipse, frequency: Array) -> Array:
     Returns:
         () positive exactly if it is feasible.
     """
-    return jnp.min(harmonic_margins(hull, ellipse, frequency))
+    return reduce(jnp.minimum, _margins(hull, ellipse, frequency))
 
 
 def _roots(terms: _Terms) -> tuple[Array, Array]:
-    # Ends of the e at which each edge is met, (n_edges,), below and above 0; without ends, infinite.
-    square = jnp.sum(terms.pulling**2, axis=1)
-    mixed = jnp.sum(terms.tilting * terms.pulling, axis=1)
-    rest = terms.constant**2 - jnp.sum(terms.tilting**2, axis=1)
+    # Ends of the e at which the first edge is met, () below and above 0; without ends, infinite.
+    pairs = [_roots_of_edge(edge) for edge in terms.edges]
+    return reduce(jnp.maximum, [low for low, _ in pairs]), reduce(jnp.minimum, [high for _, high in pairs])
+
+
+def _roots_of_edge(edge: _Edge) -> tuple[Array, Array]:
+    tilting, pulling = edge.tilting, edge.pulling
+    square = pulling[0] ** 2 + pulling[1] ** 2
+    mixed = tilting[0] * pulling[0] + tilting[1] * pulling[1]
+    rest = edge.constant**2 - (tilting[0] ** 2 + tilting[1] ** 2)
     # The root in which nothing cancels gives the other one by their product.
     far = -(mixed + jnp.copysign(jnp.sqrt(mixed**2 + square * jnp.maximum(rest, 0.0)), mixed))
     ends = far / square, -rest / far
     has_ends = square > 0.0
     low = jnp.where(has_ends, jnp.minimum(*ends), -jnp.inf)
     return low, jnp.where(has_ends, jnp.maximum(*ends), jnp.inf)
+
+
+def _exists(terms: _Terms) -> Array:
+    # Whether the natural frequency, and so any, is feasible.
+    return reduce(jnp.logical_and, [edge.constant > 0.0 for edge in terms.edges], terms.depth > terms.swing)
 
 
 def frequency_interval(hull: SpoolHull, ellipse: Ellipse) -> tuple[Array, Array]:
@@ -131,9 +161,8 @@ def frequency_interval(hull: SpoolHull, ellipse: Ellipse) -> tuple[Array, Array]
     """
     terms = _terms(hull, ellipse)
     low, high = _roots(terms)
-    slowest, fastest = jnp.minimum(jnp.min(high), 1.0), jnp.max(low)
-    exists = jnp.all(terms.constant > 0.0) & (terms.depth > terms.swing)
-    ends = (jnp.sqrt((1.0 - e) * hull.gravity / terms.depth) for e in (slowest, fastest))
+    exists = _exists(terms)
+    ends = (jnp.sqrt((1.0 - e) * hull.gravity / terms.depth) for e in (jnp.minimum(high, 1.0), low))
     first, last = (jnp.where(exists, end, jnp.nan) for end in ends)
     return first, last
 
@@ -153,19 +182,23 @@ def best_frequency(hull: SpoolHull, ellipse: Ellipse) -> Array:
     # The smallest of functions that bend downwards bends downwards: it rises up to its largest value.
     def halved(_, ends: tuple[Array, Array]) -> tuple[Array, Array]:
         middle = 0.5 * (ends[0] + ends[1])
-        active = jnp.argmin(_slack(terms, middle))
-        fall = jnp.sum((terms.tilting + middle * terms.pulling)[active] * terms.pulling[active])
+        falls = jnp.stack([_falls(edge, middle) for edge in terms.edges])
+        fall = falls[jnp.argmin(jnp.stack(_slacks(terms, middle)))]
         # A level slack, as without axes, is best taken at the frequency nearest to the natural one.
         rises = (fall < 0.0) | ((fall == 0.0) & (middle < 0.0))
         return jnp.where(rises, middle, ends[0]), jnp.where(rises, ends[1], middle)
 
     # Beside the natural frequency, e = 0, nothing helps an edge whose slack e does not change.
-    ends = (jnp.clip(jnp.max(low), -1e6, 0.0), jnp.clip(jnp.min(high), 0.0, 1.0))
+    ends = (jnp.clip(low, -1e6, 0.0), jnp.clip(high, 0.0, 1.0))
     first, last = jax.lax.fori_loop(0, HALVINGS, halved, ends)
     e = 0.5 * (first + last)
-    exists = jnp.all(terms.constant > 0.0) & (terms.depth > terms.swing)
     frequency = jnp.sqrt(jnp.maximum(1.0 - e, 0.0) * hull.gravity / terms.depth)
-    return jnp.where(exists, jnp.where(last >= 1.0 - 1e-12, 0.0, frequency), jnp.nan)
+    return jnp.where(_exists(terms), jnp.where(last >= 1.0 - 1e-12, 0.0, frequency), jnp.nan)
+
+
+def _falls(edge: _Edge, e: Array) -> Array:
+    # A positive number times the slope by which kappa of an edge falls with e.
+    return sum((t + e * p) * p for t, p in zip(edge.tilting, edge.pulling, strict=True))
 
 
 @partial(jax.jit, static_argnums=0)

@@ -10,8 +10,10 @@ from oracles import point_mass
 from outputs.test_outputs import cspr, strict_json
 
 from cspr_jax import load_robot
-from cspr_jax.bench import six_cables, three_cables, timing, workspaces
+from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.bench import ellipses, six_cables, three_cables, timing, workspaces
 from cspr_jax.cli import main
+from cspr_jax.ellipses import harmonics
 from cspr_jax.swings import sieve
 
 ROOT = Path(__file__).parents[2]
@@ -37,6 +39,7 @@ def test_bench(capsys, small_bench, kernels):
     assert (found["hand_written"] is None) == (kernels is None)
     assert 300 < found["operations_per_check"] < 900
     assert found["workspaces"]["8 cables"]["first_s"] == 1.0
+    assert all(rate > 0 for row in found["ellipses"].values() for rate in row.values())
     assert "x NumPy" in cspr(capsys, "bench", *options)
 
 
@@ -110,3 +113,13 @@ def test_the_numpy_version_of_the_three_cable_check():
         _, place, _, acceleration = point_mass.motion([0.7, 0.7, 3.0], ends[0], [0, 0, 1.7], 9.81, arcs, tau)
         wanted = point_mass.pseudotensions(base, place, acceleration, 9.81).min()
         assert found[0, arcs - 1] == pytest.approx(wanted, rel=1e-9), arcs
+
+
+def test_the_numpy_version_of_ellipses():
+    case = ellipses.work(500)
+    with double_precision():
+        margins = harmonics.of_many(harmonics.least_margin, case.hull, case.ellipse, case.frequency)
+        ends = harmonics.of_many(harmonics.frequency_interval, case.hull, case.ellipse)
+    assert 100 < (margins > 0.0).sum() < 400 and np.isnan(ends[0]).any()
+    np.testing.assert_allclose(ellipses.numpy_margins(case), margins, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(ellipses.numpy_intervals(case), ends, rtol=1e-9, atol=1e-7)

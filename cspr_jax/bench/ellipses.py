@@ -1,0 +1,119 @@
+"""Ellipses of a point mass: verdicts and intervals of frequencies a second, beside NumPy's version of the formulas."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.bench.timing import best
+from cspr_jax.build.robots import load_robot
+from cspr_jax.ellipses import harmonics
+from cspr_jax.ellipses.harmonics import Ellipse
+from cspr_jax.ellipses.hull import Hull, hull_of
+from cspr_jax.robots.kernel_axes import centred
+
+COUNT = 1 << 20
+
+
+class EllipseWork(NamedTuple):
+    """Random ellipses below the spools of a robot.
+
+    Fields:
+        hull: of the spools.
+        ellipse: leaves (n, 3) m.
+        frequency: (n,) rad/s.
+    """
+
+    hull: Hull
+    ellipse: Ellipse
+    frequency: np.ndarray
+
+
+def work(count: int) -> EllipseWork:
+    """Draw ellipses.
+
+    Returns:
+        the ellipses.
+    """
+    rng, robot = np.random.default_rng(0), centred(load_robot("prototype"))[0]
+    centre = rng.normal(size=(count, 3)) * [0.08, 0.08, 0.2] + [0.0, 0.0, 2.0]
+    axes = rng.normal(size=(2, count, 3)) * [0.3, 0.3, 0.1]
+    return EllipseWork(hull_of(robot), Ellipse(centre, *axes), 2.2 * np.exp(rng.uniform(-0.1, 0.1, count)))
+
+
+def numpy_margins(case: EllipseWork) -> np.ndarray:
+    """Margins by NumPy; see `harmonics.least_margin`.
+
+    Returns:
+        (n,).
+    """
+    constant, tilting, pulling, depth, swing = _numpy_terms(case)
+    e = 1.0 - case.frequency**2 * depth / np.asarray(case.hull.gravity)
+    harmonic = tilting + e[:, None] * pulling
+    slack = (constant - np.hypot(*harmonic)).min(1)
+    return np.where(depth > 0.0, np.minimum(slack, 1.0 - swing / depth), -np.inf)
+
+
+def numpy_intervals(case: EllipseWork) -> np.ndarray:
+    """Ends of the feasible frequencies by NumPy; see `harmonics.frequency_interval`.
+
+    Returns:
+        (2, n) rad/s, NaN where no frequency is feasible.
+    """
+    constant, tilting, pulling, depth, swing = _numpy_terms(case)
+    square, mixed, rest = (pulling**2).sum(0), (tilting * pulling).sum(0), constant**2 - (tilting**2).sum(0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        root = np.sqrt(mixed**2 + square * rest)
+        low, high = ((-mixed - root) / square).max(1), ((-mixed + root) / square).min(1)
+        ends = np.sqrt((1.0 - np.stack([np.minimum(high, 1.0), low])) * np.asarray(case.hull.gravity) / depth)
+    return np.where((constant > 0.0).all(1) & (depth > swing), ends, np.nan)
+
+
+def _numpy_terms(case: EllipseWork) -> tuple[np.ndarray, ...]:
+    # constant, tilting and pulling (..., n, n_edges), depth and swing (n,).
+    edges, normal = np.asarray(case.hull.edges), np.asarray(case.hull.normal)
+    flat = [leaf[:, :2] @ edges.T for leaf in case.ellipse]
+    depth, *swing = (leaf @ normal for leaf in case.ellipse)
+    constant = 1.0 + flat[0]
+    tilting = constant * (np.stack(swing) / depth)[..., None]
+    return constant, tilting, np.stack(flat[1:]) - tilting, depth, np.hypot(*swing)
+
+
+def rates() -> dict[str, dict[str, float]]:
+    """Ellipses a second, from arrays to arrays.
+
+    Returns:
+        "verdicts" and "frequencies": "float64" and "numpy" each.
+    """
+    case = work(COUNT)
+
+    def of_many(function, *items):
+        with double_precision():
+            return harmonics.of_many(function, case.hull, case.ellipse, *items)
+
+    return {
+        "verdicts": {
+            "float64": COUNT / best(lambda: of_many(harmonics.least_margin, case.frequency)),
+            "numpy": COUNT / best(lambda: numpy_margins(case)),
+        },
+        "frequencies": {
+            "float64": COUNT / best(lambda: of_many(harmonics.frequency_interval)),
+            "numpy": COUNT / best(lambda: numpy_intervals(case)),
+        },
+    }
+
+
+def lines(measured: dict[str, dict[str, float]]) -> list[str]:
+    """Lines for people.
+
+    Args:
+        measured: of `rates`.
+
+    Returns:
+        the lines.
+    """
+    rows = [
+        f"  {name:12s} float64 {row['float64'] / 1e6:6.1f} M/s, NumPy {row['numpy'] / 1e6:6.1f} M/s"
+        for name, row in measured.items()
+    ]
+    return ["ellipses a second", *rows]
