@@ -109,6 +109,7 @@ class Ellipses(Leg):
             time=start + float(answers.duration[: at + 1].sum()),
             flight_time=float(answers.flight_time[at]),
             tension_min=float(tension_min[at]),
+            half_axes=frame.turned(np.stack([way.last.cosine, way.last.sine])),
         )
 
     def _release(self, problem: Problem, before: Turning, scene: Scene) -> Release:

@@ -34,6 +34,8 @@ class LaunchOutcome(LegOutcome):
         robot: centred, z down.
         frame: of the robot file.
         scatter: of the landings, of a plan that names errors.
+        half_axes: (2, 3) of the ellipse that is left, from its centre to the release, and to the place a quarter of a
+            turn later, m; None of other motions.
     """
 
     segment: int
@@ -48,6 +50,7 @@ class LaunchOutcome(LegOutcome):
     robot: PointMassRobot
     frame: Frame
     scatter: Scatter | None = None
+    half_axes: np.ndarray | None = None
 
     key: ClassVar[str] = "launch"
 
@@ -57,6 +60,7 @@ class LaunchOutcome(LegOutcome):
             "segment": self.segment,
             "release": {"position": self.position.tolist(), "velocity": self.velocity.tolist(), "time": self.time},
             "control_points": None if self.control_points is None else self.control_points.tolist(),
+            "half_axes": None if self.half_axes is None else self.half_axes.tolist(),
             "landing": self.landing.tolist(),
             "flight_time": self.flight_time,
             "tension_min": self.tension_min,
@@ -119,6 +123,7 @@ def launch_outcome(
     flight_time: float,
     tension_min: float,
     control_points: np.ndarray | None = None,
+    half_axes: np.ndarray | None = None,
 ) -> LaunchOutcome:
     """Outcome of a planned release, with the scatter that its table asks for.
 
@@ -128,6 +133,7 @@ def launch_outcome(
         flight_time: s.
         tension_min: smallest tension on the segment, N.
         control_points: (3, 3) of a Bezier segment, m.
+        half_axes: (2, 3) of an ellipse, m.
 
     Returns:
         the outcome.
@@ -146,6 +152,7 @@ def launch_outcome(
         throw=throw,
         robot=robot,
         frame=frame,
+        half_axes=half_axes,
     )
     if table.errors is None:
         return launch

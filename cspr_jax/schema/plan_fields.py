@@ -115,9 +115,13 @@ SEGMENT = {
     ),
 }
 LAUNCH = {
-    "segment": ("1", "Number of the segment on which the object is released, from 0 on."),
+    "segment": ("1", "Number of the segment on which the object is released, of ellipses at its end, from 0 on."),
     "release": ("", "`position`, m, `velocity`, m/s, and `time`, s, after the start of the plan."),
-    "control_points": ("m", "Control points of the segment."),
+    "control_points": ("m", "Control points of the segment; null on an ellipse."),
+    "half_axes": (
+        "m",
+        "Ellipses: from the centre to the release, and to the place a quarter of a turn later; null elsewhere.",
+    ),
     "landing": ("m", "Place of the landing."),
     "flight_time": ("s", "Duration of the flight."),
     "tension_min": ("N", "Smallest tension of any cable on the segment."),

@@ -1,11 +1,21 @@
 """Launches from ellipses: release, flight, what is left open, and scatter, by ballistics and balances in NumPy."""
 
+import dataclasses
+
+import jax
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 from support.commands import plan as command
 
 import cspr_jax
-from cspr_jax.motions.landings import state_at
+from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.ellipses.harmonics import Ellipse
+from cspr_jax.ellipses.motion import turning
+from cspr_jax.motions.landings import Throw, landing, state_at
+from cspr_jax.robots.force_balance import cable_motion
+from cspr_jax.robots.kernel_axes import prepared
+from cspr_jax.robots.pulleys import Pulleys
 
 # A triangle with a side of 1.8 m and two others, z up; the centre lies below its centroid.
 SPOOLS = np.array([[1.0, 0.1, 3.0], [-0.6, 0.8, 3.0], [-0.4, -0.9, 3.0]])
@@ -63,6 +73,7 @@ def test_the_object_lands_on_its_target(thrown):
     np.testing.assert_allclose(place + 0.6 * velocity + 0.18 * DOWN, TARGET, atol=1e-12)
     np.testing.assert_allclose(launch["landing"], TARGET, atol=1e-12)
     assert launch["flight_time"] == 0.6 and launch["control_points"] is None and launch["segment"] == 0
+    np.testing.assert_allclose(launch["half_axes"], [POINT - CENTRE, aim(POINT, TARGET, 0.6) / NATURAL], atol=1e-12)
     flight = thrown.launch.columns()["flight_position"]
     np.testing.assert_allclose(flight[[0, -1]], [POINT, TARGET], atol=1e-12)
 
@@ -157,8 +168,40 @@ def test_a_late_object_is_on_what_follows(thrown):
         )
 
 
-def energies(times):
-    return np.array([np.sum(aim(POINT, TARGET, time) ** 2) for time in times])
+@pytest.mark.parametrize("radius", [0.0, 0.08])
+def test_errors_of_redundant_cables_and_over_pulleys(radius):
+    """Derivatives are those of differences; the place has the least sum of squares of what lengths miss."""
+    spools = np.array([[1.0, 0.1, 0.0], [-0.6, 0.8, 0.0], [-0.4, -0.9, 0.0], [0.8, 0.9, 0.0]])
+    robot, _ = prepared(cspr_jax.point_mass(spools if radius == 0.0 else spools[:3], mass=1.0))
+    if radius:
+        axes = np.tile([0.0, 0.0, 1.0], (3, 1))
+        robot = dataclasses.replace(robot, pulleys=Pulleys(np.full(3, radius), axes))
+    ellipse = Ellipse(np.array([0.0, 0.0, 2.0]), np.array([1.2, 0.2, 0.1]), np.array([0.3, 0.9, -0.2]))
+    with double_precision():
+        motion = turning(ellipse, np.asarray(NATURAL), np.asarray(0.0), 1.0)
+        throw = Throw((motion, motion), motion.duration(), np.array([1.5, 2.5, 3.0]))
+        one = jax.jit(lambda errors: landing(robot, throw, errors))
+        none = np.zeros(1 + 2 * robot.n_cables)
+        slopes = np.asarray(jax.jacfwd(one)(none))
+        steps = 1e-5 * np.eye(len(none))
+        differences = np.stack([(one(step) - one(-step)) / 2e-5 for step in steps], axis=1)
+        np.testing.assert_allclose(slopes, differences, atol=1e-6 * np.abs(slopes).max())
+        state = state_at(throw, np.float64(0.0))
+
+        def lengths(place):
+            return cable_motion(robot, place, place * 0.0, place * 0.0)[0]
+
+        wanted = lengths(state.position) + np.linspace(-0.02, 0.03, robot.n_cables)
+        own = least_squares(lambda x: np.asarray(lengths(x)) - wanted, state.position, xtol=1e-15, ftol=1e-15)
+        velocity = np.linalg.lstsq(np.asarray(jax.jacfwd(lengths)(own.x)), rates(robot, state), rcond=None)[0]
+        fall = np.roots([0.5 * GRAVITY, velocity[2], own.x[2] - 3.0]).max()
+        found = one(np.concatenate([[0.0], np.linspace(-0.02, 0.03, robot.n_cables), none[1 + robot.n_cables :]]))
+        np.testing.assert_allclose(found, own.x[:2] + velocity[:2] * fall - [1.5, 2.5], atol=1e-6)
+
+
+def rates(robot, state):
+    """Of the cables, as planned."""
+    return np.asarray(cable_motion(robot, *state[:3])[1])
 
 
 def test_the_least_energy():
