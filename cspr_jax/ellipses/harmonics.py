@@ -17,7 +17,7 @@ Mottola, Gosselin, Carricato, J. Mechanisms and Robotics 10 (2018) 031004. The f
 """
 
 from functools import partial, reduce
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -40,9 +40,9 @@ class Ellipse(NamedTuple):
         sine: (..., 3) b, m.
     """
 
-    centre: Array
-    cosine: Array
-    sine: Array
+    centre: Any
+    cosine: Any
+    sine: Any
 
 
 class _Edge(NamedTuple):

@@ -80,7 +80,7 @@ class Ellipses(Leg):
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the poses; see `Leg.join`."""
         stops = self.stops
-        scene = scene_of(problem.robot, stops.robot_file, stops.frame, stops.keys, stops.path)
+        scene = scene_of(problem.robot, stops.robot_file, stops.frame, stops.keys, stops.path, trajectory=stops.keys)
         turnings = self._turnings(problem, z0, scene)
         ways: list[Way] = []
         place = turnings[0]
@@ -268,7 +268,7 @@ def _details(problem: Problem, hull: SpoolHull | None, turning: Turning, frame: 
     details: dict[str, Any] = {"frequency": turning.frequency}
     if turning.quaternion is not None:
         rotation = np.asarray(rotations.matrix(jnp.asarray(turning.quaternion)))
-        natural = rotation_frequencies(problem, turning.ellipse.centre, rotation)
+        natural = rotation_frequencies(problem, np.asarray(turning.ellipse.centre), rotation)
         modes = frame.turned(natural.modes.reshape(3, 2, 3)).reshape(3, 6).tolist()
         details |= {"rotation_frequencies": natural.frequencies.tolist(), "rotation_modes": modes}
     if hull is None:

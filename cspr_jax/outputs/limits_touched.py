@@ -79,7 +79,7 @@ def limits_touched(plan: PlannedMotions, case: MotionProof) -> list[TouchedLimit
 def _compared(plan: PlannedMotions, motion: Spline, case: MotionProof, k: int) -> tuple[float, float]:
     # The smallest slack of a criterion about where it fails or is smallest, and what every second sample changes there.
     taus = _instants(np.asarray(motion.knots), case.proof.failing[k], float(case.proof.when[k]))
-    scene = scene_of(plan.problem.robot, plan.robot_file, plan.frame, plan.keys, Path("motion"))
+    scene = scene_of(plan.problem.robot, plan.robot_file, plan.frame, plan.keys, Path("motion"), trajectory=plan.keys)
 
     def slacks(curve: Spline) -> np.ndarray:
         states = instant_states(curve, taus)
