@@ -2,7 +2,7 @@
 
 import dataclasses
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple, cast
@@ -20,7 +20,7 @@ from cspr_jax.config.mappings import text_of
 from cspr_jax.config.motions.text import TooLongError
 from cspr_jax.config.plan import PlanFile, plan_keys
 from cspr_jax.config.robot import resolve_robot
-from cspr_jax.errors import InputError
+from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.motions.motion import Placed
 from cspr_jax.motions.proved_answers import MotionProof, proof_of
 from cspr_jax.motions.stretching import SLOWEST, least_stretching
@@ -244,11 +244,12 @@ def check(  # noqa: PLR0913
         return _check_of(plan.with_source(str(NAME), source), text_of(keys))
 
 
-def check_file(motion: Path, keys: Mapping[str, Any]) -> Check:
+def check_file(motion: Path, keys: Mapping[str, Any], *, outputs: Sequence[str] = ()) -> Check:
     """Check the motion of a file.
 
     Args:
         keys: of a plan: its robot, and what else it has but the motion.
+        outputs: options of what is to be made of the motion, for which it must be held.
 
     Returns:
         the check, feasible or not.
@@ -261,7 +262,10 @@ def check_file(motion: Path, keys: Mapping[str, Any]) -> Check:
         plan = plan_keys(data, motion)
         try:
             return _check_of(plan, text_of(data))
-        except TooLongError:
+        except TooLongError as error:
+            if outputs:
+                held = f"must be absent: {motion} is too long to be held, and judged in windows"
+                raise ConfigError(outputs[0], held) from error
             return _shown(long_plan(plan, motion), text_of(data))
 
 

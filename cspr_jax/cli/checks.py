@@ -88,8 +88,13 @@ def _check(options: argparse.Namespace) -> int:
         prepare_jax(options, quick=True)
         from cspr_jax.api import checks
 
-        check = checks.check_file(options.motion, keys)
-        _refuse_files(options, check)
+        outputs = {
+            "-o": options.output,
+            "--mjcf": options.mjcf,
+            "--animate": options.animate,
+            "--slower": options.slower,
+        }
+        check = checks.check_file(options.motion, keys, outputs=[name for name, value in outputs.items() if value])
         slower = check.slower() if options.slower and not check.feasible else None
     for line in check.plan.warnings:
         warn(line)
@@ -99,15 +104,6 @@ def _check(options: argparse.Namespace) -> int:
     finally:
         _print(options, check, slower)
     return ExitCode.DONE if shown.feasible else ExitCode.NOT_FEASIBLE
-
-
-def _refuse_files(options: argparse.Namespace, check: Any) -> None:
-    if check.plan.legs[0].motions:
-        return
-    for name in ("output", "mjcf", "animate", "slower"):
-        if getattr(options, name):
-            option = "-o" if name == "output" else f"--{name}"
-            raise ConfigError(option, f"must be absent: {options.motion} is too long to be held, and judged in windows")
 
 
 def _print(options: argparse.Namespace, check: Any, slower: Any) -> None:

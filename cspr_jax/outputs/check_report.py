@@ -66,8 +66,8 @@ def check_object(plan: PlannedMotions) -> dict[str, Any]:
         "cable_acceleration_max": float(demands.acceleration_max[0]),
         "z_lowest": float(demands.lowest[0]),
         "demands": {QUANTITIES[flag][0]: row for flag, row in _demands(plan, case).items()},
-        "interpolation": getattr(_motion(plan), "interpolation", "function"),
-        "ends": getattr(_motion(plan), "ends", "") or None,
+        "interpolation": getattr(_motion(plan) or plan.keys, "interpolation", "function"),
+        "ends": getattr(_motion(plan) or plan.keys, "ends", "") or None,
         "blocks": case.proof.blocks,
     }
     return finite(fields)
@@ -148,7 +148,7 @@ def _motion(plan: PlannedMotions) -> Any:
 def _taken_as(plan: PlannedMotions) -> str:
     motion = _motion(plan)
     if motion is None:
-        return "judged window by window"
+        return f"interpolation {plan.keys.interpolation}, judged window by window"
     if not isinstance(motion, Spline):
         proved = (
             "with bounds of its states" if hasattr(motion, "bounds") else "sampled: nothing between instants is proved"

@@ -37,6 +37,8 @@ class _Window(NamedTuple):
     duration: float
     proof: MotionProof
     demands: Demands
+    interpolation: str
+    ends: str
 
 
 def long_plan(keys: PlanFile, path: Path) -> PlannedMotions:
@@ -65,7 +67,7 @@ def long_plan(keys: PlanFile, path: Path) -> PlannedMotions:
     extremes = _reduced([window.demands for window in windows])
     return PlannedMotions(
         robot_file=robot_file,
-        keys=keys,
+        keys=keys.model_copy(update={"interpolation": windows[0].interpolation, "ends": windows[0].ends or None}),
         problem=problem,
         z0=float("nan"),
         frame=frame,
@@ -100,7 +102,8 @@ def _judged(
         curve = kept_to(robot_file.own_pattern, curve, is_planar=bool(says["is_planar"]))
         motion: Spline = placed_inward(curve, frame, reference, centre)
         extremes = demands(problem.robot, [motion], [SAMPLES + 1], limits, keys.tension_rule)
-        yield _Window(start, float(motion.duration()), proof_of(problem, motion, scene), extremes)
+        proof = proof_of(problem, motion, scene)
+        yield _Window(start, float(motion.duration()), proof, extremes, curve.interpolation, curve.ends)
 
 
 def _merged(windows: list[_Window]) -> MotionProof:

@@ -312,7 +312,7 @@ OF_ELLIPSES = (
         "1",
         "smallest normalised pseudotension",
         "Smallest pseudotension along the ellipse at `used_frequency`, 1 at rest below the centroid of the spools, or "
-        "smallest depth below the spools over that of the centre, whichever is less; NaN for spools in several planes.",
+        "smallest depth below the spools over that of the centre, if that is less; NaN for spools in several planes.",
         better="larger",
     ),
     Quantity("duration", "s", "duration of a turn", "Duration of one turn at `used_frequency`."),

@@ -4,6 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
 
 import cspr_jax
 from cspr_jax.errors import ConfigError, InputError
@@ -60,6 +61,39 @@ def test_intervals_of_failure_are_those_of_the_curve():
     assert cause["needed"] == pytest.approx(speed(times).max(), rel=5e-3)
     assert abs(cause["t"] - times[speed(times).argmax()]) < 0.02
     assert check.demands["cable_speed_max"]["bound"] >= speed(times).max()
+
+
+@pytest.mark.parametrize("floor", [1.03, 1.0])
+def test_intervals_below_the_floor_are_those_of_the_curve(floor):
+    """To a millionth of a second, as of other criteria."""
+    check, curve = (
+        cspr_jax.check("prototype", TIMES, PLACES, limits={"floor": floor}),
+        CubicSpline(TIMES, PLACES[:, 2], bc_type="clamped"),
+    )
+    assert check.verdict == "below_floor"
+    edges = check.failing.ravel()
+    roots = curve.solve(floor, extrapolate=False)
+    np.testing.assert_allclose(edges[edges < 6.0], roots, rtol=0.0, atol=1e-6)
+
+
+@pytest.mark.thorough
+def test_intervals_of_corners_below_the_floor():
+    rng, box = np.random.default_rng(5), np.array([[-0.3, -0.3, -0.3], [0.3, 0.2, 0.3]])
+    places, turns = [0.0, 0.0, 3.0] + 0.3 * rng.uniform(-1.0, 1.0, (7, 3)), 0.2 * rng.uniform(-1.0, 1.0, (7, 3))
+    units = np.concatenate([np.ones((7, 1)), turns], axis=1)
+    units /= np.linalg.norm(units, axis=1, keepdims=True)
+    check = cspr_jax.check("cogiro", TIMES, places, units, limits={"floor": 2.5, "platform_box": box.tolist()})
+    curve = CubicSpline(TIMES, np.concatenate([places, units], axis=1), bc_type="clamped")
+    corners = np.stack(np.meshgrid(*box.T), axis=-1).reshape(-1, 3) - cspr_jax.load_robot("cogiro").centre_of_mass
+
+    def height(t):
+        values = curve(t)
+        return values[2] + (corners @ Rotation.from_quat(np.roll(values[3:], -1)).as_matrix()[2]).min() - 2.5
+
+    edges = [edge for edge in check.failing.ravel() if 0.0 < edge < 6.0]
+    assert len(edges) == 2
+    for edge in edges:
+        assert height(edge - 1e-6) * height(edge + 1e-6) < 0.0
 
 
 def test_slower():

@@ -11,9 +11,10 @@ from outputs.test_outputs import cspr, strict_json
 
 from cspr_jax import load_robot
 from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.bench import ellipses, six_cables, three_cables, timing, workspaces
+from cspr_jax.bench import ellipses, motions, six_cables, three_cables, timing, workspaces
 from cspr_jax.cli import main
 from cspr_jax.ellipses import harmonics
+from cspr_jax.errors import SelfCheckError
 from cspr_jax.swings import sieve
 
 ROOT = Path(__file__).parents[2]
@@ -40,7 +41,9 @@ def test_bench(capsys, small_bench, kernels):
     assert 300 < found["operations_per_check"] < 900
     assert found["workspaces"]["8 cables"]["first_s"] == 1.0
     assert all(rate > 0 for row in found["ellipses"].values() for rate in row.values())
-    assert "x NumPy" in cspr(capsys, "bench", *options)
+    assert found["motions"] == {"3 cables, 10001 rows": 12.0}
+    text = cspr(capsys, "bench", *options)
+    assert "x NumPy" in text and "proofs of motions a second" in text
 
 
 @pytest.fixture
@@ -63,6 +66,24 @@ def test_rates_of_workspaces(few_poses):
     found = workspaces.rates()
     assert len(found) == 8 and all(x > 0 for row in found.values() for x in row.values())
     assert len(workspaces.lines(found)) == 9 and "first" in workspaces.lines(found)[1]
+
+
+def test_the_rate_of_records(monkeypatch):
+    """What is timed is decided, else it is no rate."""
+    monkeypatch.setattr(timing, "REPEATS", 1)
+    monkeypatch.setattr(motions, "ROWS", 101)
+    assert motions.record_rate() > 0.0
+    monkeypatch.setattr(motions, "THREE", motions.THREE._replace(tensions=(1e-300, np.nan)))
+    with pytest.raises(SelfCheckError, match="neither proved nor refuted"):
+        motions.record_rate()
+
+
+@pytest.mark.soak
+def test_rates_of_motions(monkeypatch):
+    monkeypatch.setattr(timing, "REPEATS", 1)
+    monkeypatch.setattr(motions, "TOGETHER", 3)
+    found = motions.rates()
+    assert len(found) == 2 and all(rate > 0.0 for rate in found.values()) and len(motions.lines(found)) == 3
 
 
 @with_compiler

@@ -1,0 +1,116 @@
+"""Proofs of motions a second: long records of three cables, and many motions of eight cables together."""
+
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.bench.timing import best
+from cspr_jax.build.robots import load_robot
+from cspr_jax.errors import SelfCheckError
+from cspr_jax.motions.amplitudes import named
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.proved_answers import MotionProof, proof_of, proofs_of
+from cspr_jax.robots.kernel_axes import centred
+from cspr_jax.robots.limits import Limits
+from cspr_jax.splines.interpolation import interpolated
+from cspr_jax.splines.motion import Spline
+from cspr_jax.splines.several import SeveralSplines
+
+DURATION, PLACES = 10.0, 7  # s; way-points of a motion
+ROWS, TOGETHER = 10_001, 100  # of a record; motions that are judged together
+
+
+class Region(NamedTuple):
+    """Where the motions of a robot go, and what its cables may pull.
+
+    Fields:
+        robot: name in the catalogue.
+        middle: of the way-points, from the centroid of the spools, z down, m.
+        reach: largest distance of each coordinate from the middle, m.
+        tilt: largest component of the quaternions' vectors; 0 for a point mass.
+        tensions: least and largest, N.
+    """
+
+    robot: str
+    middle: tuple[float, float, float]
+    reach: float
+    tilt: float
+    tensions: tuple[float, float]
+
+
+THREE = Region("prototype", (0.0, 0.0, 1.0), 0.12, 0.0, (0.1, 4.0))
+EIGHT = Region("cogiro", (0.0, 0.0, 4.0), 1.5, 0.05, (100.0, 5000.0))
+
+
+def _problem(region: Region) -> Problem:
+    robot = centred(load_robot(region.robot))[0]
+    low, high = (leaf(np.full(robot.n_cables, value)) for value in region.tensions)
+    return Problem(robot, Limits(tension_min=low, tension_max=high), named("quintic"))
+
+
+def _motion(region: Region, rng: np.random.Generator) -> Spline:
+    # Quintic spline through random poses.
+    places = np.array(region.middle) + region.reach * rng.uniform(-1.0, 1.0, (PLACES, 3))
+    turns = np.concatenate([np.ones((PLACES, 1)), region.tilt * rng.uniform(-1.0, 1.0, (PLACES, 3))], axis=1)
+    times = np.linspace(0.0, DURATION, PLACES)
+    return interpolated(times, places, turns if region.tilt else None, interpolation="quintic")
+
+
+def _decided(proofs: list[MotionProof]) -> None:
+    # A rate counts nothing that is left open.
+    if any(not (proof.proof.low > 0.0).all() and not proof.broken.any() for proof in proofs):
+        raise SelfCheckError("a motion of the bench is neither proved nor refuted")
+
+
+def record_rate() -> float:
+    """Records of three cables that are interpolated and proved a second, each of `ROWS` rows.
+
+    Returns:
+        the rate.
+
+    Raises:
+        SelfCheckError: a motion is left undecided.
+    """
+    problem, spline = _problem(THREE), _motion(THREE, np.random.default_rng(0))
+    times = np.linspace(0.0, DURATION, ROWS)
+    places = np.asarray(jax.jit(jax.vmap(spline.state))(times / DURATION).position)
+    return 1.0 / best(lambda: _decided([proof_of(problem, interpolated(times, places))]))
+
+
+def together_rate() -> float:
+    """Motions of eight cables that are judged a second, `TOGETHER` at once.
+
+    Returns:
+        the rate.
+
+    Raises:
+        SelfCheckError: a motion is left undecided.
+    """
+    problem, rng = _problem(EIGHT), np.random.default_rng(0)
+    several = SeveralSplines([_motion(EIGHT, rng) for _ in range(TOGETHER)])
+    prove = partial(proofs_of, problem, several.bounds, several.durations, jumps=several.jumps)
+    return TOGETHER / best(lambda: _decided(prove()))
+
+
+def rates() -> dict[str, Any]:
+    """Rates of all of this work.
+
+    Returns:
+        motions a second by kind of work.
+    """
+    return {f"3 cables, {ROWS} rows": record_rate(), f"8 cables, {TOGETHER} together": together_rate()}
+
+
+def lines(measured: dict[str, Any]) -> list[str]:
+    """Lines for people.
+
+    Args:
+        measured: of `rates`.
+
+    Returns:
+        the lines.
+    """
+    return ["proofs of motions a second", *(f"  {name:26s} {rate:8.3g}" for name, rate in measured.items())]
