@@ -9,7 +9,7 @@ from cspr_jax.bench.timing import best
 from cspr_jax.build.robots import load_robot
 from cspr_jax.ellipses import harmonics
 from cspr_jax.ellipses.harmonics import Ellipse
-from cspr_jax.ellipses.hull import Hull, hull_of
+from cspr_jax.ellipses.hull import SpoolHull, hull_of
 from cspr_jax.robots.kernel_axes import centred
 
 COUNT = 1 << 20
@@ -24,7 +24,7 @@ class EllipseWork(NamedTuple):
         frequency: (n,) rad/s.
     """
 
-    hull: Hull
+    hull: SpoolHull
     ellipse: Ellipse
     frequency: np.ndarray
 

@@ -198,7 +198,8 @@ def best_frequency(hull: SpoolHull, ellipse: Ellipse) -> Array:
 
 def _falls(edge: _Edge, e: Array) -> Array:
     # A positive number times the slope by which kappa of an edge falls with e.
-    return sum((t + e * p) * p for t, p in zip(edge.tilting, edge.pulling, strict=True))
+    (t0, t1), (p0, p1) = edge.tilting, edge.pulling
+    return (t0 + e * p0) * p0 + (t1 + e * p1) * p1
 
 
 @partial(jax.jit, static_argnums=0)

@@ -94,7 +94,7 @@ class EllipseMotion:
         return in_batches(partial(_bounds, self), blocks, size=BATCH)
 
 
-def _kinematics(first: Ellipse, last: Ellipse, s: tuple, turns: tuple, rates: tuple) -> tuple:
+def _kinematics(first: Ellipse, last: Ellipse, s: tuple, turns: tuple, rates: tuple) -> tuple[Any, Any, Any]:
     # Position, velocity and acceleration from s and its two derivatives in time, from cosine and sine of the angle, and
     # from its two derivatives; of numbers or of their bounds.
     spans = [after - before for before, after in zip(first, last, strict=True)]
@@ -111,7 +111,7 @@ def _kinematics(first: Ellipse, last: Ellipse, s: tuple, turns: tuple, rates: tu
     return place, pace, pull
 
 
-def _oscillation(rotation: Rotation, s: tuple, turns: tuple, rates: tuple) -> tuple:
+def _oscillation(rotation: Rotation, s: tuple, turns: tuple, rates: tuple) -> tuple[Any, Any, Any]:
     # The angle of the oscillation runs along a line as places run along an ellipse.
     first, last = (Ellipse(jnp.zeros_like(parts[0]), parts[0], parts[1]) for parts in (rotation.first, rotation.last))
     return _kinematics(first, last, s, turns, rates)

@@ -30,14 +30,14 @@ class Rotation(NamedTuple):
         last: (2,) on the last one, rad.
     """
 
-    start: Array
-    turn: Array
-    axis: Array
-    first: Array
-    last: Array
+    start: Any
+    turn: Any
+    axis: Any
+    first: Any
+    last: Any
 
 
-def turn_between(start: np.ndarray, end: np.ndarray) -> np.ndarray:
+def turn_between(start: np.ndarray, end: np.ndarray) -> Array:
     """Shortest rotation from one orientation to another.
 
     Args:

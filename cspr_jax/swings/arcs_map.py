@@ -1,7 +1,10 @@
 """Maps of smallest numbers of arcs of point masses."""
 
+from typing import Any
+
 import numpy as np
 
+from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
@@ -30,7 +33,7 @@ class MinimumArcsMap(PointMassMap):
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
         points, max_arcs = (self._starts(cells), self._targets(cells), cells["z0"]), self._keys.trajectory.max_arcs
-        settings = {"max_arcs": max_arcs, "dtype": self._keys.run.dtype}
+        settings: dict[str, Any] = {"max_arcs": max_arcs, "dtype": self._keys.run.dtype}
         if self._scene is None:
             return vars(minimum_arcs(self._problem, *points, **settings))
         from cspr_jax.maps.clear_motions import clear_motions  # with the proofs of any motion, as in `swings.arcs`
@@ -38,7 +41,7 @@ class MinimumArcsMap(PointMassMap):
 
         def join(rows: np.ndarray, arcs: np.ndarray) -> tuple[Answers, SeveralMotions]:
             answers, segments = arcs_and_segments(self._problem, *(x[rows] for x in points), arcs=arcs, **settings)
-            motions = Hypocycloid(segments, self._problem.amplitude, answers.tried_arcs.astype(float))
+            motions = Hypocycloid(segments, self._problem.amplitude, leaf(answers.tried_arcs))
             return answers, SeveralMotions(motions, answers.duration, several_bounds)
 
         return clear_motions(self._problem, self._scene, join, len(cells["z0"]), max_arcs=max_arcs)
