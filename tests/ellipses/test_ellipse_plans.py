@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from oracles import ellipses as oracle
 from oracles.beziers import cable_states, tensions
+from oracles.lines import tension_margin
 from support.ellipses import triangle
 
 import cspr_jax
@@ -117,6 +118,7 @@ CHANGES = [
 ]
 
 
+@pytest.mark.thorough
 def test_from_rest_to_an_ellipse_and_back():
     assert check_fewest_arcs(made(LEVEL, SWING)) >= 1
 
@@ -137,6 +139,24 @@ def test_in_a_plane():
         at_rest(0.0, 0.0, 1.3),
     ]
     check_plan(made([[0.8, 0.0, 0.0], [-0.8, 0.0, 0.0]], poses, tension_max=12.0))
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("height", [0.0, 0.4])
+def test_four_cables(height):
+    """Spools in one plane, and in two; tensions within limits exist at all instants, by linear programs."""
+    spools = np.array([[1.0, 0.8, 0.0], [-0.9, 1.0, height], [-1.0, -0.9, 0.0], [1.0, -1.0, height]])
+    limits = {"tension_min": 0.3, "tension_max": 8.0}
+    found = cspr_jax.plan(made(spools, SWING, **limits))
+    assert found.feasible
+    turned = np.array([1.0, 1.0, -1.0])  # that oracle's z points up
+    for motion, segment in zip(found.motions, found.to_dict()["segments"], strict=True):
+        position, _, acceleration = (x[:: INSTANTS // 150] for x in sampled(motion))
+        margin = min(
+            tension_margin(spools * turned, x * turned, a * turned, mass=MASS, gravity=GRAVITY, **limits)
+            for x, a in zip(position, acceleration, strict=True)
+        )
+        assert 0.0 < segment["margin_bound"] <= margin + 1e-9 and margin == pytest.approx(segment["margin"], rel=0.02)
 
 
 def random_plan(rng):

@@ -7,6 +7,11 @@ from oracles.beziers import tensions
 from support.ellipses import ellipses, flat_spools, triangle
 
 import cspr_jax
+from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.ellipses import harmonics
+from cspr_jax.ellipses.harmonics import Ellipse
+from cspr_jax.ellipses.hull import hull_of
+from cspr_jax.robots.kernel_axes import prepared
 
 GRAVITY = 9.81
 LEVEL = np.array([[np.sqrt(0.75), -0.5, 0.0], [-np.sqrt(0.75), -0.5, 0.0], [0.0, 1.0, 0.0]])
@@ -73,6 +78,18 @@ def test_printed_frequencies():
 def test_margins_are_those_of_samples():
     feasible, slack, above = compare_with_samples(np.random.default_rng(0), 20, 100)
     assert min(feasible, slack) > 300 and above > 50
+
+
+def test_margins_are_in_the_order_of_the_cables():
+    rng = np.random.default_rng(6)
+    for spools in (triangle(rng), flat_spools(rng, 2, planar=True)):
+        case = ellipses(rng, spools, GRAVITY, 24, above=False)
+        robot, frame = prepared(on(spools))
+        with double_precision():
+            items = Ellipse(frame.inward(case[0]), case[1], case[2])
+            found = harmonics.of_many(harmonics.harmonic_margins, hull_of(robot), items, case[3])
+        exact = oracle.margins(spools, GRAVITY, *case, 401)[1]
+        np.testing.assert_allclose(found, exact, rtol=1e-9, atol=1e-9 * (1.0 + np.abs(exact).max()))
 
 
 @pytest.mark.soak
