@@ -232,6 +232,15 @@ def test_the_least_energy_under_a_low_ceiling():
     assert edge * (1.0 - 2e-3) < time < edge
 
 
+def test_the_least_energy_above_a_floor():
+    """By hand: 0.6 m below the centre, a floor bounds the vertical velocity as a ceiling does."""
+    change = {"time": None, "choose": "energy"}
+    launch = cspr_jax.plan(content(change, more={"max_arcs": 1, "floor": 0.4}, last=None)).to_dict()["launch"]
+    upward = NATURAL * np.sqrt(0.6**2 - (POINT - CENTRE)[2] ** 2)
+    edge = np.roots([0.5 * GRAVITY, -upward, (TARGET - POINT)[2]]).real.max()
+    assert edge * (1.0 - 2e-3) < launch["flight_time"] < edge
+
+
 @pytest.mark.thorough
 def test_the_earliest_landing():
     """No other number of arcs, and no shorter flight with the same number, lands earlier."""

@@ -173,6 +173,8 @@ def test_floors_and_centres():
     assert np.linalg.norm(lift) < 0.3
     low = swing_range(robot, centres[:1], targets[:1], box, 2.0)
     assert low.verdict[0] == Verdict.BELOW_FLOOR.value and low.largest_margin[0] <= 0.0
+    deep = ReleaseBox(np.array([-1.0, -1.0, 2.4]), np.array([1.0, 1.0, 2.6]))
+    assert swing_range(robot, centres[:1], targets[:1] + [0.0, 0.0, 1.0], deep, 2.3).verdict[0] != 0
 
 
 def test_a_plan_says_the_same(result, tmp_path):
