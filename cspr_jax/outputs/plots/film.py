@@ -153,7 +153,7 @@ class _Picture:
 
     def _draw_space(self, *, is_down: bool) -> None:
         space, robot = self._space, self.robot
-        of_robot = [robot.base, robot.attached.reshape(-1, 3), robot.corners.reshape(-1, 3)]
+        of_robot = [robot.ways.reshape(-1, 3), robot.corners.reshape(-1, 3)]
         set_space(space, np.concatenate([*of_robot, self._path, *map(points_of, self._bodies)]), is_down=is_down)
         draw_bodies(space, self._bodies, is_down=is_down)
         space.plot(*self._path.T, color="0.7", linewidth=0.8)
@@ -194,7 +194,7 @@ class _Picture:
         row = self._rows[number]
         robot: Moving = self.robot
         for k, cable in enumerate(self.cables):
-            cable.set_data_3d(*np.stack([robot.base[k], robot.attached[number, k]], axis=1))
+            cable.set_data_3d(*robot.ways[number, k].T)
             cable.set_color(self._colours(self._norm(self.tension[row, k])))
         for k, edge in enumerate(self._edges):
             edge.set_data_3d(*robot.corners[number, 2 * k : 2 * k + 2].T)

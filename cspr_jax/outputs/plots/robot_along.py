@@ -7,6 +7,7 @@ import numpy as np
 
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
+from cspr_jax.outputs.plots.cable_ways import cable_ways
 from cspr_jax.outputs.plots.obstacles import points_of
 from cspr_jax.outputs.plots.robot_at import hull_of
 from cspr_jax.robots.shapes import Hull, rotation_matrix
@@ -20,12 +21,14 @@ class Moving(NamedTuple):
         base: (n_cables, 3) where the cables leave, m.
         position: (n, 3) of the effector at each row, m.
         attached: (n, n_cables, 3) where the cables are attached, m.
+        ways: (n, n_cables, m, 3) points that the cables are drawn through, from `base` to `attached`, m.
         corners: (n, 2 n_edges, 3) ends of the platform's edges, one after the other, m; none of a point mass.
     """
 
     base: np.ndarray
     position: np.ndarray
     attached: np.ndarray
+    ways: np.ndarray
     corners: np.ndarray
 
 
@@ -45,7 +48,8 @@ def moving(
     """
     position, quaternion = np.asarray(columns["position"])[rows], columns.get("quaternion")
     if robot_file is None:
-        return Moving(np.empty((0, 3)), position, np.empty((len(rows), 0, 3)), np.empty((len(rows), 0, 3)))
+        nothing = np.empty((len(rows), 0, 3))
+        return Moving(np.empty((0, 3)), position, nothing, np.empty((len(rows), 0, 2, 3)), nothing)
     base = np.asarray(robot_file.base_points, float)
     body = np.zeros_like(base) if robot_file.platform_points is None else np.asarray(robot_file.platform_points, float)
     if robot_file.centre_of_mass is not None:  # whose position a motion holds
@@ -58,7 +62,7 @@ def moving(
     attached, corners = (
         position[:, None] + np.einsum("rij,kj->rki", rotations, x) for x in (body, edges.reshape(-1, 3))
     )
-    return Moving(base, position, attached, corners)
+    return Moving(base, position, attached, cable_ways(robot_file, attached), corners)
 
 
 def _edges(robot_file: RobotFile, keys: PlanFile | None, attached: np.ndarray) -> np.ndarray:

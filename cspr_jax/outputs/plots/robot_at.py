@@ -8,6 +8,7 @@ from cspr_jax.arithmetic.frames import IDENTITY
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.errors import InputError
+from cspr_jax.outputs.plots.cable_ways import cable_ways
 from cspr_jax.outputs.plots.fixed_axes import table
 from cspr_jax.robots.shapes import FLAT, UNIT_TOLERANCE, hull, is_flat, rotation_matrix
 from cspr_jax.store.result import Result
@@ -21,12 +22,14 @@ class Posed(NamedTuple):
     Fields:
         base: (n_cables, 3) where the cables leave, m.
         attached: (n_cables, 3) where they are attached, for a point mass its place, m.
+        ways: (n_cables, m, 3) points that they are drawn through, m.
         faces: (m, 3, 3) triangles of the hull of these points, m; empty where they lie on a line.
         edges: (k, 2, 3) edges of it, m.
     """
 
     base: np.ndarray
     attached: np.ndarray
+    ways: np.ndarray
     faces: np.ndarray
     edges: np.ndarray
 
@@ -73,7 +76,10 @@ def posed(result: Result, place: np.ndarray, angles: dict[str, float]) -> Posed:
     base = np.array(robot_file.base_points, float)
     body = np.zeros_like(base) if robot_file.platform_points is None else np.array(robot_file.platform_points, float)
     faces, edges = hull_of(body)
-    return Posed(base, place + body @ rotation.T, place + faces @ rotation.T, place + edges @ rotation.T)
+    attached = place + body @ rotation.T
+    return Posed(
+        base, attached, cable_ways(robot_file, attached), place + faces @ rotation.T, place + edges @ rotation.T
+    )
 
 
 def _about(axis: str, angle: float) -> np.ndarray:

@@ -62,7 +62,7 @@ def solid_figure(result: Result, index: dict[str, int], fixed: list[str]) -> Fig
     angles = {axis: float(result.axes[axis][place]) for axis, place in index.items()}
     robot = posed(result, _middle(sides), angles)
     bodies = obstacles(result)
-    points = np.concatenate([surface.corners, robot.base, robot.attached, *bodies])
+    points = np.concatenate([surface.corners, robot.ways.reshape(-1, 3), *bodies])
     box = np.stack([points.min(0), points.max(0)]) + np.array([[-1.0], [1.0]]) * MARGIN * np.ptp(points, axis=0).max()
     figure, panel = _panel(box[1] - box[0])
     eye = _axes(panel, result, box)
@@ -190,8 +190,7 @@ def _draw_robot(panel: Axes3D, robot: Posed) -> None:
     panel.add_collection3d(
         Line3DCollection(np.stack([robot.base, down], 1), colors="#9a9a9a", linewidths=0.6, linestyles=":", zorder=0.5)
     )
-    cables = np.stack([robot.base, robot.attached], axis=1)
-    panel.add_collection3d(Line3DCollection(cables, colors=CABLES, linewidths=1.1, zorder=2.0))
+    panel.add_collection3d(Line3DCollection(robot.ways, colors=CABLES, linewidths=1.1, zorder=2.0))
     if len(robot.faces):
         panel.add_collection3d(Poly3DCollection(robot.faces, facecolors="#505050", edgecolors="none", zorder=2.1))
     panel.add_collection3d(Line3DCollection(robot.edges, colors="black", linewidths=1.2, zorder=2.2))

@@ -63,7 +63,7 @@ def draw_trajectory(figure: Figure, panel: Any, result: Result, robot_file: Robo
     robot, path = moving(result.data, robot_file, rows, keys), result.data["position"]
     flight = result.data.get("flight_position", np.empty((0, 3)))
     bodies, is_down = keys.bodies, result.attributes.get("z_axis", "down") == "down"
-    of_robot = [robot.base, robot.attached.reshape(-1, 3), robot.corners.reshape(-1, 3)]
+    of_robot = [robot.ways.reshape(-1, 3), robot.corners.reshape(-1, 3)]
     set_space(panel, np.concatenate([*of_robot, path, flight, *map(points_of, bodies)]), is_down=is_down)
     draw_bodies(panel, bodies, is_down=is_down)
     tension = result.data["tension"]
@@ -76,9 +76,8 @@ def draw_trajectory(figure: Figure, panel: Any, result: Result, robot_file: Robo
     # A flat box is larger than its panel, which is a square.
     spools.set(clip_on=False, in_layout=False)
     name_spools(panel, robot.base)
-    for row, attached, corners in zip(rows, robot.attached, robot.corners, strict=True):
-        lines = np.stack([robot.base, attached], axis=1)
-        cables = Line3DCollection(lines, colors=colours(norm(tension[row])), linewidths=1.6, zorder=2.5)
+    for row, ways, corners in zip(rows, robot.ways, robot.corners, strict=True):
+        cables = Line3DCollection(ways, colors=colours(norm(tension[row])), linewidths=1.6, zorder=2.5)
         panel.add_collection3d(cables)
         cables.set(clip_on=False, in_layout=False)
         if len(corners):

@@ -13,7 +13,7 @@ const OVER_TIME = [["tensions", "tension", "tension", "N"], ["speeds", "rate", "
 async function loaded(number) {
   if (!known.has(number)) {
     const given = content.motions[number];
-    const names = ["t", "path", "attached", "corners", "tension", "rate", "length"].filter((name) => given[name]);
+    const names = ["t", "path", "attached", "arcs", "corners", "tension", "rate", "length"].filter((name) => given[name]);
     const arrays = await Promise.all(names.map((name) => unpacked(given[name])));
     known.set(number, { ...given, ...Object.fromEntries(names.map((name, k) => [name, arrays[k]])) });
   }
@@ -44,7 +44,8 @@ function moving(row) {
   // The robot of a table may not be known: then it has no spools.
   const { own, range } = motion, { edges } = own, cables = own.base.length;
   const at = (values, width, k) => [0, 1, 2].map((axis) => values[row * width + 3 * k + axis]);
-  const lines = Array.from({ length: cables }, (_, k) => [own.base[k], at(own.attached, 3 * cables, k)]);
+  const arc = (k) => Array.from({ length: own.onArc }, (_, i) => at(own.arcs, 3 * cables * own.onArc, k * own.onArc + i));
+  const lines = Array.from({ length: cables }, (_, k) => [own.base[k], ...arc(k), at(own.attached, 3 * cables, k)]);
   const shape = Array.from({ length: edges }, (_, k) => [at(own.corners, 6 * edges, 2 * k),
     at(own.corners, 6 * edges, 2 * k + 1), [null, null, null]]).flat();
   const place = [[0, 1, 2].map((axis) => own.path[3 * row + axis])];
@@ -104,7 +105,7 @@ function surface(body, isFirst) {
 
 function box() {
   const { own } = motion, every = [0, 1, 2].map((k) => [...own.base.map((point) => point[k]),
-    ...columnOf(own.attached, 3, k), ...columnOf(own.corners, 3, k), ...columnOf(own.path, 3, k),
+    ...columnOf(own.attached, 3, k), ...columnOf(own.arcs, 3, k), ...columnOf(own.corners, 3, k), ...columnOf(own.path, 3, k),
     ...own.bodies.flatMap((body) => body.corners.map((point) => point[k])), ...(own.flight ?? []).map((point) => point[k])]);
   const ranges = every.map(extremes), margin = 0.04 * Math.max(...ranges.map(([low, high]) => high - low));
   return ranges.map(([low, high]) => [low - margin, high + margin]);

@@ -59,6 +59,9 @@ def motion_content(
         "t": packed(np.asarray(columns["t"])[rows]),
         "path": packed(robot.position),
         "attached": packed(robot.attached),
+        # What lies on pulleys, between where cables enter and where they are attached.
+        "arcs": packed(robot.ways[:, :, 1:-1]),
+        "onArc": robot.ways.shape[2] - 2,
         "corners": packed(robot.corners),
         "edges": robot.corners.shape[1] // 2,
         **{name: packed(np.asarray(columns[name])[rows]) for name in OF_CABLES if name in columns},
