@@ -74,7 +74,7 @@ def minimum_pose_arcs(  # noqa: PLR0913
             at rest.
     """
     if not isinstance(robot, PlatformRobot):
-        raise InputError("robot", getattr(robot, "name", robot), "a rigid platform")
+        raise InputError("robot", getattr(robot, "name", robot), "a platform")
     places = points_of("positions", positions)
     depth, turns = depths(z0, len(places)), quaternions("orientations", orientations, len(places))
     with double_precision():
@@ -176,7 +176,7 @@ def _of_place(
     robot: Any, place, definition: str, divisions: int, amplitude: str | Amplitude = "quintic", limits=None
 ) -> tuple[Problem, np.ndarray]:
     if not isinstance(robot, PlatformRobot):
-        raise InputError("robot", getattr(robot, "name", robot), "a rigid platform")
+        raise InputError("robot", getattr(robot, "name", robot), "a platform")
     if definition not in DEFINITIONS:
         raise InputError("definition", definition, f"one of {', '.join(DEFINITIONS)}")
     if divisions % 2 or not 4 <= divisions <= 128:

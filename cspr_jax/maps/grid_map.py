@@ -150,9 +150,7 @@ class PlatformMap(GridMap):
     def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
         """Refuse a point mass."""
         if not robot_file.is_platform:
-            raise ConfigError(
-                file, f'robot "{robot_file.name}" is {robot_file.kind}: must be a rigid platform in this map'
-            )
+            raise ConfigError(file, f'robot "{robot_file.name}" is {robot_file.kind}: must be a platform in this map')
         super().__init__(robot_file, keys, file)
 
     @property

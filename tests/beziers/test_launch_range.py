@@ -228,7 +228,6 @@ def test_its_picture(tmp_path, figures):
         ({"more": "release_q = 1"}, "did you mean release_z?"),
         ({"more": "max_duration = 0.001"}, "launch.max_duration = 0.001: must be above 0.0188"),
         ({"start": 0.1}, "trajectory.from: every point is above the spool plane"),
-        ({"robot": "boralugoda-rectangle"}, "4 points: must be 3"),
         ({"robot": "laval-mssm"}, "must be a point mass in this map; nor do three parallel pairs"),
         ({"robot": "transition-planar", "start": 0.8}, "axes.y: must be [0] for a planar robot"),
         (
