@@ -136,7 +136,7 @@ def _roots_of_edge(edge: _Edge) -> tuple[Array, Array]:
     square = pulling[0] ** 2 + pulling[1] ** 2
     mixed = tilting[0] * pulling[0] + tilting[1] * pulling[1]
     rest = edge.constant**2 - (tilting[0] ** 2 + tilting[1] ** 2)
-    # The root in which nothing cancels gives the other one by their product.
+    # The root in which nothing cancels gives the other by their product.
     far = -(mixed + jnp.copysign(jnp.sqrt(mixed**2 + square * jnp.maximum(rest, 0.0)), mixed))
     ends = far / square, -rest / far
     has_ends = square > 0.0
@@ -145,7 +145,7 @@ def _roots_of_edge(edge: _Edge) -> tuple[Array, Array]:
 
 
 def _exists(terms: _Terms) -> Array:
-    # Whether the natural frequency, and so any, is feasible.
+    # Tell whether the natural frequency, and so any, is feasible.
     return reduce(jnp.logical_and, [edge.constant > 0.0 for edge in terms.edges], terms.depth > terms.swing)
 
 

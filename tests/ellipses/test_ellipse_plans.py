@@ -62,6 +62,8 @@ def check_plan(keys):
         # Velocities and accelerations are those of the places: a rule of the fourth order, but where the jerk jumps.
         rise = 0.5 * step * (velocity[1:] + velocity[:-1]) - step**2 / 12.0 * np.diff(acceleration, axis=0)
         np.testing.assert_allclose(np.diff(position, axis=0), rise, atol=1e-11)
+        change = 0.5 * step * (acceleration[1:] + acceleration[:-1])
+        np.testing.assert_allclose(np.diff(velocity, axis=0), change, atol=10.0 * step**2)
         is_broken = breaches(spools, limits, *states)
         assert segment["verdict"] != "undecided" and bool(is_broken) == (not found.answers.feasible[i]), segment
         pose, start = keys["pose"][i + 1], keys["pose"][i]
