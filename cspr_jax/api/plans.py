@@ -130,7 +130,7 @@ class Plan(planning.PlannedMotions):
         try:
             with double_precision():
                 columns = motion_files.rows(self, rate=max(2.0 * RATES[0], 400.0 / length))
-                columns |= motion_files.failures(self)
+                columns |= motion_files.failures(self) | self.outcome_columns
             with in_style(Style()):
                 data = film(path.suffix, title, columns, self.robot_file, self.keys, speed)
         except InputError as error:

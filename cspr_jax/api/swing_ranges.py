@@ -61,5 +61,5 @@ def swing_range(
             raise InputError("limits", other_limit(known), "a floor alone")
         box = box_of(prepared_robot, frame, list(ranges.values()))
         floor = None if known.floor is None else float(known.floor)
-        found = slowest_releases(prepared_robot, frame.inward(starts), frame.inward(ends), box, floor)
-        return found.placed(frame)
+        releases = slowest_releases(prepared_robot, frame.inward(starts), frame.inward(ends), box, floor)
+        return releases.placed(frame)

@@ -31,6 +31,8 @@ from cspr_jax.schema.verdicts import FLAGS, Verdict
 SHORTEST, LOOKS, AROUND, NARROWED = 0.003, 513, 33, 8
 # Share of its room that an ellipse keeps from the plane of the spools and from the floor.
 KEPT = 1e-6
+# Bound of the rounding of margins.
+ROUNDING = 1e-13
 # Halvings that find a nearest point, and cells at a time.
 HALVINGS, TOGETHER = 80, 256
 # Slopes of the plane of the spools that count as none.
@@ -94,7 +96,7 @@ def other_limit(limits: Limits) -> str | None:
 
 
 class _Cells(NamedTuple):
-    # Of n cells: centres and targets, their depths below the plane of the spools, natural frequencies (n, 1).
+    # Centres and targets of n cells, depths of the centres below the plane of the spools, natural frequencies (n, 1).
     centre: np.ndarray
     target: np.ndarray
     depth: np.ndarray
@@ -143,16 +145,17 @@ def swing_range(
     cells = _Cells(centres, targets, np.where(depth > 0.0, depth, 1.0), np.zeros((len(centres), 1)))
     cells = cells._replace(frequency=np.sqrt(space.gravity / cells.depth)[:, None])
     parts = [slice(i, i + TOGETHER) for i in range(0, len(centres), TOGETHER)]
-    found = [_slowest(space, _Cells(*(column[part] for column in cells))) for part in parts]
-    time, place, speed, below, above = (np.concatenate(column) for column in zip(*found, strict=True))
+    columns = [_slowest(space, _Cells(*(column[part] for column in cells))) for part in parts]
+    time, place, speed, below, above = (np.concatenate(column) for column in zip(*columns, strict=True))
     velocity = (_above(space, cells, time[:, None])[:, 0] - place) / time[:, None]
     ellipse, rates = Ellipse(centres, place - centres, velocity / cells.frequency), cells.frequency[:, 0]
     nothing = np.zeros_like(centres)
     still = harmonics.of_many(harmonics.least_margin, hull, Ellipse(centres, nothing, nothing), rates)
     margin = harmonics.of_many(harmonics.least_margin, hull, ellipse, rates)
-    is_found = np.isfinite(speed) & (margin > 0.0)
+    is_found = np.isfinite(speed) & (margin > ROUNDING)
     lost = np.where(below > 0.0, 0, Verdict.ABOVE_SPOOLS.value) | np.where(above > 0.0, 0, Verdict.BELOW_FLOOR.value)
     lost = np.where(still > 0.0, np.where(lost == 0, Verdict.UNDECIDED.value, lost), Verdict.SLACK_CABLE.value)
+    lost = np.where(np.abs(still) > ROUNDING, lost, Verdict.UNDECIDED.value)
     lost = np.where(depth > 0.0, lost, Verdict.ABOVE_SPOOLS.value)
     # The larger half-axis, from the eigenvalues of a a + b b.
     squares = [np.sum(one * other, axis=1) for one, other in ((ellipse[1],) * 2, (ellipse[2],) * 2, ellipse[1:])]
@@ -198,18 +201,18 @@ def _looks(space: _Space, cells: _Cells, times: np.ndarray) -> _Looks:
 
 
 class _Interval(NamedTuple):
-    # Of a coordinate of the release, (n, k) m, NaN where there is none; and the largest room in the box, m.
+    # Ends of a coordinate of the release, (n, k) m, NaN where there is none; and the largest room in the box, m.
     low: np.ndarray
     high: np.ndarray
     room: np.ndarray
 
 
 def _interval(centre: np.ndarray, fallen: np.ndarray, share: np.ndarray, reach: np.ndarray, box) -> _Interval:
-    # Where (p - centre)^2 + share (fallen - p)^2 stays below the square of the reach.
+    # The p for which (p - centre)^2 + share (fallen - p)^2 stays below the square of the reach.
     middle = (centre[:, None] + share * fallen) / (1.0 + share)
-    away, kept = fallen - centre[:, None], reach[:, None] * (1.0 - KEPT)
-    square = kept**2 / (1.0 + share) - share * away**2 / (1.0 + share) ** 2
-    half = np.where(kept > 0.0, np.sqrt(np.where(square >= 0.0, square, np.nan)), np.nan)
+    away, inner = fallen - centre[:, None], reach[:, None] * (1.0 - KEPT)
+    square = inner**2 / (1.0 + share) - share * away**2 / (1.0 + share) ** 2
+    half = np.where(inner > 0.0, np.sqrt(np.where(square >= 0.0, square, np.nan)), np.nan)
     best = np.clip(middle, *box)
     swing = np.sqrt((best - centre[:, None]) ** 2 + share * (fallen - best) ** 2)
     return _Interval(middle - half, middle + half, reach[:, None] - swing)
@@ -221,10 +224,10 @@ def _nearest(
     # The points nearest to places in boxes whose depth lies in an interval: a shift along the normal, cut by the box.
     nearest = np.minimum(np.maximum(places, low), high)
     depth = _depth(nearest, normal)
-    wanted = np.clip(depth, depths.low, depths.high)
-    moved = np.flatnonzero(np.ravel(wanted != depth) & np.isfinite(np.ravel(wanted)))
+    goal = np.ravel(np.clip(depth, depths.low, depths.high))
+    moved = np.flatnonzero((goal != np.ravel(depth)) & np.isfinite(goal))
     start, first, last = (x.reshape(-1, 3)[moved] for x in (places, low, high))
-    goal = wanted.ravel()[moved]
+    goal = goal[moved]
     # A shift that takes each coordinate which it changes beyond the box.
     slope = np.abs(normal[np.abs(normal) > LEVEL])
     away = np.maximum(np.abs(first - start), np.abs(last - start))[:, np.abs(normal) > LEVEL]

@@ -174,7 +174,17 @@ def test_floors_and_centres():
     low = swing_range(robot, centres[:1], targets[:1], box, 2.0)
     assert low.verdict[0] == Verdict.BELOW_FLOOR.value and low.largest_margin[0] <= 0.0
     deep = ReleaseBox(np.array([-1.0, -1.0, 2.4]), np.array([1.0, 1.0, 2.6]))
-    assert swing_range(robot, centres[:1], targets[:1] + [0.0, 0.0, 1.0], deep, 2.3).verdict[0] != 0
+    assert swing_range(robot, centres[:1], np.array([[3.0, 0.0, 3.2]]), deep, 2.3).verdict[0] != 0
+
+
+def test_a_centre_on_the_edge_of_the_hull():
+    """Within rounding nothing is said."""
+    spools = np.array([[1.0, 0.0, 0.0], [-0.5, 0.7, 0.0], [-0.5, -0.7, 0.0]])
+    robot = cspr_jax.make_problem(cspr_jax.point_mass(spools, mass=1.0)).robot
+    box = ReleaseBox(np.array([-1.0, -1.0, 1.2]), np.array([1.0, 1.0, 2.6]))
+    centres = np.array([[-0.5, 0.1, 2.0], [-0.499999, 0.1, 2.0]])
+    found = swing_range(robot, centres, np.tile([3.0, 0.0, 2.2], (2, 1)), box)
+    assert found.verdict.tolist() == [Verdict.UNDECIDED.value, 0] and np.isnan(found.release_speed[0])
 
 
 def test_a_plan_says_the_same(result, tmp_path):

@@ -62,6 +62,24 @@ def test_cables_are_where_the_plan_has_them(plan):
                 assert np.linalg.norm(end - start) == pytest.approx(columns["length"][row, k])
 
 
+def test_an_object_flies_where_free_fall_takes_it(plan):
+    """From its release on; it lies where it lands."""
+    time, fall = np.linspace(1.0, 1.5, 11)[:, None], np.array([0.0, 0.0, 4.905])
+    flight = np.array([0.3, 0.1, 1.2]) + (time - 1.0) * np.array([1.0, 0.2, -0.5]) + (time - 1.0) ** 2 * fall
+    columns = plan.rows(200.0) | {"flight_t": time[:, 0], "flight_position": flight}
+    rows = np.searchsorted(columns["t"], [0.99, 1.0, 1.2, 1.9])
+    with in_style(Style()):
+        picture = films._Picture("film", columns, plan.robot_file, plan.keys, rows)
+        places = []
+        for number in range(len(rows)):
+            picture.show(number)
+            places.append(np.transpose(picture.object.get_data_3d()))
+    assert not len(places[0])
+    for place, instant in zip(places[1:], (1.0, 1.2, 1.5), strict=True):
+        wanted = [np.interp(instant, time[:, 0], values) for values in flight.T]
+        assert place[0] == pytest.approx(wanted, abs=0.02)
+
+
 @pytest.mark.thorough
 def test_other_kinds_of_films(plan, tmp_path):
     pytest.importorskip("imageio_ffmpeg")

@@ -21,7 +21,7 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.bodies_in_space import draw_bodies
 from cspr_jax.outputs.plots.fitting import fit, legend_above
-from cspr_jax.outputs.plots.labels import cable_names, line_look
+from cspr_jax.outputs.plots.labels import COLOURS, cable_names, line_look
 from cspr_jax.outputs.plots.motion import draw_limits, shade_failing
 from cspr_jax.outputs.plots.obstacles import AREA, points_of
 from cspr_jax.outputs.plots.robot_along import Moving, limits_of, moving
@@ -54,7 +54,8 @@ def film(
 
     Args:
         ending: of its file, one of `ENDINGS`.
-        columns: rows by the names of `schema.quantities.TRAJECTORY`, in the axes of the robot file, and `FAILURES`.
+        columns: rows by the names of `schema.quantities.TRAJECTORY`, in the axes of the robot file, and what there is
+            of `FAILURES` and `FLIGHT`.
         robot_file: the robot whose cables have these tensions.
         keys: the plan, for limits, obstacles and the shape of the platform.
         speed: times real time, positive.
@@ -132,6 +133,7 @@ class _Picture:
         all_rows = np.arange(len(columns["t"]))
         self.robot, self._path = moving(columns, robot_file, rows, keys), moving(columns, robot_file, all_rows).position
         self._bodies, self._failing = keys.bodies, {"failing": columns.get("failing", ())}
+        self._flight_time, self._flight = columns.get("flight_t", np.empty(0)), columns.get("flight_position")
         self._rows, self._time = rows, np.asarray(columns["t"], float)
         self.tension = np.asarray(columns["tension"], float)
         self._names = cable_names(columns)
@@ -154,12 +156,19 @@ class _Picture:
     def _draw_space(self, *, is_down: bool) -> None:
         space, robot = self._space, self.robot
         of_robot = [robot.ways.reshape(-1, 3), robot.corners.reshape(-1, 3)]
-        set_space(space, np.concatenate([*of_robot, self._path, *map(points_of, self._bodies)]), is_down=is_down)
+        flight = np.empty((0, 3)) if self._flight is None else self._flight
+        places = np.concatenate([*of_robot, self._path, flight, *map(points_of, self._bodies)])
+        set_space(space, places, is_down=is_down)
         draw_bodies(space, self._bodies, is_down=is_down)
         space.plot(*self._path.T, color="0.7", linewidth=0.8)
         name_spools(space, robot.base)
         for place, marker, name in zip(self._path[[0, -1]], ("o", "D"), ("start", "end"), strict=True):
             space.plot(*place[:, None], linestyle="", marker=marker, color="black", markerfacecolor="white", label=name)
+        # The object that is released, and its way since then.
+        self._flown = space.plot([], [], [], color=COLOURS[2], linewidth=1.4, linestyle="--")[0]
+        self.object = space.plot([], [], [], linestyle="", marker="o", markersize=6, color=COLOURS[2])[0]
+        if len(flight):
+            self._flown.set_label("flight")
         handles, words = space.get_legend_handles_labels()
         if self._bodies:
             handles, words = [*handles, Patch(**AREA)], [*words, "obstacles"]
@@ -201,5 +210,10 @@ class _Picture:
         self._mass.set_data_3d(*robot.position[number][:, None])
         self._behind.set_data_3d(*self._path[: row + 1].T)
         instant = float(self._time[row])
+        if self._flight is not None and instant >= self._flight_time[0]:
+            place = [np.interp(instant, self._flight_time, values) for values in self._flight.T]
+            behind = self._flight[self._flight_time < instant]
+            self._flown.set_data_3d(*np.vstack([behind, place]).T)
+            self.object.set_data_3d(*np.transpose([place]))
         self._mark.set_xdata([instant, instant])
         self._clock.set_text(f"t = {instant:.2f} s")
