@@ -51,15 +51,16 @@ class _StatePool:
         return dataclasses.replace(self, states=self.instants)
 
     def hold(self, multiple: np.ndarray) -> np.ndarray:
-        return self._batched(blocks_hold, self.states, _share(self.problem, multiple))
-
-    def fail(self, multiple: np.ndarray) -> np.ndarray:
-        return self._batched(instants_fail, self.instants, _share(self.problem, multiple), self.ways)
-
-    def _batched(self, kernel: Any, *cases: Any) -> np.ndarray:
         if not len(self.blocks.row):
             return np.zeros(0, bool)
-        return in_batches(partial(kernel, self.problem.robot, self.problem.limits, self.bodies), cases, size=BATCH)
+        kernel = partial(blocks_hold, self.problem.robot, self.problem.limits, self.bodies)
+        return in_batches(kernel, (self.states, _share(self.problem, multiple)), size=BATCH)
+
+    def fail(self, multiple: np.ndarray) -> np.ndarray:
+        if not len(self.blocks.row):
+            return np.zeros(0, bool)
+        share, robot, limits = _share(self.problem, multiple), self.problem.robot, self.problem.limits
+        return instants_fail(robot, limits, self.bodies, self.instants, share, self.ways)
 
 
 def _share(problem: Problem, multiple: np.ndarray) -> Share:
@@ -74,8 +75,7 @@ def _pool(problem: Problem, bodies: Bodies, motion: BoundedMotion, blocks: Block
     middle = 0.5 * (blocks.start + blocks.stop)
     each = motion.bounds(blocks.start, blocks.stop), instant_states(motion, middle / float(motion.duration()))
     states, instants = (jax.tree.map(np.asarray, bounds) for bounds in each)
-    cases = (instants, _share(problem, np.ones(len(middle))))
-    ways = in_batches(partial(worst_ways, problem.robot, problem.limits, bodies), cases, size=BATCH)
+    ways = worst_ways(problem.robot, problem.limits, bodies, instants, _share(problem, np.ones(len(middle))))
     return _StatePool(problem, bodies, motion, blocks, states, instants, ways)
 
 
