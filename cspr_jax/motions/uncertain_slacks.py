@@ -183,4 +183,4 @@ def instants_fail(
     radii = np.repeat(np.stack([share.spools, share.centre], axis=1), [robot.n_cables, 1], axis=1)
     moved = np.repeat(radii[:, None, :, None] * ways, 2, axis=1)
     ratio = np.tile(np.stack([1.0 / share.factor, share.factor], axis=1), (1, ways.shape[1]))
-    return (_of_robots(robot, limits, bodies, states, moved, ratio) < 0.0).any((1, 2))
+    return _of_robots(robot, limits, bodies, states, moved, ratio).min((1, 2)) < 0.0
