@@ -3,12 +3,15 @@
 With s from -1 at the start of a block to 1 at its end, f(s) is within `radius` of `middle + slope s`. Sums, products,
 quotients and roots of such bounds are bounds again. A smooth function's radius shrinks with the square of the length of
 the block, so that halving a block closes what is open, and functions that only have to be continuous have bounds too.
-Each operation widens the band by what rounding may be of it.
+Each operation widens the band by what rounding may be of it. Operations are compiled functions: kernels of hundreds of
+them are traced, and written down for XLA, as calls of a few.
 """
 
 import math
+from functools import partial
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -82,25 +85,15 @@ class AffineBounds(NamedTuple):
         Returns:
             the bounds.
         """
-        return _rounded(self.each(lambda x: jnp.sum(x, axis=axis)), jnp.sum(self.size(), axis=axis))
+        return _total(self, axis)
 
     def __add__(self, other: Any) -> "AffineBounds":
         """Bounds of f + g, or of f plus constants."""
-        if not isinstance(other, AffineBounds):
-            return _rounded(self._replace(middle=self.middle + other), jnp.abs(other))
-        moved = AffineBounds(self.middle + other.middle, self.slope + other.slope, self.radius + other.radius)
-        return _rounded(moved, self.size())
+        return _sum(self, other) if isinstance(other, AffineBounds) else _shifted(self, other)
 
     def __mul__(self, other: Any) -> "AffineBounds":
         """Bounds of f g, or of f times constants."""
-        if not isinstance(other, AffineBounds):
-            return _rounded(self.each(lambda x: x * other)._replace(radius=self.radius * jnp.abs(other)))
-        # s^2 is between 0 and 1.
-        half = 0.5 * self.slope * other.slope
-        sizes = (jnp.abs(self.middle) + jnp.abs(self.slope), jnp.abs(other.middle) + jnp.abs(other.slope))
-        radius = jnp.abs(half) + sizes[0] * other.radius + sizes[1] * self.radius + self.radius * other.radius
-        slope = self.middle * other.slope + self.slope * other.middle
-        return _rounded(AffineBounds(self.middle * other.middle + half, slope, radius), sizes[0] * sizes[1])
+        return _product(self, other) if isinstance(other, AffineBounds) else _scaled(self, other)
 
     def __radd__(self, other: Any) -> "AffineBounds":
         """Bounds of constants plus f."""
@@ -128,6 +121,45 @@ def _rounded(bounds: AffineBounds, size: Any = 0.0) -> AffineBounds:
     return bounds._replace(radius=bounds.radius + ROUNDING * (bounds.size() + size))
 
 
+@partial(jax.jit, static_argnames="axis")
+def _total(f: AffineBounds, axis: int) -> AffineBounds:
+    # Up to some thirty terms.
+    total = f.each(lambda x: jnp.sum(x, axis=axis))
+    return total._replace(radius=total.radius + 2.0 * ROUNDING * jnp.sum(f.size(), axis=axis))
+
+
+@jax.jit
+def _sum(f: AffineBounds, g: AffineBounds) -> AffineBounds:
+    return _rounded(AffineBounds(f.middle + g.middle, f.slope + g.slope, f.radius + g.radius))
+
+
+@jax.jit
+def _shifted(f: AffineBounds, constants: Array) -> AffineBounds:
+    middle = f.middle + constants
+    slope, radius = (jnp.broadcast_to(x, middle.shape) for x in (f.slope, f.radius))
+    return AffineBounds(middle, slope, radius + ROUNDING * (radius + jnp.abs(middle)))
+
+
+@jax.jit
+def _scaled(f: AffineBounds, constants: Array) -> AffineBounds:
+    return _rounded(AffineBounds(f.middle * constants, f.slope * constants, f.radius * jnp.abs(constants)))
+
+
+def _products(f: AffineBounds, g: AffineBounds) -> tuple[AffineBounds, Array]:
+    # Bounds of f g but for rounding, and the size of the numbers in its line; s^2 is between 0 and 1.
+    half = 0.5 * f.slope * g.slope
+    sizes = jnp.abs(f.middle) + jnp.abs(f.slope), jnp.abs(g.middle) + jnp.abs(g.slope)
+    radius = jnp.abs(half) + sizes[0] * g.radius + (sizes[1] + g.radius) * f.radius
+    slope = f.middle * g.slope + f.slope * g.middle
+    return AffineBounds(f.middle * g.middle + half, slope, radius), sizes[0] * sizes[1]
+
+
+@jax.jit
+def _product(f: AffineBounds, g: AffineBounds) -> AffineBounds:
+    product, size = _products(f, g)
+    return product._replace(radius=product.radius + ROUNDING * (product.radius + size))
+
+
 def constant(values: Array) -> AffineBounds:
     """Bounds of constants.
 
@@ -140,6 +172,7 @@ def constant(values: Array) -> AffineBounds:
     return AffineBounds(values, jnp.zeros_like(values), jnp.zeros_like(values))
 
 
+@jax.jit
 def squared(f: AffineBounds) -> AffineBounds:
     """Bounds of f^2.
 
@@ -151,6 +184,7 @@ def squared(f: AffineBounds) -> AffineBounds:
     return _rounded(AffineBounds(f.middle**2 + half, 2.0 * f.middle * f.slope, radius), line**2)
 
 
+@jax.jit
 def reciprocal(f: AffineBounds) -> AffineBounds:
     """Bounds of 1 / f, of a positive function.
 
@@ -161,6 +195,7 @@ def reciprocal(f: AffineBounds) -> AffineBounds:
     return bent(f, value, -(value**2), 2.0 / _positive(f) ** 3)
 
 
+@jax.jit
 def root(f: AffineBounds) -> AffineBounds:
     """Bounds of the square root of a positive function.
 
@@ -171,6 +206,7 @@ def root(f: AffineBounds) -> AffineBounds:
     return bent(f, value, 0.5 / value, -0.25 * _positive(f) ** -1.5)
 
 
+@jax.jit
 def reciprocal_root(f: AffineBounds) -> AffineBounds:
     """Bounds of 1 over the square root of a positive function.
 
@@ -181,6 +217,7 @@ def reciprocal_root(f: AffineBounds) -> AffineBounds:
     return bent(f, value, -0.5 * value**3, 0.75 * _positive(f) ** -2.5)
 
 
+@jax.jit
 def arc_sine(f: AffineBounds) -> AffineBounds:
     """Bounds of the angle of a sine, between -pi/2 and pi/2.
 
@@ -227,6 +264,7 @@ def bent(f: AffineBounds, value: Array, slope: Array, bend: Array) -> AffineBoun
     return _rounded(AffineBounds(value + half, slope * f.slope, jnp.abs(slope) * f.radius + jnp.abs(half)), value)
 
 
+@jax.jit
 def sincospi(f: AffineBounds) -> tuple[AffineBounds, AffineBounds]:
     """Bounds of sin(pi f) and cos(pi f).
 
@@ -248,6 +286,7 @@ def sincospi(f: AffineBounds) -> tuple[AffineBounds, AffineBounds]:
     return one(sine, cosine), one(cosine, -sine)
 
 
+@jax.jit
 def dot(f: AffineBounds, g: AffineBounds | Array) -> AffineBounds:
     """Bounds of the products of vectors.
 
@@ -258,9 +297,14 @@ def dot(f: AffineBounds, g: AffineBounds | Array) -> AffineBounds:
     Returns:
         (...).
     """
-    return (f * g).total()
+    if not isinstance(g, AffineBounds):
+        return (f * g).total()
+    product, size = _products(f, g)
+    total = product.each(lambda x: jnp.sum(x, axis=-1))
+    return total._replace(radius=total.radius + 3.0 * ROUNDING * (total.radius + jnp.sum(size, axis=-1)))
 
 
+@jax.jit
 def norm_squared(f: AffineBounds) -> AffineBounds:
     """Bounds of the squared lengths of vectors.
 
@@ -273,6 +317,7 @@ def norm_squared(f: AffineBounds) -> AffineBounds:
     return squared(f).total()
 
 
+@jax.jit
 def norm_bound(f: AffineBounds) -> Array:
     """Upper bounds of the lengths of vectors: at the ends of their lines, and of the band.
 
@@ -287,6 +332,7 @@ def norm_bound(f: AffineBounds) -> Array:
     return length * (1.0 + ROUNDING)
 
 
+@jax.jit
 def cross(f: AffineBounds, g: AffineBounds) -> AffineBounds:
     """Bounds of the vector products.
 
@@ -297,14 +343,14 @@ def cross(f: AffineBounds, g: AffineBounds) -> AffineBounds:
     Returns:
         (..., 3).
     """
-    ahead, behind = np.array([1, 2, 0]), np.array([2, 0, 1])
 
-    def part(bounds: AffineBounds, order: np.ndarray) -> AffineBounds:
-        return bounds.each(lambda x: x[..., order])
+    def ahead(bounds: AffineBounds) -> AffineBounds:
+        return bounds.each(lambda x: jnp.concatenate([x[..., 1:], x[..., :1]], axis=-1))
 
-    return part(f, ahead) * part(g, behind) - part(f, behind) * part(g, ahead)
+    return ahead(f * ahead(g) - ahead(f) * g)
 
 
+@jax.jit
 def turned(matrix: AffineBounds | Array, f: AffineBounds | Array) -> AffineBounds:
     """Bounds of matrices times vectors; one of both may be constant.
 
@@ -317,8 +363,7 @@ def turned(matrix: AffineBounds | Array, f: AffineBounds | Array) -> AffineBound
     """
     across: Any = f.each(lambda x: x[..., None, :]) if isinstance(f, AffineBounds) else f[..., None, :]
     # Constants go to the right.
-    product: AffineBounds = matrix * across if isinstance(matrix, AffineBounds) else across * matrix
-    return product.total()
+    return dot(matrix, across) if isinstance(matrix, AffineBounds) else dot(across, matrix)
 
 
 def stacked(bounds: "list[AffineBounds]", axis: int = -1) -> AffineBounds:

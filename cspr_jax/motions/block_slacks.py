@@ -28,6 +28,7 @@ from cspr_jax.robots.state_bounds import CableBounds, StateBounds, balance_bound
 from cspr_jax.robots.witness_tensions import witness_tensions
 from cspr_jax.robots.wrench_balance import SINGULAR
 from cspr_jax.robots.wrench_sets import tension_range
+from cspr_jax.runtime import compile_options
 from cspr_jax.schema.verdicts import Verdict
 
 BATCH = 64
@@ -77,7 +78,7 @@ def _edges(slack: AffineBounds) -> tuple[Pair, Pair]:
     return below, above
 
 
-@partial(jax.jit, static_argnames=("passes", "contacts_alone"))
+@partial(jax.jit, static_argnames=("passes", "contacts_alone"), compiler_options=compile_options.least())
 def _kernel(
     robot: AnyRobot,
     limits: Limits,

@@ -53,20 +53,17 @@ class _StatePool:
         return dataclasses.replace(self, states=self.instants)
 
     def hold(self, multiple: np.ndarray) -> np.ndarray:
-        return self._batched(blocks_hold, self.states, _share(self.problem, multiple))
-
-    def fail(self, multiple: np.ndarray) -> np.ndarray:
-        return self._batched(instants_fail, self.instants, _share(self.problem, multiple), self.ways)
-
-    def _batched(self, kernel: Any, *cases: Any) -> np.ndarray:
         if not len(self.blocks.row):
             return np.zeros(0, bool)
-        return _batched(kernel, self.problem, self.bodies, cases, contacts_alone=self.contacts_alone)
+        of_robot = self.problem.robot, self.problem.limits, self.bodies
+        kernel = partial(blocks_hold, *of_robot, contacts_alone=self.contacts_alone)
+        return in_batches(kernel, (self.states, _share(self.problem, multiple)), size=BATCH)
 
-
-def _batched(kernel: Any, problem: Problem, bodies: Bodies, cases: Any, *, contacts_alone: bool) -> np.ndarray:
-    function = partial(kernel, problem.robot, problem.limits, bodies, contacts_alone=contacts_alone)
-    return in_batches(function, cases, size=BATCH)
+    def fail(self, multiple: np.ndarray) -> np.ndarray:
+        if not len(self.blocks.row):
+            return np.zeros(0, bool)
+        share, of_robot = _share(self.problem, multiple), (self.problem.robot, self.problem.limits, self.bodies)
+        return instants_fail(*of_robot, self.instants, share, self.ways, contacts_alone=self.contacts_alone)
 
 
 def _share(problem: Problem, multiple: np.ndarray) -> Share:
@@ -83,8 +80,8 @@ def _pool(
     middle = 0.5 * (blocks.start + blocks.stop)
     each = motion.bounds(blocks.start, blocks.stop), instant_states(motion, middle / float(motion.duration()))
     states, instants = (jax.tree.map(np.asarray, bounds) for bounds in each)
-    cases = (instants, _share(problem, np.ones(len(middle))))
-    ways = _batched(worst_ways, problem, bodies, cases, contacts_alone=contacts_alone)
+    share, of_robot = _share(problem, np.ones(len(middle))), (problem.robot, problem.limits, bodies)
+    ways = worst_ways(*of_robot, instants, share, contacts_alone=contacts_alone)
     return _StatePool(problem, bodies, motion, contacts_alone, blocks, states, instants, ways)
 
 

@@ -14,20 +14,24 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.affine_bounds import AffineBounds, norm_bound
+from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.motions.block_slacks import limit_slacks, tension_slacks
 from cspr_jax.robots.cables import AnyRobot, wrench_units
 from cspr_jax.robots.contact_bodies import Bodies
 from cspr_jax.robots.contact_bounds import contact_bounds
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.state_bounds import CableBounds, StateBounds, attachments, balance_bounds, cable_bounds
-from cspr_jax.robots.uncertain_tensions import centre_wrench, uncertain_tensions, with_mass
+from cspr_jax.robots.uncertain_tensions import UncertainTensions, centre_wrench, uncertain_tensions, with_mass
 from cspr_jax.robots.wrench_sets import tension_range
+from cspr_jax.runtime import compile_options
 
 # Displacement by which differences are taken, over the length of a cable; criteria of which the worst one is sought.
 STEP, NEAREST = 1e-6, 2
+BATCH = 256  # robots at instants
 
 
 class Share(NamedTuple):
@@ -44,7 +48,7 @@ class Share(NamedTuple):
     factor: Array
 
 
-@partial(jax.jit, static_argnames="contacts_alone")
+@partial(jax.jit, static_argnames="contacts_alone", compiler_options=compile_options.least())
 def blocks_hold(
     robot: AnyRobot, limits: Limits, bodies: Bodies, cases: tuple[StateBounds, Share], *, contacts_alone: bool = False
 ) -> Array:
@@ -81,11 +85,14 @@ def _wider(bounds: AffineBounds, radius: Array) -> AffineBounds:
 def _cables_hold(robot: AnyRobot, limits: Limits, state: StateBounds, cables: CableBounds, share: Share) -> Array:
     # Prove tensions, and the limits of lengths, speeds and accelerations, with the unit vectors u' of cables at most
     # `turn` from u.
-    (low, high), is_met, spools = tension_range(robot, limits), jnp.ones((), bool), share.spools
-    for ratio in (1.0 / share.factor, share.factor):
-        heavy = with_mass(robot, ratio)
-        tensions = uncertain_tensions(heavy, state, cables, (low, high), (spools, share.centre))
-        is_met &= ((tensions.low > low) & (tensions.high < high)).all()
+    (low, high), spools = tension_range(robot, limits), share.spools
+
+    def at_mass(ratio: Array) -> UncertainTensions:
+        other = with_mass(robot, ratio)
+        return uncertain_tensions(other, state, cables, (low, high), (spools, share.centre))
+
+    tensions = jax.vmap(at_mass)(jnp.stack([1.0 / share.factor, share.factor]))
+    is_met = ((tensions.low > low[None]) & (tensions.high < high[None])).all()
     if limits.cable_length_max is not None:
         is_met &= (cables.length.high() + spools < limits.cable_length_max).all()
     if limits.cable_speed_max is None and limits.cable_acceleration_max is None:
@@ -107,86 +114,112 @@ def _cables_hold(robot: AnyRobot, limits: Limits, state: StateBounds, cables: Ca
     return is_met
 
 
+@partial(jax.jit, static_argnames="contacts_alone", compiler_options=compile_options.least())
 def _upper_slacks(
     robot: AnyRobot,
     limits: Limits,
     bodies: Bodies,
-    state: StateBounds,
-    moved: Array,
-    ratio: Array,
+    cases: tuple[StateBounds, Array, Array],
     *,
     contacts_alone: bool,
 ) -> Array:
-    # Upper bounds of slacks of a robot whose spools and mass centre are moved, (n_cables + 1, 3) m, (n_slacks,).
-    other = with_mass(dataclasses.replace(robot, base_points=robot.base_points + moved[:-1]), ratio)
-    cables, unit = cable_bounds(other, state), 1.0 / wrench_units(robot)
-    parts: list[tuple[Array, ...]] = [contact_bounds(other, bodies, state, cables)]
-    if not contacts_alone:
-        matrix, wrench = balance_bounds(other, state, cables)
-        wrench = wrench + centre_wrench(other, state, moved[-1])
-        parts += tension_slacks(other, limits, matrix * unit[:, None], wrench * unit)
-        parts += limit_slacks(limits, state, cables)
-    high = jnp.concatenate([part[1] for part in parts])
-    return jnp.where(jnp.isnan(high), jnp.inf, high)
+    # Upper bounds of slacks, (k, n_slacks), at instants, of robots whose spools and mass centre are moved, (k, n_cables
+    # + 1, 3) m, and whose masses are multiples of the planned one, (k,).
+    def one(state: StateBounds, moved: Array, ratio: Array) -> Array:
+        other = with_mass(dataclasses.replace(robot, base_points=robot.base_points + moved[:-1]), ratio)
+        cables, unit = cable_bounds(other, state), 1.0 / wrench_units(robot)
+        parts: list[tuple[Array, ...]] = [contact_bounds(other, bodies, state, cables)]
+        if not contacts_alone:
+            matrix, wrench = balance_bounds(other, state, cables)
+            wrench = wrench + centre_wrench(other, state, moved[-1])
+            parts += tension_slacks(other, limits, matrix * unit[:, None], wrench * unit)
+            parts += limit_slacks(limits, state, cables)
+        high = jnp.concatenate([part[1] for part in parts])
+        return jnp.where(jnp.isnan(high), jnp.inf, high)
+
+    return jax.vmap(one)(*cases)
 
 
-@partial(jax.jit, static_argnames="contacts_alone")
+def _of_robots(
+    robot: AnyRobot,
+    limits: Limits,
+    bodies: Bodies,
+    states: StateBounds,
+    moved: np.ndarray,
+    ratio: np.ndarray,
+    *,
+    contacts_alone: bool,
+) -> np.ndarray:
+    # Upper bounds of slacks, (k, m, n_slacks), of m robots at each of k instants.
+    shape = moved.shape[:2]
+    repeated = jax.tree.map(lambda x: np.repeat(x, shape[1], axis=0), states)
+    cases = repeated, moved.reshape(-1, *moved.shape[2:]), ratio.reshape(-1)
+    kernel = partial(_upper_slacks, robot, limits, bodies, contacts_alone=contacts_alone)
+    return in_batches(kernel, cases, size=BATCH).reshape(*shape, -1)
+
+
 def worst_ways(
-    robot: AnyRobot, limits: Limits, bodies: Bodies, cases: tuple[StateBounds, Share], *, contacts_alone: bool = False
-) -> Array:
+    robot: AnyRobot,
+    limits: Limits,
+    bodies: Bodies,
+    states: StateBounds,
+    share: Share,
+    *,
+    contacts_alone: bool = False,
+) -> np.ndarray:
     """Unit displacements that are worst, to first order, for the criteria that an uncertainty breaks first.
 
     Args:
         robot: without pulleys.
-        cases: states at k instants, and the uncertainty (k,).
+        states: at k instants.
+        share: the uncertainty, (k,).
         contacts_alone: as for `blocks_hold`.
 
     Returns:
         (k, 2, n_cables + 1, 3) of the spools and of the mass centre.
     """
+    count = robot.n_cables + 1
+    rays = np.asarray(robot.base_points)[None] - states.position.middle[:, None]
+    step = STEP * np.linalg.norm(rays, axis=2).max(1)[:, None, None, None]
+    # The planned robot comes first.
+    moves = np.eye(3 * count + 1, 3 * count, -1).reshape(1, -1, count, 3)
+    ratio = np.ones((len(step), 3 * count + 1))
+    high = _of_robots(robot, limits, bodies, states, step * moves, ratio, contacts_alone=contacts_alone)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        slopes = np.swapaxes(high[:, 1:] - high[:, :1], 1, 2).reshape(len(step), -1, count, 3) / step
+        slopes = np.where(np.isfinite(slopes), slopes, 0.0)
+        sizes = np.linalg.norm(slopes, axis=3)
+        room = high[:, 0] / (sizes[..., :-1].sum(2) * share.spools[:, None] + sizes[..., -1] * share.centre[:, None])
+        first = np.argsort(np.where(np.isfinite(room), room, np.inf), axis=1)[
+            :, np.minimum(np.arange(NEAREST), room.shape[1] - 1)
+        ]
+        ways = -slopes / np.where(sizes > 0.0, sizes, 1.0)[..., None]
+    return np.take_along_axis(ways, first[..., None, None], axis=1)
 
-    def one(state: StateBounds, share: Share) -> Array:
-        shape, ratio = (robot.n_cables + 1, 3), jnp.ones(())
-        step = STEP * jnp.max(cable_bounds(robot, state).length.middle)
-        moves = step * jnp.eye(shape[0] * shape[1]).reshape(-1, *shape)
-        slacks = partial(_upper_slacks, robot, limits, bodies, state, ratio=ratio, contacts_alone=contacts_alone)
-        planned, others = slacks(jnp.zeros(shape)), jax.vmap(slacks)(moves)
-        slopes = ((others - planned[None]) / step).T.reshape(-1, *shape)
-        slopes = jnp.where(jnp.isfinite(slopes), slopes, 0.0)
-        sizes = jnp.sqrt(jnp.sum(slopes**2, axis=2))
-        radii = jnp.append(jnp.full(robot.n_cables, share.spools), share.centre)
-        room = planned / (sizes @ radii)
-        first = jnp.argsort(jnp.where(jnp.isfinite(room), room, jnp.inf))[jnp.array([0, min(1, len(room) - 1)])]
-        return -slopes[first] / jnp.where(sizes > 0.0, sizes, 1.0)[first, :, None]
 
-    return jax.vmap(one)(*cases)
-
-
-@partial(jax.jit, static_argnames="contacts_alone")
 def instants_fail(
     robot: AnyRobot,
     limits: Limits,
     bodies: Bodies,
-    cases: tuple[StateBounds, Share, Array],
+    states: StateBounds,
+    share: Share,
+    ways: np.ndarray,
     *,
     contacts_alone: bool = False,
-) -> Array:
+) -> np.ndarray:
     """Tell at which instants a robot that is displaced, light or heavy, breaks a criterion.
 
     Args:
         robot: without pulleys.
-        cases: states at k instants, shares (k,), and unit displacements as of `worst_ways`.
+        states: at k instants.
+        share: (k,).
+        ways: unit displacements as of `worst_ways`.
         contacts_alone: as for `blocks_hold`.
 
     Returns:
         (k,).
     """
-
-    def one(state: StateBounds, share: Share, ways: Array) -> Array:
-        radii = jnp.append(jnp.full(robot.n_cables, share.spools), share.centre)[:, None]
-        masses = jnp.stack([1.0 / share.factor, share.factor])
-        slacks = partial(_upper_slacks, robot, limits, bodies, state, contacts_alone=contacts_alone)
-        high = jax.vmap(lambda way: jax.vmap(lambda ratio: slacks(radii * way, ratio))(masses))(ways)
-        return (high < 0.0).any()
-
-    return jax.vmap(one)(*cases)
+    radii = np.repeat(np.stack([share.spools, share.centre], axis=1), [robot.n_cables, 1], axis=1)
+    moved = np.repeat(radii[:, None, :, None] * ways, 2, axis=1)
+    ratio = np.tile(np.stack([1.0 / share.factor, share.factor], axis=1), (1, ways.shape[1]))
+    return _of_robots(robot, limits, bodies, states, moved, ratio, contacts_alone=contacts_alone).min((1, 2)) < 0.0

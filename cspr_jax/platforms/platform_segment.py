@@ -35,6 +35,7 @@ from cspr_jax.robots.point_mass import rest_point, spool_radius
 from cspr_jax.robots.state import State
 from cspr_jax.robots.state_bounds import StateBounds
 from cspr_jax.robots.wrench_balance import normalised_determinant
+from cspr_jax.runtime import compile_options
 
 # Blocks of which bounds are computed at a time.
 BATCH = 64
@@ -252,7 +253,7 @@ class PlatformMotion:
         return in_batches(partial(_bounds, self.segment, self.arcs, kind=self.kind), blocks, size=BATCH)
 
 
-@partial(jax.jit, static_argnames="kind")
+@partial(jax.jit, static_argnames="kind", compiler_options=compile_options.least())
 def _bounds(segment: PlatformSegment, arcs: Array, blocks: TimeBounds, *, kind: PlatformMotionKind) -> StateBounds:
     return jax.vmap(partial(_block_bounds, kind, segment, arcs))(blocks)
 

@@ -54,9 +54,9 @@ class FacePlanes(NamedTuple):
 class _Features(NamedTuple):
     # The nearest features of two bodies: kind (0 edges, 1 a corner of the first and a face of the second, 2 the other
     # way round), and the numbers of both.
-    kind: Array
-    first: Array
-    second: Array
+    kind: Any
+    first: Any
+    second: Any
 
 
 SEGMENT = np.array([[0, 1]]), np.zeros((0, 3), int)
@@ -191,6 +191,8 @@ def _unit(vectors: Array) -> Array:
 
 
 def _nearest_features(p: Array, q: Array, first: Solid, second: Solid) -> _Features:
+    if len(first.edges) == len(second.edges) == 1:
+        return _Features(0, 0, 0)
     (a, u), (b, v) = _ends(p, first.edges), _ends(q, second.edges)
     a, u, b, v = a[:, None], u[:, None], b[None], v[None]
     s, t = nearest(a, u, b, v)
@@ -213,7 +215,10 @@ def _nearest_features(p: Array, q: Array, first: Solid, second: Solid) -> _Featu
 def _edges_at(features: _Features, first: Solid, second: Solid) -> list[Array]:
     # Corners of the two edges that are the nearest ones; of other features any edges.
     chosen = (first, features.first), (second, features.second)
-    return [jnp.asarray(body.edges)[jnp.minimum(k, len(body.edges) - 1)] for body, k in chosen]
+    return [
+        body.edges[0] if len(body.edges) == 1 else jnp.asarray(body.edges)[jnp.minimum(k, len(body.edges) - 1)]
+        for body, k in chosen
+    ]
 
 
 def _direction(p: Array, q: Array, first: Solid, second: Solid, features: _Features) -> Array:

@@ -2,6 +2,7 @@
 
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -94,6 +95,7 @@ def between(a: Array, u: Array, b: Array, v: Array) -> Array:
     return b - a + t[..., None] * v - s[..., None] * u
 
 
+@jax.jit
 def nearest(a: Array, u: Array, b: Array, v: Array) -> tuple[Array, Array]:
     """Find where segments a + s u and b + t v are nearest to each other.
 

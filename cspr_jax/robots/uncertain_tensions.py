@@ -27,7 +27,7 @@ from cspr_jax.robots.cables import AnyRobot, wrench_units
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.state_bounds import CableBounds, StateBounds, balance_bounds, balanced_part
-from cspr_jax.robots.witness_tensions import right_inverse, witness_tensions
+from cspr_jax.robots.witness_tensions import witness_tensions
 
 # Surplus of a solution, and least change of tensions, as parts of the largest of them.
 SURPLUS = 1e-9
@@ -78,10 +78,10 @@ def uncertain_tensions(
     unit = 1.0 / wrench_units(robot)
     matrix, wrench = balance_bounds(robot, state, cables)
     matrix, wrench = matrix * unit[:, None], wrench * unit
-    tensions = witness_tensions(matrix, wrench, *limits).tension
+    witness = witness_tensions(matrix, wrench, *limits)
+    tensions, inverse = witness.tension, witness.inverse
     sine = sizes[0] / cables.length.low()
     tilt = jnp.where((sine >= 0.0) & (sine < 1.0), sine, jnp.nan) / jnp.sqrt(1.0 - sine**2)
-    inverse = right_inverse(matrix.middle)
     block = _UnitBlock(inverse, matrix, _across(robot, state, cables, unit), tilt, tensions)
     centre = _centre_change(robot, state, inverse * unit[None], sizes[1]) + SURPLUS * jnp.max(tensions.size())
     within, displaced = block.changes(inverse)
@@ -121,14 +121,15 @@ class _UnitBlock(NamedTuple):
 def _closer(block: _UnitBlock, displaced: Array, rest: Array, least: Array, centre: Array) -> tuple[Array, Array]:
     # Bound how much each tension falls and rises, (n_cables,); NaN where one might fall below the smallest tension.
     diagonal = jnp.diagonal(displaced)
-    down = _largest_sum(block, displaced - jnp.diag(diagonal), centre) + diagonal * least + rest
-    up = _largest_sum(block, displaced, centre) + rest
+    less, up = _largest_sum(block, jnp.stack([displaced - jnp.diag(diagonal), displaced]), centre)
+    down, up = less + diagonal * least + rest, up + rest
     is_valid = (block.tensions.low() - down > least).all() & (least >= 0.0).all()
     return jnp.where(is_valid, down, jnp.nan), jnp.where(is_valid, up, jnp.nan)
 
 
 def _largest_sum(block: _UnitBlock, weights: Array, centre: Array) -> Array:
-    # Bound sums of tensions of any robot, none below 0, times rows of weights, (n_cables,); NaN: no bound is known.
+    # Bound sums of tensions of any robot, none below 0, times rows of weights, (2, n_cables); NaN: no bound is known.
+    shape, weights = weights.shape[:2], weights.reshape(-1, weights.shape[2])
     high, floor = block.tensions.high(), SURPLUS * jnp.max(weights, axis=1, keepdims=True)
 
     def corrected(_, more: Array) -> Array:
@@ -137,7 +138,7 @@ def _largest_sum(block: _UnitBlock, weights: Array, centre: Array) -> Array:
     more = lax.fori_loop(0, ROUNDS, corrected, jnp.zeros_like(weights))
     within, shifted = block.changes((weights + more) @ block.inverse)
     total = (weights + more) @ (high + centre) + within @ high
-    return jnp.where((within + shifted <= more).all(1), total, jnp.nan)
+    return jnp.where((within + shifted <= more).all(1), total, jnp.nan).reshape(shape)
 
 
 def centre_wrench(robot: AnyRobot, state: StateBounds, centre: Array) -> AffineBounds:

@@ -31,12 +31,14 @@ class WitnessTensions(NamedTuple):
             -inf where nothing is known.
         above: (2,) likewise a line above it; inf where nothing is known.
         is_regular: () whether the matrix is proved to have full rank throughout.
+        inverse: (n_cables, dof) right inverse of the matrix in the middle.
     """
 
     tension: AffineBounds
     below: Array
     above: Array
     is_regular: Array
+    inverse: Array
 
     @property
     def margin_low(self) -> Array:
@@ -62,19 +64,20 @@ def witness_tensions(matrix: AffineBounds, wrench: AffineBounds, low: Array, hig
         the tensions.
     """
     dof, count = matrix.middle.shape
+    inverse = right_inverse(matrix.middle)
     if count == dof:
-        tension, is_regular = _solution(matrix, wrench, jnp.zeros(count))
+        tension, is_regular = _solution(matrix, inverse, wrench, jnp.zeros(count))
         smallest = jnp.min(jnp.minimum(tension.high() - low, high - tension.low()))
         above = jnp.broadcast_to(jnp.where(is_regular, smallest, jnp.inf), (2,))
     else:
         face = nearest_face(matrix.middle, wrench.middle, low, high)
-        tension, is_regular = _solution(matrix, wrench, face.tensions, face.follow)
-        above = _face_margin(matrix, wrench, low, high, face)
+        tension, is_regular = _solution(matrix, inverse, wrench, face.tensions, face.follow)
+        above = _face_margin(matrix, inverse, wrench, (low, high), face)
     # The smallest of functions above lines is above the line between the smallest values at both ends.
     lines = tension.middle - tension.slope, tension.middle + tension.slope
     slacks = [jnp.minimum(line - low, high - line) - tension.radius for line in lines]
     below = jnp.stack([jnp.min(slack) for slack in slacks])
-    return WitnessTensions(tension, jnp.where(is_regular, below, -jnp.inf), above, is_regular)
+    return WitnessTensions(tension, jnp.where(is_regular, below, -jnp.inf), above, is_regular, inverse)
 
 
 def right_inverse(matrix: Array) -> Array:
@@ -92,12 +95,11 @@ def right_inverse(matrix: Array) -> Array:
 
 
 def _solution(
-    matrix: AffineBounds, right: AffineBounds, start: Array, follow: Array | None = None
+    matrix: AffineBounds, inverse: Array, right: AffineBounds, start: Array, follow: Array | None = None
 ) -> tuple[AffineBounds, Array]:
     # Bound a solution of M(s) x(s) = b(s), with M (m, n) and n >= m, near a line through `start`, (n,), whose slope
-    # `follow` changes; say whether M is proved to have rank m throughout.
+    # `follow` changes; say whether M, with this right inverse in the middle, is proved to have rank m throughout.
     m, n = matrix.middle.shape
-    inverse = right_inverse(matrix.middle)
     middle = start + inverse @ (right.middle - matrix.middle @ start)
     slope = inverse @ (right.slope - matrix.slope @ middle)
     slope = slope if follow is None else slope + follow @ slope
@@ -112,13 +114,15 @@ def _solution(
     return line._replace(radius=jnp.where(is_known, radius, jnp.nan)), is_known
 
 
-def _face_margin(matrix: AffineBounds, wrench: AffineBounds, low: Array, high: Array, face: NearestFace) -> Array:
+def _face_margin(
+    matrix: AffineBounds, inverse: Array, wrench: AffineBounds, limits: tuple[Array, Array], face: NearestFace
+) -> Array:
     # Values at start and end of a line above the largest distance from the limits, by the face that is nearest in the
     # middle.
     dof, count = matrix.middle.shape
-    columns = face.columns
-    across = matrix.each(lambda x: x[:, columns].T)
-    normal, is_normal = _solution(across, constant(jnp.zeros(dof - 1)), face.along @ right_inverse(matrix.middle))
+    columns, (low, high) = face.columns, limits
+    across, nothing = matrix.each(lambda x: x[:, columns].T), constant(jnp.zeros(dof - 1))
+    normal, is_normal = _solution(across, right_inverse(across.middle), nothing, face.along @ inverse)
     is_spanning = (jnp.arange(count)[:, None] == columns[None]).any(1)
     along = turned(matrix.each(jnp.transpose), normal).each(lambda x: jnp.where(is_spanning, 0.0, x))
     # Each cable at the limit that gives the least; the other one counts as far as its product may change sign.

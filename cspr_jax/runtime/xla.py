@@ -24,15 +24,10 @@ from typing import Any
 from cspr_jax.arithmetic.cores import SHARE, cores, quota
 from cspr_jax.errors import ConfigError, printable, shown
 from cspr_jax.runtime import compile_cache, stages
+from cspr_jax.runtime.compile_options import QUICK
 
 # Twice as fast where the processor has such vectors; XLA chooses half their width by itself.
 WIDE, NEEDS = "--xla_cpu_prefer_vector_width=512", "avx512f"
-# Half of the time for compiling, for code that is slower: plans move a few robots, once.
-QUICK = (
-    "--xla_backend_optimization_level=1",
-    "--xla_cpu_use_fusion_emitters=false",
-    "--xla_cpu_parallel_codegen_split_count=1",
-)
 PROBE_SECONDS, LARGEST_RECORD = 120, 1 << 16
 # glibc gives each thread memory of its own, and XLA has many threads: what one frees, the others cannot use. With four
 # arenas a long sweep needs half the memory; with one, threads that compile would wait for each other. The last number

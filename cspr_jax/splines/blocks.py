@@ -1,5 +1,7 @@
 """Affine bounds of a spline's states over blocks of time."""
 
+from functools import partial
+
 import jax
 import numpy as np
 
@@ -7,6 +9,7 @@ from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.piecewise_bounds import overlaps, piecewise_bounds
 from cspr_jax.arithmetic.rotation_bounds import rotation_bounds
 from cspr_jax.robots.state_bounds import StateBounds
+from cspr_jax.runtime import compile_options
 
 BATCH = 256
 
@@ -43,6 +46,6 @@ def spline_bounds(
     return StateBounds(*translation, *in_batches(_rotations, piecewise_bounds(quaternion, parts), size=BATCH))
 
 
-@jax.jit
+@partial(jax.jit, compiler_options=compile_options.least())
 def _rotations(bands):
     return jax.vmap(rotation_bounds)(*bands)

@@ -9,6 +9,7 @@ from support.splines import random_spline
 
 import cspr_jax
 from cspr_jax.motions.amplitudes import named
+from cspr_jax.motions.block_slacks import block_slacks
 from cspr_jax.motions.motion_tolerances import motion_tolerances
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.kernel_axes import centred
@@ -128,6 +129,28 @@ def test_no_robot_within_a_proved_multiple_fails_and_one_within_a_refuted_one_do
             assert (room(problem.limits, *balances(problem.robot, state, base, centre, ratio)) > 0.0).all()
         assert min(worst_rooms(problem, state, 0.999 * proved)) > 0.0
         assert min(worst_rooms(problem, state, 1.02 * refuted)) < 0.0
+
+
+# Earlier answers: sums of lower and upper bounds of slacks over 64 blocks, multiples that are proved and refuted.
+EARLIER = {
+    "prototype": (539.926155335892, 547.8629590650987, 17.381225303436, 17.55679323579394),
+    "transition-planar": (212.39536948122557, 214.64128138189074, 164.81993372082331, 171.7738975524902),
+    "boralugoda-rectangle": (19540.731256572413, 20003.536303128818, 38.412865660858145, 47.59375),
+    "laval-mssm": (1839.5049888590202, 1863.4279621750402, 9.423449796712482, 10.122499651727225),
+    "cogiro": (18114.875408314423, 19105.816915858733, 42.545277191162114, 128.75),
+}
+
+
+@pytest.mark.parametrize(
+    "name", [name if name == "prototype" else pytest.param(name, marks=pytest.mark.thorough) for name in EARLIER]
+)
+def test_answers_are_those_of_before(name):
+    """However the kernels are written and compiled."""
+    problem, spline = case(name, 1)
+    edges = np.linspace(0.0, float(spline.duration()), 65)
+    slacks = block_slacks(problem.robot, problem.limits, spline.bounds, edges[:-1], edges[1:])
+    multiples = np.concatenate(motion_tolerances(problem, spline)[:2])
+    np.testing.assert_allclose([slacks.low.sum(), slacks.high.sum(), *multiples], EARLIER[name], rtol=1e-9)
 
 
 def demands(base, state):

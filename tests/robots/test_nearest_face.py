@@ -1,5 +1,7 @@
 """Nearest faces against the exact most central tensions of random balances."""
 
+from functools import partial
+
 import jax
 import numpy as np
 import pytest
@@ -25,15 +27,17 @@ def balances(dof: int, count: int, seed: int) -> tuple[np.ndarray, np.ndarray, n
     return matrices, np.einsum("kij,kj->ki", matrices, tensions), tensions
 
 
-def judged(matrices, wrenches, low, high):
-    def one(matrix, wrench):
-        face = nearest_face(matrix, wrench, low, high)
-        return face, centred(matrix, wrench, low, high)[1]
-
-    return jax.tree.map(np.asarray, jax.jit(jax.vmap(one))(matrices, wrenches))
+@jax.jit
+@partial(jax.vmap, in_axes=(0, 0, None, None))
+def JUDGED(matrix, wrench, low, high):
+    return nearest_face(matrix, wrench, low, high), centred(matrix, wrench, low, high)[1]
 
 
-SHAPES = [(2, 3), (3, 5), (3, 8), (6, 7), (6, 8), pytest.param(6, 10, marks=pytest.mark.thorough)]
+def judged(*arguments):
+    return jax.tree.map(np.asarray, JUDGED(*arguments))
+
+
+SHAPES = [(2, 3), (3, 5), (3, 8), (6, 8), *(pytest.param(6, n, marks=pytest.mark.thorough) for n in (7, 10))]
 
 
 @pytest.mark.parametrize(("dof", "count"), SHAPES)
@@ -71,7 +75,8 @@ def test_changes_follow_the_face():
 def test_cable_beside_the_face():
     """Two cables in line, and one that no wrench without change concerns."""
     matrix, wrench = np.array([[[1.0, -1.0, 0.0], [0.0, 0.0, 1.0]]]), np.array([[2.0, 7.0]])
-    face, largest = judged(matrix, wrench, np.full(3, 1.0), np.full(3, 9.0))
+    cases = (np.repeat(x, COUNT, axis=0) for x in (matrix, wrench))
+    face, largest = judged(*cases, np.full(3, 1.0), np.full(3, 9.0))
     np.testing.assert_allclose(face.tensions[0], [7.0, 5.0, 7.0], atol=1e-12)
     assert largest[0] == pytest.approx(2.0)
 

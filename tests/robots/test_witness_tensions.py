@@ -1,5 +1,7 @@
 """Bounds of cables, balances and tensions over blocks against instants, and against linear programs by HiGHS."""
 
+from functools import partial
+
 import jax
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ from scipy.optimize import linprog
 from support.splines import random_spline
 
 import cspr_jax
+from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.robots import cables
 from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.state_bounds import balance_bounds, cable_bounds
@@ -29,6 +32,31 @@ def float64():
         yield
 
 
+@jax.jit
+def EXACT(robot, spline, taus):
+    unit = cables.wrench_units(robot)
+
+    def one(tau):
+        state = spline.state(tau)
+        balance = robot.wrench_matrix(state) / unit[:, None], robot.inertial_wrench(state) / unit
+        return *cables.cable_motion(robot, state), *balance
+
+    return jax.vmap(jax.vmap(one))(taus)
+
+
+@jax.jit
+def BOUNDS(robot, limits, states):
+    unit = 1.0 / cables.wrench_units(robot)
+
+    def one(state):
+        known = cable_bounds(robot, state)
+        matrix, wrench = balance_bounds(robot, state, known)
+        matrix, wrench = matrix * unit[:, None], wrench * unit
+        return known.length, known.rate, known.acceleration, matrix, wrench, witness_tensions(matrix, wrench, *limits)
+
+    return jax.vmap(one)(states)
+
+
 def judged(name: str, seed: int, count: int, low: float, high: float):
     """Exact balances at instants of random blocks, and the bounds of these blocks."""
     robot = centred(cspr_jax.load_robot(name))[0]
@@ -36,23 +64,9 @@ def judged(name: str, seed: int, count: int, low: float, high: float):
     spline, table = random_spline(seed, middle=middle, size=size, tilt=tilt)
     edges = np.linspace(0.0, table.x[-1], count + 1)
     times = 0.5 * (edges[:-1] + edges[1:])[:, None] + 0.5 * np.diff(edges)[:, None] * S
-    unit = np.asarray(cables.wrench_units(robot))
-
-    def exact(t):
-        state = spline.state(t)
-        balance = robot.wrench_matrix(state) / unit[:, None], robot.inertial_wrench(state) / unit
-        return *cables.cable_motion(robot, state), *balance
-
-    def bounds(state):
-        known = cable_bounds(robot, state)
-        matrix, wrench = balance_bounds(robot, state, known)
-        matrix, wrench = matrix * (1.0 / unit)[:, None], wrench * (1.0 / unit)
-        limits = np.full(robot.n_cables, low), np.full(robot.n_cables, high)
-        return known.length, known.rate, known.acceleration, matrix, wrench, witness_tensions(matrix, wrench, *limits)
-
-    instants = jax.jit(jax.vmap(jax.vmap(exact)))(times / table.x[-1])
-    found = jax.jit(jax.vmap(bounds))(spline.bounds(edges[:-1], edges[1:]))
-    return [np.asarray(x) for x in instants], jax.tree.map(np.asarray, found)
+    limits = np.full(robot.n_cables, low), np.full(robot.n_cables, high)
+    instants = in_batches(partial(EXACT, robot, spline), times / table.x[-1], size=10)
+    return instants, in_batches(partial(BOUNDS, robot, limits), spline.bounds(edges[:-1], edges[1:]), size=10)
 
 
 def largest_distance(matrix, wrench, low: float, high: float) -> float:

@@ -20,7 +20,7 @@ from cspr_jax.arithmetic import batches
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.cli import main
 from cspr_jax.errors import ConfigError
-from cspr_jax.runtime import compile_cache, xla
+from cspr_jax.runtime import compile_cache, compile_options, xla
 
 ROOT = Path(__file__).parents[2]
 
@@ -54,6 +54,14 @@ xla.prepare({device})
 print(json.dumps({{k: os.environ.get(k) for k in ("XLA_FLAGS", "JAX_COMPILATION_CACHE_DIR", "JAX_PLATFORMS",
     "TF_CPP_MIN_LOG_LEVEL")}}))
 """
+
+
+def test_proofs_are_compiled_least_where_little_is_computed(monkeypatch):
+    monkeypatch.setenv("XLA_FLAGS", " ".join(compile_options.QUICK))
+    assert jax.jit(lambda x: x + 1.0, compiler_options=compile_options.least())(1.0) == 2.0
+    assert compile_options.least() == {"xla_backend_optimization_level": 0}
+    monkeypatch.setenv("XLA_FLAGS", xla.WIDE)
+    assert compile_options.least() is None
 
 
 def test_settings_of_the_user_win(tmp_path):

@@ -3,7 +3,7 @@
 import jax
 import numpy as np
 import pytest
-from support.splines import random_spline
+from support.splines import random_spline, states_of
 
 from cspr_jax.arithmetic import piecewise_bounds
 
@@ -22,10 +22,9 @@ def excess(seed: int, degree: int, count: int) -> dict[str, tuple[float, float]]
     spline, table = random_spline(seed, degree=degree)
     edges = np.linspace(0.0, table.x[-1], count + 1)
     times = 0.5 * (edges[:-1] + edges[1:])[:, None] + 0.5 * np.diff(edges)[:, None] * S
-    states = jax.jit(jax.vmap(jax.vmap(lambda t: spline.state(t))))(times / table.x[-1])
-    bounds, result = spline.bounds(edges[:-1], edges[1:]), {}
+    states, bounds, result = states_of(spline, times), spline.bounds(edges[:-1], edges[1:]), {}
     for name in NAMES:
-        values, band = np.asarray(getattr(states, name)), jax.tree.map(np.asarray, getattr(bounds, name))
+        values, band = getattr(states, name), jax.tree.map(np.asarray, getattr(bounds, name))
         s = S.reshape(1, -1, *(1,) * (values.ndim - 2))
         over = np.abs(values - band.middle[:, None] - band.slope[:, None] * s) - band.radius[:, None]
         # Blocks in which the quaternion may vanish have no bounds.

@@ -4,7 +4,7 @@ import jax
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from support.splines import random_spline
+from support.splines import random_spline, states_of
 
 
 @pytest.fixture(autouse=True)
@@ -13,17 +13,12 @@ def float64():
         yield
 
 
-def states(spline, times):
-    tau = times / float(spline.duration())
-    return jax.tree.map(np.asarray, jax.jit(jax.vmap(lambda t: spline.state(t)))(tau))
-
-
 @pytest.mark.parametrize("degree", [3, 5])
 def test_states_are_those_of_scipy(degree):
     for seed in range(5):
         spline, table = random_spline(seed, degree=degree)
         times = np.linspace(0.0, table.x[-1], 101)
-        found = states(spline, times)
+        found = states_of(spline, times)
         for order, name in enumerate(("position", "velocity", "acceleration")):
             expected = table.derivative(order)(times)[:, :3] if order else table(times)[:, :3]
             np.testing.assert_allclose(getattr(found, name), expected, atol=1e-10 * np.abs(expected).max())
@@ -36,7 +31,7 @@ def test_states_are_those_of_scipy(degree):
 def test_angular_velocity_by_differences():
     spline, table = random_spline(7, tilt=0.5)
     times, step = np.linspace(0.5, table.x[-1] - 0.5, 40), 1e-4
-    before, here, after = (states(spline, times + shift) for shift in (-step, 0.0, step))
+    before, here, after = (states_of(spline, times + shift) for shift in (-step, 0.0, step))
     turned = Rotation.from_matrix(after.rotation @ np.swapaxes(before.rotation, 1, 2)).as_rotvec()
     np.testing.assert_allclose(here.angular_velocity, turned / (2.0 * step), atol=1e-6)
     change = (after.angular_velocity - before.angular_velocity) / (2.0 * step)
