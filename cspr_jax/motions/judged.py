@@ -112,7 +112,8 @@ class Judge(NamedTuple):
         for i, proof in zip(rows.tolist(), self._proofs(motions, rows, intervals), strict=True):
             proofs[i], verdict[i] = proof, proof.verdict
         verdict[~is_judged & (verdict & ~FEWER == 0)] = Verdict.NOT_FINITE
-        if self.problem.limits.uncertainty is not None:
+        uncertainty: Any = self.problem.limits.uncertainty
+        if uncertainty is not None and float(uncertainty.spool_positions) > 0.0:  # masses move no cable
             answers = self._for_all_robots(answers, motions, verdict, rows[verdict[rows] == 0])
         return _Trial(answers, proofs, verdict)
 

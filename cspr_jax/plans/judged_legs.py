@@ -105,14 +105,17 @@ class JudgedLeg(Leg):
             problem,
             scene_of(problem.robot, stops.robot_file, stops.frame, stops.keys, stops.path, trajectory=stops.keys),
         )
-        robot, motions = problem.robot, list[Motion]()
+        robot, joined = problem.robot, dict[bytes, tuple[Answers, list[Motion]]]()
 
         def join(rows: np.ndarray, arcs: np.ndarray) -> tuple[Answers, list[Motion]]:
             whole = prescribed.copy()
             whole[rows] = arcs
-            answers, motions[:] = self._with(whole).join(plain, z0)
+            key = whole.tobytes()
+            if key not in joined:
+                joined[key] = self._with(whole).join(plain, z0)
+            answers, motions = joined[key]
             if len(rows) == len(self):  # answers of lines have no rows
-                return answers, list(motions)
+                return answers, motions
             return answers.rows(rows), [motions[i] for i in rows]
 
         is_determined, has_pulleys = robot.n_cables == robot.dof, judge.has_pulleys
@@ -121,7 +124,7 @@ class JudgedLeg(Leg):
             is_searched = is_determined and not has_pulleys and len(self) == 1
         most = stops.max_arcs if is_searched else 0
         judged = judge.smallest(join, prescribed, step=self._leg.step, max_arcs=most)
-        join(np.arange(len(self)), judged.arcs)
+        motions = join(np.arange(len(self)), judged.arcs)[1]
         return _answers(judged.answers, judged.proofs, has_pulleys=has_pulleys), motions
 
     def _with(self, arcs: np.ndarray) -> Leg:

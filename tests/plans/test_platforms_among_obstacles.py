@@ -60,9 +60,8 @@ def near(plan, way, along):
     return (1.0 - along) * place + along * np.array(plan.robot_file.base_points[0]) + way
 
 
-@pytest.mark.parametrize(
-    "name", ["six", *(pytest.param(name, marks=pytest.mark.thorough) for name in ("variable", "eight"))]
-)
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", CASES)
 def test_a_ball_beside_a_platform_and_one_beside_a_cable(name):
     """A little smaller than the space that the samples show it is proved to keep clear, a little larger it is met."""
     keys = CASES[name]
