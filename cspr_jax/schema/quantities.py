@@ -320,8 +320,8 @@ OF_ELLIPSES = (
         "limit_margin",
         "1",
         "smallest slack of the limits",
-        "Smallest slack of the limits beside tensions, and of the depth below the spools: lengths over the robot's size, "
-        "speeds and accelerations over what is allowed; NaN where only formulas are used.",
+        "Smallest slack of the limits beside tensions, and of the depth below the spools: lengths over the robot's "
+        "size, speeds and accelerations over what is allowed; NaN where only formulas are used.",
     ),
 )
 # Why accessible orientations are not attained, by the best candidate's flags.
