@@ -307,6 +307,7 @@ MAP_KINDS: dict[str, MapKind] = {
             pictured=("margin", "verdict"),
             motionless=columns.OF_ELLIPSES,
             families=("ellipse",),
+            cells=16384,
             planned=True,
             patterns=("2T", "3T"),
             takes=columns.ELLIPSE_KEYS,
