@@ -281,8 +281,7 @@ MAP_KINDS: dict[str, MapKind] = {
         MapKind(
             name="swing-range",
             title="Range of throws from swings",
-            description="least speed with which an object, released from an ellipse about `trajectory.from` at its "
-            "natural frequency, reaches each landing place",
+            description="least speed with which an object that is released from an ellipse reaches each landing place",
             implementation="cspr_jax.ellipses.swing_range_map:SwingRangeMap",
             cost=CellCost(seconds=3e-3),
             quantities=columns.OF_SWINGS,

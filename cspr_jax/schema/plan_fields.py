@@ -179,6 +179,11 @@ CHECK = {
         "By limit or condition: `value` of the worst cable, `bound` that is proved for all, what is `allowed`, `unit`, "
         "`cable` (from 0 on; null: none) and `t`, s.",
     ),
+    "on_limit": (
+        "",
+        "Criteria that the motion meets or misses by less than its samples tell: as `cause`, and `tolerance`, what "
+        "samples leave open, in its unit; empty where there are none.",
+    ),
     "interpolation": ("", '"cubic", "quintic", "hermite", "pieces" (polynomials), or "function" (sampled).'),
     "ends": ("", '"rest", "natural" or "periodic"; null where the motion has its own ends.'),
     "blocks": ("1", "Number of blocks of time that were looked at."),
