@@ -1,6 +1,7 @@
 """Motion through every second sample of another one, by which is estimated how closely samples tell a motion."""
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 
@@ -30,7 +31,7 @@ def thinned(spline: Spline, first: int) -> Spline:
         is_kept[1:-1] |= (np.abs(starts[1:] - ends[:-1]) > JUMP * np.abs(ends).max()).any(axis=1)
     rows = np.flatnonzero(is_kept)
     times = np.repeat(knots[rows], 2)[1:-1]
-    fewer = {
+    fewer: dict[str, Any] = {
         name: leaf(hermite(times, [_between(starts[rows[:-1]], ends[rows[1:] - 1]) for starts, ends in pairs]))
         for name, pairs in sides.items()
     }
