@@ -24,7 +24,7 @@ ROWS, TOGETHER = 10_001, 100  # of a record; motions that are judged together
 
 
 class Region(NamedTuple):
-    """Motions of one robot, and what its cables may pull.
+    """Region in which the motions of a robot go, and what its cables may pull.
 
     Fields:
         robot: name in the catalogue.

@@ -174,3 +174,39 @@ def test_a_joint_stays(tmp_path):
         found = cspr_jax.plan({key: value for key, value in each.items() if value != []})
         rows = found.rows()["position"]
         np.testing.assert_allclose(rows, place + 0.0 * rows, atol=1e-12)
+
+
+@pytest.mark.thorough
+def test_a_spline_between_other_families_read_back(tmp_path):
+    """Transitions before it, a fastest line behind it, which sits on its limit; the CSV has the verdict of the plan."""
+    text = """
+schema = 1
+robot = "prototype"
+family = "spline"
+interpolation = "quintic"
+z0 = 1.7
+[[pose]]
+rest = true
+[[pose]]
+position = [0.5, 0.3, 1.6]
+family = "transition"
+[[pose]]
+rest = true
+family = "transition"
+[[pose]]
+position = [0.1, 0.05, 1.6]
+time = 2.0
+[[pose]]
+position = [0.0, 0.0, 1.5]
+time = 4.0
+rest = true
+[[pose]]
+position = [0.02, 0.01, 1.5]
+family = "quintic"
+"""
+    code, _, err = plan(tmp_path, text, "-o", tmp_path / "motion.csv")
+    assert (code, err) == (0, "")
+    check = cspr_jax.check("prototype", tmp_path / "motion.csv")
+    assert check.feasible and check.duration == pytest.approx(
+        cspr_jax.plan(tmp_path / "plan.toml").answers.duration.sum()
+    )

@@ -59,7 +59,7 @@ def motion_content(
         "t": packed(np.asarray(columns["t"])[rows]),
         "path": packed(robot.position),
         "attached": packed(robot.attached),
-        # What lies on pulleys, between where cables enter and where they are attached.
+        # Points on pulleys, between where cables enter and where they are attached.
         "arcs": packed(robot.ways[:, :, 1:-1]),
         "onArc": robot.ways.shape[2] - 2,
         "corners": packed(robot.corners),
