@@ -120,7 +120,7 @@ def _upper_slacks(
     # Upper bounds of slacks of a robot whose spools and mass centre are moved, (n_cables + 1, 3) m, (n_slacks,).
     other = with_mass(dataclasses.replace(robot, base_points=robot.base_points + moved[:-1]), ratio)
     cables, unit = cable_bounds(other, state), 1.0 / wrench_units(robot)
-    parts = [contact_bounds(other, bodies, state, cables)]
+    parts: list[tuple[Array, ...]] = [contact_bounds(other, bodies, state, cables)]
     if not contacts_alone:
         matrix, wrench = balance_bounds(other, state, cables)
         wrench = wrench + centre_wrench(other, state, moved[-1])
