@@ -4,7 +4,6 @@ from cspr_jax.schema.quantities import REFUSALS
 
 TOLERATED = ("tolerated", "not_tolerated")
 UNCERTAIN = (("limits.uncertainty", TOLERATED),)
-SURROUNDINGS = ("obstacle", "platform_box", "platform_hull")
 COMMON = ("verdict", "duration", "margin", "margin_bound", "limit_margin", "feasible_at_infinity")
 OF_TRANSITIONS = ("least_oscillations", "inclination_gain", "used_inclination", "used_z0")
 OF_OSCILLATIONS = (
