@@ -17,7 +17,7 @@ Mottola, Gosselin, Carricato, J. Mechanisms and Robotics 10 (2018) 031004. The f
 """
 
 from functools import partial, reduce
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -40,9 +40,9 @@ class Ellipse(NamedTuple):
         sine: (..., 3) b, m.
     """
 
-    centre: Array
-    cosine: Array
-    sine: Array
+    centre: Any
+    cosine: Any
+    sine: Any
 
 
 class _Edge(NamedTuple):
@@ -196,7 +196,8 @@ def best_frequency(hull: Hull, ellipse: Ellipse) -> Array:
 
 def _falls(edge: _Edge, e: Array) -> Array:
     # A positive number times the slope by which kappa of an edge falls with e.
-    return sum((t + e * p) * p for t, p in zip(edge.tilting, edge.pulling, strict=True))
+    tilting, pulling = edge.tilting, edge.pulling
+    return (tilting[0] + e * pulling[0]) * pulling[0] + (tilting[1] + e * pulling[1]) * pulling[1]
 
 
 @partial(jax.jit, static_argnums=0)
