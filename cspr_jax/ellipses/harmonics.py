@@ -198,13 +198,8 @@ def best_frequency(hull: SpoolHull, ellipse: Ellipse) -> Array:
 
 def _falls(edge: _Edge, e: Array) -> Array:
     # A positive number times the slope by which kappa of an edge falls with e.
-<<<<<<< HEAD
     (t0, t1), (p0, p1) = edge.tilting, edge.pulling
     return (t0 + e * p0) * p0 + (t1 + e * p1) * p1
-=======
-    tilting, pulling = edge.tilting, edge.pulling
-    return (tilting[0] + e * pulling[0]) * pulling[0] + (tilting[1] + e * pulling[1]) * pulling[1]
->>>>>>> any-eoracle
 
 
 @partial(jax.jit, static_argnums=0)
