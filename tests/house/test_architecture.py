@@ -37,7 +37,7 @@ KERNELS = ("errors", "arithmetic", "schema", "robots", "motions", "workspaces", 
 # What a room is about, what it rests on, and its files in the order in which they are read, stand in its guide.
 GUIDES = ("motions", "workspaces", *FAMILIES)
 # Tables of rows: to split one hides rows and shortens nothing. They may have more than 400 lines.
-TABLES = ("schema.quantities",)
+TABLES = ("schema.map_kinds", "schema.quantities")
 # Folders, all of them, and modules that never import jax.
 WITHOUT_JAX = (
     "api.listings",
