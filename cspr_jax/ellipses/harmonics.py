@@ -17,7 +17,7 @@ Mottola, Gosselin, Carricato, J. Mechanisms and Robotics 10 (2018) 031004. The f
 """
 
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -32,7 +32,7 @@ HALVINGS = 64
 
 
 class Ellipse(NamedTuple):
-    """Harmonic ellipse.
+    """Harmonic ellipse; numbers of jax or of NumPy.
 
     Fields:
         centre: (..., 3) C, from the centroid of the spools, z down, m.
@@ -40,9 +40,9 @@ class Ellipse(NamedTuple):
         sine: (..., 3) b, m.
     """
 
-    centre: Array
-    cosine: Array
-    sine: Array
+    centre: Any
+    cosine: Any
+    sine: Any
 
 
 class _Terms(NamedTuple):

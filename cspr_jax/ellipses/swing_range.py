@@ -255,8 +255,8 @@ def _slowest(space: _Space, cells: _Cells) -> tuple[np.ndarray, ...]:
     below, above = looks.below[each, at], looks.above[each, at]
     for _ in range(NARROWED):
         best = looks.speed.argmin(1)
-        ends = (times[each, np.clip(best + step, 0, times.shape[1] - 1)] for step in (-1, 1))
-        times = np.linspace(*ends, AROUND, axis=1)
+        before, after = (times[each, np.clip(best + step, 0, times.shape[1] - 1)] for step in (-1, 1))
+        times = np.linspace(before, after, AROUND, axis=1)
         looks = _looks(space, cells, times)
     best = looks.speed.argmin(1)
     return times[each, best], looks.place[each, best], looks.speed[each, best], below, above
