@@ -152,7 +152,8 @@ def _static_limits(points: np.ndarray, low: np.ndarray, *, is_size: bool) -> lis
             slope = (low[ahead] ** 2 - low[first] ** 2) / (along[ahead] - along[first])
             zero = along[first] - low[first] ** 2 / slope
             place = 1.0 / zero if is_size else zero
-        places.append(float(np.clip(place, *sorted((points[inside], points[first])))))
+        ends = points[inside], points[first]
+        places.append(float(np.clip(place, min(ends), max(ends))))
     return places
 
 
