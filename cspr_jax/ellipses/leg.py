@@ -143,7 +143,9 @@ class Ellipses(Leg):
             raise ConfigError(stops.path, f"{name}.ellipse: must be absent at rest")
         if pose.rest and pose.turns is not None and i:
             raise ConfigError(stops.path, f"{name}.turns = {pose.turns:g}: must be absent at rest")
-        if pose.position is not None and not pose.rest and (i or not stops.first):
+        # Families before and behind need the place of the pose that they share.
+        is_shared = (i == 0 and stops.first > 0) or (i == len(stops) and stops.last < len(stops.keys.pose) - 1)
+        if pose.position is not None and not pose.rest and not is_shared:
             raise ConfigError(stops.path, f"{name}.position = {shown(pose.position)}: must be absent on an ellipse")
         before = stops.poses[i - 1] if i else None
         if not pose.rest and pose.ellipse is None and (before is None or before.rest):
