@@ -47,7 +47,8 @@ def hull_of(robot: AnyRobot) -> SpoolHull:
     if robot.pulleys is not None:
         raise InputError("pulley_radius", np.asarray(robot.pulleys.radius).tolist(), "absent: formulas know no pulleys")
     if not np.abs(points @ normal).max() <= IN_PLANE * float(spool_radius(robot)):
-        raise InputError("base_points", points.tolist(), "spools in one plane, for a formula of the frequencies")
+        allowed = "must lie in one plane, for a formula of the frequencies"
+        raise InputError("base_points", None, allowed, fault="spools in several planes")
     edges = np.stack([_gradient(points[:, :2][ends], robot.dof) for ends in edge_ends(points, robot.dof)])
     return SpoolHull(leaf(edges), leaf(normal), leaf(robot.gravity))
 

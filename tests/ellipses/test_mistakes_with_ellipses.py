@@ -134,7 +134,7 @@ def test_mistakes_from_python(robot, change, line):
         (None, {"a": [A, A]}, "a = .*must be"),
         (None, {"centres": PLACE}, "centres.*shape"),
         (FLAT, {}, "b = .*y = 0"),
-        (FOUR, {}, "base_points = .*spools in one plane"),
+        (FOUR, {}, "base_points: spools in several planes"),
     ],
 )
 def test_mistakes_with_many(robot, change, line):
