@@ -166,7 +166,7 @@ class PlatformMap(GridMap):
         return {
             "a feasible cell with a margin below zero": feasible & ~(smallest > 0.0),
             "a feasible cell that breaks a limit": feasible & ~(answers["limit_margin"] > -TOUCHED),
-            "a margin below its proved bound": answers["margin_bound"] > margin + ROUNDING * (1.0 + np.abs(margin)),
+            "a margin below its proved bound": _exceeds(answers["margin_bound"], margin),
             "an infeasible cell whose verdict is 0": ~feasible & (answers["verdict"] == 0),
             "a feasible cell without a duration": feasible & ~(answers["duration"] > 0.0),
             "a feasible cell that touches an obstacle": feasible & (answers.get("clearance", margin) <= -ROUNDING),
@@ -203,7 +203,13 @@ class PointMassMap(GridMap):
             "a feasible cell with a margin below zero": feasible & ~(margin > -ROUNDING),
             "a feasible cell whose verdict is not": feasible & ((verdict & ~unsure) != 0),
             "an infeasible cell whose verdict is 0": ~feasible & (verdict == 0),
-            "a margin below its proved bound": answers["margin_bound"] > margin + ROUNDING * (1.0 + np.abs(margin)),
+            "a margin below its proved bound": _exceeds(answers["margin_bound"], margin),
             "a feasible cell without a duration": feasible & ~lasts,
             "a feasible cell that touches an obstacle": feasible & (answers.get("clearance", margin) <= -ROUNDING),
         }
+
+
+def _exceeds(bound: np.ndarray, margin: np.ndarray) -> np.ndarray:
+    # Tell where a bound is above its margin, but for rounding; cables that span too little have a margin of -inf.
+    with np.errstate(invalid="ignore"):
+        return bound > margin + ROUNDING * (1.0 + np.abs(margin))

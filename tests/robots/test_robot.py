@@ -194,17 +194,17 @@ FILES = {
     "eight": ("3R3T", BOX, f"platform_points = {CORNERS}"),
     "eight on a mass": ("3T", BOX, ""),
 }
-SWEEP = """schema = 1
-map = "{kind}"
+ENVELOPES = """schema = 1
+map = "transition-envelopes"
 robot = "robot.toml"
 [axes]
 x = [0.5]
 y = [0.0]
 z = [1.4]
 z0 = [1.4]
+tau = [0.0, 0.5, 1.0]
 [trajectory]
-family = "{family}"
-from = {{ rest = true }}
+family = "transition"
 """
 
 
@@ -231,31 +231,27 @@ def test_files_of_any_number_of_cables_load(tmp_path, name):
     at, is_platform = state(robot, RNG), pattern == "3R3T"
     own = centred(robot)[0]
     assert jax.eval_shape(own.wrench_matrix, at).shape == (robot.dof, len(points))
-    if not is_platform and robot.dof != 2:
-        with pytest.raises(InputError, match=f"base_points: {len(points)} points: must be 3"):
-            cspr_jax.minimum_arcs(robot, np.array([[0.5, 0.1, 1.0]]), z0=1.4)
+    if not is_platform:
+        with pytest.raises(InputError, match=f"base_points: {len(points)} points: must be {robot.dof}"):
+            cspr_jax.make_problem(robot)
 
 
-@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("name", ["four", "three planar", "eight on a mass"])
 def test_maps_of_more_cables_say_that_they_do_not_exist(tmp_path, name, capsys):
-    """Plans of swings do, and maps of arcs of point masses: `swings.test_redundant_arcs`."""
+    """Envelopes are those of pseudotensions; maps of swings exist: `swings.test_redundant_arcs`."""
     path, _ = written(tmp_path, name)
-    is_platform, count = FILES[name][0] == "3R3T", len(FILES[name][1])
-    family, kind = ("hypocycloid", "poses") if is_platform else ("transition", "minimum-oscillations")
-    head = SWEEP.replace("from = {{ rest = true }}\n", "") if family == "transition" else SWEEP
-    (tmp_path / "sweep.toml").write_text(head.format(family=family, kind=kind))
-    freedoms = 6 if is_platform else 2 if "planar" in name else 3
+    count, freedoms = len(FILES[name][1]), 2 if "planar" in name else 3
+    (tmp_path / "sweep.toml").write_text(ENVELOPES)
     code = main(["run", str(tmp_path / "sweep.toml"), "-o", str(tmp_path / "run")])
     line = capsys.readouterr().err.strip()
-    wanted = f'{path}: base_points: {count} points: must be {freedoms} for family "{family}" (it does not exist yet'
+    wanted = f'{path}: base_points: {count} points: must be {freedoms} for family "transition" (it does not exist yet'
     assert code == 2 and wanted in line and len(line.splitlines()) == 1, line
     assert not (tmp_path / "run").exists()
 
 
 def test_an_inline_robot_of_more_cables_is_named_where_it_stands(tmp_path, capsys):
     inline = f'{{ name = "r", base_points = {SPOOLS}, mass = 1.0 }}'
-    text = SWEEP.replace("from = {{ rest = true }}\n", "").format(family="transition", kind="minimum-oscillations")
-    (tmp_path / "sweep.toml").write_text(text.replace('"robot.toml"', inline))
+    (tmp_path / "sweep.toml").write_text(ENVELOPES.replace('"robot.toml"', inline))
     assert main(["run", str(tmp_path / "sweep.toml"), "-o", str(tmp_path / "run")]) == 2
     assert "sweep.toml: robot.base_points: 4 points: must be 3 for family" in capsys.readouterr().err
 
