@@ -124,3 +124,14 @@ def test_margin_on_eight_cables():
     assert segment["margin_bound"] <= least
     assert least == pytest.approx(segment["margin"], rel=0.02)
     assert all(number > 0.0 for number in segment["rotation_frequencies"])
+
+
+@pytest.mark.thorough
+def test_the_fastest_frequency_of_a_platform():
+    """What lies above it fails: samples know the inertia of the oscillation."""
+    ellipse = SIX["pose"][1]["ellipse"] | {"oscillation": {"axis": [0.0, 0.0, 1.0], "angle": 0.3}}
+    keys = {"schema": 1, "robot": "laval-mssm", "family": "ellipse", "turns": 1.0}
+    fastest = cspr_jax.plan(keys | {"ellipse": ellipse | {"frequency": "fastest"}})
+    assert fastest.feasible
+    above = fastest.to_dict()["segments"][0]["frequency"] * (1.0 + 3e-4)
+    assert not cspr_jax.plan(keys | {"ellipse": ellipse | {"frequency": above}}).feasible
