@@ -185,6 +185,26 @@ def depths(z0, count: int) -> np.ndarray:
     return np.broadcast_to(DEPTHS.array("z0", z0), (count,)).copy()
 
 
+def release_ranges(x, y, z) -> list:
+    """Ranges of places of release.
+
+    Args:
+        x: least and largest x, m; None: unbounded here.
+        y: likewise.
+        z: likewise.
+
+    Returns:
+        the three.
+
+    Raises:
+        InputError: a least one above the largest.
+    """
+    for name, values in {"release_x": x, "release_y": y, "release_z": z}.items():
+        if values is not None and not values[0] <= values[1]:
+            raise InputError(name, list(values), "[least, largest], the first not above the second, at most 1e6 m")
+    return [x, y, z]
+
+
 def quaternions(key: str, orientations, count: int) -> np.ndarray:
     """Orientations.
 

@@ -7,7 +7,14 @@ import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.api.argument_checks import checked
-from cspr_jax.api.arguments import check_in_plane, check_point_mass, kernel_problem, points_of, starts_and_ends
+from cspr_jax.api.arguments import (
+    check_in_plane,
+    check_point_mass,
+    kernel_problem,
+    points_of,
+    release_ranges,
+    starts_and_ends,
+)
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.beziers.duration_roots import Ends
 from cspr_jax.beziers.durations import feasible_durations
@@ -189,13 +196,10 @@ def launch_range(
             not finite, or bounds that leave no release.
     """
     starts, ends = starts_and_ends(robot, start, targets)
-    ranges = {"release_x": release_x, "release_y": release_y, "release_z": release_z}
-    for name, values in ranges.items():
-        if values is not None and not values[0] <= values[1]:
-            raise InputError(name, list(values), "[least, largest], the first not above the second, at most 1e6 m")
+    ranges = release_ranges(release_x, release_y, release_z)
     with double_precision():
         problem, frame = kernel_problem(robot, "quintic", limits, free_end=None, any_cables=True)
-        bounds = bounds_of(problem, frame, list(ranges.values()), max_duration)
+        bounds = bounds_of(problem, frame, ranges, max_duration)
         launches = search_launches(problem, frame.inward(starts), frame.inward(ends), bounds, int(population))
         return launches.placed(frame)
 

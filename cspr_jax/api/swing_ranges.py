@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cspr_jax.api.argument_checks import checked
-from cspr_jax.api.arguments import starts_and_ends
+from cspr_jax.api.arguments import release_ranges, starts_and_ends
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.ellipses.swing_range import SwingRange, other_limit
 from cspr_jax.ellipses.swing_range import swing_range as slowest_releases
@@ -50,16 +50,13 @@ def swing_range(
             do not fit, values that are not finite, or bounds that leave no release.
     """
     starts, ends = starts_and_ends(robot, start, targets)
-    ranges = {"release_x": release_x, "release_y": release_y, "release_z": release_z}
-    for name, values in ranges.items():
-        if values is not None and not values[0] <= values[1]:
-            raise InputError(name, list(values), "[least, largest], the first not above the second, at most 1e6 m")
+    ranges = release_ranges(release_x, release_y, release_z)
     with double_precision():
         prepared_robot, frame = prepared(robot, pulleys=True)
         known = limits_over(robot, limits)
         if other_limit(known) is not None:
             raise InputError("limits", other_limit(known), "a floor alone")
-        box = box_of(prepared_robot, frame, list(ranges.values()))
+        box = box_of(prepared_robot, frame, ranges)
         floor = None if known.floor is None else float(known.floor)
         releases = slowest_releases(prepared_robot, frame.inward(starts), frame.inward(ends), box, floor)
         return releases.placed(frame)

@@ -55,7 +55,9 @@ def overlaps(
     knot = first[block] + np.arange(len(block)) - np.repeat(np.cumsum(counts) - counts, counts)
     low, high, width = np.maximum(knots[knot], start[block]), np.minimum(knots[knot + 1], end[block]), np.diff(knots)
     of_piece = (np.stack([low, high]) - knots[knot]) / width[knot]
-    of_block = 2.0 * (np.stack([low, high]) - start[block]) / (end - start)[block] - 1.0
+    # A block that is too short for its numbers to differ gets no bounds.
+    with np.errstate(invalid="ignore"):
+        of_block = 2.0 * (np.stack([low, high]) - start[block]) / (end - start)[block] - 1.0
     # Each table has one knot more than pieces.
     return PieceParts(block, knot - of_blocks[block], of_piece, of_block, width[knot])
 

@@ -14,18 +14,17 @@ from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.differential_evolution import evolved
-from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.beziers.launch import through
 from cspr_jax.beziers.margins import depths_of
 from cspr_jax.beziers.motion import Bezier
 from cspr_jax.beziers.release_bounds import ReleaseBounds
 from cspr_jax.beziers.sequences import margins_of
 from cspr_jax.beziers.verdicts import BATCH, smallest_slacks, verdicts
+from cspr_jax.maps.releases import Releases
 from cspr_jax.motions.flight import aimed
 from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.point_mass import spool_radius
-from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.verdicts import FLAGS
 
 UNKNOWNS, POPULATION = 6, 64
@@ -69,50 +68,19 @@ class Shot(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True)
-class LaunchRange(Columns):
-    """Launches to n landing places, (n,) each; NaN where no launch is proved feasible, but for the first two.
+class LaunchRange(Releases):
+    """Launches to n landing places by one Bezier segment each; see `Releases`.
+
+    A verdict of 0 says that the segment is proved feasible; else it is that of the segment with the largest margin
+    found, which does not say that there is no other. Margins are smallest slacks, of taut cables, depth and limits.
 
     Fields:
-        verdict: flags of `Verdict`: 0 if a launch was found whose segment is proved feasible, else those of the segment
-            with the largest margin found, which does not say that there is no other.
-        largest_margin: largest smallest slack, of taut cables, depth and limits, of the segments that were tried.
-        release_speed: least speed at the release of the launches found, m/s.
-        duration: of the segment of that launch, s.
-        release_time: of the release, after the start of the segment, s.
-        flight_time: s.
-        release_x: of the place of the release, m.
-        release_y: likewise.
-        release_z: likewise.
+        duration: (n,) of the segment, s.
+        release_time: (n,) of the release, after the start of the segment, s.
     """
 
-    verdict: np.ndarray
-    largest_margin: np.ndarray
-    release_speed: np.ndarray
     duration: np.ndarray
     release_time: np.ndarray
-    flight_time: np.ndarray
-    release_x: np.ndarray
-    release_y: np.ndarray
-    release_z: np.ndarray
-
-    @property
-    def feasible(self) -> np.ndarray:
-        """Tell whether a launch to each place was found, its segment proved feasible, (n,)."""
-        return self.verdict == 0
-
-    @property
-    def releases(self) -> np.ndarray:
-        """Places of the releases, (n, 3) m."""
-        return np.stack([self.release_x, self.release_y, self.release_z], axis=1)
-
-    def placed(self, frame: Frame) -> "LaunchRange":
-        """The same, with the places of the releases in other axes.
-
-        Returns:
-            the launches.
-        """
-        x, y, z = frame.outward(self.releases).T
-        return dataclasses.replace(self, release_x=x, release_y=y, release_z=z)
 
 
 def _shot(known: tuple[Problem, ReleaseBounds], question: LaunchRequirement, x: Array) -> Shot:
@@ -179,10 +147,10 @@ def _answers(known: tuple[Problem, ReleaseBounds], cases: tuple[LaunchRequiremen
         np.where(is_found, FLAGS(0), verdict[each, largest]),
         margin[each, largest],
         shown(speed),
-        shown(shots.motion.time),
-        shown(shots.share * shots.motion.time),
         shown(shots.flight_time),
         *(shown(x) for x in shots.position.T),
+        duration=shown(shots.motion.time),
+        release_time=shown(shots.share * shots.motion.time),
     )
 
 

@@ -10,17 +10,13 @@ from cspr_jax.config.launch import LaunchSearch
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.maps.from_places import FromPlacesMap
-from cspr_jax.schema.tiles import Grid
+from cspr_jax.maps.releases_map import ReleasesMap
 
-_START = ("from_x", "from_y", "from_z", "z")
 _OF_LAUNCHES = ("duration", "release_time", "flight_time", "release_x", "release_y", "release_z")
 
 
-class LaunchRangeMap(FromPlacesMap):
+class LaunchRangeMap(ReleasesMap):
     """The launch of least speed to each landing place; see `GridMap`."""
-
-    any_cables = True
 
     def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
         """Refuse bounds that leave no release."""
@@ -36,15 +32,6 @@ class LaunchRangeMap(FromPlacesMap):
         """Answers of the cells of a tile; see `GridMap.__call__`."""
         arguments: Any = (self._starts(cells), self._targets(cells), self._bounds, self._search.population)
         return vars(launch_range(self._problem, *arguments).placed(self._frame))
-
-    def refuse_hopeless(self, grid: Grid) -> None:
-        """Refuse starts that are all out of reach, since objects may land anywhere; see `GridMap.refuse_hopeless`.
-
-        Raises:
-            ConfigError: what is wrong with all starts.
-        """
-        self._refuse_out_of_plane(grid)
-        self._refuse_out_of_reach(self._starts(self._corners(grid, _START)), "trajectory.from")
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""

@@ -254,14 +254,15 @@ class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys):
         flat = {name: data[name] for name in WHOLE if name in data}
         if "pose" in data or not (flat or "ellipse" in data):
             return data
-        rest = {name: value for name, value in data.items() if name not in flat}
-        if flat:
-            rest["ellipse"] = flat | data.get("ellipse", {})
-        return rest | {"pose": [{}, {}]}
+        if "ellipse" in data:  # keys beside the table are unknown ones
+            return data | {"pose": [{}, {}]}
+        return {name: value for name, value in data.items() if name not in flat} | {"ellipse": flat, "pose": [{}, {}]}
 
     @model_validator(mode="after")
     def _on_one_ellipse(self) -> "PlanFile":
         if self.ellipse is None:
+            if self.turns is not None:
+                raise fault("turns", self.turns, "absent beside [[pose]] tables, which have turns of their own")
             return self
         if len(self.pose) != 2 or any(pose.model_fields_set for pose in self.pose):
             raise fault("ellipse", "{...}", "absent beside [[pose]] tables, which have ellipses of their own")

@@ -238,6 +238,8 @@ class Ellipses(Leg):
         if arcs % max(step, 1) or (arcs and not step):
             allowed = "absent on one and the same ellipse" if not step else "even between two ellipses"
             raise ConfigError(stops.path, f"{stops.name(i)}.arcs = {arcs}: must be {allowed}")
+        if not arcs and step > stops.max_arcs:
+            raise ConfigError(stops.path, f"max_arcs = {stops.max_arcs}: must be at least {step} between two ellipses")
         if not step and not turns and not between(first, last):
             key = "turns" if stops.keys.ellipse is not None else f"{stops.name(i)}.turns"
             raise ConfigError(stops.path, f"{key} = 0: must be above 0 on one and the same ellipse")

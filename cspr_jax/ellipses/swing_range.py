@@ -15,15 +15,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.ellipses import harmonics
 from cspr_jax.ellipses.harmonics import Ellipse
 from cspr_jax.ellipses.hull import hull_of
 from cspr_jax.maps.release_box import ReleaseBox
+from cspr_jax.maps.releases import Releases
 from cspr_jax.motions.limits import limits_set
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot
-from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
 # Shortest time of flight, over the longest one, number of times, and how often a grid of `AROUND` times narrows about
@@ -40,49 +39,17 @@ LEVEL = 1e-9
 
 
 @dataclasses.dataclass(frozen=True)
-class SwingRange(Columns):
-    """Slowest releases to n landing places, (n,) each; NaN where there is none, but for the first two.
+class SwingRange(Releases):
+    """Slowest releases from ellipses to n landing places; see `Releases`.
+
+    Where there is none, the verdict says what stands in the way at all times of flight that were looked at. Margins are
+    of taut cables and depth, and over the depth of the centre of the floor.
 
     Fields:
-        verdict: flags of `Verdict`: 0 where a release was found, whose ellipse is feasible; else what stands in the way
-            at all times of flight that were looked at.
-        largest_margin: largest margin, of taut cables and depth, and over the depth of the centre of the floor, of the
-            ellipses of all times of flight.
-        release_speed: m/s.
-        flight_time: s.
-        swing_amplitude: largest distance of that ellipse from its centre, m.
-        release_x: of the place of the release, m.
-        release_y: likewise.
-        release_z: likewise.
+        swing_amplitude: (n,) largest distance of the ellipse from its centre, m.
     """
 
-    verdict: np.ndarray
-    largest_margin: np.ndarray
-    release_speed: np.ndarray
-    flight_time: np.ndarray
     swing_amplitude: np.ndarray
-    release_x: np.ndarray
-    release_y: np.ndarray
-    release_z: np.ndarray
-
-    @property
-    def feasible(self) -> np.ndarray:
-        """Tell whether a launch to each place was found, (n,)."""
-        return self.verdict == 0
-
-    @property
-    def releases(self) -> np.ndarray:
-        """Places of the releases, (n, 3) m."""
-        return np.stack([self.release_x, self.release_y, self.release_z], axis=1)
-
-    def placed(self, frame: Frame) -> "SwingRange":
-        """The same, with the places of the releases in other axes.
-
-        Returns:
-            the releases.
-        """
-        x, y, z = frame.outward(self.releases).T
-        return dataclasses.replace(self, release_x=x, release_y=y, release_z=z)
 
 
 def other_limit(limits: Limits) -> str | None:
@@ -167,7 +134,7 @@ def swing_range(
     return SwingRange(
         np.where(is_found, 0, lost).astype(FLAGS),
         np.where(still > 0.0, np.minimum(np.minimum(still, 1.0) * below, above), np.minimum(still, -KEPT)),
-        *(shown(x) for x in (speed, time, size, *place.T)),
+        *(shown(x) for x in (speed, time, *place.T, size)),
     )
 
 

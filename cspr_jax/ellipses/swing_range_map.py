@@ -8,18 +8,14 @@ from cspr_jax.config.sweep import SweepFile
 from cspr_jax.ellipses.hull import hull_of
 from cspr_jax.ellipses.swing_range import other_limit, swing_range
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.maps.from_places import FromPlacesMap
 from cspr_jax.maps.release_box import box_of
-from cspr_jax.schema.tiles import Grid
+from cspr_jax.maps.releases_map import ReleasesMap
 
-_START = ("from_x", "from_y", "from_z", "z")
 _OF_SWINGS = ("release_speed", "flight_time", "swing_amplitude", "release_x", "release_y", "release_z")
 
 
-class SwingRangeMap(FromPlacesMap):
+class SwingRangeMap(ReleasesMap):
     """The slowest release from an ellipse to each landing place; see `GridMap`."""
-
-    any_cables = True
 
     def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
         """Refuse limits and keys of searches that formulas do not know."""
@@ -47,15 +43,6 @@ class SwingRangeMap(FromPlacesMap):
         depth = None if floor is None else float(floor)
         answers = swing_range(self._problem.robot, self._starts(cells), self._targets(cells), self._box, depth)
         return vars(answers.placed(self._frame))
-
-    def refuse_hopeless(self, grid: Grid) -> None:
-        """Refuse centres that are all out of reach, since objects may land anywhere; see `GridMap.refuse_hopeless`.
-
-        Raises:
-            ConfigError: what is wrong with all centres.
-        """
-        self._refuse_out_of_plane(grid)
-        self._refuse_out_of_reach(self._starts(self._corners(grid, _START)), "trajectory.from")
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""

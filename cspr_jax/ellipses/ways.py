@@ -65,7 +65,7 @@ class Way(NamedTuple):
 
     Fields:
         motion: with the turns behind it.
-        proof: of all of it; None: samples refute it.
+        proof: of all of it.
         arcs: number of half turns of the way.
         fewer_undecided: whether a smaller number stayed undecided.
     """
@@ -143,17 +143,15 @@ def least_way(
     Args:
         turns: on the last ellipse.
         arcs: fixed number of arcs; 0: free.
-        max_arcs: largest number of arcs tried.
+        max_arcs: largest number of arcs tried, at least the step of the way.
 
     Returns:
         the way; without a proof the one whose smallest slack is the largest.
     """
     step = step_of(first, last)
-    numbers = [arcs] if arcs or not step else range(step, max_arcs + 1, step)
-    best: Way | None = None
     undecided: Way | None = None
-    reached = -np.inf
-    for number in numbers:
+    refuted: list[tuple[float, Way]] = []
+    for number in [arcs] if arcs or not step else range(step, max_arcs + 1, step):
         motion = motion_between(problem.amplitude, first, last, number, turns)
         proof = sampled_proof(problem, motion, scene, FEW)
         if not proof.broken.any():
@@ -162,11 +160,9 @@ def least_way(
                 return Way(motion, proof, number, undecided is not None)
             if not proof.broken.any():
                 undecided = undecided or Way(motion, proof, number)
-        slack = float((proof.proof.high / proof.scales).min())
-        if best is None or slack > reached:
-            best, reached = Way(motion, proof, number), slack
-    chosen = undecided or best
-    if chosen is None:
-        raise ValueError("no number of arcs")
+        refuted.append((float((proof.proof.high / proof.scales).min()), Way(motion, proof, number)))
+    if undecided is not None:
+        return undecided
+    best = max(refuted, key=lambda each: each[0])[1]
     # A motion that samples have refuted is bounded for its causes.
-    return chosen._replace(proof=proof_of(problem, chosen.motion, scene))
+    return best._replace(proof=proof_of(problem, best.motion, scene))

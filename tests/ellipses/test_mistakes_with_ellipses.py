@@ -142,3 +142,21 @@ def test_mistakes_with_many(robot, change, line):
     arguments = {"centres": [PLACE], "a": A, "b": B, "frequencies": 2.0} | change
     with pytest.raises(InputError, match=line):
         cspr_jax.ellipse_margins(made, **arguments)
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        (f"{HEAD}ellipse = 3\n{CENTRE}\n", "unknown key centre"),
+        (f"{HEAD}{CENTRE}\n[ellipse]\n{AXES}\n", "unknown key centre"),
+        (from_rest(GOOD).replace(HEAD, f"{HEAD}turns = 2\n"), "turns = 2.0: must be absent"),
+        (
+            f"{HEAD}max_arcs = 1\n[[pose]]\nellipse = {{ {GOOD} }}\n[[pose]]\nellipse = {{ {CENTRE}, radius = 0.4 }}\n",
+            "max_arcs = 1: must be at least 2 between two ellipses",
+        ),
+    ],
+    ids=["no table", "in two places", "turns of poses", "no number of arcs"],
+)
+def test_keys_that_contradict_the_plan(tmp_path, text, line):
+    code, _, error = plan(tmp_path, text)
+    assert code == 2 and line in error and error.count("\n") <= 2, error

@@ -1,0 +1,51 @@
+"""Columns that launches to many landing places share, by whatever motion the object is released."""
+
+import dataclasses
+from typing import Self
+
+import numpy as np
+
+from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.schema.columns import Columns
+
+
+@dataclasses.dataclass(frozen=True)
+class Releases(Columns):
+    """Slowest releases to n landing places, (n,) each; NaN where there is none, but for the first two.
+
+    Fields:
+        verdict: flags of `Verdict`: 0 where a launch was found.
+        largest_margin: largest margin of the motions that were tried.
+        release_speed: m/s.
+        flight_time: s.
+        release_x: of the place of the release, m.
+        release_y: likewise.
+        release_z: likewise.
+    """
+
+    verdict: np.ndarray
+    largest_margin: np.ndarray
+    release_speed: np.ndarray
+    flight_time: np.ndarray
+    release_x: np.ndarray
+    release_y: np.ndarray
+    release_z: np.ndarray
+
+    @property
+    def feasible(self) -> np.ndarray:
+        """Tell whether a launch to each place was found, (n,); its motion is feasible."""
+        return self.verdict == 0
+
+    @property
+    def releases(self) -> np.ndarray:
+        """Places of the releases, (n, 3) m."""
+        return np.stack([self.release_x, self.release_y, self.release_z], axis=1)
+
+    def placed(self, frame: Frame) -> Self:
+        """The same, with the places of the releases in other axes.
+
+        Returns:
+            the releases.
+        """
+        x, y, z = frame.outward(self.releases).T
+        return dataclasses.replace(self, release_x=x, release_y=y, release_z=z)
