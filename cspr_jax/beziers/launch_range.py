@@ -143,12 +143,15 @@ def _answers(known: tuple[Problem, ReleaseBounds], cases: tuple[LaunchRequiremen
     def shown(values: np.ndarray) -> np.ndarray:
         return np.where(is_found, values.reshape(count, tracks)[each, slowest], np.nan)
 
+    x, y, z = (shown(axis) for axis in shots.position.T)
     return LaunchRange(
-        np.where(is_found, FLAGS(0), verdict[each, largest]),
-        margin[each, largest],
-        shown(speed),
-        shown(shots.flight_time),
-        *(shown(x) for x in shots.position.T),
+        verdict=np.where(is_found, FLAGS(0), verdict[each, largest]),
+        largest_margin=margin[each, largest],
+        release_speed=shown(speed),
+        flight_time=shown(shots.flight_time),
+        release_x=x,
+        release_y=y,
+        release_z=z,
         duration=shown(shots.motion.time),
         release_time=shown(shots.share * shots.motion.time),
     )
