@@ -21,12 +21,14 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
-from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.arithmetic.batches import in_batches, in_parts
 from cspr_jax.ellipses.hull import SpoolHull
 
-BATCH = 16384
+# Ellipses in a batch, and in the part of one of two threads.
+BATCH, LARGEST = 16384, 1 << 20
 # Halvings that narrow e to the last bit.
 HALVINGS = 64
 
@@ -216,4 +218,11 @@ def of_many(function, hull: SpoolHull, *items):
     Returns:
         its results, NumPy leaves (n, ...).
     """
-    return in_batches(partial(_each, function, hull), items, size=BATCH)
+
+    def part(rows: slice):
+        return in_batches(partial(_each, function, hull), jax.tree.map(lambda leaf: leaf[rows], items), size=BATCH)
+
+    count = len(jax.tree.leaves(items)[0])
+    if count <= BATCH:
+        return part(slice(None))
+    return jax.tree.map(lambda *parts: np.concatenate(parts), *in_parts(part, count, LARGEST))
