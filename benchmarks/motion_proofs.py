@@ -14,8 +14,8 @@ from cspr_jax.robots.cables import wrench_units
 from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.tension_programs import by_program
-from cspr_jax.splines.interpolation import interpolated
-from cspr_jax.splines.several import SeveralSplines
+from cspr_jax.curves.interpolation import interpolated
+from cspr_jax.curves.several import SeveralSplines
 
 INSTANTS, PROGRAMS, ROWS, DURATION = 200, 5, 10_001, 10.0
 # Robots, the middle of their motions and how far these go, m, tilts, and limits of tensions, N.

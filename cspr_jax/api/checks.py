@@ -20,6 +20,8 @@ from cspr_jax.config.mappings import text_of
 from cspr_jax.config.motions.text import TooLongError
 from cspr_jax.config.plan import PlanFile, plan_keys
 from cspr_jax.config.robot import resolve_robot
+from cspr_jax.curves.files import reference_of, samples_of
+from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.motions.motion import Placed
 from cspr_jax.motions.proved_answers import MotionProof, proof_of
@@ -30,9 +32,7 @@ from cspr_jax.plans import planning
 from cspr_jax.plans.long_motions import long_plan
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
-from cspr_jax.splines.files import reference_of, samples_of
 from cspr_jax.splines.functions import FunctionMotion, function_motion
-from cspr_jax.splines.motion import Spline
 
 
 @dataclasses.dataclass(frozen=True)

@@ -17,6 +17,8 @@ from cspr_jax.build.scenes import scene_of
 from cspr_jax.config.equivalents import as_moved
 from cspr_jax.config.plan import plan_keys
 from cspr_jax.config.robot import resolve_robot
+from cspr_jax.curves.files import kept_to, placed_inward, reference_of, samples_of, source_spline
+from cspr_jax.curves.several import SeveralSplines
 from cspr_jax.errors import InputError
 from cspr_jax.motions.cause import Cause
 from cspr_jax.motions.proved_answers import answers_of, judge_all_robots, proofs_of
@@ -24,8 +26,6 @@ from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
 from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.families import FAMILIES
-from cspr_jax.splines.files import kept_to, placed_inward, reference_of, samples_of, source_spline
-from cspr_jax.splines.several import SeveralSplines
 
 
 @dataclasses.dataclass(frozen=True)

@@ -15,6 +15,8 @@ from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import amplitude_of, kernel_problem, warn_of_rest
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import IDENTITY, Frame
+from cspr_jax.curves.files import kept_to, placed_inward, reference_of, samples_of, source_spline
+from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import InputError
 from cspr_jax.motions import slacks as motion_slacks
 from cspr_jax.motions.amplitudes import Amplitude, named
@@ -31,8 +33,6 @@ from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PointMassRobot, rest_point
 from cspr_jax.robots.state import State
 from cspr_jax.robots.tension_rule_table import CENTRED, TENSION_RULES
-from cspr_jax.splines.files import kept_to, placed_inward, reference_of, samples_of, source_spline
-from cspr_jax.splines.motion import Spline
 from cspr_jax.swings import transition as transitions
 from cspr_jax.swings.hypocycloid import Hypocycloid, segment
 

@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 
+from cspr_jax.curves.spline import Spline
 from cspr_jax.motions.criteria import Criterion
 from cspr_jax.motions.proved_answers import MotionProof, ProvedAnswers
 from cspr_jax.outputs.plan_report import finite, verdict_text
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.runtime.terminal import cell
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.splines.motion import Spline
 
 SCHEMA = 1
 # Intervals of failure that the text names; the JSON has all of them.

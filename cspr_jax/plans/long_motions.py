@@ -14,6 +14,9 @@ from cspr_jax.build.scenes import scene_of
 from cspr_jax.config.equivalents import as_moved
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile, resolve_robot
+from cspr_jax.curves.files import centre_from, kept_to, placed_inward, reference_of
+from cspr_jax.curves.reading import window_splines
+from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.motions.demands import SAMPLES, Demands, demands
 from cspr_jax.motions.leg import JoinedLeg
@@ -23,9 +26,6 @@ from cspr_jax.motions.time_proof import TimeProof
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.robots.limits import NO_LIMITS
 from cspr_jax.schema.families import FAMILIES
-from cspr_jax.splines.files import centre_from, kept_to, placed_inward, reference_of
-from cspr_jax.splines.motion import Spline
-from cspr_jax.splines.reading import window_splines
 from cspr_jax.store.motion_samples import motion_windows
 
 # Demands that are smallest values; the others are largest ones.

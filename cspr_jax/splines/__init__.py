@@ -1,22 +1,9 @@
-"""Splines: motions that a user brings, as piecewise polynomials in time.
+"""Splines: motions that a user brings, as curves or as functions of time.
 
-What controllers play is a table of samples or way-points and an interpolation between them: polynomials, piece by
-piece. Over a block of time each lies within a narrow band around a straight line, found from its Bernstein
-coefficients, whether the block holds a part of a piece or hundreds of pieces. From such bands follow bounds of cables,
-of the balance and of tensions (`robots.state_bounds`, `robots.witness_tensions`), and so verdicts between the samples.
-
-Orientations are quaternions that are interpolated as they are and normalised afterwards.
+Curves through samples and way-points, and what is read as such, are in `curves`; here they become motions of plans.
 
 Files, each importing only from those above it:
 
-    blocks              bounds of states over blocks of time
-    motion              positions and rotations over time
-    several             blocks of several motions together
-    interpolation       cubic, quintic and Hermite curves through samples
-    thinned             curves through every second sample
-    reading             tables and pieces that were read, curves of SciPy, tables window by window
-    noise               noise of recorded samples, and smoothing
-    files               motions of files and arrays, in the axes of the kernels
     functions           motions that are functions of time
     leg                 poses at their times, and files, as a leg of plans
 """

@@ -11,9 +11,9 @@ from jax import Array
 from cspr_jax.arithmetic import rotations
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.curves.spline import turning_of
 from cspr_jax.errors import InputError
 from cspr_jax.robots.state import State
-from cspr_jax.splines.motion import turning_of
 
 
 @jax.tree_util.register_dataclass
@@ -69,7 +69,7 @@ def function_motion(
     Args:
         function: gives positions (3,) m, of a platform also (7,) with quaternions behind them, at instants () s.
         duration: s.
-        reference: (4,) of `splines.files.reference_of`.
+        reference: (4,) of `curves.files.reference_of`.
         is_platform: whether the robot has orientations.
 
     Returns:

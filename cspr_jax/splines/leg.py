@@ -10,6 +10,11 @@ from cspr_jax.build.robots import build_robot
 from cspr_jax.build.scenes import scene_of
 from cspr_jax.config.motions.hints import unit_hints
 from cspr_jax.config.motions.table import MotionPieces, MotionTable
+from cspr_jax.curves.files import centre_from, kept_to, moving_ends, placed_inward, reference_of, source_spline
+from cspr_jax.curves.interpolation import interpolated
+from cspr_jax.curves.noise import noise_notes, smoothed
+from cspr_jax.curves.reading import pieces_of
+from cspr_jax.curves.spline import Spline, part
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.leg import Leg
@@ -19,11 +24,6 @@ from cspr_jax.motions.proved_answers import proved_answers
 from cspr_jax.motions.waypoints import Waypoints
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.splines.files import centre_from, kept_to, moving_ends, placed_inward, reference_of, source_spline
-from cspr_jax.splines.interpolation import interpolated
-from cspr_jax.splines.motion import Spline, part
-from cspr_jax.splines.noise import noise_notes, smoothed
-from cspr_jax.splines.reading import pieces_of
 from cspr_jax.store.motion_samples import read_motion
 
 # Keys of poses that other families take, and a spline does not.

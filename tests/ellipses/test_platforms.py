@@ -8,7 +8,7 @@ from scipy.optimize import linprog
 
 import cspr_jax
 from cspr_jax.arithmetic import rotations
-from cspr_jax.splines.files import reference_of
+from cspr_jax.curves.files import reference_of
 
 SIX = {
     "schema": 1,

@@ -10,13 +10,13 @@ from oracles import any_motion
 from oracles.any_motion_cases import KINDS, random_case
 
 import cspr_jax
+from cspr_jax.curves.interpolation import interpolated
 from cspr_jax.motions.block_slacks import block_slacks
 from cspr_jax.motions.criteria import criteria
 from cspr_jax.motions.time_proof import time_proof
 from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.splines.interpolation import interpolated
 
 # Two robots have pulleys.
 PULLEYS = True

@@ -10,6 +10,9 @@ from support.platforms import crossed_robot
 from support.splines import random_spline
 
 import cspr_jax
+from cspr_jax.curves import interpolation
+from cspr_jax.curves.several import SeveralSplines
+from cspr_jax.curves.spline import Spline
 from cspr_jax.motions.block_slacks import BlockSlacks, block_slacks
 from cspr_jax.motions.criteria import Criterion, criteria
 from cspr_jax.motions.time_proof import time_proof, time_proofs
@@ -22,9 +25,6 @@ from cspr_jax.robots.pulleys import exits
 from cspr_jax.robots.tension_distribution import centred as most_central
 from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.splines import interpolation
-from cspr_jax.splines.motion import Spline
-from cspr_jax.splines.several import SeveralSplines
 
 # Robots, where they move and how far, m, their tilt, and limits that some motions break.
 CASES = {

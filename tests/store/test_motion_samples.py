@@ -7,8 +7,8 @@ from plans.test_planning import SHORT
 from support.commands import plan
 
 import cspr_jax
+from cspr_jax.curves.reading import spline_of
 from cspr_jax.errors import ConfigError
-from cspr_jax.splines.reading import spline_of
 from cspr_jax.store.motion_samples import motion_windows, read_motion
 
 from .test_motion_table import PLATFORM

@@ -5,8 +5,8 @@ import numpy as np
 from scipy.interpolate import CubicSpline, PPoly, make_interp_spline
 
 from cspr_jax.arithmetic.piecewise_bounds import bernstein_of_powers
+from cspr_jax.curves.spline import Spline
 from cspr_jax.robots.state import State
-from cspr_jax.splines.motion import Spline
 
 # Instants that are computed together: splines of as many pieces, and any number of instants, share what is compiled.
 TOGETHER = 1024

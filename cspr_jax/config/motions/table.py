@@ -27,8 +27,8 @@ class MotionTable:
         accelerations: (n, 3) m/s^2, or None.
         angular_velocities: (n, 3) rad/s, fixed axes, or None.
         angular_accelerations: (n, 3) rad/s^2, fixed axes, or None.
-        interpolation: that the file names, of `splines.interpolation.INTERPOLATIONS`, or None.
-        ends: that the file names, of `splines.interpolation.ENDS`, or None.
+        interpolation: that the file names, of `curves.interpolation.INTERPOLATIONS`, or None.
+        ends: that the file names, of `curves.interpolation.ENDS`, or None.
         z_axis: where z points in it, "up" or "down"; None: as in the file of the robot.
         point: whose positions it has, one of `POINTS`; None: it does not say.
         from_reference: whether orientations count from the reference orientation, and not from the platform's own axes.

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cspr_jax.curves.blocks import spline_bounds
+from cspr_jax.curves.spline import Spline
 from cspr_jax.robots.state_bounds import StateBounds
-from cspr_jax.splines.blocks import spline_bounds
-from cspr_jax.splines.motion import Spline
 
 
 class SeveralSplines:

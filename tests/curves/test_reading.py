@@ -7,9 +7,9 @@ from scipy.interpolate import BPoly, BSpline, CubicSpline, PchipInterpolator, ma
 
 from cspr_jax.config.motions import text
 from cspr_jax.config.motions.table import MotionPieces, MotionTable
+from cspr_jax.curves.interpolation import interpolated
+from cspr_jax.curves.reading import pieces_of, spline_of, window_splines
 from cspr_jax.errors import InputError
-from cspr_jax.splines.interpolation import interpolated
-from cspr_jax.splines.reading import pieces_of, spline_of, window_splines
 
 TIMES = np.array([0.0, 0.5, 1.2, 2.0, 3.3])
 VALUES = np.random.default_rng(0).normal(size=(5, 7))

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline, make_interp_spline
 
+from cspr_jax.curves.interpolation import continuous, interpolated
 from cspr_jax.errors import InputError
-from cspr_jax.splines.interpolation import continuous, interpolated
 
 TIMES = np.array([1.0, 1.7, 2.0, 3.1, 3.5, 4.4])
 PLACES = np.random.default_rng(3).normal(size=(6, 3))

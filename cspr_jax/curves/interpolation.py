@@ -13,8 +13,8 @@ from scipy.interpolate import BSpline, CubicSpline, PPoly, make_interp_spline
 
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.piecewise_bounds import bernstein_of_powers
+from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import InputError
-from cspr_jax.splines.motion import Spline
 
 INTERPOLATIONS = ("cubic", "quintic", "hermite")
 ENDS = ("rest", "natural", "periodic")

@@ -18,9 +18,9 @@ from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.piecewise_bounds import bernstein_of_powers
 from cspr_jax.config.motions.table import MotionPieces, MotionTable
 from cspr_jax.config.motions.text import MotionWindow
+from cspr_jax.curves.interpolation import check_steps, continuous, hermite, interpolated
+from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import InputError
-from cspr_jax.splines.interpolation import check_steps, continuous, hermite, interpolated
-from cspr_jax.splines.motion import Spline
 
 # Shares of the largest coefficient by which pieces may miss each other, and by which windows may.
 MEETING, WINDOWS_MEETING = 1e-6, 1e-9
@@ -35,15 +35,15 @@ def spline_of(
     """A motion that was read, as a spline in its axes.
 
     Args:
-        interpolation: of a table, one of `splines.interpolation.INTERPOLATIONS`; None: that of the file, else "hermite"
+        interpolation: of a table, one of `curves.interpolation.INTERPOLATIONS`; None: that of the file, else "hermite"
             if it has velocities, else "cubic".
-        ends: of splines through a table, one of `splines.interpolation.ENDS`; None: those of the file, else "rest".
+        ends: of splines through a table, one of `curves.interpolation.ENDS`; None: those of the file, else "rest".
 
     Returns:
         the motion; it begins at 0.
 
     Raises:
-        InputError: samples or pieces that are no motion; see `splines.interpolation.interpolated`.
+        InputError: samples or pieces that are no motion; see `curves.interpolation.interpolated`.
     """
     check_steps(source.knots if isinstance(source, MotionPieces) else source.times)
     if isinstance(source, MotionPieces):

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.arithmetic.elementary import leaf
-from cspr_jax.splines.interpolation import hermite
-from cspr_jax.splines.motion import Spline
+from cspr_jax.curves.interpolation import hermite
+from cspr_jax.curves.spline import Spline
 
 JUMP = 1e-6  # share of the largest acceleration by which one jumps, but for rounding, where legs meet
 

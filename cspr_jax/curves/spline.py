@@ -11,9 +11,9 @@ from jax import Array
 from cspr_jax.arithmetic import rotations
 from cspr_jax.arithmetic.affine_bounds import cross, turned
 from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.curves.blocks import spline_bounds
 from cspr_jax.robots.state import State
 from cspr_jax.robots.state_bounds import StateBounds
-from cspr_jax.splines.blocks import spline_bounds
 
 # Second derivatives that differ by less than this part of the largest one do not jump.
 SAME = 1e-9
@@ -30,7 +30,7 @@ class Spline:
             None for a point mass.
         z0: () depth at which slacks are normalised, m.
         offset: (3,) from the point whose positions these are to the mass centre, platform axes, m; None: it is that.
-        interpolation: how its samples were joined, one of `splines.interpolation.INTERPOLATIONS`, or "pieces".
+        interpolation: how its samples were joined, one of `curves.interpolation.INTERPOLATIONS`, or "pieces".
         ends: of the same, or "".
     """
 

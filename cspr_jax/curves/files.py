@@ -13,14 +13,14 @@ from cspr_jax.arithmetic.rotations import products
 from cspr_jax.config.motions.table import MotionPieces, MotionTable
 from cspr_jax.config.motions.text import LONGEST, SHORTEST
 from cspr_jax.config.robot import RobotFile
+from cspr_jax.curves.reading import pieces_of, spline_of
+from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import InputError
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.reference_pose import aligned
-from cspr_jax.splines.motion import Spline
-from cspr_jax.splines.reading import pieces_of, spline_of
 
 # Samples of a motion, not way-points, are at least so many; the part of the largest speed that counts as moving.
 MANY, MOVING = 30, 0.2

@@ -5,8 +5,8 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from cspr_jax.config.motions.table import MotionTable
+from cspr_jax.curves.noise import noise_notes, noise_of, smoothed
 from cspr_jax.errors import InputError
-from cspr_jax.splines.noise import noise_notes, noise_of, smoothed
 
 
 def least_jerk(t, duration):

@@ -9,8 +9,8 @@ from scipy.interpolate import CubicSpline, make_smoothing_spline
 from scipy.optimize import brentq
 
 from cspr_jax.config.motions.table import MotionTable
+from cspr_jax.curves.interpolation import continuous
 from cspr_jax.errors import InputError
-from cspr_jax.splines.interpolation import continuous
 
 # Rows of the stretches in which noise is estimated, and the most of them.
 STRETCH, STRETCHES = 96, 16
