@@ -53,16 +53,8 @@ class Spline:
         piece = jnp.clip(jnp.searchsorted(knots, t, side="right") - 1, 0, len(knots) - 2)
         width = knots[piece + 1] - knots[piece]
         share = (t - knots[piece]) / width
-        position, velocity, acceleration = _values(jnp.asarray(self.position)[piece], share, width)
-        if self.quaternion is None:
-            return State(position, velocity, acceleration)
-        rotation, spin, spin_rate, unit = turning_of(*_values(jnp.asarray(self.quaternion)[piece], share, width))
-        if self.offset is not None:
-            arm = rotation @ self.offset
-            swing = jnp.cross(spin, arm)
-            position, velocity = position + arm, velocity + swing
-            acceleration = acceleration + jnp.cross(spin_rate, arm) + jnp.cross(spin, swing)
-        return State(position, velocity, acceleration, rotation, spin, spin_rate, unit)
+        quaternion = None if self.quaternion is None else jnp.asarray(self.quaternion)[piece]
+        return piece_state(jnp.asarray(self.position)[piece], quaternion, share, width, self.offset)
 
     def stretched(self, factor: float) -> "Spline":
         """The motion run more slowly, or faster.
@@ -139,8 +131,44 @@ def part(spline: Spline, first: int, last: int) -> Spline:
     )
 
 
-def _values(coefficients: Array, share: Array, width: Array) -> tuple[Array, Array, Array]:
-    # Value and first two derivatives of (degree + 1, n) Bernstein coefficients, at a share of the width of the piece.
+def piece_state(
+    position: Array, quaternion: Array | None, share: Array, width: Array, offset: Array | None = None
+) -> State:
+    """State on one piece of a spline.
+
+    Args:
+        position: (degree + 1, 3) Bernstein coefficients, m.
+        quaternion: (degree + 1, 4) likewise; None for a point mass.
+        share: () of the piece that has passed, from 0 to 1.
+        width: () duration of the piece, s.
+        offset: as of `Spline`.
+
+    Returns:
+        the state.
+    """
+    place, velocity, acceleration = piece_values(position, share, width)
+    if quaternion is None:
+        return State(place, velocity, acceleration)
+    rotation, spin, spin_rate, unit = turning_of(*piece_values(quaternion, share, width))
+    if offset is not None:
+        arm = rotation @ offset
+        swing = jnp.cross(spin, arm)
+        place, velocity = place + arm, velocity + swing
+        acceleration = acceleration + jnp.cross(spin_rate, arm) + jnp.cross(spin, swing)
+    return State(place, velocity, acceleration, rotation, spin, spin_rate, unit)
+
+
+def piece_values(coefficients: Array, share: Array, width: Array) -> tuple[Array, Array, Array]:
+    """Value and first two derivatives on one piece.
+
+    Args:
+        coefficients: (degree + 1, n) Bernstein coefficients.
+        share: () of the piece that has passed, from 0 to 1.
+        width: () of the piece, s.
+
+    Returns:
+        (n,) each, by s and by s^2.
+    """
     degree = coefficients.shape[0] - 1
     first = jnp.diff(coefficients, axis=0) * (degree / width)
     second = jnp.diff(first, axis=0) * (max(degree - 1, 0) / width)

@@ -1,0 +1,78 @@
+"""Lower bound of the time along a section, from the multipliers of its grid."""
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.motions.problem import Problem
+from cspr_jax.paths.discrete import Discrete
+from cspr_jax.paths.duality import Multipliers, Rates, lower_bound
+from cspr_jax.paths.multipliers import dual_multipliers
+from cspr_jax.paths.nodes import BATCH, Places, places_on, state_at
+from cspr_jax.paths.rows import tangent_directions, unit_wrenches
+from cspr_jax.robots.cables import AnyRobot, cable_motion
+from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.wrench_sets import tension_range, wrench_faces
+
+# x at which the search for multipliers begins, at least, over its largest value.
+LEAST = 1e-9
+
+
+def path_bound(problem: Problem, path: Discrete, x: np.ndarray) -> float:
+    """Rigorous lower bound of the time of any motion along a section.
+
+    Args:
+        problem: robot and limits.
+        x: (n_nodes,) squared path speeds of a motion on the grid.
+
+    Returns:
+        the bound, s; -inf where none is known.
+    """
+    robot, limits, curve, grid = problem.robot, problem.limits, path.section.curve, path.grid
+    middles = np.maximum(0.5 * (x[1:] + x[:-1]), LEAST * x.max())
+    of_nodes, of_cells = dual_multipliers(path.dual_rows(), path.ends, middles)
+    nodes = places_on(curve, grid.nodes, ahead=True)
+    values = in_batches(partial(_of_nodes, robot, limits), (nodes, of_nodes.T), size=BATCH)
+    centres = places_on(curve, 0.5 * (grid.nodes[1:] + grid.nodes[:-1]), ahead=True)
+    rates = in_batches(partial(_of_cells, robot, limits), (centres, grid.speed, of_cells), size=BATCH)
+    return lower_bound(robot, limits, path, Multipliers(*values), Rates(*rates))
+
+
+@jax.jit
+def _of_nodes(robot: AnyRobot, limits: Limits, nodes: tuple[Places, Array]) -> tuple[Array, Array, Array]:
+    # Multipliers of what the half-planes are made of, from those of the half-planes.
+    def one(place: Places, pressures: Array) -> tuple[Array, Array, Array]:
+        state = state_at(place)
+        faces = wrench_faces(unit_wrenches(robot, state).matrix, *tension_range(robot, limits))
+        count, n_cables = len(faces.offsets), robot.n_cables
+        wrench = -(pressures[:count] @ faces.normals) / (robot.mass * robot.gravity)
+        bend, turn, rest = jnp.zeros(n_cables), jnp.zeros(3), pressures[count:]
+        if limits.cable_acceleration_max is not None:
+            bend, rest = rest[:n_cables] - rest[n_cables : 2 * n_cables], rest[2 * n_cables :]
+        if getattr(limits, "acceleration_max", None) is not None:
+            turn = rest @ tangent_directions(state.velocity, state.acceleration)
+        return wrench, bend, turn
+
+    return jax.vmap(one)(*nodes)
+
+
+@jax.jit
+def _of_cells(robot: AnyRobot, limits: Limits, cells: tuple[Places, Array, Array]) -> tuple[Array, Array]:
+    # The cap of a cell is that of the cable, or of the mass centre, whose limit is nearest in its middle.
+    def one(place: Places, most: Array, pressure: Array) -> tuple[Array, Array]:
+        state = state_at(place)
+        none, square = jnp.zeros(robot.n_cables), jnp.sum(state.velocity**2)
+        if limits.cable_speed_max is None:
+            return none, pressure / square
+        rates = jnp.square(cable_motion(robot, state)[1])
+        shares = rates / jnp.square(limits.cable_speed_max)
+        nearest = jnp.argmax(shares)
+        is_cable = shares[nearest] >= square / jnp.square(most)
+        of_cables = jnp.where(is_cable & (jnp.arange(robot.n_cables) == nearest), pressure / rates, none)
+        return of_cables, jnp.where(is_cable, 0.0, pressure / square)
+
+    return jax.vmap(one)(*cells)

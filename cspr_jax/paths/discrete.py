@@ -1,0 +1,167 @@
+"""A section of a path on its grid: half-planes at both sides of all cells, with margins, as solvers take them."""
+
+import dataclasses
+from typing import NamedTuple
+
+import jax
+import numpy as np
+
+from cspr_jax.motions.problem import Problem
+from cspr_jax.paths.controllable import Fastest, cells_of, fastest
+from cspr_jax.paths.multipliers import SideRows
+from cspr_jax.paths.nodes import Grid, grid_of, side_rows
+from cspr_jax.paths.rows import Rows, face_count
+from cspr_jax.paths.section import Section, Settings
+from cspr_jax.paths.smooth import NodeRows
+
+# Path speeds are taken to be no larger than so many times that of a fall along the path.
+FASTER = 1e2
+# Shares of x that differ by less at both sides of a node are the same.
+SAME = 1e-6
+
+
+class Margins(NamedTuple):
+    """Margins that half-planes keep in each cell, (n_cells,) each.
+
+    Fields:
+        tension: from both ends of the range of every tension, N.
+        acceleration: part of each limit of an acceleration.
+        speed: part of each limit of a speed.
+    """
+
+    tension: np.ndarray
+    acceleration: np.ndarray
+    speed: np.ndarray
+
+    def at_nodes(self) -> "Margins":
+        """At each node the larger of the margins of both cells.
+
+        Returns:
+            the margins, (n_cells + 1,) each.
+        """
+        return Margins(*(np.fmax(np.append(x, x[-1]), np.insert(x, 0, x[0])) for x in self))
+
+
+@dataclasses.dataclass(frozen=True)
+class Discrete:
+    """Section on its grid.
+
+    Fields:
+        section: NumPy leaves.
+        grid: nodes and speed limits.
+        start: half-planes at the starts of the cells, (n_cells, n_rows).
+        end: at their ends.
+        n_faces: number of half-planes that bound tensions.
+        ends: x at the start and at the end.
+        largest: x that is taken to be larger than any.
+    """
+
+    section: Section
+    grid: Grid
+    start: Rows
+    end: Rows
+    n_faces: int
+    ends: tuple[float, float]
+    largest: float
+
+    @property
+    def no_margins(self) -> Margins:
+        """Margins of zero."""
+        return Margins(*np.zeros((3, len(self.grid.width))))
+
+    def can_rest(self) -> tuple[bool, bool]:
+        """Tell whether tensions within their limits hold the effector at the start, and at the end."""
+        first, last = ((rows.most[k] >= 0.0).all() for rows, k in ((self.start, 0), (self.end, -1)))
+        return bool(first), bool(last)
+
+    def with_margins(self, margins: Margins) -> "Discrete":
+        """The same with tighter half-planes and caps.
+
+        Returns:
+            the section.
+        """
+        nodes = margins.at_nodes()
+        shares = np.arange(self.start.most.shape[1]) < self.n_faces
+
+        def tighter(rows: Rows, places: slice) -> Rows:
+            lost = np.where(shares, nodes.tension[places, None], nodes.acceleration[places, None])
+            return rows._replace(most=rows.most - rows.size * lost, cap=rows.cap * (1.0 - nodes.speed[places]) ** 2)
+
+        first, last = tighter(self.start, slice(None, -1)), tighter(self.end, slice(1, None))
+        return dataclasses.replace(self, start=first, end=last)
+
+    def cap(self) -> np.ndarray:
+        """Largest x at the nodes, (n_cells + 1,), finite."""
+        both = np.append(self.start.cap, np.inf), np.insert(self.end.cap, 0, np.inf)
+        return np.minimum(np.minimum(*both), self.largest)
+
+    def fastest(self, bend: np.ndarray) -> Fastest:
+        """The fastest motion on the grid.
+
+        Args:
+            bend: (n_cells,) change of u within the cells, over their widths.
+
+        Returns:
+            the motion, of one path.
+        """
+        one = (self.start, self.end), self.grid.width, bend, self.cap()
+        cells = jax.tree.map(np.asarray, cells_of(*jax.tree.map(lambda leaf: leaf[..., None], one)))
+        return jax.tree.map(np.asarray, fastest(cells, *(np.array([x]) for x in self.ends)))
+
+    def node_rows(self) -> NodeRows:
+        """Half-planes at the nodes; where those of both sides differ, all of them.
+
+        Returns:
+            the half-planes.
+        """
+        sides = [np.concatenate([s, e[-1:]]).T for s, e in zip(self.start[:3], self.end[:3], strict=True)]
+        jump = np.abs(self.start.x[1:] - self.end.x[:-1]).max(initial=0.0)
+        if jump > SAME * np.abs(self.start.x).max():
+            before = [np.concatenate([s[:1], e]).T for s, e in zip(self.start[:3], self.end[:3], strict=True)]
+            sides = [np.concatenate(pair) for pair in zip(sides, before, strict=True)]
+        return NodeRows(*sides, cap=self.cap(), width=self.grid.width)
+
+    def dual_rows(self) -> SideRows:
+        """Half-planes of the dual problem.
+
+        Returns:
+            the half-planes.
+        """
+        start, end = self.start, self.end
+        return SideRows(
+            u=np.concatenate([start.u, end.u[-1:]]).T,
+            before=np.concatenate([start.x[:1], end.x]).T,
+            after=np.concatenate([start.x, end.x[-1:]]).T,
+            most=np.concatenate([start.most, end.most[-1:]]).T,
+            cap=np.minimum(0.5 * (start.cap + end.cap), self.largest),
+            width=self.grid.width,
+        )
+
+
+def discrete(problem: Problem, section: Section, settings: Settings) -> Discrete:
+    """A section on its grid.
+
+    Args:
+        problem: robot and limits.
+        settings: of the section.
+
+    Returns:
+        the section, without margins.
+    """
+    robot, curve, most = problem.robot, section.curve, getattr(problem.limits, "speed_max", None)
+    if most is not None:
+        section = section._replace(speed=np.minimum(section.speed, most))
+    speeds = settings.start_speed, settings.end_speed
+    grid = grid_of(section, settings.grid, (speeds[0] == 0.0, speeds[1] == 0.0))
+    start, end = side_rows(robot, problem.limits, curve, grid)
+    points, knots = np.asarray(curve.position), np.asarray(curve.knots)
+    steep = [
+        (points.shape[1] - 1) * float(np.linalg.norm(step)) / width
+        for step, width in (
+            (points[0, 1] - points[0, 0], knots[1] - knots[0]),
+            (points[-1, -1] - points[-1, -2], knots[-1] - knots[-2]),
+        )
+    ]
+    ends = tuple((speed / slope) ** 2 if speed else 0.0 for speed, slope in zip(speeds, steep, strict=True))
+    largest = FASTER**2 * float(robot.gravity) * float(knots[-1])
+    return Discrete(section, grid, start, end, face_count(robot), (ends[0], ends[1]), largest)

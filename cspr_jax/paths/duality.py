@@ -1,0 +1,210 @@
+"""Rigorous lower bound of the least time along a path, by weak duality.
+
+A motion along a path obeys d(a s')/dt + r in K(s): a(s) is the momentum of a unit path speed, r the weight, K the
+wrenches that the cables can give. With u = s'' and x = s'^2, that is a u + a' x + r in K. For any continuous y(s), with
+S(y, s) the largest product of y with a wrench of K,
+
+    0 <= integral of S - y . (a u + a' x + r) = integral of S - y . r - (y . a' - y' . a) x / 2, less [y . a x / 2],
+
+by parts, since u is half of the derivative of x along the path. The time is the integral of 1 / sqrt x, and 1 / sqrt x
++ g x is at least 1.5 (2 g)^(1/3), whatever x, so that
+
+    T >= [y . a x / 2] + integral of 1.5 (y . a' - y' . a)^(1/3) + y . r - S(y, s).
+
+The limits of cables' accelerations (a = l') and of the Cartesian one (a = p') are of the same form; a limit of speed
+adds a multiplier times what it leaves. The multipliers of `paths.smooth` make the bound close; any others leave it
+true. Over each cell all functions lie in bands around lines (`arithmetic.affine_bounds`).
+"""
+
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.arithmetic.affine_bounds import ROUNDING, AffineBounds, constant, dot, norm_squared, squared, turned
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.paths.discrete import Discrete
+from cspr_jax.paths.nodes import places_on, state_at
+from cspr_jax.paths.rows import unit_wrenches
+from cspr_jax.robots.cables import AnyRobot, cable_motion, wrench_units
+from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.state_bounds import StateBounds, balance_bounds, cable_bounds
+from cspr_jax.robots.wrench_sets import tension_range
+from cspr_jax.runtime import compile_options
+
+BATCH = 64
+# Part of the sums by which the bound is lowered: more than the rounding of what is summed here.
+SAFE = 1e-10
+# Times that multipliers are smoothed, and nodes on each side of a cell in which they are.
+REPAIRS, REACH = 12, 3
+
+
+class Multipliers(NamedTuple):
+    """Multipliers at nodes, linear between them, a metre of path.
+
+    Fields:
+        wrench: (n_nodes, dof) of the wrench balance, over the units of wrenches, s / N.
+        bend: (n_nodes, n_cables) of the cables' accelerations, s^3 / m; zeros without a limit.
+        turn: (n_nodes, 3) of the Cartesian acceleration, likewise.
+    """
+
+    wrench: np.ndarray
+    bend: np.ndarray
+    turn: np.ndarray
+
+
+class Rates(NamedTuple):
+    """Multipliers of squared speeds, one a cell, a metre of path; none is negative.
+
+    Fields:
+        cable: (n_cells, n_cables) s^3 / m^2.
+        mass_centre: (n_cells,) likewise; of no account where its speed is not limited.
+    """
+
+    cable: np.ndarray
+    mass_centre: np.ndarray
+
+
+class _Cell(NamedTuple):
+    # What belongs to one cell: multipliers at both ends, its width, and its largest Cartesian speed.
+    start: Multipliers
+    end: Multipliers
+    rates: Rates
+    width: Array
+    most: Array
+
+
+def lower_bound(robot: AnyRobot, limits: Limits, path: Discrete, multipliers: Multipliers, rates: Rates) -> float:
+    """Lower bound of the time of all motions along a section.
+
+    Args:
+        robot: centred, z down.
+        path: the section on its grid.
+        multipliers: at its nodes.
+        rates: of its cells.
+
+    Returns:
+        the bound, s; -inf where nothing is known.
+    """
+    nodes, curve, speed = path.grid.nodes, path.section.curve, path.grid.speed
+    states = curve.bounds(nodes[:-1], nodes[1:])
+    width = np.diff(nodes)
+    for _ in range(REPAIRS):
+        start, end = (Multipliers(*(leaf[side] for leaf in multipliers)) for side in (slice(None, -1), slice(1, None)))
+        cells = _Cell(start, end, rates, width, speed)
+        gains, losses = in_batches(partial(_kernel, robot, limits), (states, cells), size=BATCH)
+        total = float(np.sum(gains) - np.sum(losses))
+        if np.isfinite(total):
+            total += _boundary(robot, path, multipliers)
+            return total - SAFE * float(np.sum(np.abs(gains)) + np.sum(np.abs(losses)))
+        multipliers = _smoothed(multipliers, ~np.isfinite(gains - losses))
+    return -np.inf
+
+
+def _boundary(robot: AnyRobot, path: Discrete, multipliers: Multipliers) -> float:
+    # [y . a x / 2], of all that is of the form of the wrench balance.
+    total = 0.0
+    for place, sign, x in ((0, -1.0, path.ends[0]), (-1, 1.0, path.ends[1])):
+        if x > 0.0:
+            node = places_on(path.section.curve, path.grid.nodes[[place]], ahead=place == 0)
+            state = state_at(jax.tree.map(lambda leaf: leaf[0], node))
+            along = multipliers.wrench[place] @ unit_wrenches(robot, state).momentum
+            along += multipliers.bend[place] @ cable_motion(robot, state)[1] + multipliers.turn[place] @ state.velocity
+            total += 0.5 * sign * x * float(along)
+    return total
+
+
+def _smoothed(multipliers: Multipliers, unknown: np.ndarray) -> Multipliers:
+    # Where multipliers change so fast that the bound fails, means of neighbours.
+    near = np.convolve(unknown, np.ones(2 * REACH), mode="full")[REACH - 1 : len(unknown) + REACH] > 0.0
+    near[[0, -1]] = False
+
+    def one(leaf: np.ndarray) -> np.ndarray:
+        means = leaf.copy()
+        means[1:-1] = 0.25 * (leaf[:-2] + leaf[2:]) + 0.5 * leaf[1:-1]
+        return np.where(near.reshape(-1, *[1] * (leaf.ndim - 1)), means, leaf)
+
+    return Multipliers(*map(one, multipliers))
+
+
+def _line(start: Array, end: Array) -> AffineBounds:
+    return AffineBounds(0.5 * (start + end), 0.5 * (end - start), jnp.zeros_like(start))
+
+
+def _steep(start: Array, end: Array, width: Array) -> AffineBounds:
+    # The derivative of the line between both.
+    change = (end - start) / width
+    return AffineBounds(change, jnp.zeros_like(change), ROUNDING * jnp.abs(change))
+
+
+def _ends(bounds: AffineBounds, sign: float) -> tuple[Array, Array]:
+    # Values at both ends of the line below (-1), or above (1), a function.
+    side = bounds.middle + sign * bounds.radius
+    return side - bounds.slope, side + bounds.slope
+
+
+def _along(start: Array, end: Array, width: Array, momentum: AffineBounds, bend: AffineBounds) -> AffineBounds:
+    # y . a' - y' . a.
+    return dot(_line(start, end), bend) - dot(_steep(start, end, width), momentum)
+
+
+@partial(jax.jit, compiler_options=compile_options.least())
+def _kernel(robot: AnyRobot, limits: Limits, blocks: tuple[StateBounds, _Cell]) -> tuple[Array, Array]:
+    # What each cell adds to the bound, and what it takes from it.
+    def one(state: StateBounds, cell: _Cell) -> tuple[Array, Array]:
+        twice, lost = _of_wrenches(robot, limits, state, cell)
+        cables = cable_bounds(robot, state)
+        if limits.cable_acceleration_max is not None:
+            ends = cell.start.bend, cell.end.bend
+            twice = twice + _along(*ends, cell.width, cables.rate, cables.acceleration)
+            lost += jnp.sum(limits.cable_acceleration_max * 0.5 * (jnp.abs(ends[0]) + jnp.abs(ends[1])))
+        if getattr(limits, "acceleration_max", None) is not None:
+            ends = cell.start.turn, cell.end.turn
+            twice = twice + _along(*ends, cell.width, state.velocity, state.acceleration)
+            lost += limits.acceleration_max * 0.5 * (jnp.linalg.norm(ends[0]) + jnp.linalg.norm(ends[1]))
+        if limits.cable_speed_max is not None:
+            twice = twice + (2.0 * cell.rates.cable * squared(cables.rate)).total()
+            lost += jnp.sum(jnp.square(limits.cable_speed_max) * cell.rates.cable)
+        rate = jnp.where(jnp.isfinite(cell.most), cell.rates.mass_centre, 0.0)
+        twice = twice + 2.0 * rate * norm_squared(state.velocity)
+        lost += rate * jnp.square(jnp.where(jnp.isfinite(cell.most), cell.most, 0.0))
+        # A concave function of a line is above the line between its values at both ends.
+        low, high = _ends(twice, -1.0)
+        values = [1.5 * jnp.where(side >= 0.0, jnp.cbrt(side), -jnp.inf) for side in (low, high)]
+        return cell.width * 0.5 * (values[0] + values[1]), cell.width * lost
+
+    return jax.vmap(one)(*blocks)
+
+
+def _of_wrenches(robot: AnyRobot, limits: Limits, state: StateBounds, cell: _Cell) -> tuple[AffineBounds, Array]:
+    # y . a' - y' . a of the wrench balance, and the mean of S - y . r over the cell.
+    unit = 1.0 / wrench_units(robot)
+    still = state.velocity * 0.0
+    rest, pushed = (
+        state._replace(velocity=still, acceleration=still),
+        state._replace(velocity=still, acceleration=state.velocity),
+    )
+    if state.rotation is not None:
+        rest = rest._replace(angular_velocity=still, angular_acceleration=still)
+        pushed = pushed._replace(angular_velocity=still, angular_acceleration=state.angular_velocity)
+    cables = cable_bounds(robot, rest)
+    matrix, weight = balance_bounds(robot, rest, cables)
+    momentum = balance_bounds(robot, pushed, cables)[1] - weight
+    bend = balance_bounds(robot, state, cables)[1] - weight
+    matrix, weight, momentum, bend = matrix * unit[:, None], weight * unit, momentum * unit, bend * unit
+    ends = cell.start.wrench, cell.end.wrench
+    line = _line(*ends)
+    pulls = turned(matrix.each(jnp.transpose), line)
+    low, high = tension_range(robot, limits)
+
+    def most(value: Array) -> Array:
+        return jnp.where(value > 0.0, value * high, value * low)
+
+    # A convex function of a line is below the line between its values at both ends.
+    sides = [jnp.maximum(most(up), most(down)) for up, down in zip(_ends(pulls, 1.0), _ends(pulls, -1.0), strict=True)]
+    support = 0.5 * jnp.sum(sides[0] + sides[1])
+    held = dot(line, weight)
+    return _along(*ends, cell.width, momentum, bend), support - (held.middle - held.radius)

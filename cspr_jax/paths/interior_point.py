@@ -1,0 +1,129 @@
+"""Interior-point method for a convex objective with many linear constraints, whose matrix its problem solves itself.
+
+A primal-dual method that needs no feasible start: slacks and pressures (multipliers) of all constraints stay positive,
+and the products of both fall together (Mehrotra 1992).
+"""
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+# Steps at most; part of the objective by which the optimum may be missed; part of the way to a bound that a step goes;
+# part of the mean product of slacks and pressures at which each step aims.
+STEPS, GAP, SHARE, AIM = 80, 1e-7, 0.99, 0.1
+# What constraints and equations may be missed by, in their own scales.
+MISSED, LEVEL = 1e-9, 1e-6
+
+
+class Constrained(Protocol):
+    """Problem: minimise an objective of unknowns z, of any shape, where no slack is negative."""
+
+    def value(self, z: np.ndarray) -> float:
+        """The objective.
+
+        Args:
+            z: unknowns.
+        """
+
+    def slacks(self, z: np.ndarray) -> np.ndarray:
+        """Slacks of the constraints, (m,).
+
+        Args:
+            z: unknowns.
+        """
+
+    def residual(self, z: np.ndarray, pressures: np.ndarray) -> np.ndarray:
+        """Gradient of the Lagrangian, and the residuals of equations, as `z`.
+
+        Args:
+            z: unknowns.
+            pressures: (m,).
+        """
+
+    def pushed(self, z: np.ndarray, pressures: np.ndarray) -> np.ndarray:
+        """Gradient of minus the slacks times pressures, as `z`.
+
+        Args:
+            z: unknowns.
+            pressures: (m,).
+        """
+
+    def change(self, z: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """Change of the slacks, to first order, (m,).
+
+        Args:
+            z: unknowns.
+            step: as `z`.
+        """
+
+    def solved(self, z: np.ndarray, weights: np.ndarray, right: np.ndarray) -> np.ndarray:
+        """Step that the Hessian, with weighted squares of the slacks' gradients, turns into a right-hand side.
+
+        Args:
+            z: unknowns.
+            weights: (m,).
+            right: as `z`.
+        """
+
+    def positive(self, z: np.ndarray) -> np.ndarray:
+        """Unknowns that must stay positive, (k,).
+
+        Args:
+            z: unknowns, or a step.
+        """
+
+
+class Optimum(NamedTuple):
+    """Result.
+
+    Fields:
+        z: unknowns.
+        pressures: (m,) multipliers of the constraints.
+        is_optimal: whether the method converged.
+    """
+
+    z: np.ndarray
+    pressures: np.ndarray
+    is_optimal: bool
+
+
+def _length(pairs: list[tuple[np.ndarray, np.ndarray]]) -> float:
+    # Longest step, up to 1, by which no value loses more than a share of itself.
+    shares = [1.0]
+    for value, change in pairs:
+        falling = change < 0.0
+        shares.append(SHARE * float(np.min(-value[falling] / change[falling], initial=np.inf)))
+    return min(shares)
+
+
+def interior_point(problem: Constrained, z: np.ndarray) -> Optimum:
+    """Minimise.
+
+    Args:
+        z: start; its slacks may be negative.
+
+    Returns:
+        the optimum; where there is none, what was reached.
+    """
+    slacks = problem.slacks(z)
+    slacks = np.maximum(slacks, 0.05)
+    pressures = 0.1 * problem.value(z) / len(slacks) / slacks
+    for _ in range(STEPS):
+        missed = slacks - problem.slacks(z)
+        residual = problem.residual(z, pressures)
+        complement = float(slacks @ pressures)
+        is_met = np.abs(missed).max() < MISSED and np.abs(residual).max() < LEVEL
+        if is_met and complement < GAP * problem.value(z):
+            return Optimum(z, pressures, True)
+        target, weights = AIM * complement / len(slacks), pressures / slacks
+        push = target / slacks - pressures + weights * missed
+        step = problem.solved(z, weights, -residual - problem.pushed(z, push))
+        slack_step = problem.change(z, step) - missed
+        pressure_step = target / slacks - pressures - weights * slack_step
+        primal = _length([(slacks, slack_step), (problem.positive(z), problem.positive(step))])
+        dual = _length([(pressures, pressure_step)])
+        if not np.isfinite(primal * dual) or not np.isfinite(step).all():
+            break
+        z = z + primal * step
+        slacks, pressures = slacks + primal * slack_step, pressures + dual * pressure_step
+    return Optimum(z, pressures, False)

@@ -1,0 +1,199 @@
+"""Least time along one section of a path: the fastest motion, proved, and a lower bound of all motions' time."""
+
+import dataclasses
+from typing import NamedTuple, cast
+
+import numpy as np
+
+from cspr_jax.curves.spline import Spline
+from cspr_jax.motions.problem import Problem
+from cspr_jax.paths.bound import path_bound
+from cspr_jax.paths.controllable import Fastest, smallest_of_slopes
+from cspr_jax.paths.discrete import Discrete, discrete
+from cspr_jax.paths.nodes import derivatives, places_on
+from cspr_jax.paths.section import Section, Settings
+from cspr_jax.paths.smooth import Ends, smooth
+from cspr_jax.paths.tightening import cell_slacks
+from cspr_jax.paths.timed import Run, cell_times, distance_from_path, timed
+from cspr_jax.robots.clearance import Scene
+
+# Rounds of proof and tightening; how often ramps are shortened by half where none of their length exist.
+ROUNDS, SHORTER = 5, 4
+
+
+class PhasePlane(NamedTuple):
+    """Path speeds of a section, (n_nodes,) each, m/s.
+
+    Fields:
+        coordinate: s, m.
+        low: smallest path speed from which the end can be reached; NaN where there is none.
+        high: largest such path speed.
+        cap: largest path speed that limits of speeds allow.
+        speed: of the motion; NaN without one.
+    """
+
+    coordinate: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    cap: np.ndarray
+    speed: np.ndarray
+
+
+class NoMotion(NamedTuple):
+    """Why a section cannot be run along.
+
+    Fields:
+        coordinate: s of the place at which it fails, m.
+        position: (3,) the place, in the axes of the kernels, m.
+        rows: numbers of the two half-planes that leave no path speed there; () where the speed at an end is refused.
+        end: "start" or "end" where the speed there is not possible, else "".
+    """
+
+    coordinate: float
+    position: np.ndarray
+    rows: tuple[int, ...]
+    end: str
+
+
+@dataclasses.dataclass(frozen=True)
+class LeastTime:
+    """The fastest motion along a section.
+
+    Fields:
+        motion: over time; its knots are those of the grid; None if there is none.
+        coordinate: (n_nodes,) s at these knots, m.
+        duration: s; NaN if there is none.
+        lower_bound: rigorous lower bound of the time of any motion along the section, s; NaN where none is known.
+        jumping: duration of the fastest motion without ramps on the same grid, before margins, s.
+        ramp_time: of the motion, s; 0 where its accelerations jump.
+        deviation: largest distance of the motion from the path at samples, m.
+        binding: what binds: name of a flag, cable from 0 on or None, share of the duration.
+        plane: path speeds.
+        failure: why there is no motion, or None.
+    """
+
+    motion: Spline | None
+    coordinate: np.ndarray
+    duration: float
+    lower_bound: float
+    jumping: float
+    ramp_time: float
+    deviation: float
+    binding: tuple[tuple[str, int | None, float], ...]
+    plane: PhasePlane
+    failure: NoMotion | None
+
+
+def least_time_motion(problem: Problem, scene: Scene | None, section: Section, settings: Settings) -> LeastTime:
+    """Find the fastest motion along a section.
+
+    Args:
+        scene: bodies that can meet; they are judged with the motion, and do not change it.
+        settings: of this section.
+
+    Returns:
+        the motion; where tightening ends before all is proved, the last one.
+    """
+    path = discrete(problem, section, settings)
+    first = path.fastest(np.zeros_like(path.grid.width))
+    if first.empty[0] >= 0 or not first.is_start[0]:
+        return _without_motion(path, first)
+    jumping, bend = _bent(path, first)
+    bound = path_bound(problem, path, jumping.x)
+    run, jerk = _ramped(path, jumping, settings.ramp_time)
+    margins, weight = path.no_margins, float(problem.robot.mass * problem.robot.gravity)
+    for _ in range(ROUNDS):
+        motion = timed(section, path.grid, run)
+        slacks = cell_slacks(problem, motion, scene)
+        if slacks.is_met:
+            break
+        margins = slacks.grown(margins, weight)
+        tighter = path.with_margins(margins)
+        slower = _smooth(tighter, run, jerk) if np.isfinite(jerk) else _jumping(tighter, bend)
+        if slower is None:
+            break
+        run = slower
+    times = np.diff(np.asarray(motion.knots))
+    speed = np.sqrt(run.x)
+    return LeastTime(
+        motion=motion,
+        coordinate=path.grid.nodes,
+        duration=float(times.sum()),
+        lower_bound=bound if np.isfinite(bound) else np.nan,
+        jumping=float(cell_times(jumping, path.grid.width).sum()),
+        ramp_time=float(np.ptp(np.concatenate([jumping.before, jumping.after])) / jerk),
+        deviation=distance_from_path(section, path.grid, run, motion),
+        binding=slacks.binding(times),
+        plane=_plane(path, first, speed),
+        failure=None,
+    )
+
+
+def _plane(path: Discrete, solution: Fastest, speed: np.ndarray) -> PhasePlane:
+    with np.errstate(invalid="ignore"):  # of the square roots of unknown speeds
+        low, high = np.sqrt(solution.low[:, 0]), np.sqrt(solution.high[:, 0])
+    cap = path.cap()
+    return PhasePlane(path.grid.nodes, low, high, np.where(cap < path.largest, np.sqrt(cap), np.inf), speed)
+
+
+def _without_motion(path: Discrete, solution: Fastest) -> LeastTime:
+    # Tell the place that no speed passes, or the end that is not reached.
+    cell, n_cells = int(solution.empty[0]), len(path.grid.width)
+    end = "end" if cell == n_cells else "start" if cell < 0 else ""
+    node = max(cell, 0)
+    n_rows = path.start.u.shape[1]
+    # Half-planes of both ends of a cell follow each other; what is beyond them leads into the next set.
+    rows = () if end else tuple(int(row) % n_rows for row in solution.meeting[:, 0] if row < 2 * n_rows)
+    place = np.asarray(
+        derivatives(places_on(path.section.curve, path.grid.nodes[[node]], ahead=node < n_cells))[0][0][0]
+    )
+    unknown = np.full(n_cells + 1, np.nan)
+    failure = NoMotion(float(path.grid.nodes[node]), place, rows, end)
+    numbers = dict.fromkeys(("duration", "lower_bound", "jumping", "ramp_time", "deviation"), np.nan)
+    plane = _plane(path, solution, unknown)
+    return LeastTime(motion=None, coordinate=path.grid.nodes, binding=(), plane=plane, failure=failure, **numbers)
+
+
+def _run_of(solution: Fastest, path: Discrete, bend: np.ndarray) -> Run | None:
+    if solution.empty[0] >= 0 or not solution.is_start[0]:
+        return None
+    half = 0.5 * bend * path.grid.width
+    return Run(solution.x[:, 0], solution.u[:, 0] - half, solution.u[:, 0] + half)
+
+
+def _jumping(path: Discrete, bend: np.ndarray) -> Run | None:
+    return _run_of(path.fastest(bend), path, bend)
+
+
+def _bent(path: Discrete, solution: Fastest) -> tuple[Run, np.ndarray]:
+    # Let the path acceleration change within cells as it does from cell to cell, twice; the changes that it has then.
+    bend = np.zeros_like(path.grid.width)
+    run = _run_of(solution, path, bend)
+    for _ in range(2):
+        change = smallest_of_slopes(solution.u, path.grid.width[:, None])[:, 0]
+        following = path.fastest(change)
+        better = _run_of(following, path, change)
+        if better is None:
+            break
+        run, bend, solution = better, change, following
+    return cast(Run, run), bend
+
+
+def _ramped(path: Discrete, jumping: Run, ramp_time: float) -> tuple[Run, float]:
+    # The fastest motion with ramps, half as long where there is none, and the largest path jerk.
+    if ramp_time > 0.0:
+        rests = path.can_rest()
+        rests = rests[0] and path.ends[0] == 0.0, rests[1] and path.ends[1] == 0.0
+        for times in 0.5 ** np.arange(SHORTER) * ramp_time:
+            jerk = float(np.ptp(np.concatenate([jumping.before, jumping.after])) / times)
+            run = _smooth(path, jumping._replace(rests=rests), jerk)
+            if run is not None:
+                return run, jerk
+    return jumping, np.inf
+
+
+def _smooth(path: Discrete, start: Run, jerk: float) -> Run | None:
+    # The accelerations at nodes begin as means of those of both cells.
+    u = 0.5 * (np.append(start.before, start.after[-1]) + np.insert(start.after, 0, start.before[0]))
+    solution = smooth(path.node_rows(), Ends(path.ends, start.rests), (start.x, u), jerk)
+    return Run(solution.x, solution.u[:-1], solution.u[1:], start.rests) if solution.is_optimal else None

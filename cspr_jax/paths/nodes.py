@@ -1,0 +1,195 @@
+"""Nodes of a section of a path: between them the path acceleration is sought, and at both sides of them half-planes."""
+
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+from jax import Array
+
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.curves.spline import Spline, piece_state, piece_values
+from cspr_jax.paths.rows import Rows, path_rows
+from cspr_jax.paths.section import Section
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.state import State
+
+# Part of the nodes over which cells become wider, from an end at zero speed on; cells there that are narrower still.
+RAMP, SMALLER = 0.25, 5
+# Places that are computed together. Pieces are raised to one degree, so that all sections share what is compiled.
+BATCH, DEGREE = 64, 5
+# A node that is nearer to the end of a piece than this part of its width lies there.
+NEAR = 1e-9
+
+
+class Grid(NamedTuple):
+    """Nodes of one section.
+
+    Fields:
+        nodes: (n_cells + 1,) path coordinates, m; where accelerations or speed limits jump, and at marks, there is a node.
+        speed: (n_cells,) largest speed of the mass centre in each cell, m/s, inf for none.
+    """
+
+    nodes: np.ndarray
+    speed: np.ndarray
+
+    @property
+    def width(self) -> np.ndarray:
+        """Widths of the cells, (n_cells,), m."""
+        return np.diff(self.nodes)
+
+
+class Places(NamedTuple):
+    """Places on pieces of a section, (k, ...) each.
+
+    Fields:
+        position: (k, 6, 3) Bernstein coefficients of their pieces, m.
+        quaternion: (k, 6, 4) likewise; None for a point mass.
+        share: (k,) of the piece before the place.
+        width: (k,) of the pieces, m.
+        offset: (k, 3) as of `Spline`, or None.
+    """
+
+    position: np.ndarray
+    quaternion: np.ndarray | None
+    share: np.ndarray
+    width: np.ndarray
+    offset: np.ndarray | None
+
+
+def grid_of(section: Section, count: int, slow: tuple[bool, bool]) -> Grid:
+    """Nodes of a section: close together where it is slow, as instants of a motion that speeds up and slows down are.
+
+    Args:
+        section: NumPy leaves.
+        count: number of cells; more where two such places are closer than nodes.
+        slow: whether it begins, and whether it ends, at zero speed.
+
+    Returns:
+        the nodes.
+    """
+    knots = np.asarray(section.curve.knots)
+    nodes = knots[-1] * _shares(count, slow)
+    changes = knots[1:-1][np.diff(section.speed) != 0.0]
+    places: list[float] = np.unique(np.concatenate([section.curve.jumps(), changes, section.marks[1:-1]])).tolist()
+    for k, place in enumerate(places):
+        nearest = int(np.argmin(np.abs(nodes - place)))
+        if 0 < nearest < len(nodes) - 1 and nodes[nearest] not in places[:k]:
+            nodes[nearest] = place
+        else:
+            nodes = np.insert(nodes, np.searchsorted(nodes, place), place)
+    return Grid(nodes, section.speed[_pieces(knots, 0.5 * (nodes[1:] + nodes[:-1]))])
+
+
+def _pieces(knots: np.ndarray, places: np.ndarray) -> np.ndarray:
+    return np.clip(np.searchsorted(knots, places, side="right") - 1, 0, len(knots) - 2)
+
+
+def _shares(count: int, slow: tuple[bool, bool]) -> np.ndarray:
+    # The cells at slow ends are divided again, each a quarter as wide as the next.
+    more = SMALLER if count > 8 * SMALLER else 0
+    shares = _way(np.linspace(0.0, 1.0, count + 1 - more * sum(slow)), slow)
+    parts = 0.25 ** np.arange(more, 0, -1)
+    first, last = shares[1] * parts, 1.0 - (1.0 - shares[-2]) * parts[::-1]
+    inner = [first] * slow[0] + [shares[1:-1]] + [last] * slow[1]
+    return np.concatenate([shares[:1], *inner, shares[-1:]])
+
+
+def _way(time: np.ndarray, slow: tuple[bool, bool]) -> np.ndarray:
+    # Way of a motion that speeds up over a part of its time, and slows down over as long, where it has to.
+    before, after = (RAMP if end else 0.0 for end in slow)
+    way, left = time - 0.5 * before, 1.0 - time
+    total = 1.0 - 0.5 * before - 0.5 * after
+    if before:
+        way = np.where(time < before, 0.5 * time**2 / before, way)
+    if after:
+        way = np.where(left < after, total - 0.5 * left**2 / after, way)
+    return way / total
+
+
+def places_on(curve: Spline, coordinates: np.ndarray, *, ahead: bool) -> Places:
+    """Places on a curve.
+
+    Args:
+        curve: NumPy leaves.
+        coordinates: (k,) path coordinates, m.
+        ahead: whether a place between two pieces lies on the later one.
+
+    Returns:
+        the places.
+    """
+    knots = np.asarray(curve.knots)
+    near = NEAR * float(np.diff(knots).min())
+    piece = _pieces(knots, coordinates + (near if ahead else -near))
+    width = np.diff(knots)[piece]
+    share = np.clip((coordinates - knots[piece]) / width, 0.0, 1.0)
+    turning = None if curve.quaternion is None else _raised(np.asarray(curve.quaternion))[piece]
+    offset = None if curve.offset is None else np.broadcast_to(curve.offset, (len(piece), 3))
+    return Places(_raised(np.asarray(curve.position))[piece], turning, share, width, offset)
+
+
+def _raised(coefficients: np.ndarray) -> np.ndarray:
+    # The same pieces as polynomials of a higher degree.
+    while coefficients.shape[1] <= DEGREE:
+        degree = coefficients.shape[1]
+        shares = (np.arange(1, degree) / degree)[:, None]
+        inner = shares * coefficients[:, :-1] + (1.0 - shares) * coefficients[:, 1:]
+        coefficients = np.concatenate([coefficients[:, :1], inner, coefficients[:, -1:]], axis=1)
+    return coefficients
+
+
+def state_at(place: Places) -> State:
+    """State of a path that is run along at a unit path speed, at one place.
+
+    Returns:
+        the state.
+    """
+    return piece_state(*place)
+
+
+@jax.jit
+def _rows(robot: AnyRobot, limits: Limits, arguments: tuple[Places, Array]) -> Rows:
+    return jax.vmap(lambda place, speed: path_rows(robot, limits, state_at(place), speed))(*arguments)
+
+
+def side_rows(robot: AnyRobot, limits: Limits, curve: Spline, grid: Grid) -> tuple[Rows, Rows]:
+    """Half-planes at the starts and at the ends of the cells.
+
+    Args:
+        robot: centred, z down.
+        curve: NumPy leaves.
+        grid: of it.
+
+    Returns:
+        leaves (n_cells, ...) each.
+    """
+    places = [
+        places_on(curve, grid.nodes[:-1], ahead=True),
+        places_on(curve, grid.nodes[1:], ahead=False),
+    ]
+    both = jax.tree.map(lambda *x: np.concatenate(x), *places)
+    rows = in_batches(partial(_rows, robot, limits), (both, np.concatenate([grid.speed, grid.speed])), size=BATCH)
+    count = len(grid.speed)
+    start, end = (jax.tree.map(lambda leaf, s=s: leaf[s], rows) for s in (slice(count), slice(count, None)))
+    return start, end
+
+
+@jax.jit
+def _derivatives(places: Places) -> Any:
+    def one(place: Places):
+        rates = [piece_values(place.position, place.share, place.width)]
+        if place.quaternion is not None:
+            rates.append(piece_values(place.quaternion, place.share, place.width))
+        return rates
+
+    return jax.vmap(one)(places)
+
+
+def derivatives(places: Places) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Values and first two derivatives along the path.
+
+    Returns:
+        those of the position, and of the quaternion if there is one.
+    """
+    return in_batches(_derivatives, places, size=BATCH)

@@ -1,0 +1,166 @@
+"""Half-planes of path acceleration u = s'' and squared path speed x = s'^2 in which a motion along a path stays.
+
+At one place of a path the acceleration is p' u + p'' x, so that the wrench that the cables must supply is
+a u + b x + r, with the momentum a of a unit path speed, its derivative b along the path, and the weight r. Each face of
+the set of wrenches that the cables can give, each limit of a cable's acceleration, and each tangent of the largest
+Cartesian acceleration is one half-plane (Bobrow, Dubowsky and Gibson 1985; Verscheure et al. 2009; Pham and Pham 2018).
+"""
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.robots.cables import AnyRobot, cable_motion, wrench_units
+from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.state import State
+from cspr_jax.robots.wrench_sets import spanning, tension_range, wrench_faces
+
+# Tangents of the largest Cartesian acceleration: half of a polygon around the circle, in which p'' lies.
+TANGENTS = 24
+
+
+class Rows(NamedTuple):
+    """Half-planes u_share u + x_share x <= most of one place; of n_rows, without units where they bound tensions.
+
+    Fields:
+        u: (..., n_rows) share of the path acceleration.
+        x: (..., n_rows) share of the squared path speed.
+        most: (..., n_rows) bound.
+        size: (..., n_rows) what the bound loses for a margin of 1: N of tensions, all of its value of accelerations.
+        cap: (...) largest x that speeds allow, inf for none.
+    """
+
+    u: Array
+    x: Array
+    most: Array
+    size: Array
+    cap: Array
+
+
+def face_count(robot: AnyRobot) -> int:
+    """Number of the half-planes that bound tensions: the first ones.
+
+    Returns:
+        the number.
+    """
+    return 2 * len(spanning(robot.n_cables, robot.dof))
+
+
+class UnitWrenches(NamedTuple):
+    """Parts of the wrench that the cables must supply on a path, over the units of wrenches, (dof,) N each.
+
+    Fields:
+        matrix: (dof, n_cables) wrenches of unit tensions.
+        momentum: of a unit path speed.
+        bend: its derivative along the path.
+        rest: what holds the weight.
+    """
+
+    matrix: Array
+    momentum: Array
+    bend: Array
+    rest: Array
+
+
+def still(state: State, *, pushed: bool) -> State:
+    """State of a path that stands still, or sets off from there at a unit path acceleration.
+
+    Args:
+        state: of the path, run along at a unit path speed.
+        pushed: whether it sets off.
+
+    Returns:
+        the state.
+    """
+    none = jnp.zeros_like(state.velocity)
+    changes = {"velocity": none, "acceleration": state.velocity if pushed else none}
+    if state.rotation is not None:
+        changes |= {"angular_velocity": none, "angular_acceleration": state.angular_velocity if pushed else none}
+    return state._replace(**changes)
+
+
+def unit_wrenches(robot: AnyRobot, state: State) -> UnitWrenches:
+    """Parts of the wrench balance at one place.
+
+    Args:
+        robot: centred, z down.
+        state: of the path, run along at a unit path speed.
+
+    Returns:
+        the parts.
+    """
+    unit = wrench_units(robot)
+    rest = robot.inertial_wrench(still(state, pushed=False)) / unit
+    momentum = robot.inertial_wrench(still(state, pushed=True)) / unit - rest
+    bend = robot.inertial_wrench(state) / unit - rest
+    return UnitWrenches(robot.wrench_matrix(state) / unit[:, None], momentum, bend, rest)
+
+
+def path_rows(robot: AnyRobot, limits: Limits, state: State, speed: Array) -> Rows:
+    """Half-planes of one place.
+
+    Args:
+        robot: centred, z down.
+        state: of the path, run along at a unit path speed.
+        speed: () largest speed of the mass centre, m/s, inf for none.
+
+    Returns:
+        the half-planes: faces of the tensions, then accelerations of cables, then tangents.
+    """
+    parts = [_of_tensions(robot, limits, unit_wrenches(robot, state))]
+    cap = jnp.square(speed) / jnp.maximum(jnp.sum(state.velocity**2), _TINY)
+    _, rate, bend = cable_motion(robot, state)
+    if limits.cable_acceleration_max is not None:
+        most = jnp.broadcast_to(jnp.asarray(limits.cable_acceleration_max), rate.shape)
+        both = (jnp.concatenate([side, -side]) for side in (rate, bend))
+        parts.append((*both, *[jnp.concatenate([most, most])] * 2))
+    if limits.cable_speed_max is not None:
+        cap = jnp.minimum(cap, jnp.min(jnp.square(limits.cable_speed_max) / jnp.maximum(rate**2, _TINY)))
+    if getattr(limits, "acceleration_max", None) is not None:
+        parts.append(_tangents(state.velocity, state.acceleration, limits.acceleration_max))
+    return Rows(*(jnp.concatenate(column) for column in zip(*parts, strict=True)), cap)
+
+
+# Squared sizes that are taken to be no smaller, so that quotients stay finite.
+_TINY = 1e-30
+
+
+def _of_tensions(robot: AnyRobot, limits: Limits, wrenches: UnitWrenches) -> tuple[Array, ...]:
+    # One half-plane a face, over the weight.
+    low, high = tension_range(robot, limits)
+    faces = wrench_faces(wrenches.matrix, low, high)
+    weight = robot.mass * robot.gravity
+    normals, bounds = faces.normals / weight, jnp.isfinite(faces.offsets)
+    most = normals @ wrenches.rest - jnp.where(bounds, faces.offsets, 0.0) / weight
+    size = jnp.sum(jnp.abs(normals @ wrenches.matrix), axis=1)
+    return (
+        -(normals @ wrenches.momentum),
+        -(normals @ wrenches.bend),
+        jnp.where(bounds, most, 1.0),
+        jnp.where(bounds, size, 0.0),
+    )
+
+
+def tangent_directions(velocity: Array, acceleration: Array) -> Array:
+    """Directions in which the Cartesian acceleration is bounded, in the plane of p' and p''.
+
+    Args:
+        velocity: (3,) p'.
+        acceleration: (3,) p'', to one side of which all of them point.
+
+    Returns:
+        (n_tangents, 3) unit vectors.
+    """
+    along = velocity / jnp.sqrt(jnp.maximum(jnp.sum(velocity**2), _TINY))
+    bend = acceleration - jnp.dot(acceleration, along) * along
+    across = bend / jnp.sqrt(jnp.maximum(jnp.sum(bend**2), _TINY))
+    angles = np.linspace(0.0, np.pi, TANGENTS + 1)
+    return np.cos(angles)[:, None] * along + np.sin(angles)[:, None] * across
+
+
+def _tangents(velocity: Array, acceleration: Array, most: Array) -> tuple[Array, ...]:
+    directions = tangent_directions(velocity, acceleration)
+    bounds = most * jnp.ones(TANGENTS + 1)
+    return directions @ velocity, directions @ acceleration, bounds, bounds

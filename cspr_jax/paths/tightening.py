@@ -1,0 +1,107 @@
+"""What a motion along a path misses of its limits between the nodes, by proof, and what binds it."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.curves.spline import Spline
+from cspr_jax.motions.block_slacks import block_slacks
+from cspr_jax.motions.criteria import Criterion, criteria
+from cspr_jax.motions.problem import Problem
+from cspr_jax.paths.discrete import Margins
+from cspr_jax.robots.clearance import Scene
+from cspr_jax.schema.verdicts import Verdict
+
+TENSIONS = Verdict.SLACK_CABLE | Verdict.OVER_TENSION | Verdict.WRENCH_INFEASIBLE
+# Slack, over its scale, that is left where a limit is met; by what more than is missed margins grow; below which a
+# criterion binds.
+LEFT, MORE, BINDING = 1e-7, 1.02, 0.01
+# Times that a cell is halved, and by how much of what is missed its bounds may be apart.
+HALVINGS, LOOSE = 3, 0.5
+# Criteria that faster or slower motion changes, by their units.
+SPEEDS, ACCELERATIONS = "m/s", "m/s^2"
+
+
+class CellSlacks(NamedTuple):
+    """Bounds of the slacks of criteria over the cells of a motion, over their scales.
+
+    Fields:
+        rows: criteria of tensions, speeds and accelerations.
+        low: (n_cells, n_rows) lower bounds; of tensions over the weight, of others over what is allowed.
+        high: (n_cells, n_rows) upper bounds.
+    """
+
+    rows: list[Criterion]
+    low: np.ndarray
+    high: np.ndarray
+
+    @property
+    def is_met(self) -> bool:
+        """Tell whether all criteria are met in all cells."""
+        return bool((self.low > 0.0).all())
+
+    def grown(self, margins: Margins, weight: float) -> Margins:
+        """Margins with which what is missed will be met.
+
+        Args:
+            margins: with which the motion was sought.
+            weight: N.
+
+        Returns:
+            the margins.
+        """
+
+        def lacking(chosen: list[bool]) -> np.ndarray:
+            return MORE * np.maximum(LEFT - self.low[:, chosen].min(1, initial=np.inf), 0.0)
+
+        tension = weight * lacking([bool(row.flag & TENSIONS) for row in self.rows])
+        others = (lacking([row.unit == unit for row in self.rows]) for unit in (ACCELERATIONS, SPEEDS))
+        return Margins(*(old + more for old, more in zip(margins, (tension, *others), strict=True)))
+
+    def binding(self, times: np.ndarray) -> tuple[tuple[str, int | None, float], ...]:
+        """What binds, and for which share of the time.
+
+        Args:
+            times: (n_cells,) durations of the cells, s.
+
+        Returns:
+            names of flags, cables from 0 on or None, and shares, the largest first.
+        """
+        nearest = self.high.argmin(1)
+        binds = self.high[np.arange(len(nearest)), nearest] < BINDING
+        shares = np.bincount(nearest[binds], times[binds], len(self.rows)) / times.sum()
+        order = [k for k in np.argsort(-shares, kind="stable").tolist() if shares[k] > 0.0]
+        rows = [self.rows[k] for k in order]
+        names = [(row.flag.text, row.cables[0] if row.cables else None) for row in rows]
+        return tuple((*name, float(shares[k])) for name, k in zip(names, order, strict=True))
+
+
+def cell_slacks(problem: Problem, motion: Spline, scene: Scene | None = None) -> CellSlacks:
+    """Bounds of the slacks that depend on how fast a motion is, over each of its pieces.
+
+    Args:
+        scene: as for `motions.proved_answers.proved_answers`.
+
+    Returns:
+        the bounds.
+    """
+    knots, rows = np.asarray(motion.knots), criteria(problem.robot, problem.limits, scene)
+    weight = float(problem.robot.mass * problem.robot.gravity)
+    chosen = [k for k, row in enumerate(rows) if row.flag & TENSIONS or row.unit in (SPEEDS, ACCELERATIONS)]
+    scales = np.array([weight if rows[k].flag & TENSIONS else rows[k].allowed for k in chosen])
+    cell, start, end = np.arange(len(knots) - 1), knots[:-1], knots[1:]
+    low = np.full((len(cell), len(chosen)), np.inf)
+    high = low.copy()
+    for level in range(HALVINGS + 1):
+        slacks = block_slacks(problem.robot, problem.limits, motion.bounds, start, end, scene)
+        below, above = slacks.low[:, chosen] / scales, slacks.high[:, chosen] / scales
+        np.minimum.at(high, cell, above)
+        # A block says how much is missed where the lower bound is about as close as the upper one.
+        is_loose = ((below < 0.0) & (above - below > LOOSE * np.maximum(-above, LEFT))).any(1) & (level < HALVINGS)
+        np.minimum.at(low, cell[~is_loose], below[~is_loose])
+        if not is_loose.any():
+            break
+        cell, middle = np.repeat(cell[is_loose], 2), 0.5 * (start + end)[is_loose]
+        start = np.stack([start[is_loose], middle], axis=1).ravel()
+        end = np.stack([middle, end[is_loose]], axis=1).ravel()
+    return CellSlacks([rows[k] for k in chosen], low, high)
