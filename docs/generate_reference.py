@@ -8,7 +8,8 @@ from pydantic import BaseModel
 from cspr_jax.config.launch import LaunchSearch
 from cspr_jax.config.limits import LimitTable
 from cspr_jax.config.obstacles import ObstacleTable
-from cspr_jax.config.plan import DepthRule, PlanFile, Pose
+from cspr_jax.config.plan import DepthRule, PlanFile
+from cspr_jax.config.pose import Pose
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import Axes, AxisRange, From, Orientations, RunTable, SweepFile, SweepTrajectory
 from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude

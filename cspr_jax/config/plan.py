@@ -8,15 +8,16 @@ from pydantic import Discriminator, Field, PrivateAttr, Tag, model_validator
 
 from cspr_jax.config.ellipse import WHOLE, EllipseTable
 from cspr_jax.config.kinds import refuse_other_kinds
-from cspr_jax.config.launch import LaunchTable, Seconds
+from cspr_jax.config.launch import LaunchTable
 from cspr_jax.config.limits import LimitTable, Point, Positive
 from cspr_jax.config.obstacles import SurroundingsKeys
+from cspr_jax.config.path import PathTable
+from cspr_jax.config.pose import Pose, Turns
 from cspr_jax.config.reading import LARGEST_FILE, Table, checked, parse_toml
-from cspr_jax.config.trajectory import BetaHat, FamilyName, Quaternion, TiltTorsion, TrajectoryKeys
+from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.config.wording import fault, name_of
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.robots.tension_rule_table import CENTRED, TENSION_RULES
-from cspr_jax.schema.limits import LARGEST_MAX_ARCS
 
 
 class DepthRule(Table):
@@ -31,71 +32,6 @@ Depth = Annotated[
     Annotated[Positive, Tag("~number")] | Annotated[DepthRule, Tag("~choice")],
     Discriminator(lambda value: "~choice" if isinstance(value, dict | DepthRule) else "~number"),
 ]
-
-
-LARGEST_TIME = 1e9
-Vector = Annotated[list[Annotated[float, Field(ge=-1e9, le=1e9)]], Field(min_length=3, max_length=3)]
-Duration = Annotated[
-    Annotated[Seconds, Tag("~number")] | Annotated[Literal["least"], Tag("~least")],
-    Discriminator(lambda value: "~least" if isinstance(value, str) else "~number"),
-]
-
-Turns = Annotated[float, Field(ge=0.0, le=1e6)]
-
-
-class Pose(Table):
-    """One pose of the sequence."""
-
-    position: Point | None = Field(None, description="target [x, y, z], m; a rest pose may leave it out")
-    rest: bool = Field(False, description="true: at rest in P0, below the centroid of the spools")
-    tilt_torsion: TiltTorsion | None = Field(
-        None,
-        description="platform: orientation [phi, theta, sigma], Z_phi X_theta Z_(sigma - phi), rad; phi from the "
-        "direction of the target seen from the vertical through the centroid",
-    )
-    quaternion: Quaternion | None = Field(
-        None, description="platform: orientation [w, x, y, z], a unit quaternion, in place of tilt_torsion"
-    )
-    beta_hat: BetaHat | None = Field(
-        None,
-        description="platform: beta-hat at this pose, which fixes its angular acceleration, thesis (3.81); absent: "
-        "found by search",
-    )
-    arcs: Annotated[int, Field(ge=1, le=LARGEST_MAX_ARCS)] | None = Field(
-        None,
-        description="number of arcs of the segment that ends here; 2 n for n oscillations; absent: found by search",
-    )
-    duration: Duration | None = Field(
-        None, description='bezier: duration of the segment that ends here, s, or "least", the default'
-    )
-    family: FamilyName | None = Field(
-        None, description="family of the segment that ends here, in place of the plan's; not at the first pose"
-    )
-    time: Annotated[float, Field(ge=-LARGEST_TIME, le=LARGEST_TIME)] | None = Field(
-        None,
-        description="spline: instant of this pose, s; of a leg's first pose 0 where it is absent. Only differences "
-        "between poses count",
-    )
-    velocity: Vector | None = Field(
-        None,
-        description='spline: velocity at this pose, m/s; of inner poses with interpolation = "hermite" alone; absent: '
-        "as `ends` says",
-    )
-    acceleration: Vector | None = Field(None, description="spline: acceleration at this pose, m/s^2, likewise")
-    motion: str | None = Field(
-        None,
-        min_length=1,
-        description="spline: file of the motion that ends at this pose, in place of poses with times",
-    )
-    ellipse: EllipseTable | None = Field(
-        None,
-        description="ellipse: ellipse that is reached at this pose; absent, and not at rest: that of the pose before",
-    )
-    turns: Turns | None = Field(
-        None,
-        description="ellipse: turns on the ellipse of this pose once it is reached (default 0, where the pose before "
-        "has the same ellipse 1)",
-    )
 
 
 class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys):
@@ -159,12 +95,17 @@ class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys):
         "stand in the plan itself",
     )
     turns: Turns | None = Field(None, description="ellipse: turns on the ellipse of the plan (default 1)")
+    path: PathTable | None = Field(
+        None,
+        description="path: [path] with points, a file or an arc, in place of the poses; without, it says how the poses "
+        "are joined",
+    )
     launch: LaunchTable | None = Field(None, description="bezier, ellipse: [launch] of an object that is released")
     stretch: Annotated[float, Field(ge=1e-6, le=1e9)] | None = Field(
         None, description="spline: factor by which all durations grow (default 1)"
     )
     pose: Annotated[list[Pose], Field(min_length=2, max_length=10_000)] = Field(
-        description="the poses in their order, at least two [[pose]] tables; absent with `motion` or `ellipse`"
+        description="the poses in their order, at least two [[pose]] tables; absent with `motion`, `ellipse` or `path`"
     )
 
     # Samples and splines by the names of `motion`, in place of files.
@@ -216,7 +157,23 @@ class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys):
         # The first pose of a leg that begins with a file lies where the file begins.
         starts = [i - 1 for i in ends if i == 1 or self.family_of(i - 2) != self.family_of(i - 1)]
         turning = [i for i, pose in enumerate(self.pose) if not pose.rest and self._is_on_ellipse(i)]
-        return tuple(sorted({*launched, *ends, *starts, *turning}))
+        return tuple(sorted({*launched, *ends, *starts, *turning, *self._ends_of_paths()}))
+
+    def _ends_of_paths(self) -> list[int]:
+        # Poses that a path decides: where it ends, and where the first one of a leg begins.
+        ends = []
+        for i, path in ((i, pose.path) for i, pose in enumerate(self.pose) if pose.path is not None):
+            is_first = i == 1 or (i > 1 and self.family_of(i - 2) != "path")
+            start = self.pose[i - 1]
+            has_start = path.has_start or self.is_one_path
+            ends += [i] * (path.has_end or self.is_one_path)
+            ends += [i - 1] * (is_first and has_start and start.position is None and not start.rest)
+        return ends
+
+    @property
+    def is_one_path(self) -> bool:
+        """Tell whether the plan is one path, which has places of its own, in place of poses."""
+        return self.path is not None and self.path.is_whole
 
     def _is_on_ellipse(self, i: int) -> bool:
         pose = self.pose[i]
@@ -268,6 +225,33 @@ class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys):
             raise fault("ellipse", "{...}", "absent beside [[pose]] tables, which have ellipses of their own")
         pose = [Pose(ellipse=self.ellipse), Pose(turns=1.0 if self.turns is None else self.turns)]
         return self.model_copy(update={"pose": pose})
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_one_path(cls, data: Any) -> Any:
+        # A plan of one path is a plan of two poses, which the path joins.
+        if isinstance(data, dict) and isinstance(data.get("path"), dict) and "pose" not in data:
+            return data | {"pose": [{}, {}]}
+        return data
+
+    @model_validator(mode="after")
+    def _on_one_path(self) -> "PlanFile":
+        path = self.path
+        has_poses = any(pose.model_fields_set for pose in self.pose)
+        if path is None or (has_poses and not path.is_whole):
+            return self
+        if not path.is_whole:
+            raise fault("path.points", None, "the points of the path, or [[pose]] tables")
+        if has_poses:
+            key = next(key for key in ("points", "file", "centre") if getattr(path, key) is not None)
+            raise fault(
+                f"path.{key}", shown(getattr(path, key)), "absent beside [[pose]] tables, which have the places"
+            )
+        if path.points is not None and len(path.points) < 2:
+            raise fault("path.points", shown(path.points), "two points or more")
+        if path.centre is not None and path.start is None:
+            raise fault("path.start", None, "where the path begins, [x, y, z], m")
+        return self.model_copy(update={"pose": [Pose(), Pose(path=path)]})
 
     @model_validator(mode="after")
     def _first_family(self) -> "PlanFile":

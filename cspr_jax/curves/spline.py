@@ -1,6 +1,7 @@
 """Piecewise polynomial motion: what a table of samples or way-points and an interpolation are, in Bernstein form."""
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
 import jax
@@ -129,6 +130,25 @@ def part(spline: Spline, first: int, last: int) -> Spline:
     return dataclasses.replace(
         spline, knots=leaf(knots - knots[0]), position=spline.position[first:last], quaternion=turning
     )
+
+
+def chained(splines: Sequence[Spline]) -> Spline:
+    """Splines one behind another, as one motion.
+
+    Args:
+        splines: at least one, of one degree; NumPy leaves.
+
+    Returns:
+        the motion.
+    """
+    ends = np.concatenate([[0.0], np.cumsum([spline.knots[-1] for spline in splines])])
+    knots = [spline.knots[:-1] + start for spline, start in zip(splines, ends[:-1], strict=True)]
+    tables: dict[str, Any] = {
+        name: leaf(np.concatenate([getattr(spline, name) for spline in splines]))
+        for name in ("position", "quaternion")
+        if getattr(splines[0], name) is not None
+    }
+    return dataclasses.replace(splines[0], knots=leaf(np.append(np.concatenate(knots), ends[-1])), **tables)
 
 
 def piece_state(

@@ -14,7 +14,7 @@ from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.build.orientations import pose_quaternions
 from cspr_jax.build.scenes import scene_of
 from cspr_jax.config.ellipse import EllipseTable, Hertz
-from cspr_jax.config.plan import Pose
+from cspr_jax.config.pose import Pose
 from cspr_jax.ellipses import harmonics
 from cspr_jax.ellipses.frequencies import chosen_frequency
 from cspr_jax.ellipses.harmonics import Ellipse

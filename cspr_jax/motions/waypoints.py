@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from cspr_jax.arithmetic.frames import Frame
-from cspr_jax.config.plan import PlanFile, Pose
+from cspr_jax.config.plan import PlanFile
+from cspr_jax.config.pose import Pose
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.schema.families import FAMILIES

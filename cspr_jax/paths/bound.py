@@ -13,7 +13,7 @@ from cspr_jax.paths.discrete import Discrete
 from cspr_jax.paths.duality import Multipliers, Rates, lower_bound
 from cspr_jax.paths.multipliers import dual_multipliers
 from cspr_jax.paths.nodes import BATCH, Places, places_on, state_at
-from cspr_jax.paths.rows import tangent_directions, unit_wrenches
+from cspr_jax.paths.rows import TINY, tangent_directions, unit_wrenches
 from cspr_jax.robots.cables import AnyRobot, cable_motion
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.wrench_sets import tension_range, wrench_faces
@@ -65,14 +65,16 @@ def _of_cells(robot: AnyRobot, limits: Limits, cells: tuple[Places, Array, Array
     # The cap of a cell is that of the cable, or of the mass centre, whose limit is nearest in its middle.
     def one(place: Places, most: Array, pressure: Array) -> tuple[Array, Array]:
         state = state_at(place)
-        none, square = jnp.zeros(robot.n_cables), jnp.sum(state.velocity**2)
+        none, square = jnp.zeros(robot.n_cables), jnp.maximum(jnp.sum(state.velocity**2), TINY)
         if limits.cable_speed_max is None:
             return none, pressure / square
         rates = jnp.square(cable_motion(robot, state)[1])
         shares = rates / jnp.square(limits.cable_speed_max)
         nearest = jnp.argmax(shares)
         is_cable = shares[nearest] >= square / jnp.square(most)
-        of_cables = jnp.where(is_cable & (jnp.arange(robot.n_cables) == nearest), pressure / rates, none)
+        of_cables = jnp.where(
+            is_cable & (jnp.arange(robot.n_cables) == nearest), pressure / jnp.maximum(rates, TINY), none
+        )
         return of_cables, jnp.where(is_cable, 0.0, pressure / square)
 
     return jax.vmap(one)(*cells)

@@ -91,7 +91,7 @@ def _sides(u: Array, x_share: Array, most: Array, x: Array) -> _Sides:
     return _Sides(at(upper, above), at(slope, above), at(lower, below), at(slope, below), size, above, below)
 
 
-def _edge(u: Array, x_share: Array, most: Array, x: Array, sign: float) -> tuple[Array, Array, _Sides]:
+def _edge(u: Array, x_share: Array, most: Array, x: Array, sign: float) -> tuple[Array, _Sides]:
     # Follow h from outside to where it is no longer negative; a NaN says that it is so nowhere.
     def evaluate(x: Array) -> tuple[Array, Array, Array, _Sides]:
         sides = _sides(u, x_share, most, x)
@@ -111,7 +111,7 @@ def _edge(u: Array, x_share: Array, most: Array, x: Array, sign: float) -> tuple
 
     x, is_outside, _ = lax.while_loop(is_open, follow, (x, jnp.isfinite(x), 0))
     sides = evaluate(x)[3]
-    return jnp.where(is_outside, jnp.nan, x), x, sides
+    return jnp.where(is_outside, jnp.nan, x), sides
 
 
 def _flat_range(u: Array, x_share: Array, most: Array, cap: Array) -> tuple[Array, Array]:
@@ -149,8 +149,8 @@ def fastest(cells: Cells, start: Array, end: Array, free_end: bool = False) -> F
         low, high, empty, meeting, index = following
         rows = rows_of(cell, low, high)
         floor, ceiling = _flat_range(*rows, cell.cap)
-        top, at_top, sides = _edge(*rows, jnp.where(ceiling >= floor, ceiling, jnp.nan), 1.0)
-        bottom, _, _ = _edge(*rows, floor, -1.0)
+        top, sides = _edge(*rows, jnp.where(ceiling >= floor, ceiling, jnp.nan), 1.0)
+        bottom, _ = _edge(*rows, floor, -1.0)
         is_empty = ~(bottom <= top)
         is_last = is_empty & (empty < 0) & jnp.isfinite(low)
         empty = jnp.where(is_last, index, empty)

@@ -11,7 +11,7 @@ from cspr_jax.paths.controllable import Fastest, cells_of, fastest
 from cspr_jax.paths.multipliers import SideRows
 from cspr_jax.paths.nodes import Grid, grid_of, side_rows
 from cspr_jax.paths.rows import Rows, face_count
-from cspr_jax.paths.section import Section, Settings
+from cspr_jax.paths.section import Section, SectionSettings
 from cspr_jax.paths.smooth import NodeRows
 
 # Path speeds are taken to be no larger than so many times that of a fall along the path.
@@ -138,7 +138,7 @@ class Discrete:
         )
 
 
-def discrete(problem: Problem, section: Section, settings: Settings) -> Discrete:
+def discrete(problem: Problem, section: Section, settings: SectionSettings) -> Discrete:
     """A section on its grid.
 
     Args:

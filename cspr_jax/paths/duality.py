@@ -16,6 +16,7 @@ adds a multiplier times what it leaves. The multipliers of `paths.smooth` make t
 true. Over each cell all functions lie in bands around lines (`arithmetic.affine_bounds`).
 """
 
+import dataclasses
 from functools import partial
 from typing import NamedTuple
 
@@ -24,14 +25,16 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.arithmetic.affine_bounds import ROUNDING, AffineBounds, constant, dot, norm_squared, squared, turned
+from cspr_jax.arithmetic.affine_bounds import ROUNDING, AffineBounds, cross, dot, norm_squared, squared, turned
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.paths.discrete import Discrete
 from cspr_jax.paths.nodes import places_on, state_at
 from cspr_jax.paths.rows import unit_wrenches
 from cspr_jax.robots.cables import AnyRobot, cable_motion, wrench_units
 from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.state_bounds import StateBounds, balance_bounds, cable_bounds
+from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.robots.platform import RIGID
+from cspr_jax.robots.state_bounds import CableBounds, StateBounds, balance_bounds, balanced_part, cable_bounds
 from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.runtime import compile_options
 
@@ -40,6 +43,8 @@ BATCH = 64
 SAFE = 1e-10
 # Times that multipliers are smoothed, and nodes on each side of a cell in which they are.
 REPAIRS, REACH = 12, 3
+# Axis of forces along gravity; by what more than is lacking weight is added.
+DOWN, MORE = 2, 1.01
 
 
 class Multipliers(NamedTuple):
@@ -95,13 +100,24 @@ def lower_bound(robot: AnyRobot, limits: Limits, path: Discrete, multipliers: Mu
     for _ in range(REPAIRS):
         start, end = (Multipliers(*(leaf[side] for leaf in multipliers)) for side in (slice(None, -1), slice(1, None)))
         cells = _Cell(start, end, rates, width, speed)
-        gains, losses = in_batches(partial(_kernel, robot, limits), (states, cells), size=BATCH)
+        gains, losses, lacks = in_batches(partial(_kernel, robot, limits), (states, cells), size=BATCH)
+        if (lacks > 0.0).any():
+            multipliers = _pulled_down(robot, multipliers, lacks)
+            continue
         total = float(np.sum(gains) - np.sum(losses))
         if np.isfinite(total):
             total += _boundary(robot, path, multipliers)
             return total - SAFE * float(np.sum(np.abs(gains)) + np.sum(np.abs(losses)))
         multipliers = _smoothed(multipliers, ~np.isfinite(gains - losses))
     return -np.inf
+
+
+def _pulled_down(robot: AnyRobot, multipliers: Multipliers, lacks: np.ndarray) -> Multipliers:
+    # With a share of weight in y, no cable without a largest tension gains by pulling.
+    wrench = multipliers.wrench.copy()
+    lacks = MORE * np.fmax(lacks, 0.0)
+    wrench[:, PATTERNS[robot.pattern].forces.index(DOWN)] += np.fmax(np.append(lacks, 0.0), np.insert(lacks, 0, 0.0))
+    return multipliers._replace(wrench=wrench)
 
 
 def _boundary(robot: AnyRobot, path: Discrete, multipliers: Multipliers) -> float:
@@ -152,10 +168,10 @@ def _along(start: Array, end: Array, width: Array, momentum: AffineBounds, bend:
 
 
 @partial(jax.jit, compiler_options=compile_options.least())
-def _kernel(robot: AnyRobot, limits: Limits, blocks: tuple[StateBounds, _Cell]) -> tuple[Array, Array]:
-    # What each cell adds to the bound, and what it takes from it.
-    def one(state: StateBounds, cell: _Cell) -> tuple[Array, Array]:
-        twice, lost = _of_wrenches(robot, limits, state, cell)
+def _kernel(robot: AnyRobot, limits: Limits, blocks: tuple[StateBounds, _Cell]) -> tuple[Array, Array, Array]:
+    # What each cell adds to the bound, what it takes from it, and how much weight its multipliers lack.
+    def one(state: StateBounds, cell: _Cell) -> tuple[Array, Array, Array]:
+        twice, lost, lack = _of_wrenches(robot, limits, state, cell)
         cables = cable_bounds(robot, state)
         if limits.cable_acceleration_max is not None:
             ends = cell.start.bend, cell.end.bend
@@ -174,13 +190,13 @@ def _kernel(robot: AnyRobot, limits: Limits, blocks: tuple[StateBounds, _Cell]) 
         # A concave function of a line is above the line between its values at both ends.
         low, high = _ends(twice, -1.0)
         values = [1.5 * jnp.where(side >= 0.0, jnp.cbrt(side), -jnp.inf) for side in (low, high)]
-        return cell.width * 0.5 * (values[0] + values[1]), cell.width * lost
+        return cell.width * 0.5 * (values[0] + values[1]), cell.width * lost, lack
 
     return jax.vmap(one)(*blocks)
 
 
-def _of_wrenches(robot: AnyRobot, limits: Limits, state: StateBounds, cell: _Cell) -> tuple[AffineBounds, Array]:
-    # y . a' - y' . a of the wrench balance, and the mean of S - y . r over the cell.
+def _of_wrenches(robot: AnyRobot, limits: Limits, state: StateBounds, cell: _Cell) -> tuple[AffineBounds, Array, Array]:
+    # y . a' - y' . a of the wrench balance, the mean of S - y . r over the cell, and what y lacks of weight.
     unit = 1.0 / wrench_units(robot)
     still = state.velocity * 0.0
     rest, pushed = (
@@ -199,12 +215,27 @@ def _of_wrenches(robot: AnyRobot, limits: Limits, state: StateBounds, cell: _Cel
     line = _line(*ends)
     pulls = turned(matrix.each(jnp.transpose), line)
     low, high = tension_range(robot, limits)
+    is_bounded = jnp.isfinite(high)
 
     def most(value: Array) -> Array:
-        return jnp.where(value > 0.0, value * high, value * low)
+        return jnp.where(value > 0.0, value * jnp.where(is_bounded, high, 0.0), value * low)
 
     # A convex function of a line is below the line between its values at both ends.
     sides = [jnp.maximum(most(up), most(down)) for up, down in zip(_ends(pulls, 1.0), _ends(pulls, -1.0), strict=True)]
     support = 0.5 * jnp.sum(sides[0] + sides[1])
     held = dot(line, weight)
-    return _along(*ends, cell.width, momentum, bend), support - (held.middle - held.radius)
+    lack = jnp.zeros(())
+    if DOWN in PATTERNS[robot.pattern].forces:
+        upward = -matrix.high()[PATTERNS[robot.pattern].forces.index(DOWN)]
+        gains = jnp.where(is_bounded, 0.0, pulls.high())
+        lack = jnp.max(jnp.where(gains > 0.0, gains / jnp.maximum(upward, 0.0), 0.0))
+    if PATTERNS[robot.pattern].along_line:
+        bend = bend - _turning_axes(robot, pushed, cables) * unit
+    return _along(*ends, cell.width, momentum, bend), support - (held.middle - held.radius), lack
+
+
+def _turning_axes(robot: AnyRobot, pushed: StateBounds, cables: CableBounds) -> AffineBounds:
+    # What of the momentum's derivative only comes from axes that turn with the platform: e' . L = e . (L x omega).
+    whole = balance_bounds(dataclasses.replace(robot, pattern=RIGID), pushed, cables)[1].each(lambda x: x[3:])
+    moment = cross(whole, pushed.angular_acceleration).each(lambda x: x[:, None])
+    return balanced_part(robot, pushed.rotation, moment * 0.0, moment).each(lambda x: x[:, 0])

@@ -9,16 +9,18 @@ from cspr_jax.curves.spline import Spline
 from cspr_jax.motions.problem import Problem
 from cspr_jax.paths.bound import path_bound
 from cspr_jax.paths.controllable import Fastest, smallest_of_slopes
-from cspr_jax.paths.discrete import Discrete, discrete
+from cspr_jax.paths.discrete import FASTER, Discrete, discrete
 from cspr_jax.paths.nodes import derivatives, places_on
-from cspr_jax.paths.section import Section, Settings
+from cspr_jax.paths.section import Section, SectionSettings
 from cspr_jax.paths.smooth import Ends, smooth
 from cspr_jax.paths.tightening import cell_slacks
 from cspr_jax.paths.timed import Run, cell_times, distance_from_path, timed
 from cspr_jax.robots.clearance import Scene
 
 # Rounds of proof and tightening; how often ramps are shortened by half where none of their length exist.
-ROUNDS, SHORTER = 5, 4
+ROUNDS, SHORTER = 8, 4
+# Speed of a motion that counts as slow, over that of a fall along the path.
+SLOW = 0.01
 
 
 class PhasePlane(NamedTuple):
@@ -60,9 +62,9 @@ class LeastTime:
     """The fastest motion along a section.
 
     Fields:
-        motion: over time; its knots are those of the grid; None if there is none.
+        motion: over time; its knots are those of the grid; a slow one if none is feasible.
         coordinate: (n_nodes,) s at these knots, m.
-        duration: s; NaN if there is none.
+        duration: of it, s.
         lower_bound: rigorous lower bound of the time of any motion along the section, s; NaN where none is known.
         jumping: duration of the fastest motion without ramps on the same grid, before margins, s.
         ramp_time: of the motion, s; 0 where its accelerations jump.
@@ -72,7 +74,7 @@ class LeastTime:
         failure: why there is no motion, or None.
     """
 
-    motion: Spline | None
+    motion: Spline
     coordinate: np.ndarray
     duration: float
     lower_bound: float
@@ -84,7 +86,7 @@ class LeastTime:
     failure: NoMotion | None
 
 
-def least_time_motion(problem: Problem, scene: Scene | None, section: Section, settings: Settings) -> LeastTime:
+def least_time_motion(problem: Problem, scene: Scene | None, section: Section, settings: SectionSettings) -> LeastTime:
     """Find the fastest motion along a section.
 
     Args:
@@ -147,11 +149,30 @@ def _without_motion(path: Discrete, solution: Fastest) -> LeastTime:
     place = np.asarray(
         derivatives(places_on(path.section.curve, path.grid.nodes[[node]], ahead=node < n_cells))[0][0][0]
     )
-    unknown = np.full(n_cells + 1, np.nan)
-    failure = NoMotion(float(path.grid.nodes[node]), place, rows, end)
-    numbers = dict.fromkeys(("duration", "lower_bound", "jumping", "ramp_time", "deviation"), np.nan)
-    plane = _plane(path, solution, unknown)
-    return LeastTime(motion=None, coordinate=path.grid.nodes, binding=(), plane=plane, failure=failure, **numbers)
+    run = _slow(path)
+    motion = timed(path.section, path.grid, run)
+    return LeastTime(
+        motion=motion,
+        coordinate=path.grid.nodes,
+        duration=float(motion.knots[-1]),
+        lower_bound=np.nan,
+        jumping=np.nan,
+        ramp_time=np.nan,
+        deviation=distance_from_path(path.section, path.grid, run, motion),
+        binding=(),
+        plane=_plane(path, solution, np.full(n_cells + 1, np.nan)),
+        failure=NoMotion(float(path.grid.nodes[node]), place, rows, end),
+    )
+
+
+def _slow(path: Discrete) -> Run:
+    # A slow motion, whose tensions are about those at rest, to be shown where none is feasible.
+    share = path.grid.nodes / path.grid.nodes[-1]
+    bump = 4.0 * SLOW**2 * path.largest / FASTER**2
+    x = (1.0 - share) * path.ends[0] + share * path.ends[1] + bump * share * (1.0 - share)
+    x[[0, -1]] = path.ends
+    u = 0.5 * np.diff(x) / path.grid.width
+    return Run(x, u, u)
 
 
 def _run_of(solution: Fastest, path: Discrete, bend: np.ndarray) -> Run | None:

@@ -27,7 +27,8 @@ class Grid(NamedTuple):
     """Nodes of one section.
 
     Fields:
-        nodes: (n_cells + 1,) path coordinates, m; where accelerations or speed limits jump, and at marks, there is a node.
+        nodes: (n_cells + 1,) path coordinates, m; there is one at each mark, and where accelerations or speed limits
+            jump.
         speed: (n_cells,) largest speed of the mass centre in each cell, m/s, inf for none.
     """
 

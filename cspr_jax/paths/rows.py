@@ -19,6 +19,8 @@ from cspr_jax.robots.wrench_sets import spanning, tension_range, wrench_faces
 
 # Tangents of the largest Cartesian acceleration: half of a polygon around the circle, in which p'' lies.
 TANGENTS = 24
+# Squared sizes that are taken to be no smaller, so that quotients stay finite.
+TINY = 1e-30
 
 
 class Rows(NamedTuple):
@@ -110,21 +112,17 @@ def path_rows(robot: AnyRobot, limits: Limits, state: State, speed: Array) -> Ro
         the half-planes: faces of the tensions, then accelerations of cables, then tangents.
     """
     parts = [_of_tensions(robot, limits, unit_wrenches(robot, state))]
-    cap = jnp.square(speed) / jnp.maximum(jnp.sum(state.velocity**2), _TINY)
+    cap = jnp.square(speed) / jnp.maximum(jnp.sum(state.velocity**2), TINY)
     _, rate, bend = cable_motion(robot, state)
     if limits.cable_acceleration_max is not None:
         most = jnp.broadcast_to(jnp.asarray(limits.cable_acceleration_max), rate.shape)
         both = (jnp.concatenate([side, -side]) for side in (rate, bend))
         parts.append((*both, *[jnp.concatenate([most, most])] * 2))
     if limits.cable_speed_max is not None:
-        cap = jnp.minimum(cap, jnp.min(jnp.square(limits.cable_speed_max) / jnp.maximum(rate**2, _TINY)))
+        cap = jnp.minimum(cap, jnp.min(jnp.square(limits.cable_speed_max) / jnp.maximum(rate**2, TINY)))
     if getattr(limits, "acceleration_max", None) is not None:
         parts.append(_tangents(state.velocity, state.acceleration, limits.acceleration_max))
     return Rows(*(jnp.concatenate(column) for column in zip(*parts, strict=True)), cap)
-
-
-# Squared sizes that are taken to be no smaller, so that quotients stay finite.
-_TINY = 1e-30
 
 
 def _of_tensions(robot: AnyRobot, limits: Limits, wrenches: UnitWrenches) -> tuple[Array, ...]:
@@ -153,9 +151,9 @@ def tangent_directions(velocity: Array, acceleration: Array) -> Array:
     Returns:
         (n_tangents, 3) unit vectors.
     """
-    along = velocity / jnp.sqrt(jnp.maximum(jnp.sum(velocity**2), _TINY))
+    along = velocity / jnp.sqrt(jnp.maximum(jnp.sum(velocity**2), TINY))
     bend = acceleration - jnp.dot(acceleration, along) * along
-    across = bend / jnp.sqrt(jnp.maximum(jnp.sum(bend**2), _TINY))
+    across = bend / jnp.sqrt(jnp.maximum(jnp.sum(bend**2), TINY))
     angles = np.linspace(0.0, np.pi, TANGENTS + 1)
     return np.cos(angles)[:, None] * along + np.sin(angles)[:, None] * across
 

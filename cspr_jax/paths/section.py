@@ -1,19 +1,29 @@
-"""Section of a path: a curve without corners over the path coordinate, and how fast each piece may be run along."""
+"""Sections of paths: curves over the path coordinate s, without corners, made of quintic Hermite pieces."""
 
+import dataclasses
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import BPoly
 
+from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.curves.interpolation import continuous, hermite, interpolated
 from cspr_jax.curves.spline import Spline
+
+# Orientations that differ by less are one orientation; half of the angle, rad.
+SAME_ORIENTATION = 1e-12
+# Largest half of an angle by which a piece turns, rad; a quintic misses a turn at a constant rate by 4e-7 of it.
+LARGEST_TURN = 0.5
 
 
 class Section(NamedTuple):
-    """Section of a path.
+    """Part of a path without corners, along which a motion need not stop.
 
     Fields:
-        curve: NumPy leaves; its time is the path coordinate s, about the length that is run through, m.
-        speed: (m,) largest speed of the mass centre on each of its m pieces, m/s, inf for none.
-        marks: (k,) values of s at which it passes its points.
+        curve: positions and orientations over s, m, in place of time; continuous, with its first derivative; NumPy
+            leaves. Its second derivative may jump between pieces.
+        speed: (pieces,) largest speed that is allowed there, m/s; inf without one.
+        marks: (k,) values of s at which it passes its points, the first 0, the last its length; each is a knot.
     """
 
     curve: Spline
@@ -21,8 +31,134 @@ class Section(NamedTuple):
     marks: np.ndarray
 
 
-class Settings(NamedTuple):
+class SectionSettings(NamedTuple):
+    """SectionSettings of the motion along a section.
+
+    Fields:
+        grid: number of cells.
+        ramp_time: time in which accelerations rise and fall, s; 0: they jump.
+        start_speed: speed at its start, m/s.
+        end_speed: speed at its end, m/s.
+    """
+
     grid: int
     ramp_time: float
     start_speed: float = 0.0
     end_speed: float = 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Track:
+    """Places of a section, as nodes of Hermite pieces.
+
+    Fields:
+        s: (n,) increasing, from 0; two nodes at one s where the second derivative jumps.
+        place: (n, 3) m.
+        first: (n, 3) derivative with respect to s.
+        second: (n, 3) second derivative, 1/m.
+        speed: (n - 1,) largest speed of each piece, m/s; also of the empty ones.
+        marks: (k,) s of its points, each one of `s`.
+    """
+
+    s: np.ndarray
+    place: np.ndarray
+    first: np.ndarray
+    second: np.ndarray
+    speed: np.ndarray
+    marks: np.ndarray
+
+    def table(self) -> np.ndarray:
+        """Bernstein coefficients of the pieces that are not empty.
+
+        Returns:
+            (m, 6, 3).
+        """
+        return hermite(self.s, [self.place, self.first, self.second])
+
+    def refined(self, s: np.ndarray) -> "Track":
+        """The same track with more nodes.
+
+        Args:
+            s: (k,) where they are to be, between its ends; increasing, none of them a node.
+
+        Returns:
+            the track.
+        """
+        knots, behind = np.unique(self.s), np.searchsorted(self.s, s)
+        curve = BPoly(np.moveaxis(self.table(), 1, 0), knots)
+        added = {
+            name: np.insert(getattr(self, name), behind, curve(s, order), axis=0)
+            for order, name in enumerate(("place", "first", "second"))
+        }
+        speed = np.insert(self.speed, behind - 1, self.speed[behind - 1])
+        return dataclasses.replace(self, s=np.insert(self.s, behind, s), speed=speed, **added)
+
+
+def section_of(track: Track, quaternions: np.ndarray | None = None) -> Section:
+    """Section of a track and of orientations at its marks.
+
+    Between two marks the orientation turns at a constant rate, about one axis; through more it is a C2 spline.
+
+    Args:
+        quaternions: (k, 4) unit quaternions at the marks, scalar first; None: of a point mass.
+
+    Returns:
+        the section.
+    """
+    turning = None
+    if quaternions is not None:
+        units = continuous(quaternions)
+        halves = half_angles(units)
+        steady = len(units) == 2
+        if steady:
+            track = track.refined(_between(track.s, LARGEST_TURN * track.s[-1] / max(halves[0], LARGEST_TURN)))
+        if halves.max() <= SAME_ORIENTATION:
+            turning = np.broadcast_to(units[0], (int((np.diff(track.s) > 0.0).sum()), 6, 4))
+        elif steady:
+            turning = hermite(track.s, turn(units, track.s / track.s[-1], track.s[-1]))
+        else:
+            rates = interpolated(track.marks, np.zeros((len(units), 3)), units, ends="natural")
+            curve = BPoly(np.moveaxis(np.asarray(rates.quaternion), 1, 0), track.marks)
+            turning = hermite(track.s, [curve(track.s, order) for order in range(3)])
+    curve = Spline(leaf(np.unique(track.s)), leaf(track.table()), None if turning is None else leaf(turning))
+    return Section(curve, track.speed[np.diff(track.s) > 0.0], track.marks)
+
+
+def _between(s: np.ndarray, width: float) -> np.ndarray:
+    # Places that cut intervals wider than a width.
+    counts = np.ceil(np.diff(s) / width).astype(int)
+    cuts = [np.linspace(a, b, count + 1)[1:-1] for a, b, count in zip(s[:-1], s[1:], counts, strict=True)]
+    return np.concatenate(cuts)
+
+
+def half_angles(units: np.ndarray) -> np.ndarray:
+    """Halves of the angles between consecutive orientations.
+
+    Args:
+        units: (n, 4) unit quaternions, of continuous signs.
+
+    Returns:
+        (n - 1,) rad.
+    """
+    apart, together = (np.linalg.norm(units[1:] + sign * units[:-1], axis=1) for sign in (-1.0, 1.0))
+    return 2.0 * np.arctan2(apart, together)
+
+
+def turn(units: np.ndarray, share: np.ndarray, length: float = 1.0) -> list[np.ndarray]:
+    """Orientations at a constant rate from one to another, and their derivatives.
+
+    Args:
+        units: (2, 4) unit quaternions, of continuous signs.
+        share: (n,) of the way.
+        length: of the way, m.
+
+    Returns:
+        unit quaternions, and their first and second derivatives along the way, (n, 4) each.
+    """
+    half = float(half_angles(units)[0])
+    across = units[1] - (units[1] @ units[0]) * units[0]
+    across /= np.linalg.norm(across) or 1.0
+    rate = half / length
+    cosine, sine = np.cos(half * share)[:, None], np.sin(half * share)[:, None]
+    value = cosine * units[0] + sine * across
+    return [value, rate * (cosine * across - sine * units[0]), -(rate**2) * value]

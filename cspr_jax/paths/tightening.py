@@ -15,7 +15,7 @@ from cspr_jax.schema.verdicts import Verdict
 TENSIONS = Verdict.SLACK_CABLE | Verdict.OVER_TENSION | Verdict.WRENCH_INFEASIBLE
 # Slack, over its scale, that is left where a limit is met; by what more than is missed margins grow; below which a
 # criterion binds.
-LEFT, MORE, BINDING = 1e-7, 1.02, 0.01
+LEFT, MORE, BINDING = 1e-7, 1.3, 0.01
 # Times that a cell is halved, and by how much of what is missed its bounds may be apart.
 HALVINGS, LOOSE = 3, 0.5
 # Criteria that faster or slower motion changes, by their units.

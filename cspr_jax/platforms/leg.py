@@ -14,7 +14,7 @@ from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import IDENTITY
 from cspr_jax.build.orientations import given_quaternion, orientations
 from cspr_jax.config.hints import plan_hints
-from cspr_jax.config.plan import Pose
+from cspr_jax.config.pose import Pose
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.motions.amplitudes import Amplitude, derivatives
 from cspr_jax.motions.fewest_limits import Refused

@@ -2,7 +2,7 @@
 
 A face's d - 1 cables span it; the others, n - d + 1, are all at one distance from a limit where tensions are as far
 from their limits as the face allows. With tensions t0 + N^T x, N without a wrench, these cables and the distance r obey
-N_S^T x - sign r = limit_S - t0_S, one small system, which gives their changes too, as long as the face stays.
+N_S^T x - sign r = limit_S - t0_S, one small system.
 
 With up to two cables more than needed the products of the other cables with normals are relations among the rows of
 N^T, some thirty products in place of determinants; with more they follow from the normals of `wrench_sets`.
@@ -30,14 +30,11 @@ class NearestFace(NamedTuple):
         along: (n_cables,) products of a normal that points inside with the cables; 0 for those that span the face.
         columns: (dof - 1,) cables that span the face.
         tensions: (n_cables,) most central tensions, N.
-        follow: (n_cables, n_cables) what is added to any change of the tensions, times that change, so that all cables
-            that do not span the face keep one distance from their limits.
     """
 
     along: Array
     columns: Array
     tensions: Array
-    follow: Array
 
 
 def nearest_face(matrix: Array, wrench: Array, low: Array, high: Array) -> NearestFace:
@@ -71,13 +68,12 @@ def nearest_face(matrix: Array, wrench: Array, low: Array, high: Array) -> Neare
     at, product = jnp.asarray(others)[place], along[place]
     limit = jnp.where(product == 0.0, 0.5 * (low[at] + high[at]), limits[place])
     system = jnp.concatenate([solutions.kernel.T[at], -(jnp.sign(product) * weights[at])[:, None]], axis=1)
-    moves = -solutions.kernel.T @ solved(system, jnp.eye(count - dof + 1))[0][:-1]
-    is_other = (at[:, None] == jnp.arange(count)[None]).astype(moves.dtype)
+    along_kernel = solved(system, (solutions.least[at] - limit)[:, None])[0][:-1, 0]
+    is_other = (at[:, None] == jnp.arange(count)[None]).astype(product.dtype)
     return NearestFace(
         along=product @ is_other,
         columns=jnp.asarray(spanning(count, dof))[place % len(chosen)],
-        tensions=solutions.least + moves @ (solutions.least[at] - limit),
-        follow=moves @ is_other,
+        tensions=solutions.least - solutions.kernel.T @ along_kernel,
     )
 
 

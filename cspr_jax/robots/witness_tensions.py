@@ -1,18 +1,19 @@
 """Witness tensions: tensions that balance a motion throughout a block of time, and bounds of how central they can be.
 
-In the middle of a block tensions f are chosen, and their slope f' by the derivative of the balance, so that f + s f'
-leaves a residual r(s) of second order. For any B with A(s) B = 1 + E(s), the correction B (1 + E)^-1 r balances
-exactly, and where the rows of |E| sum to less than 1 it is bounded. Where the bounds keep the limits, there are
-tensions within them at every instant: a proof. On as many cables as components these are the only ones, and A is
-nowhere singular.
+A line f + s f' of tensions, whose middle and slope are corrected by the balance and its derivative, leaves a residual
+r(s) of second order. For any B with A(s) B = 1 + E(s), the correction B (1 + E)^-1 r balances exactly, and where the
+rows of |E| sum to less than 1 it is bounded. Where the bounds keep the limits, there are tensions within them at every
+instant: a proof. On as many cables as components these are the only ones, and A is nowhere singular.
 
-For more cables, a face of the set of wrenches refutes. With y(s) normal to the d - 1 columns that span it (found in the
+For more cables, the line joins the most central tensions at both ends of the block: between them tensions are at least
+about as far from their limits, also where another face becomes the nearest one. A face of the set of wrenches refutes. With y(s) normal to the d - 1 columns that span it (found in the
 same way, as a solution of a balance), tensions that are r from their limits give at most y w >= sum of y A_i times the
 limit on the other side, and r sum |y A_i|: that bounds r from above.
 """
 
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 from jax import Array
 
@@ -66,13 +67,16 @@ def witness_tensions(matrix: AffineBounds, wrench: AffineBounds, low: Array, hig
     dof, count = matrix.middle.shape
     inverse = right_inverse(matrix.middle)
     if count == dof:
-        tension, is_regular = _solution(matrix, inverse, wrench, jnp.zeros(count))
+        tension, is_regular = _solution(matrix, inverse, wrench, jnp.zeros(count), jnp.zeros(count))
         smallest = jnp.min(jnp.minimum(tension.high() - low, high - tension.low()))
         above = jnp.broadcast_to(jnp.where(is_regular, smallest, jnp.inf), (2,))
     else:
-        face = nearest_face(matrix.middle, wrench.middle, low, high)
-        tension, is_regular = _solution(matrix, inverse, wrench, face.tensions, face.follow)
-        above = _face_margin(matrix, inverse, wrench, (low, high), face)
+        at_ends = [jnp.stack([x.middle - x.slope, x.middle + x.slope]) for x in (matrix, wrench)]
+        faces = jax.vmap(nearest_face, (0, 0, None, None))(*at_ends, low, high)
+        before, after = faces.tensions
+        tension, is_regular = _solution(matrix, inverse, wrench, 0.5 * (before + after), 0.5 * (after - before))
+        nearer = jnp.argmin(jnp.min(jnp.minimum(faces.tensions - low[None], high[None] - faces.tensions), axis=1))
+        above = _face_margin(matrix, inverse, wrench, (low, high), jax.tree.map(lambda leaf: leaf[nearer], faces))
     # The smallest of functions above lines is above the line between the smallest values at both ends.
     lines = tension.middle - tension.slope, tension.middle + tension.slope
     slacks = [jnp.minimum(line - low, high - line) - tension.radius for line in lines]
@@ -95,14 +99,13 @@ def right_inverse(matrix: Array) -> Array:
 
 
 def _solution(
-    matrix: AffineBounds, inverse: Array, right: AffineBounds, start: Array, follow: Array | None = None
+    matrix: AffineBounds, inverse: Array, right: AffineBounds, start: Array, rise: Array
 ) -> tuple[AffineBounds, Array]:
-    # Bound a solution of M(s) x(s) = b(s), with M (m, n) and n >= m, near a line through `start`, (n,), whose slope
-    # `follow` changes; say whether M, with this right inverse in the middle, is proved to have rank m throughout.
+    # Bound a solution of M(s) x(s) = b(s), with M (m, n) and n >= m, near a line through `start` that rises by `rise`,
+    # (n,); say whether M, with this right inverse in the middle, is proved to have rank m throughout.
     m, n = matrix.middle.shape
     middle = start + inverse @ (right.middle - matrix.middle @ start)
-    slope = inverse @ (right.slope - matrix.slope @ middle)
-    slope = slope if follow is None else slope + follow @ slope
+    slope = rise + inverse @ (right.slope - matrix.slope @ middle - matrix.middle @ rise)
     line = AffineBounds(middle, slope, jnp.zeros(n))
     residual = (right - turned(matrix, line)).size()
     # Sums of rows of |M B - 1|; that of the middle is rounding.
@@ -122,7 +125,7 @@ def _face_margin(
     dof, count = matrix.middle.shape
     columns, (low, high) = face.columns, limits
     across, nothing = matrix.each(lambda x: x[:, columns].T), constant(jnp.zeros(dof - 1))
-    normal, is_normal = _solution(across, right_inverse(across.middle), nothing, face.along @ inverse)
+    normal, is_normal = _solution(across, right_inverse(across.middle), nothing, face.along @ inverse, jnp.zeros(dof))
     is_spanning = (jnp.arange(count)[:, None] == columns[None]).any(1)
     along = turned(matrix.each(jnp.transpose), normal).each(lambda x: jnp.where(is_spanning, 0.0, x))
     # Each cable at the limit that gives the least; the other one counts as far as its product may change sign.

@@ -147,6 +147,20 @@ _ROWS = (
         pose_keys=("turns",),
         end_keys=("ellipse",),
     ),
+    Family(
+        "path",
+        "along lines, splines, arcs, files of points and G-code, in the least time",
+        dict.fromkeys(ANY_PATTERN, "cspr_jax.paths.leg:Paths"),
+        rests_anywhere=True,
+        takes_amplitude=False,
+        any_cables=ANY_PATTERN,
+        knows_uncertainty=True,
+        uncertain_redundancy=True,
+        knows_obstacles=True,
+        knows_pulleys=True,
+        keys=("path",),
+        pose_keys=("path",),
+    ),
 )
 FAMILIES: dict[str, Family] = {row.name: row for row in _ROWS}
 

@@ -4,7 +4,7 @@ import jax
 import numpy as np
 
 from cspr_jax.arithmetic.elementary import leaf
-from cspr_jax.config.plan import Pose
+from cspr_jax.config.pose import Pose
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.leg import Leg, each

@@ -67,6 +67,8 @@ PLAIN = {
     4: ("t", "x", "y", "z"),
     8: ("t", "x", "y", "z", "qw", "qx", "qy", "qz"),
 }
+# Tables of paths have no times.
+PLAIN_PATH = {len(names) - 1: names[1:] for names in PLAIN.values() if "y" in names}
 _VALUES = {
     "point": POINTS,
     "interpolation": ("cubic", "quintic", "hermite"),
@@ -148,7 +150,9 @@ def directives(comments: list[tuple[int, str]], path: Path) -> dict[str, str]:
     return values
 
 
-def columns(heads: list[str] | None, count: int, units: str, path: Path, line: int) -> MotionColumns:
+def columns(
+    heads: list[str] | None, count: int, units: str, path: Path, line: int, *, has_times: bool = True
+) -> MotionColumns:
     """Columns of a table.
 
     Args:
@@ -157,6 +161,7 @@ def columns(heads: list[str] | None, count: int, units: str, path: Path, line: i
         units: that its directive names, such as "mm, deg, ms".
         path: named in errors.
         line: of the header, or of the first row.
+        has_times: whether the table is that of a motion, and not of a path.
 
     Returns:
         the columns.
@@ -167,12 +172,13 @@ def columns(heads: list[str] | None, count: int, units: str, path: Path, line: i
     """
     common = _common(units, path)
     if heads is None:
-        if count not in PLAIN:
-            plain = ", ".join(map(str, PLAIN))
+        plain = PLAIN if has_times else PLAIN_PATH
+        if count not in plain:
+            counts, words = ", ".join(map(str, plain)), "t, x, y, z, ..." if has_times else "x, y, z, ..."
             raise ConfigError(
-                path, f"line {line}: {count} columns without a header: must be {plain}, or name them: t, x, y, z, ..."
+                path, f"line {line}: {count} columns without a header: must be {counts}, or name them: {words}"
             )
-        heads = list(PLAIN[count])
+        heads = list(plain[count])
     names, factors, notes = list[str](), list[float](), list[str]()
     for column, head in enumerate(heads):
         name, unit = _parted(head)
@@ -187,7 +193,7 @@ def columns(heads: list[str] | None, count: int, units: str, path: Path, line: i
             notes.append(f"column {shown(head)} is not read: {question}known: {', '.join(NAMES)}")
     is_written = "position_x" in heads and "velocity_x" in heads
     result = MotionColumns(tuple(names), tuple(heads), np.array(factors), is_written, tuple(notes))
-    _check(result, path, line)
+    _check(result, path, line, has_times)
     return result
 
 
@@ -234,11 +240,11 @@ def _factor(name: str, unit: str, common: dict[int, str], place: str, path: Path
     return table[above] / (TIMES[below] ** power if power else 1.0)
 
 
-def _check(result: MotionColumns, path: Path, line: int) -> None:
+def _check(result: MotionColumns, path: Path, line: int, has_times: bool) -> None:
     place = f"line {line}"
     for group, (names, _) in GROUPS.items():
         missing = [name for name in names if name not in result.names]
-        if group in ("times", "positions") or len(missing) < len(names):
+        if group == "positions" or (group == "times" and has_times) or len(missing) < len(names):
             # Planar robots move in the plane of x and z, and turn by their pitch.
             is_planar = "y" not in result.names and group not in ("tilts", "quaternions")
             spared = (

@@ -53,27 +53,31 @@ class MotionWindow:
     is_last: bool
 
 
-def read(path: Path) -> MotionTable:
-    """A table of a motion, as a whole.
+def read(path: Path, *, has_times: bool = True) -> MotionTable:
+    """A table of a motion, or of the points of a path, as a whole.
+
+    Args:
+        has_times: as for `windows`.
 
     Returns:
-        the samples.
+        the samples; of a path, times are the numbers of the rows.
 
     Raises:
         ConfigError: a mistake in the file.
         TooLongError: more than `MOST_ROWS` rows; see `windows`.
     """
-    window = next(windows(path, MOST_ROWS))
+    window = next(windows(path, MOST_ROWS, has_times=has_times))
     if not window.is_last:
         raise TooLongError(path, f"more than {MOST_ROWS} rows: must be fewer where a motion is read as a whole")
     return window.table
 
 
-def windows(path: Path, rows: int = WINDOW) -> Iterator[MotionWindow]:
+def windows(path: Path, rows: int = WINDOW, *, has_times: bool = True) -> Iterator[MotionWindow]:
     """A table of a motion, window by window.
 
     Args:
         rows: from the first to the last row of a window, at least `OVERLAP`.
+        has_times: whether the table is that of a motion, and not of a path.
 
     Yields:
         the windows; each begins with the row with which the one before ends.
@@ -81,7 +85,7 @@ def windows(path: Path, rows: int = WINDOW) -> Iterator[MotionWindow]:
     Raises:
         ConfigError: a mistake in the file, when the window that holds it is due.
     """
-    reader = _Reader(path)
+    reader = _Reader(path, has_times)
     pending, first, count = np.empty((0, 0)), 0, 0
     for block in reader.blocks():
         pending = np.concatenate([pending, block]) if len(pending) else block
@@ -91,13 +95,14 @@ def windows(path: Path, rows: int = WINDOW) -> Iterator[MotionWindow]:
             yield MotionWindow(reader.table(pending[: last + OVERLAP + 1]), first, last, is_last=False)
             pending, first = pending[last - OVERLAP :], OVERLAP
     if count < 2:
-        raise ConfigError(path, f"{count} rows: must be two or more, each with a time and a position")
+        words = "a time and a position" if has_times else "a position"
+        raise ConfigError(path, f"{count} rows: must be two or more, each with {words}")
     yield MotionWindow(reader.table(pending), first, len(pending) - 1, is_last=True)
 
 
 class _Reader:
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self, path: Path, has_times: bool) -> None:
+        self.path, self.has_times = path, has_times
         self.notes: dict[str, None] = {}
         self.previous: np.ndarray | None = None
         self.columns: MotionColumns
@@ -126,7 +131,8 @@ class _Reader:
     def table(self, rows: np.ndarray) -> MotionTable:
         values, names = self.columns.values, ("velocities", "accelerations")
         turning = ("angular_velocities", "angular_accelerations")
-        time, positions = values("times", rows), values("positions", rows)
+        time = values("times", rows) if self.has_times else np.arange(float(len(rows)))[:, None]
+        positions = values("positions", rows)
         quaternions = self._quaternions(rows)
         parts = {name: values(name, rows) for name in names}
         if quaternions is not None:
@@ -160,9 +166,8 @@ class _Reader:
         self.has_tail = self.delimiter is not None and content.endswith(self.delimiter)
         heads = self._cells(content)
         has_header = not all(_is_number(cell) for cell in heads)
-        self.columns = columns(
-            heads if has_header else None, len(heads), self.directives.get("units", ""), self.path, line
-        )
+        names, units = heads if has_header else None, self.directives.get("units", "")
+        self.columns = columns(names, len(heads), units, self.path, line, has_times=self.has_times)
         self.notes |= dict.fromkeys(self.columns.notes)
         return line + has_header, "\n".join(rows[line - 1 + has_header :])
 
@@ -223,12 +228,8 @@ class _Reader:
         if not (np.abs(rows[:, read]) <= LARGEST_NUMBER).all():
             self._refuse(text, line)
         chain = rows if self.previous is None else np.vstack([self.previous, rows])
-        steps = np.diff(chain[:, self.columns.names.index("t")])
-        late = np.flatnonzero(steps < 0.0 if self.columns.is_written else steps <= 0.0)
-        if len(late):
-            self._refuse_time(chain, int(late[0]), len(chain) - len(rows), text, line)
-        if self.columns.is_written:
-            self._check_joins(chain, steps, len(chain) - len(rows), text, line)
+        if self.has_times:
+            self._check_times(chain, len(chain) - len(rows), text, line)
         quaternions = self.columns.values("quaternions", rows)
         if quaternions is not None:
             self._check_lengths(quaternions, text, line)
@@ -237,6 +238,14 @@ class _Reader:
             if angles is not None and np.abs(angles).max() > 2.0 * math.pi + 1e-3:
                 reach = np.abs(angles).max()
                 self.notes[f"angles reach {reach:.4g} rad: are they degrees? Then say so: # units: deg"] = None
+
+    def _check_times(self, chain: np.ndarray, before: int, text: str, line: int) -> None:
+        steps = np.diff(chain[:, self.columns.names.index("t")])
+        late = np.flatnonzero(steps < 0.0 if self.columns.is_written else steps <= 0.0)
+        if len(late):
+            self._refuse_time(chain, int(late[0]), before, text, line)
+        if self.columns.is_written:
+            self._check_joins(chain, steps, before, text, line)
 
     def _refuse_time(self, chain: np.ndarray, i: int, before: int, text: str, line: int) -> None:
         number = _line_of(text, line, i + 1 - before)

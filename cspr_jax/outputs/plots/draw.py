@@ -17,7 +17,7 @@ from cspr_jax.outputs.plots.lines import PlottedLine, line_figure, lines_of, nam
 from cspr_jax.outputs.plots.motion_comparison import motion_comparison_figure
 from cspr_jax.outputs.plots.motion_pictures import motion_picture
 from cspr_jax.outputs.plots.planes import in_order
-from cspr_jax.outputs.plots.sections import POLAR, Section, section_figure, tells
+from cspr_jax.outputs.plots.sections import POLAR, PlaneSection, section_figure, tells
 from cspr_jax.outputs.plots.selection import nearest
 from cspr_jax.outputs.plots.solid import SPACE, solid_figure
 from cspr_jax.schema.quantities import TILT_TORSION
@@ -197,7 +197,7 @@ def _map_figure(result: Result, quantity: str | None, at: dict[str, float], line
     says = _telling_cells(result, at, order) if tuple(view.across[:2]) == POLAR else None
     if not panels:
         data, hatched, says = data[..., None], hatched[..., None], None if says is None else says[..., None]
-    section = Section(view.name, view.across[:2], panels, view.place, _constant(result, view), hatched)
+    section = PlaneSection(view.name, view.across[:2], panels, view.place, _constant(result, view), hatched)
     figure = section_figure(result, section, data, says)
     if view.across[1:] == ["frequency"] and set(SHOWN) <= set(result.data):
         first = at | {"frequency": float(result.axes["frequency"][0])}

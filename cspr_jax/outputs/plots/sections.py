@@ -30,7 +30,7 @@ HATCH = "////"
 PANEL, SINGLE = 3.1, 5.2  # inches, the longer side
 
 
-class Section(NamedTuple):
+class PlaneSection(NamedTuple):
     """Content of sections of a map.
 
     Fields:
@@ -51,7 +51,9 @@ class Section(NamedTuple):
     excluded: np.ndarray
 
 
-def section_figure(result: Result, section: Section, data: np.ndarray, informative: np.ndarray | None = None) -> Figure:
+def section_figure(
+    result: Result, section: PlaneSection, data: np.ndarray, informative: np.ndarray | None = None
+) -> Figure:
     """Sections of a map, one in each panel.
 
     Args:

@@ -1,0 +1,136 @@
+"""Keys of paths that a motion runs along in the least time, in a plan or in one of its poses; without jax."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from cspr_jax.config.limits import NotNegative, Point, Positive
+from cspr_jax.config.reading import Table
+from cspr_jax.config.trajectory import Angle, Quaternion
+from cspr_jax.config.wording import either, fault
+from cspr_jax.errors import shown
+
+# Keys of a shape, by the kinds that take them.
+_ALL = ("line", "polyline", "cubic", "quintic", "arc", "circle", "csv", "gcode")
+_KINDS = {
+    "points": ("line", "polyline", "cubic", "quintic"),
+    "file": ("csv", "gcode"),
+    "interpolation": ("csv",),
+    "centre": ("arc", "circle"),
+    "start": ("arc", "circle"),
+    "normal": ("arc", "circle"),
+    "angle": ("arc",),
+    "orientations": _ALL,
+    "closed": ("line", "polyline", "cubic", "quintic", "csv"),
+    "corner": ("polyline", "csv", "gcode"),
+    "blend_tolerance": ("polyline", "csv", "gcode"),
+}
+_NEEDED = {"arc": ("centre", "angle"), "circle": ("centre",), "csv": ("file",), "gcode": ("file",)}
+GRID, RAMP_TIME = 500, 0.1
+MOST_POINTS = 100_000
+
+
+class PathTable(Table):
+    """Path, along which a motion takes the least time."""
+
+    kind: Literal["line", "polyline", "cubic", "quintic", "arc", "circle", "csv", "gcode"] = Field(
+        "line",
+        description='"line", straight lines with a stop at every point, the default; "polyline", straight lines; '
+        '"cubic" (C2) or "quintic" (C4), a spline through the points; "arc"; "circle"; "csv", a file of points; '
+        '"gcode", a file of G-code',
+    )
+    points: Annotated[list[Point], Field(min_length=1, max_length=MOST_POINTS)] | None = Field(
+        None,
+        description="points [x, y, z], m: of a plan all of them, of a pose those between the pose before and this one",
+    )
+    file: str | None = Field(None, min_length=1, description="csv, gcode: the file, from the folder of the plan")
+    interpolation: Literal["polyline", "cubic", "quintic"] | None = Field(
+        None, description='csv: path through the points of the file, by its kind; absent: "polyline"'
+    )
+    centre: Point | None = Field(None, description="arc, circle: centre [x, y, z], m")
+    start: Point | None = Field(
+        None, description="arc, circle: where it begins, [x, y, z], m; of a pose absent: at the pose before"
+    )
+    normal: Point | None = Field(
+        None,
+        description="arc, circle: direction [x, y, z] about which it turns, by the rule of the right hand; absent: z "
+        "of the robot file, of a planar robot y",
+    )
+    angle: Angle | None = Field(None, description="arc: by which it turns, rad; negative: the other way")
+    orientations: Annotated[list[Quaternion], Field(min_length=1, max_length=MOST_POINTS)] | None = Field(
+        None,
+        description="platforms: unit quaternions [w, x, y, z], one for each point (arc, circle: for start and end), or "
+        "one for all; absent: those of the poses, else the reference orientation",
+    )
+    closed: bool | None = Field(None, description="whether the path ends where it begins (default false)")
+    corner: Literal["stop", "blend"] | None = Field(
+        None,
+        description='polyline, csv, gcode: at corners "stop", the default, or "blend", a curve in place of each of '
+        "them, continuous in direction and curvature",
+    )
+    blend_tolerance: Positive | None = Field(
+        None, description="largest distance of a blended path from the corner, m; needed to blend"
+    )
+    start_speed: NotNegative | None = Field(None, description="speed where the path begins, m/s (default 0)")
+    end_speed: NotNegative | None = Field(None, description="speed where the path ends, m/s (default 0)")
+    grid: Annotated[int, Field(ge=2, le=100_000)] | None = Field(
+        None, description=f"number of cells into which each part of the path without a stop is cut (default {GRID})"
+    )
+    ramp_time: NotNegative | None = Field(
+        None,
+        description=f"time in which accelerations, and so tensions, rise and fall, s (default {RAMP_TIME}); 0: they "
+        "jump",
+    )
+
+    @model_validator(mode="after")
+    def _of_its_kind(self) -> "PathTable":
+        for key, kinds in _KINDS.items():
+            value = getattr(self, key)
+            if value is not None and self.kind not in kinds:
+                raise fault(key, shown(value), f"absent unless kind = {either(kinds)}")
+        for key in _NEEDED.get(self.kind, ()):
+            if getattr(self, key) is None:
+                raise fault(key, None, f"a path of kind {self.kind} needs it")
+        if self.angle == 0.0:
+            raise fault("angle", self.angle, "an angle that is not zero")
+        if self.normal is not None and not any(self.normal):
+            raise fault("normal", self.normal, "a direction that is not zero")
+        if (self.corner == "blend") != (self.blend_tolerance is not None):
+            if self.blend_tolerance is None:
+                raise fault("blend_tolerance", None, 'a distance in m, with corner = "blend"')
+            raise fault("blend_tolerance", self.blend_tolerance, 'absent unless corner = "blend"')
+        if self.corner is not None and self.interpolation in ("cubic", "quintic"):
+            raise fault("corner", shown(self.corner), 'absent unless interpolation = "polyline"')
+        return self
+
+    @property
+    def is_whole(self) -> bool:
+        """Tell whether the table has the path itself, and does not only say how poses are joined."""
+        return self.points is not None or self.kind in _NEEDED
+
+    @property
+    def has_end(self) -> bool:
+        """Tell whether the path itself decides where it ends: it needs no pose there."""
+        return self.kind in _NEEDED or bool(self.closed)
+
+    @property
+    def has_start(self) -> bool:
+        """Tell whether the table has the place where the path begins."""
+        return self.file is not None or self.start is not None
+
+    @property
+    def curve(self) -> str:
+        """Kind of the curve through points, of a file or not."""
+        return (self.interpolation or "polyline") if self.kind == "csv" else self.kind
+
+    def beside(self, plan: "PathTable | None") -> "PathTable":
+        """Table of a pose, with what the plan says of all paths.
+
+        Args:
+            plan: table of the plan; None: there is none.
+
+        Returns:
+            the table.
+        """
+        common: dict[str, Any] = {} if plan is None else {name: getattr(plan, name) for name in ("grid", "ramp_time")}
+        return self.model_copy(update={name: value for name, value in common.items() if getattr(self, name) is None})

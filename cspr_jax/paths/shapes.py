@@ -1,0 +1,57 @@
+"""Arcs of a plan, and moves of G-code, as elements of paths."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cspr_jax.config.gcode import Move
+from cspr_jax.errors import InputError
+from cspr_jax.paths.elements import Arc, Element, Straight
+
+# Part of its radius by which an arc may begin beside the plane of its centre: rounding.
+BESIDE = 1e-6
+
+
+def arc_of(centre: np.ndarray, start: np.ndarray, normal: np.ndarray, angle: float) -> Arc:
+    """Arc of a circle.
+
+    Args:
+        centre: (3,) m.
+        start: (3,) m.
+        normal: (3,) about which it turns, of any length but zero.
+        angle: by which it turns, rad.
+
+    Returns:
+        the arc.
+
+    Raises:
+        InputError: an arc that begins in its centre, or not in the plane of its centre.
+    """
+    axis = normal / np.linalg.norm(normal)
+    radius = start - centre
+    height = float(radius @ axis)
+    size = float(np.linalg.norm(radius - height * axis))
+    if size == 0.0 or abs(height) > BESIDE * size:
+        allowed = "in a plane with the start, normal to `normal`, and apart from it"
+        raise InputError("centre", centre.tolist(), allowed)
+    return Arc(centre + height * axis, start, axis, angle)
+
+
+def elements_of(moves: Sequence[Move]) -> list[Element]:
+    """Lines, arcs and helices of moves.
+
+    Args:
+        moves: each begins where the one before ends.
+
+    Returns:
+        one element for each move.
+    """
+    elements: list[Element] = []
+    for move in moves:
+        start, end = np.array(move.start), np.array(move.end)
+        if move.centre is None:
+            elements.append(Straight(start, end, speed=move.speed))
+        else:
+            centre = np.array([*move.centre, move.start[2]])
+            elements.append(Arc(centre, start, np.eye(3)[2], move.angle, float(end[2] - start[2]), move.speed))
+    return elements

@@ -1,0 +1,84 @@
+"""Paths through points: straight lines between them, or C2 and C4 splines over the lengths of their chords."""
+
+import itertools
+
+import numpy as np
+from scipy.interpolate import BPoly
+
+from cspr_jax.curves.interpolation import continuous, interpolated
+from cspr_jax.errors import InputError
+from cspr_jax.paths.corners import Corners, tracks_of
+from cspr_jax.paths.elements import Straight
+from cspr_jax.paths.section import SAME_ORIENTATION, Track, half_angles
+
+# Part of the speed along the chords below which a spline stands still, and samples of each of its pieces.
+STANDING, SAMPLES = 1e-6, 32
+
+
+def chords(points: np.ndarray, quaternions: np.ndarray | None = None) -> np.ndarray:
+    """Distances between consecutive points; where only the orientation changes, the angle.
+
+    Args:
+        points: (n, 3) m.
+        quaternions: (n, 4) unit quaternions, or None.
+
+    Returns:
+        (n - 1,) m, or rad.
+
+    Raises:
+        InputError: fewer than two points, or the same twice in a row.
+    """
+    if len(points) < 2:
+        raise InputError("points", None, "must be two or more", fault=f"{len(points)} of them")
+    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    if quaternions is not None:
+        halves = half_angles(continuous(quaternions))
+        lengths = np.where((lengths == 0.0) & (halves > SAME_ORIENTATION), 2.0 * halves, lengths)
+    same = np.flatnonzero(lengths == 0.0)
+    if len(same):
+        i = int(same[0])
+        raise InputError(f"points[{i + 1}]", points[i + 1].tolist(), f"another place than points[{i}]")
+    return lengths
+
+
+def through_points(
+    kind: str,
+    points: np.ndarray,
+    quaternions: np.ndarray | None = None,
+    *,
+    corner: str = "stop",
+    tolerance: float = 0.0,
+    closed: bool = False,
+) -> list[Track]:
+    """Tracks through points; each mark is at one of them, or at the corner that is blended there.
+
+    Args:
+        kind: "line", "polyline", "cubic" or "quintic".
+        points: (n, 3) m; the last one of a closed path is the first.
+        quaternions: (n, 4) unit quaternions, or None.
+        corner: of a polyline, "stop" or "blend".
+        tolerance: of blends, m.
+        closed: whether a spline ends in the direction in which it begins.
+
+    Returns:
+        the tracks.
+
+    Raises:
+        InputError: points that make no path.
+    """
+    lengths = chords(points, quaternions)
+    if kind in ("line", "polyline") or len(points) == 2:
+        lines = [Straight(a, b, turn) for a, b, turn in zip(points, points[1:], lengths.tolist(), strict=False)]
+        rule: Corners = "every" if kind == "line" else "blend" if corner == "blend" else "stop"
+        return tracks_of(lines, rule, tolerance)
+    s = np.concatenate([[0.0], np.cumsum(lengths)])
+    curve = interpolated(s, points, interpolation=kind, ends="periodic" if closed else "natural")
+    values = BPoly(np.moveaxis(np.asarray(curve.position), 1, 0), s)
+    place, first, second = (values(s, order) for order in range(3))
+    # The last value comes from the last piece, so nothing is lost where ends are natural.
+    fine = np.concatenate([np.linspace(*ends, SAMPLES, endpoint=False) for ends in itertools.pairwise(s)])
+    speeds = np.linalg.norm(values(fine, 1), axis=1)
+    if speeds.min() <= STANDING and (np.diff(points, axis=0) != 0.0).any():
+        i = int(np.argmin(speeds)) // SAMPLES
+        raise InputError("points", None, "must make a curve that turns back nowhere", fault=f"behind points[{i}]")
+    return [Track(s, place, first, second, np.full(len(lengths), np.inf), s)]
