@@ -72,7 +72,7 @@ def grid_of(section: Section, count: int, slow: tuple[bool, bool]) -> Grid:
     """
     knots = np.asarray(section.curve.knots)
     nodes = knots[-1] * _shares(count, slow)
-    changes = knots[1:-1][np.diff(section.speed) != 0.0]
+    changes = knots[1:-1][section.speed[1:] != section.speed[:-1]]
     places: list[float] = np.unique(np.concatenate([section.curve.jumps(), changes, section.marks[1:-1]])).tolist()
     for k, place in enumerate(places):
         nearest = int(np.argmin(np.abs(nodes - place)))
