@@ -1,6 +1,7 @@
 """Least time along one section of a path: the fastest motion, proved, and a lower bound of all motions' time."""
 
 import dataclasses
+import itertools
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -12,7 +13,7 @@ from cspr_jax.paths.controllable import Fastest, smallest_of_slopes
 from cspr_jax.paths.discrete import FASTER, Discrete, discrete
 from cspr_jax.paths.nodes import derivatives, places_on
 from cspr_jax.paths.section import Section, SectionSettings
-from cspr_jax.paths.smooth import Ends, smooth
+from cspr_jax.paths.smooth import Ends, Smooth, below_ramps, smooth
 from cspr_jax.paths.tightening import cell_slacks
 from cspr_jax.paths.timed import Run, cell_times, distance_from_path, timed
 from cspr_jax.robots.clearance import Scene
@@ -21,6 +22,9 @@ from cspr_jax.robots.clearance import Scene
 ROUNDS, SHORTER = 8, 4
 # Speed of a motion that counts as slow, over that of a fall along the path.
 SLOW = 0.01
+# Shares of x of the motion without ramps from which the search for one with ramps begins; optima, each with tangents
+# at the one before.
+STARTS, TANGENTS = (0.8, 0.4), 3
 
 
 class PhasePlane(NamedTuple):
@@ -111,7 +115,7 @@ def least_time_motion(problem: Problem, scene: Scene | None, section: Section, s
             break
         margins = slacks.grown(margins, weight)
         tighter = path.with_margins(margins)
-        slower = _smooth(tighter, run, jerk) if np.isfinite(jerk) else _jumping(tighter, bend)
+        slower = _slower(tighter, run, bend, jerk)
         if slower is None:
             break
         run = slower
@@ -204,17 +208,24 @@ def _ramped(path: Discrete, jumping: Run, ramp_time: float) -> tuple[Run, float]
     # The fastest motion with ramps, half as long where there is none, and the largest path jerk.
     if ramp_time > 0.0:
         rests = path.can_rest()
-        rests = rests[0] and path.ends[0] == 0.0, rests[1] and path.ends[1] == 0.0
-        for times in 0.5 ** np.arange(SHORTER) * ramp_time:
-            jerk = float(np.ptp(np.concatenate([jumping.before, jumping.after])) / times)
-            run = _smooth(path, jumping._replace(rests=rests), jerk)
+        ends = Ends(path.ends, (rests[0] and path.ends[0] == 0.0, rests[1] and path.ends[1] == 0.0))
+        for time, slower in itertools.product(0.5 ** np.arange(SHORTER) * ramp_time, STARTS):
+            jerk = float(np.ptp(np.concatenate([jumping.before, jumping.after])) / time)
+            start = below_ramps(slower * jumping.x, path.grid.width, jerk, ends)
+            run = _smoothed(path, start, ends, jerk, TANGENTS)
             if run is not None:
                 return run, jerk
     return jumping, np.inf
 
 
-def _smooth(path: Discrete, start: Run, jerk: float) -> Run | None:
-    # The accelerations at nodes begin as means of those of both cells.
-    u = 0.5 * (np.append(start.before, start.after[-1]) + np.insert(start.after, 0, start.before[0]))
-    solution = smooth(path.node_rows(), Ends(path.ends, start.rests), (start.x, u), jerk)
-    return Run(solution.x, solution.u[:-1], solution.u[1:], start.rests) if solution.is_optimal else None
+def _smoothed(path: Discrete, start: Smooth, ends: Ends, jerk: float, times: int) -> Run | None:
+    motion = smooth(path.node_rows(), ends, start, jerk, times)
+    return None if motion is None else Run(motion.x, motion.u[:-1], motion.u[1:], ends.rests)
+
+
+def _slower(path: Discrete, run: Run, bend: np.ndarray, jerk: float) -> Run | None:
+    # The fastest motion within tighter limits.
+    if not np.isfinite(jerk):
+        return _jumping(path, bend)
+    start = Smooth(run.x, np.append(run.before, run.after[-1]))
+    return _smoothed(path, start, Ends(path.ends, run.rests), jerk, 1)

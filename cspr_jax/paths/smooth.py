@@ -3,7 +3,7 @@
 Between nodes u = s'' changes at a constant rate along the path, so that x = s'^2 is quadratic there. The time is a
 convex function of x, and the half-planes at the nodes are linear in u and x (Verscheure et al. 2009): an interior-point
 method finds the optimum, with a banded matrix a step. The limit |du/ds| sqrt(x) <= J of the path jerk is not convex; it
-is replaced by its tangent from inside at each step.
+is replaced by its tangents at a known motion, which lie inside, and the optimum is that of the next tangents.
 
 From rest and to rest, s is the cube of time over the first and the last cell: a constant jerk.
 """
@@ -15,9 +15,12 @@ from scipy.linalg import solve_banded
 
 from cspr_jax.paths.interior_point import interior_point
 
-# Bands below and above the diagonal, with three unknowns a node; what keeps the matrix regular; part of the largest
-# squared path speed from which the search starts, at least.
-BANDS, REGULAR, LEAST = 4, 1e-14, 1e-4
+# Bands below and above the diagonal, with three unknowns a node; what keeps the matrix regular; smallest x over the
+# largest from which the search starts.
+BANDS, REGULAR, LEAST = 4, 1e-14, 1e-12
+# Half-planes of each side that count about a motion, at its x and at a share of it; whose share of u is no smaller; by
+# how much others may be missed; how often these are added.
+NEAREST, SLOWER, FLAT, MISSED, MORE_ROWS = 6, 0.8, 1e-12, 1e-9, 4
 
 
 class Ends(NamedTuple):
@@ -49,6 +52,40 @@ class NodeRows(NamedTuple):
     cap: np.ndarray
     width: np.ndarray
 
+    def nearest(self, x: np.ndarray) -> "NodeRows":
+        """The half-planes that bound u most, from either side, about a motion; duplicates among them.
+
+        Args:
+            x: (n_nodes,) squared path speeds of the motion.
+
+        Returns:
+            the half-planes; all if there are few.
+        """
+        if len(self.u) <= 4 * NEAREST:
+            return self
+        chosen = []
+        over = np.where(np.abs(self.u) > FLAT, self.u, 1.0)
+        for share in (1.0, SLOWER):
+            value = (self.most - share * self.x * x) / over
+            for sign in (1.0, -1.0):
+                bounds = np.where(sign * self.u > FLAT, sign * value, np.inf)
+                chosen.append(np.argpartition(bounds, NEAREST, axis=0)[:NEAREST])
+        places = np.concatenate(chosen)
+        sides = (np.take_along_axis(side, places, axis=0) for side in (self.u, self.x, self.most))
+        return NodeRows(*sides, cap=self.cap, width=self.width)
+
+    def beside(self, others: "NodeRows") -> "NodeRows":
+        """These half-planes and others.
+
+        Args:
+            others: at the same nodes.
+
+        Returns:
+            all of them.
+        """
+        pairs = zip(self[:3], others[:3], strict=True)
+        return NodeRows(*(np.concatenate(pair) for pair in pairs), cap=self.cap, width=self.width)
+
     def with_cap(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Half-planes with the cap as the last one.
 
@@ -62,33 +99,63 @@ class NodeRows(NamedTuple):
 
 
 class Smooth(NamedTuple):
-    """Optimum on the grid.
+    """Motion on the grid.
 
     Fields:
         x: (n_nodes,) squared path speeds.
         u: (n_nodes,) path accelerations.
-        is_optimal: whether the method converged.
     """
 
     x: np.ndarray
     u: np.ndarray
-    is_optimal: bool
 
 
-def smooth(rows: NodeRows, ends: Ends, start: tuple[np.ndarray, np.ndarray], jerk: float = np.inf) -> Smooth:
+def smooth(rows: NodeRows, ends: Ends, start: Smooth, jerk: float, times: int = 1) -> Smooth | None:
     """Least time with a continuous path acceleration.
 
     Args:
         ends: speeds, and whether it rests there.
-        start: x and u at the nodes from which the search begins, (n_nodes,) each.
-        jerk: largest size of s''', m/s^3.
+        start: motion from which the search begins, and at which the path jerk is bounded at first.
+        jerk: largest path jerk, m/s^3.
+        times: number of optima, each with tangents at the one before, at least.
 
     Returns:
-        the optimum; where there is none, what was reached.
+        the optimum; None if there is none, or none was reached.
     """
-    problem = _Problem(rows, ends, jerk)
-    z, _, is_optimal = interior_point(problem, problem.start(*start))
-    return Smooth(z[:, 0], z[:, 1], is_optimal)
+    near, motion = rows.nearest(start.x), start
+    for time in range(times + MORE_ROWS):
+        problem = _Problem(near, ends, jerk, motion.x)
+        z, _, is_optimal = interior_point(problem, problem.start(motion))
+        if not is_optimal:
+            return None
+        motion = Smooth(z[:, 0], z[:, 1])
+        if time >= times - 1:
+            if (rows.most - rows.u * motion.u - rows.x * motion.x).min() > -MISSED:
+                return motion
+            near = near.beside(rows.nearest(motion.x))
+    return None
+
+
+def below_ramps(x: np.ndarray, width: np.ndarray, jerk: float, ends: Ends) -> Smooth:
+    """Motion that is no faster than another one, nor than ramps from rest and to rest are.
+
+    Args:
+        x: (n_nodes,) squared path speeds of the other one.
+        width: (n_nodes - 1,) m.
+        jerk: largest path jerk, m/s^3.
+        ends: speeds, and whether it rests there.
+
+    Returns:
+        the motion.
+    """
+    s = np.concatenate([[0.0], np.cumsum(width)])
+    x = x.copy()
+    for way, rest in zip((s, s[-1] - s), ends.rests, strict=True):
+        # s = J t^3 / 6
+        x = np.minimum(x, (0.5 * jerk) ** 2 * (6.0 * way / jerk) ** (4.0 / 3.0)) if rest else x
+    x[1:-1] = np.maximum(x[1:-1], LEAST * x.max())
+    x[[0, -1]] = ends.speeds
+    return Smooth(x, 0.5 * np.gradient(x, s))
 
 
 class _Time(NamedTuple):
@@ -114,17 +181,27 @@ def _time(x: np.ndarray, width: np.ndarray, rests: tuple[bool, bool]) -> _Time:
     return _Time(float(np.sum(scaled / both)), np.where(moves, gradient, 0.0), np.where(moves, bend, 1.0), coupling)
 
 
-class _Jerk(NamedTuple):
-    # Tangents of the limit of the path jerk: +-(u1 - u0) share + (x0 + x1) level <= most, (n_cells,).
+class _Tangents(NamedTuple):
+    # Tangents of the limit of the path jerk: +-(u1 - u0) share + (x0 + x1) level <= 1, (n_cells,).
     share: np.ndarray
     level: np.ndarray
-    most: np.ndarray
+
+
+def _tangents(x: np.ndarray, width: np.ndarray, jerk: float, rests: tuple[bool, bool]) -> _Tangents:
+    middle = 0.5 * (x[1:] + x[:-1])
+    # 1 / sqrt x is above its tangent 1.5 / sqrt m - 0.5 x / m^1.5.
+    share, level = middle**0.5 / (1.5 * jerk * width), 1.0 / (6.0 * middle)
+    for end, rest in zip((0, -1), rests, strict=True):
+        if rest:  # the jerk of the cell is 2 x^1.5 / 9 D^2
+            share[end], level[end] = 0.0, (4.5 * width[end] ** 2 * jerk) ** (-2.0 / 3.0)
+    return _Tangents(share, level)
 
 
 class _Problem:
     # Unknowns are x, u, and the multiplier of the equation of the cell that follows, (n_nodes, 3).
-    def __init__(self, rows: NodeRows, ends: Ends, jerk: float) -> None:
-        self.ends, self.jerk, self.width = ends, jerk, rows.width
+    def __init__(self, rows: NodeRows, ends: Ends, jerk: float, x: np.ndarray) -> None:
+        self.ends, self.width = ends, rows.width
+        self.tangents = _tangents(x, rows.width, jerk, ends.rests)
         self.u, self.x, self.most = rows.with_cap()
         count = len(rows.cap)
         self.free = np.ones((count, 3), bool)
@@ -138,10 +215,8 @@ class _Problem:
                 self.cells[:, :, end] = 0.0
                 self.cells[1 + end, :, end] = 2.0 / 3.0, -rows.width[end] * (1.0 + 2.0 * end)
 
-    def start(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
-        x = np.maximum(x, LEAST * x.max())
-        x[[0, -1]] = self.ends.speeds
-        return np.stack([x, np.where(self.free[:, 1], u, 0.0), np.zeros(len(x))], axis=1)
+    def start(self, motion: Smooth) -> np.ndarray:
+        return np.stack([motion.x, np.where(self.free[:, 1], motion.u, 0.0), np.zeros(len(motion.x))], axis=1)
 
     def value(self, z: np.ndarray) -> float:
         return _time(z[:, 0], self.width, self.ends.rests).value
@@ -151,46 +226,26 @@ class _Problem:
 
     def slacks(self, z: np.ndarray) -> np.ndarray:
         slacks = self.most - self.u * z[:, 1] - self.x * z[:, 0]
-        tangents = self._tangents(z)
-        if tangents is None:
-            return slacks.ravel()
-        return np.concatenate([slacks.ravel(), *(tangents.most - side for side in self._turned(tangents, z))])
+        return np.concatenate([slacks.ravel(), *(1.0 - side for side in self._turned(z))])
 
     def change(self, z: np.ndarray, step: np.ndarray) -> np.ndarray:
         slacks = -self.u * step[:, 1] - self.x * step[:, 0]
-        tangents = self._tangents(z)
-        if tangents is None:
-            return slacks.ravel()
-        return np.concatenate([slacks.ravel(), *(-side for side in self._turned(tangents, step))])
+        return np.concatenate([slacks.ravel(), *(-side for side in self._turned(step))])
 
-    def _tangents(self, z: np.ndarray) -> _Jerk | None:
-        if not np.isfinite(self.jerk):
-            return None
-        middle = 0.5 * (z[1:, 0] + z[:-1, 0])
-        share, level, most = 1.0 / (self.jerk * self.width), 0.25 * middle**-1.5, 1.5 * middle**-0.5
-        for end, rest in zip((0, -1), self.ends.rests, strict=True):
-            if rest:  # the jerk of the cell is 2 x^1.5 / 9 D^2
-                largest = (4.5 * self.width[end] ** 2 * self.jerk) ** (2.0 / 3.0)
-                share[end], level[end], most[end] = 0.0, 1.0 / largest, 1.0
-        return _Jerk(share, level, most)
-
-    @staticmethod
-    def _turned(tangents: _Jerk, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        change, total = tangents.share * np.diff(z[:, 1]), tangents.level * (z[1:, 0] + z[:-1, 0])
+    def _turned(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        change, total = self.tangents.share * np.diff(z[:, 1]), self.tangents.level * (z[1:, 0] + z[:-1, 0])
         return total + change, total - change
 
     def pushed(self, z: np.ndarray, pressures: np.ndarray) -> np.ndarray:
         of_rows = pressures[: self.u.size].reshape(self.u.shape)
         pushed = np.zeros_like(z)
         pushed[:, 0], pushed[:, 1] = np.sum(self.x * of_rows, axis=0), np.sum(self.u * of_rows, axis=0)
-        tangents = self._tangents(z)
-        if tangents is not None:
-            up, down = pressures[self.u.size :].reshape(2, -1)
-            total, difference = (up + down) * tangents.level, (up - down) * tangents.share
-            pushed[:-1, 0] += total
-            pushed[1:, 0] += total
-            pushed[:-1, 1] -= difference
-            pushed[1:, 1] += difference
+        up, down = pressures[self.u.size :].reshape(2, -1)
+        total, difference = (up + down) * self.tangents.level, (up - down) * self.tangents.share
+        pushed[:-1, 0] += total
+        pushed[1:, 0] += total
+        pushed[:-1, 1] -= difference
+        pushed[1:, 1] += difference
         return np.where(self.free, pushed, 0.0)
 
     def residual(self, z: np.ndarray, pressures: np.ndarray) -> np.ndarray:
@@ -211,16 +266,14 @@ class _Problem:
         own[0, 1] = np.sum(of_rows * self.x * self.u, axis=0)
         own[1, 1] = np.sum(of_rows * self.u**2, axis=0) + REGULAR
         next_[0, 0] = time.coupling
-        tangents = self._tangents(z)
-        if tangents is not None:
-            up, down = weights[self.u.size :].reshape(2, -1)
-            of_level, of_share = (up + down) * tangents.level**2, (up + down) * tangents.share**2
-            mixed = (up - down) * tangents.level * tangents.share
-            for near, sign in ((slice(None, -1), -1.0), (slice(1, None), 1.0)):
-                own[0, 0, near] += of_level
-                own[1, 1, near] += of_share
-                own[0, 1, near] += sign * mixed
-            next_[:2, :2] += np.array([[of_level, mixed], [-mixed, -of_share]])
+        up, down = weights[self.u.size :].reshape(2, -1)
+        share, level = self.tangents
+        of_level, of_share, mixed = (up + down) * level**2, (up + down) * share**2, (up - down) * level * share
+        for near, sign in ((slice(None, -1), -1.0), (slice(1, None), 1.0)):
+            own[0, 0, near] += of_level
+            own[1, 1, near] += of_share
+            own[0, 1, near] += sign * mixed
+        next_[:2, :2] += np.array([[of_level, mixed], [-mixed, -of_share]])
         own[1, 0] = own[0, 1]
         own[2, :2, :-1] = own[:2, 2, :-1] = self.cells[0]
         own[2, 2, -1] = 1.0

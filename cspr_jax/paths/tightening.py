@@ -13,9 +13,9 @@ from cspr_jax.robots.clearance import Scene
 from cspr_jax.schema.verdicts import Verdict
 
 TENSIONS = Verdict.SLACK_CABLE | Verdict.OVER_TENSION | Verdict.WRENCH_INFEASIBLE
-# Slack, over its scale, that is left where a limit is met; by what more than is missed margins grow; below which a
-# criterion binds.
-LEFT, MORE, BINDING = 1e-7, 1.3, 0.01
+# Slack, over its scale, that is left where a limit is met; by what more than is missed, and by how
+# much at least, margins grow; below which a criterion binds.
+LEFT, MORE, STEP, BINDING = 1e-7, 1.3, 1e-5, 0.01
 # Times that a cell is halved, and by how much of what is missed its bounds may be apart.
 HALVINGS, LOOSE = 3, 0.5
 # Criteria that faster or slower motion changes, by their units.
@@ -52,7 +52,8 @@ class CellSlacks(NamedTuple):
         """
 
         def lacking(chosen: list[bool]) -> np.ndarray:
-            return MORE * np.maximum(LEFT - self.low[:, chosen].min(1, initial=np.inf), 0.0)
+            missed = LEFT - self.low[:, chosen].min(1, initial=np.inf)
+            return np.where(missed > 0.0, MORE * missed + STEP, 0.0)
 
         tension = weight * lacking([bool(row.flag & TENSIONS) for row in self.rows])
         others = (lacking([row.unit == unit for row in self.rows]) for unit in (ACCELERATIONS, SPEEDS))

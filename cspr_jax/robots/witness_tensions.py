@@ -6,9 +6,10 @@ rows of |E| sum to less than 1 it is bounded. Where the bounds keep the limits, 
 instant: a proof. On as many cables as components these are the only ones, and A is nowhere singular.
 
 For more cables, the line joins the most central tensions at both ends of the block: between them tensions are at least
-about as far from their limits, also where another face becomes the nearest one. A face of the set of wrenches refutes. With y(s) normal to the d - 1 columns that span it (found in the
-same way, as a solution of a balance), tensions that are r from their limits give at most y w >= sum of y A_i times the
-limit on the other side, and r sum |y A_i|: that bounds r from above.
+about as far from their limits, also where another face becomes the nearest one. A face of the set of wrenches refutes.
+With y(s) normal to the d - 1 columns that span it (found in the same way, as a solution of a balance), tensions that
+are r from their limits give at most y w >= sum of y A_i times the limit on the other side, and r sum |y A_i|: that
+bounds r from above.
 """
 
 from typing import NamedTuple
