@@ -13,10 +13,11 @@ from cspr_jax.paths.discrete import Discrete
 from cspr_jax.paths.duality import Multipliers, Rates, lower_bound
 from cspr_jax.paths.multipliers import dual_multipliers
 from cspr_jax.paths.nodes import BATCH, Places, places_on, state_at
-from cspr_jax.paths.rows import TINY, tangent_directions, unit_wrenches
+from cspr_jax.paths.rows import TINY, tangent_directions, tension_faces, unit_wrenches
 from cspr_jax.robots.cables import AnyRobot, cable_motion
 from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.wrench_sets import tension_range, wrench_faces
+from cspr_jax.robots.witness_tensions import right_inverse
+from cspr_jax.runtime import compile_options
 
 # x at which the search for multipliers begins, at least, over its largest value.
 LEAST = 1e-9
@@ -42,14 +43,15 @@ def path_bound(problem: Problem, path: Discrete, x: np.ndarray) -> float:
     return lower_bound(robot, limits, path, Multipliers(*values), Rates(*rates))
 
 
-@jax.jit
+@partial(jax.jit, compiler_options=compile_options.least())
 def _of_nodes(robot: AnyRobot, limits: Limits, nodes: tuple[Places, Array]) -> tuple[Array, Array, Array]:
     # Multipliers of what the half-planes are made of, from those of the half-planes.
     def one(place: Places, pressures: Array) -> tuple[Array, Array, Array]:
         state = state_at(place)
-        faces = wrench_faces(unit_wrenches(robot, state).matrix, *tension_range(robot, limits))
-        count, n_cables = len(faces.offsets), robot.n_cables
-        wrench = -(pressures[:count] @ faces.normals) / (robot.mass * robot.gravity)
+        matrix = unit_wrenches(robot, state).matrix
+        along = tension_faces(robot, limits, matrix).along
+        count, n_cables = along.shape
+        wrench = -(pressures[:count] @ along @ right_inverse(matrix)) / (robot.mass * robot.gravity)
         bend, turn, rest = jnp.zeros(n_cables), jnp.zeros(3), pressures[count:]
         if limits.cable_acceleration_max is not None:
             bend, rest = rest[:n_cables] - rest[n_cables : 2 * n_cables], rest[2 * n_cables :]
@@ -60,7 +62,7 @@ def _of_nodes(robot: AnyRobot, limits: Limits, nodes: tuple[Places, Array]) -> t
     return jax.vmap(one)(*nodes)
 
 
-@jax.jit
+@partial(jax.jit, compiler_options=compile_options.least())
 def _of_cells(robot: AnyRobot, limits: Limits, cells: tuple[Places, Array, Array]) -> tuple[Array, Array]:
     # The cap of a cell is that of the cable, or of the mass centre, whose limit is nearest in its middle.
     def one(place: Places, most: Array, pressure: Array) -> tuple[Array, Array]:

@@ -17,6 +17,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
+from cspr_jax.paths.rows import Rows
+from cspr_jax.runtime import compile_options
+
 # A half-plane whose share of u is smaller bounds x alone. Steps of Newton, at most.
 FLAT, STEPS = 1e-12, 40
 # Part of the numbers in it by which h may miss zero.
@@ -39,6 +42,19 @@ class Cells(NamedTuple):
     most: Array
     width: Array
     cap: Array
+
+
+def _cells_of(sides: tuple[Rows, Rows], width: Array, bend: Array, cap: Array) -> Cells:
+    # At the end of a cell x is that at its start and what u in the middle adds.
+    start, end = sides
+    half = (0.5 * bend * width)[:, None]
+    return Cells(
+        u=jnp.concatenate([start.u, end.u + 2.0 * width[:, None] * end.x], axis=1),
+        x=jnp.concatenate([start.x, end.x], axis=1),
+        most=jnp.concatenate([start.most + start.u * half, end.most - end.u * half], axis=1),
+        width=width,
+        cap=cap,
+    )
 
 
 class Fastest(NamedTuple):
@@ -124,18 +140,22 @@ def _flat_range(u: Array, x_share: Array, most: Array, cap: Array) -> tuple[Arra
     return jnp.maximum(low, 0.0), jnp.where(never, -1.0, jnp.minimum(high, cap))
 
 
-@partial(jax.jit, static_argnames=("free_end",))
-def fastest(cells: Cells, start: Array, end: Array, free_end: bool = False) -> Fastest:
+@partial(jax.jit, compiler_options=compile_options.least())
+def fastest(sides: tuple[Rows, Rows], width: Array, bend: Array, cap: Array, ends: tuple[Array, Array]) -> Fastest:
     """Fastest motions along paths.
 
     Args:
-        start: (n_paths,) x at the start.
-        end: (n_paths,) x at the end.
-        free_end: whether the end may have any x up to that one.
+        sides: half-planes at the starts and at the ends of the cells, (n_cells, n_rows, n_paths).
+        width: (n_cells, n_paths) m.
+        bend: (n_cells, n_paths) change of u along each cell, over its width.
+        cap: (n_cells + 1, n_paths) largest x at the nodes, finite.
+        ends: (n_paths,) x at the start, and at the end.
 
     Returns:
         the motions.
     """
+    cells = _cells_of(sides, width, bend, cap)
+    start, end = ends
     n_rows = cells.u.shape[1]
 
     def rows_of(cell: Cells, low: Array, high: Array) -> tuple[Array, Array, Array]:
@@ -161,12 +181,11 @@ def fastest(cells: Cells, start: Array, end: Array, free_end: bool = False) -> F
     n_cells, n_paths = cells.width.shape
     is_end = end <= cells.cap[-1]
     last = jnp.where(is_end, end, jnp.nan)
-    lowest = jnp.where(is_end, 0.0, jnp.nan) if free_end else last
     none = jnp.full(n_paths, -1)
-    first = (lowest, last, jnp.where(is_end, none, n_cells), jnp.full((2, n_paths), n_rows), n_cells - 1)
+    first = (last, last, jnp.where(is_end, none, n_cells), jnp.full((2, n_paths), n_rows), n_cells - 1)
     steps = cells._replace(cap=cells.cap[:-1])
     (_, _, empty, meeting, _), (low, high) = lax.scan(back, first, steps, reverse=True)
-    low, high = jnp.concatenate([low, lowest[None]]), jnp.concatenate([high, last[None]])
+    low, high = jnp.concatenate([low, last[None]]), jnp.concatenate([high, last[None]])
     is_start = (start >= low[0] - CLOSE * (1.0 + start)) & (start <= high[0] + CLOSE * (1.0 + start))
 
     def ahead(x: Array, step):
@@ -178,29 +197,6 @@ def fastest(cells: Cells, start: Array, end: Array, free_end: bool = False) -> F
     beginning = jnp.clip(start, low[0], high[0])
     _, (x, u, binding) = lax.scan(ahead, beginning, (steps, low[1:], high[1:]))
     return Fastest(low, high, jnp.concatenate([beginning[None], x]), u, binding, empty, meeting, is_start)
-
-
-def cells_of(sides, width: Array, bend: Array, cap: Array) -> Cells:
-    """Cells of half-planes at their ends.
-
-    Args:
-        sides: `paths.rows.Rows` of the starts, and of the ends of cells, leaves (n_cells, n_rows, n_paths).
-        width: (n_cells, n_paths) m.
-        bend: (n_cells, n_paths) change of u along the cell, over its width.
-        cap: (n_cells + 1, n_paths).
-
-    Returns:
-        the cells.
-    """
-    start, end = sides
-    half = (0.5 * bend * width)[:, None]
-    return Cells(
-        u=jnp.concatenate([start.u, end.u + 2.0 * width[:, None] * end.x], axis=1),
-        x=jnp.concatenate([start.x, end.x], axis=1),
-        most=jnp.concatenate([start.most + start.u * half, end.most - end.u * half], axis=1),
-        width=width,
-        cap=cap,
-    )
 
 
 def smallest_of_slopes(u: np.ndarray, width: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ import jax
 import numpy as np
 
 from cspr_jax.motions.problem import Problem
-from cspr_jax.paths.controllable import Fastest, cells_of, fastest
+from cspr_jax.paths.controllable import Fastest, fastest
 from cspr_jax.paths.multipliers import SideRows
 from cspr_jax.paths.nodes import Grid, grid_of, side_rows
 from cspr_jax.paths.rows import Rows, face_count
@@ -104,9 +104,9 @@ class Discrete:
         Returns:
             the motion, of one path.
         """
-        one = (self.start, self.end), self.grid.width, bend, self.cap()
-        cells = jax.tree.map(np.asarray, cells_of(*jax.tree.map(lambda leaf: leaf[..., None], one)))
-        return jax.tree.map(np.asarray, fastest(cells, *(np.array([x]) for x in self.ends)))
+        sizes = self.grid.width, bend, self.cap(), tuple(np.asarray(x) for x in self.ends)
+        one = jax.tree.map(lambda leaf: np.asarray(leaf)[..., None], ((self.start, self.end), *sizes))
+        return jax.tree.map(np.asarray, fastest(*one))
 
     def node_rows(self) -> NodeRows:
         """Half-planes at the nodes; where those of both sides differ, all of them.

@@ -14,6 +14,7 @@ from cspr_jax.paths.section import Section
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.state import State
+from cspr_jax.runtime import compile_options
 
 # Part of the nodes over which cells become wider, from an end at zero speed on; cells there that are narrower still.
 RAMP, SMALLER = 0.25, 5
@@ -149,7 +150,7 @@ def state_at(place: Places) -> State:
     return piece_state(*place)
 
 
-@jax.jit
+@partial(jax.jit, compiler_options=compile_options.least())
 def _rows(robot: AnyRobot, limits: Limits, arguments: tuple[Places, Array]) -> Rows:
     return jax.vmap(lambda place, speed: path_rows(robot, limits, state_at(place), speed))(*arguments)
 
@@ -176,7 +177,7 @@ def side_rows(robot: AnyRobot, limits: Limits, curve: Spline, grid: Grid) -> tup
     return start, end
 
 
-@jax.jit
+@partial(jax.jit, compiler_options=compile_options.least())
 def _derivatives(places: Places) -> Any:
     def one(place: Places):
         rates = [piece_values(place.position, place.share, place.width)]

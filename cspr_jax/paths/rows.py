@@ -14,8 +14,11 @@ from jax import Array
 
 from cspr_jax.robots.cables import AnyRobot, cable_motion, wrench_units
 from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.nearest_face import beside_faces, one_sided_faces
 from cspr_jax.robots.state import State
-from cspr_jax.robots.wrench_sets import spanning, tension_range, wrench_faces
+from cspr_jax.robots.tension_distribution import all_tensions
+from cspr_jax.robots.witness_tensions import right_inverse
+from cspr_jax.robots.wrench_sets import spanning, tension_range
 
 # Tangents of the largest Cartesian acceleration: half of a polygon around the circle, in which p'' lies.
 TANGENTS = 24
@@ -125,20 +128,44 @@ def path_rows(robot: AnyRobot, limits: Limits, state: State, speed: Array) -> Ro
     return Rows(*(jnp.concatenate(column) for column in zip(*parts, strict=True)), cap)
 
 
+class TensionFaces(NamedTuple):
+    """Faces of the set of wrenches that the cables can give, by what they say of tensions t: along t >= least.
+
+    Fields:
+        along: (n_faces, n_cables) products of the normals, which point inside, with the cables.
+        least: (n_faces,) smallest products with tensions within their limits, N; -inf of a face that bounds nothing.
+    """
+
+    along: Array
+    least: Array
+
+
+def tension_faces(robot: AnyRobot, limits: Limits, matrix: Array) -> TensionFaces:
+    """Faces at one place.
+
+    Args:
+        matrix: (dof, n_cables) wrenches of unit tensions, over their units.
+
+    Returns:
+        the faces, those of `wrench_sets.spanning` with one sign and then with the other.
+    """
+    count, dof = robot.n_cables, robot.dof
+    low, high = tension_range(robot, limits)
+    is_beside = (beside_faces(count, dof)[..., None] == np.arange(count)).astype(float)
+    kernel = all_tensions(matrix, jnp.zeros(dof)).kernel if count > dof else jnp.zeros((0, count))
+    one_sided = jnp.sum(one_sided_faces(matrix, kernel)[..., None] * is_beside, axis=1)
+    along = jnp.concatenate([one_sided, -one_sided])
+    least = jnp.where(along > 0.0, along * low[None], jnp.where(along < 0.0, along * high[None], 0.0)).sum(1)
+    return TensionFaces(along, jnp.where((along != 0.0).any(1), least, -jnp.inf))
+
+
 def _of_tensions(robot: AnyRobot, limits: Limits, wrenches: UnitWrenches) -> tuple[Array, ...]:
     # One half-plane a face, over the weight.
-    low, high = tension_range(robot, limits)
-    faces = wrench_faces(wrenches.matrix, low, high)
-    weight = robot.mass * robot.gravity
-    normals, bounds = faces.normals / weight, jnp.isfinite(faces.offsets)
-    most = normals @ wrenches.rest - jnp.where(bounds, faces.offsets, 0.0) / weight
-    size = jnp.sum(jnp.abs(normals @ wrenches.matrix), axis=1)
-    return (
-        -(normals @ wrenches.momentum),
-        -(normals @ wrenches.bend),
-        jnp.where(bounds, most, 1.0),
-        jnp.where(bounds, size, 0.0),
-    )
+    faces, weight = tension_faces(robot, limits, wrenches.matrix), robot.mass * robot.gravity
+    inverse, bounds = right_inverse(wrenches.matrix), jnp.isfinite(faces.least)
+    momentum, bend, rest = (jnp.sum(faces.along * (inverse @ x)[None], axis=1) / weight for x in wrenches[1:])
+    most = jnp.where(bounds, rest - jnp.where(bounds, faces.least, 0.0) / weight, 1.0)
+    return -momentum, -bend, most, jnp.where(bounds, jnp.sum(jnp.abs(faces.along), axis=1) / weight, 0.0)
 
 
 def tangent_directions(velocity: Array, acceleration: Array) -> Array:

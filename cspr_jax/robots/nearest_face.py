@@ -16,8 +16,8 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.elementary import solved
-from cspr_jax.robots.tension_distribution import AllTensions, all_tensions
-from cspr_jax.robots.wrench_sets import FLAT, spanning, wrench_faces
+from cspr_jax.robots.tension_distribution import all_tensions
+from cspr_jax.robots.wrench_sets import FLAT, normals_to, spanning
 
 # A tension without a largest value is held below so many times the largest that the wrench needs.
 CAP = 1e3
@@ -53,8 +53,8 @@ def nearest_face(matrix: Array, wrench: Array, low: Array, high: Array) -> Neare
     solutions = all_tensions(matrix, wrench)
     cap = CAP * (jnp.max(jnp.abs(solutions.least)) + jnp.max(low))
     low, high = jnp.asarray(low), jnp.minimum(high, jnp.maximum(cap, low))
-    chosen = _others(count, dof)
-    along = _relations(solutions, chosen) if count - dof <= 2 else _products(matrix, low, high, chosen)
+    chosen = beside_faces(count, dof)
+    along = one_sided_faces(matrix, solutions.kernel)
     # Faces of both signs, each cable at the limit that gives the least.
     along, others = jnp.concatenate([along, -along]), np.concatenate([chosen, chosen])
     limits = jnp.where(along > 0.0, low[others], high[others])
@@ -83,14 +83,34 @@ def _distances(along: Array, slacks: Array, weights: Array) -> Array:
 
 
 @functools.cache
-def _others(count: int, dof: int) -> np.ndarray:
-    # The cables that do not span a face, (n_choices, count - dof + 1), in the order of `spanning`.
+def beside_faces(count: int, dof: int) -> np.ndarray:
+    """Cables that do not span a face.
+
+    Returns:
+        (n_choices, count - dof + 1) in the order of `wrench_sets.spanning`.
+    """
     return np.array([np.setdiff1d(np.arange(count), columns) for columns in spanning(count, dof)])
 
 
-def _relations(solutions: AllTensions, chosen: np.ndarray) -> Array:
-    # Products by the relation among rows of the null space, one row more than it has columns.
-    rows = solutions.kernel.T[chosen]
+def one_sided_faces(matrix: Array, kernel: Array) -> Array:
+    """Products of a normal to each choice of d - 1 cables with the other cables.
+
+    Args:
+        matrix: (dof, n_cables) unit columns.
+        kernel: (n_cables - dof, n_cables) orthonormal tensions without a wrench.
+
+    Returns:
+        (n_choices, n_cables - dof + 1), the cables as `beside_faces` has them; 0 for cables in the face.
+    """
+    dof, count = matrix.shape
+    chosen = beside_faces(count, dof)
+    if count - dof > 2:
+        normals = normals_to(matrix)
+        size = jnp.linalg.norm(normals, axis=1)[:, None]
+        along = jnp.take_along_axis(normals / jnp.where(size > FLAT, size, 1.0) @ matrix, jnp.asarray(chosen), axis=1)
+        return jnp.where((size > FLAT) & (jnp.abs(along) > FLAT), along, 0.0)
+    # One row of the null space more than it has columns: the relation among them.
+    rows = kernel.T[chosen]
     if chosen.shape[1] == 1:
         return jnp.ones(chosen.shape)
     if chosen.shape[1] == 2:
@@ -100,10 +120,4 @@ def _relations(solutions: AllTensions, chosen: np.ndarray) -> Array:
         along = after[..., 0] * last[..., 1] - after[..., 1] * last[..., 0]
     size = jnp.max(jnp.abs(along), axis=1, keepdims=True)
     along = jnp.where(size > FLAT, along / jnp.where(size > FLAT, size, 1.0), 0.0)
-    return jnp.where(jnp.abs(along) > FLAT, along, 0.0)
-
-
-def _products(matrix: Array, low: Array, high: Array, chosen: np.ndarray) -> Array:
-    normals = wrench_faces(matrix, low, high).normals[: len(chosen)]
-    along = jnp.take_along_axis(normals @ matrix, jnp.asarray(chosen), axis=1)
     return jnp.where(jnp.abs(along) > FLAT, along, 0.0)
