@@ -51,7 +51,10 @@ def least_time_motion(problem: Problem, scene: Scene, section: Section, settings
     s[-1] = knots[-1]
     # s'^2 = x: a parabola in s from 0 to 0, of constant acceleration at both ends.
     share = s / s[-1]
-    ends = (1.0 - share) * settings.start_speed**2 + share * settings.end_speed**2
+    legs = np.diff(np.asarray(section.curve.position)[[0, -1]], axis=1)[[0, 1], [0, -1]] * 5.0
+    paces = np.linalg.norm(legs, axis=1) / np.diff(knots)[[0, -1]]
+    first, last = (np.array([settings.start_speed, settings.end_speed]) / np.where(paces > 0.0, paces, 1.0)) ** 2
+    ends = (1.0 - share) * first + share * last
     x = ends + 4.0 * SPEED**2 * share * (1.0 - share)
     rate, bend = np.sqrt(np.maximum(x, 0.0)), 0.5 * np.gradient(x, s, edge_order=2)
     steps = 2.0 * np.diff(s) / (rate[1:] + rate[:-1])

@@ -62,6 +62,19 @@ def test_blends_and_rest():
     assert speeds[middle] > 0.01
 
 
+def test_speeds_at_the_ends():
+    """Of the whole plan, and not of its parts; a closed path of a pose comes back."""
+    table = {"kind": "cubic", "grid": 50, "start_speed": 0.05, "end_speed": 0.08}
+    result = cspr_jax.plan(ROBOT | {"path": table, "pose": poses(PLACES, _2={"rest": True})})
+    speeds = np.linalg.norm(result.rows()["velocity"], axis=1)
+    middle = int(np.argmin(np.linalg.norm(walked(result) - PLACES[2], axis=1)))
+    assert speeds[[0, middle, -1]] == pytest.approx([0.05, 0.0, 0.08], abs=1e-9)
+    loop = {"kind": "quintic", "closed": True, "points": PLACES[1:], "grid": 50}
+    back = cspr_jax.plan(ROBOT | {"pose": [{"position": PLACES[0]}, {"path": loop}]})
+    np.testing.assert_allclose(walked(back)[[0, -1]], [PLACES[0], PLACES[0]], atol=1e-12)
+    assert all(passes(walked(back), place) < 1e-3 for place in PLACES)
+
+
 def test_arcs_and_circles():
     centre, start = np.array([0.0, 0.0, 1.4]), np.array([0.06, 0.0, 1.4])
     circle = {"kind": "circle", "centre": centre, "start": start, "grid": 50}
@@ -143,7 +156,7 @@ def one(keys, position=True):
         (whole("points = [[0, 0, 1]]"), "path.points = [[0.0, 0.0, 1.0]]: must be two points or more"),
         (whole("points = [[0, 0, 1], [0, 0, nan]]"), "path.points[1][2] = nan: must be a finite number"),
         (whole("points = [[0, 0, 1], [0, 1]]"), "path.points[1] = [0, 1]: must be a list of at least 3"),
-        (whole("points = [[0, 0, 1], [0, 0, 1]]"), "path.points[1] = [0.0, 0.0, 1.0]: must be another place"),
+        (whole("points = [[0, 0, 1], [0, 0, 1]]"), "path.points = [0.0, 0.0, 1.0]: must be another place"),
         (whole('kind = "cubic"'), "path.points is missing: the points of the path, or [[pose]] tables"),
         (whole(LINE) + TWO, "path.points = [[0.0, 0.0, 1.4], [0.05, 0.0, 1.4]]: must be absent beside [[pose]] tables"),
         (whole(f'{LINE}\ncorner = "stop"'), 'path.corner = "stop": must be absent unless kind = "polyline", "csv" or'),
@@ -177,13 +190,13 @@ def one(keys, position=True):
         (whole(f"{LINE}\ngrid = 10.5"), "path.grid = 10.5: must be an integer"),
         (whole(f"{LINE}\nramp_time = nan"), "path.ramp_time = nan: must be a finite number"),
         (whole(f"{LINE}\nspeed = 1"), "unknown key path.speed = 1: did you mean"),
-        (f"{HEAD}[path]\nclosed = true\n{TWO}", "path.closed: must be absent beside [[pose]] tables"),
+        (f"{HEAD}[path]\nclosed = true\n{TWO}", "path.closed = true: must be absent without points"),
         (f"{HEAD}{TWO}arcs = 2\n", 'pose[1].arcs: must be absent with family = "path"'),
         (
             HEAD.replace('"path"', '"spline"') + TWO + "time = 1\n[path]\n",
             'path: must be absent unless family = "path"',
         ),
-        (one("points = [[0, 0, 1.4]]"), "pose[1].path.points[1] = [0.0, 0.0, 1.4]: must be another place"),
+        (one("points = [[0, 0, 1.4]]"), "pose[1].path.points = [0.0, 0.0, 1.4]: must be another place"),
         (one('kind = "arc", centre = [0.1, 0, 1.4], angle = 1'), "pose[1].position: must be absent: pose[1].path"),
         (
             one('kind = "arc", centre = [0.1, 0, 1.4], start = [0, 0, 1.4], angle = 1', False),
