@@ -318,8 +318,8 @@ def norm_squared(f: AffineBounds) -> AffineBounds:
 
 
 @jax.jit
-def norm_bound(f: AffineBounds) -> Array:
-    """Upper bounds of the lengths of vectors: at the ends of their lines, and of the band.
+def norm(f: AffineBounds) -> AffineBounds:
+    """Bounds of the lengths of vectors, also of those that vanish.
 
     Args:
         f: (..., n).
@@ -327,9 +327,13 @@ def norm_bound(f: AffineBounds) -> Array:
     Returns:
         (...).
     """
+    # A length is convex: it lies below the chord between the ends of the line, and above its part along any direction.
     start, end = (jnp.sqrt(jnp.sum((f.middle + side) ** 2, axis=-1)) for side in (-f.slope, f.slope))
-    length = jnp.maximum(start, end) + jnp.sqrt(jnp.sum(f.radius**2, axis=-1))
-    return length * (1.0 + ROUNDING)
+    apart, size = jnp.sqrt(jnp.sum(f.radius**2, axis=-1)), jnp.sqrt(jnp.sum(f.middle**2, axis=-1))
+    along = jnp.sum(f.middle * f.slope, axis=-1) / jnp.where(size > 0.0, size, 1.0)
+    slope, above = 0.5 * (end - start), 0.5 * (start + end) + apart
+    below = size - apart - jnp.abs(along - slope)
+    return _rounded(AffineBounds(0.5 * (above + below), slope, 0.5 * (above - below)), start + end)
 
 
 @jax.jit

@@ -17,6 +17,8 @@ _SETTINGS |= {20: "units", 21: "units", 90: "distances", 91: "distances"}
 _READ = "G0 G1 G2 G3 G17 G20 G21 G90 G91, X Y Z I J R, F, N, M2 M30"
 _UNITS = {20: 0.0254, 21: 0.001}
 MINUTE = 60.0  # s
+# Moves that are not longer go nowhere, m.
+SAME_PLACE = 1e-9
 # By which rounded numbers may take the end of an arc off its circle, m.
 ROUNDED = 1e-5
 
@@ -119,14 +121,16 @@ class _GcodeReader:
         if motion < 2 and words:
             raise self._error(min(words), "must be absent unless G2 or G3 is on")
         before, end = self.place, self._end(lengths)
-        self.place = end
         if before is None:
             if motion >= 2:
                 raise self._error(f"G{motion}", "must follow a place: G0 or G1 first")
+            self.place = end
         elif motion >= 2:
             self.moves.append(self._arc(before, end, lengths, motion))
-        elif end != before:
+            self.place = end
+        elif math.dist(end, before) > SAME_PLACE:
             self.moves.append(Move(self.line, before, end, speed=self.speed if motion else math.inf))
+            self.place = end
 
     def _end(self, lengths: dict[str, float]) -> list[float]:
         if self.place is None:

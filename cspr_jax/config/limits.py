@@ -73,7 +73,8 @@ def _limit_keys(*, per_cable: bool) -> dict[str, Any]:
     keys: dict[str, Any] = {}
     for row in LIMITS:
         if row.per_cable == per_cable:
-            kind = (NotNegativePerCable if row.from_zero else PerCable) if per_cable else Coordinate
+            kind = Coordinate if row.is_height else NotNegativePerCable if row.from_zero else PerCable
+            kind = kind if per_cable or row.is_height else Positive
             kind = TensionPerCable if row.name == "tension_max" else kind
             text = f"{row.description}{', one number, or one per cable' * per_cable}, {row.unit}"
             keys[row.name] = (kind | None, Field(None, description=text))
@@ -119,6 +120,10 @@ class LimitTable(_Heights):
         None,
         description="hypocycloids, transitions and splines: feasible then means feasible for every robot within this "
         "uncertainty",
+    )
+
+    tension_margin: NotNegative | None = Field(
+        None, description="distance that tensions keep from both ends of their range, N"
     )
 
     if TYPE_CHECKING:

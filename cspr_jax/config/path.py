@@ -91,6 +91,9 @@ class PathTable(Table):
         for key in _NEEDED.get(self.kind, ()):
             if getattr(self, key) is None:
                 raise fault(key, None, f"a path of kind {self.kind} needs it")
+        for key in ("orientations", "closed") if self.kind in _KINDS["points"] and self.points is None else ():
+            if getattr(self, key) is not None:
+                raise fault(key, shown(getattr(self, key)), "absent without points")
         if self.angle == 0.0:
             raise fault("angle", self.angle, "an angle that is not zero")
         if self.normal is not None and not any(self.normal):

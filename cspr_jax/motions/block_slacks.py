@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.arithmetic.affine_bounds import AffineBounds, dot
+from cspr_jax.arithmetic.affine_bounds import AffineBounds, dot, norm
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.determinant_bounds import changes_sign, determinant, size_range
 from cspr_jax.motions.criteria import AT_INSTANTS, contact_criteria, criteria, judged_poses
@@ -162,10 +162,13 @@ def limit_slacks(limits: Limits, state: StateBounds, cables: CableBounds) -> lis
     parts: list[Part] = []
     values = {"depth": state.position.each(lambda x: x[2:]), "length": cables.length}
     rates = {"speed": cables.rate, "acceleration": cables.acceleration}
+    sizes = {"mass_centre_speed": state.velocity, "mass_centre_acceleration": state.acceleration}
     for row in limits_set(limits):
         limit = jnp.asarray(getattr(limits, row.name))
         if row.quantity in values:
             parts.append(_lines(*_edges(limit - values[row.quantity])))
+        elif row.quantity in sizes:
+            parts.append(_lines(*_edges(limit - norm(sizes[row.quantity].each(lambda x: x[None])))))
         elif row.quantity in rates:
             parts.append(_within(limit, rates[row.quantity]))
     return parts

@@ -48,9 +48,22 @@ def limits_of(
         raise InputError(f"{at}tension_min", low.tolist(), "below tension_max for every cable")
     if values["floor"] is not None:
         values["floor"] = leaf(frame_of(robot.base_points, robot.z_axis).depth(values["floor"]))
+    values |= _narrowed(values, limits.get("tension_margin"), n_cables, at)
     uncertain = limits.get("uncertainty")
     uncertain = defaults.get("uncertainty") if uncertain is None else uncertain
     return Limits(**values, uncertainty=None if uncertain is None else _uncertainty(uncertain, f"{at}uncertainty."))
+
+
+def _narrowed(values: Mapping[str, Any], margin: float | None, n_cables: int, at: str) -> dict[str, Any]:
+    # Tension limits with a distance from both ends of their range.
+    if margin is None:
+        return {}
+    low, high = values["tension_min"], values["tension_max"]
+    low = np.full(n_cables, margin) if low is None else low + margin
+    high = None if high is None else high - margin
+    if high is not None and not (low < high).all():
+        raise InputError(f"{at}tension_margin", margin, "less than half of the range of tensions of every cable")
+    return {"tension_min": leaf(low), "tension_max": None if high is None else leaf(high)}
 
 
 def _uncertainty(uncertainty: Any, at: str) -> Uncertainty:
@@ -80,6 +93,26 @@ def check_bounded(limits: Limits) -> None:
             np.asarray(high).tolist(),
             "finite, or absent (only workspaces and platforms on more than six cables take infinite ones)",
         )
+
+
+def check_judged(limits: Limits, families: tuple[str, ...]) -> None:
+    """Refuse limits of the mass centre's motion where verdicts do not take them into account.
+
+    Args:
+        families: as for `check_certain`.
+
+    Raises:
+        InputError: a limit that must be absent.
+    """
+    knowing = [row.name for row in FAMILIES.values() if row.knows_mass_centre]
+    for row in LIMITS:
+        if (
+            row.of_mass_centre
+            and getattr(limits, row.name) is not None
+            and not (families and set(families) <= set(knowing))
+        ):
+            allowed = f"absent but for the families {', '.join(knowing)}"
+            raise InputError(row.name, float(getattr(limits, row.name)), allowed)
 
 
 def check_certain(
@@ -114,7 +147,7 @@ def check_certain(
 def _limit(row: Limit, value: Any, n_cables: int, at: str) -> Array:
     allowed = row.allowed + f", or {n_cables}: one a cable" * row.per_cable
     values = numbers(f"{at}{row.name}", value, allowed)
-    least = -np.inf if not row.per_cable else 0.0 if row.from_zero else np.nextafter(0.0, 1.0)
+    least = -np.inf if row.is_height else 0.0 if row.from_zero else np.nextafter(0.0, 1.0)
     shapes = [(), (n_cables,)] if row.per_cable else [()]
     is_number = np.isfinite(values) | ((values == np.inf) & (row.name == "tension_max") & (values.ndim > 0))
     if values.shape not in shapes or not ((values >= least) & is_number).all():
@@ -175,5 +208,6 @@ def limits_over(
     merged = limits_of(robot, vars(limits or NO_LIMITS), vars(robot.limits), "limits.")
     if not any_tensions:
         check_bounded(merged)
+    check_judged(merged, families)
     check_certain(robot, merged, families)
     return merged

@@ -31,6 +31,8 @@ class Values(NamedTuple):
         length: (n_cables,) of the cables, m.
         speed: (n_cables,) size of the rate of the length, m/s.
         acceleration: (n_cables,) size of its second derivative, m/s^2.
+        mass_centre_speed: () m/s.
+        mass_centre_acceleration: () size of it, m/s^2.
     """
 
     tension: Array
@@ -38,6 +40,8 @@ class Values(NamedTuple):
     length: Array
     speed: Array
     acceleration: Array
+    mass_centre_speed: Array
+    mass_centre_acceleration: Array
 
 
 def values(robot: AnyRobot, state: State) -> Values:
@@ -50,8 +54,13 @@ def values(robot: AnyRobot, state: State) -> Values:
     Returns:
         the quantities.
     """
+    return _values(robot, state, cables.tensions(robot, state))
+
+
+def _values(robot: AnyRobot, state: State, tensions: Array) -> Values:
     length, rate, bend = cables.cable_motion(robot, state)
-    return Values(cables.tensions(robot, state), state.position[2], length, jnp.abs(rate), jnp.abs(bend))
+    speed, pull = jnp.linalg.norm(state.velocity), jnp.linalg.norm(state.acceleration)
+    return Values(tensions, state.position[2], length, jnp.abs(rate), jnp.abs(bend), speed, pull)
 
 
 def scales(n_cables: int, weight: Array, z0: Array) -> dict[str, tuple[float, Array]]:
@@ -104,8 +113,7 @@ def other_slacks(robot: AnyRobot, limits: Limits, state: State, z0: Array) -> li
     Returns:
         () each.
     """
-    length, rate, bend = cables.cable_motion(robot, state)
-    quantities = Values(jnp.zeros_like(length), state.position[2], length, jnp.abs(rate), jnp.abs(bend))
+    quantities = _values(robot, state, jnp.zeros(robot.n_cables))
     scale = scales(robot.n_cables, robot.mass * robot.gravity, z0)
     return [
         jnp.min(slack(row, getattr(limits, row.name), getattr(quantities, row.quantity), scale))

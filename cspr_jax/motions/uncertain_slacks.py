@@ -17,7 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.arithmetic.affine_bounds import AffineBounds, norm_bound
+from cspr_jax.arithmetic.affine_bounds import AffineBounds, norm
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.motions.block_slacks import limit_slacks, tension_slacks
 from cspr_jax.robots.cables import AnyRobot, wrench_units
@@ -101,7 +101,7 @@ def _cables_hold(robot: AnyRobot, limits: Limits, state: StateBounds, cables: Ca
     near, speed = cables.length.low(), cables.rate.size()
     sine = spools / near
     slowest = jnp.maximum(0.0, jnp.maximum(cables.rate.low(), -cables.rate.high()))
-    square = jnp.maximum(norm_bound(velocity) ** 2 - slowest**2, 0.0)
+    square = jnp.maximum(norm(velocity).high() ** 2 - slowest**2, 0.0)
     faster = sine * jnp.sqrt(square) + (1.0 - jnp.sqrt(1.0 - sine**2)) * speed
     if limits.cable_speed_max is not None:
         is_met &= (speed + faster < limits.cable_speed_max).all()
@@ -109,7 +109,7 @@ def _cables_hold(robot: AnyRobot, limits: Limits, state: StateBounds, cables: Ca
         # With q = v^2 - rate^2, of length q / l + u pull: q' / l' - q / l, and (u' - u) pull.
         short = jnp.where(near > spools, near - spools, jnp.nan)
         more = faster * (2.0 * speed + faster) / short + square * spools / (near * short)
-        more += jnp.arcsin(sine) * norm_bound(pull)
+        more += jnp.arcsin(sine) * norm(pull).high()
         is_met &= (cables.acceleration.size() + more < limits.cable_acceleration_max).all()
     return is_met
 

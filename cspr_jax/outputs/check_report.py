@@ -27,6 +27,8 @@ QUANTITIES = {
     Verdict.CABLE_TOO_LONG: ("cable_length_max", "largest cable length"),
     Verdict.CABLE_TOO_FAST: ("cable_speed_max", "largest cable speed"),
     Verdict.CABLE_OVER_ACCELERATION: ("cable_acceleration_max", "largest cable acceleration"),
+    Verdict.TOO_FAST: ("speed_max", "largest speed"),
+    Verdict.OVER_ACCELERATION: ("acceleration_max", "largest acceleration"),
     Verdict.CABLE_CABLE: ("cable_distance", "distance between cables"),
     Verdict.CABLE_PLATFORM: ("platform_distance", "distance of cables from the platform"),
     Verdict.OBSTACLE: ("obstacle_distance", "distance from obstacles"),

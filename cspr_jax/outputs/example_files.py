@@ -61,15 +61,19 @@ def copy(names: list[str], place: Path) -> list[Path]:
             near = difflib.get_close_matches(name, known, n=1)
             hint = f"did you mean {near[0]}? " if near else ""
             raise ConfigError("examples", f"{shown(name)}: {hint}must be one of those that `cspr examples` lists")
-    copies = {name: place / f"{name}.toml" for name in names}
+    # A plan of a path may come with a file of the path, of the same name.
+    originals = [
+        path for name in names for path in sorted(source.glob(f"{name}.*"), key=lambda path: path.suffix != ".toml")
+    ]
+    copies = {path: place / path.name for path in originals}
     for path in copies.values():
         if path.exists():
             raise RefusedError(printable(f"{path}: is there already: remove it, or choose another folder with -o"))
     make_folders(Disk(), place)
-    for name, path in copies.items():
+    for original, path in copies.items():
         try:
             with path.open("xb") as file:
-                file.write((source / f"{name}.toml").read_bytes())
+                file.write(original.read_bytes())
         except FileExistsError as error:
             raise RefusedError(printable(f"{path}: is there already: choose another folder with -o")) from error
     return list(copies.values())

@@ -55,7 +55,7 @@ def _of_nodes(robot: AnyRobot, limits: Limits, nodes: tuple[Places, Array]) -> t
         bend, turn, rest = jnp.zeros(n_cables), jnp.zeros(3), pressures[count:]
         if limits.cable_acceleration_max is not None:
             bend, rest = rest[:n_cables] - rest[n_cables : 2 * n_cables], rest[2 * n_cables :]
-        if getattr(limits, "acceleration_max", None) is not None:
+        if limits.acceleration_max is not None:
             turn = rest @ tangent_directions(state.velocity, state.acceleration)
         return wrench, bend, turn
 

@@ -1,6 +1,5 @@
 """Courses of paths between poses: what a table of a plan says, as tracks with orientations at their marks."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -70,8 +69,8 @@ class Course(NamedTuple):
         Returns:
             the sections.
         """
-        turnings: Sequence[np.ndarray | None] = self.quaternions or [None] * len(self.tracks)
-        return [section_of(track, turning) for track, turning in zip(self.tracks, turnings, strict=True)]
+        units = self.quaternions
+        return [section_of(track, units[i] if units else None) for i, track in enumerate(self.tracks)]
 
 
 def course_through(table: PathTable, points: np.ndarray, quaternions: np.ndarray | None) -> Course:

@@ -148,7 +148,7 @@ def discrete(problem: Problem, section: Section, settings: SectionSettings) -> D
     Returns:
         the section, without margins.
     """
-    robot, curve, most = problem.robot, section.curve, getattr(problem.limits, "speed_max", None)
+    robot, curve, most = problem.robot, section.curve, problem.limits.speed_max
     if most is not None:
         section = section._replace(speed=np.minimum(section.speed, most))
     speeds = settings.start_speed, settings.end_speed

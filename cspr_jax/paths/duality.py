@@ -177,7 +177,7 @@ def _kernel(robot: AnyRobot, limits: Limits, blocks: tuple[StateBounds, _Cell]) 
             ends = cell.start.bend, cell.end.bend
             twice = twice + _along(*ends, cell.width, cables.rate, cables.acceleration)
             lost += jnp.sum(limits.cable_acceleration_max * 0.5 * (jnp.abs(ends[0]) + jnp.abs(ends[1])))
-        if getattr(limits, "acceleration_max", None) is not None:
+        if limits.acceleration_max is not None:
             ends = cell.start.turn, cell.end.turn
             twice = twice + _along(*ends, cell.width, state.velocity, state.acceleration)
             lost += limits.acceleration_max * 0.5 * (jnp.linalg.norm(ends[0]) + jnp.linalg.norm(ends[1]))

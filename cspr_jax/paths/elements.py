@@ -7,6 +7,8 @@ import numpy as np
 
 # Angle of one quintic piece of an arc, rad: it misses the arc by its sixth power over 46080 radii, 8.3e-11.
 LARGEST_PIECE = 0.125
+# Places that are nearer to each other are one place, m.
+SAME_PLACE = 1e-9
 
 
 class Nodes(NamedTuple):
@@ -44,7 +46,7 @@ class Straight:
     @property
     def moves(self) -> bool:
         """Tell whether it has a direction."""
-        return bool((self.start != self.end).any())
+        return bool(np.linalg.norm(self.end - self.start) > SAME_PLACE)
 
     @property
     def length(self) -> float:

@@ -86,11 +86,6 @@ class Paths(Leg):
                     raise ConfigError(stops.path, f'{stops.name(i)}.{key}: must be absent with family = "path"')
             if i and pose.path is not None and not stops.keys.is_one_path:
                 self._check_path(i, pose.path)
-        table = stops.keys.path
-        if table is not None and not stops.keys.is_one_path:
-            for key in ("orientations", "closed"):
-                if getattr(table, key) is not None:
-                    raise ConfigError(stops.path, f"path.{key}: must be absent beside [[pose]] tables")
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the poses; see `Leg.join`."""
@@ -125,9 +120,8 @@ class Paths(Leg):
             places[run.last] = course.tracks[-1].place[-1]
             if units is not None:
                 units[run.last] = course.quaternions[-1][-1]
-            segments = np.full(sum(len(section.marks) - 1 for section in sections), run.first)
-            if run.table.is_whole is False:
-                segments = np.arange(run.first, run.last)
+            count = sum(len(section.marks) - 1 for section in sections)
+            segments = np.full(count, run.first) if run.table.is_whole else np.arange(run.first, run.last)
             rides += _settled(run, sections, segments)
         self._check_going_on(rides)
         return rides
@@ -143,7 +137,9 @@ class Paths(Leg):
             if pose.path is not None:
                 runs.append(CourseRun(i - 1, i, pose.path.beside(keys.path)))
             elif ends:
-                runs.append(CourseRun(first, i, usual))
+                # The speeds are those at the ends of the leg.
+                inner = ["start_speed"] * (first > 0) + ["end_speed"] * (i < len(self))
+                runs.append(CourseRun(first, i, usual.model_copy(update=dict.fromkeys(inner))))
             if pose.path is not None or ends:
                 first = i
         return runs

@@ -123,7 +123,7 @@ def path_rows(robot: AnyRobot, limits: Limits, state: State, speed: Array) -> Ro
         parts.append((*both, *[jnp.concatenate([most, most])] * 2))
     if limits.cable_speed_max is not None:
         cap = jnp.minimum(cap, jnp.min(jnp.square(limits.cable_speed_max) / jnp.maximum(rate**2, TINY)))
-    if getattr(limits, "acceleration_max", None) is not None:
+    if limits.acceleration_max is not None:
         parts.append(_tangents(state.velocity, state.acceleration, limits.acceleration_max))
     return Rows(*(jnp.concatenate(column) for column in zip(*parts, strict=True)), cap)
 

@@ -37,8 +37,8 @@ class SectionSettings(NamedTuple):
     Fields:
         grid: number of cells.
         ramp_time: time in which accelerations rise and fall, s; 0: they jump.
-        start_speed: speed at its start, m/s.
-        end_speed: speed at its end, m/s.
+        start_speed: speed at its start, that of the place and not of s, m/s.
+        end_speed: speed at its end, likewise, m/s.
     """
 
     grid: int

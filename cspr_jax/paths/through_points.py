@@ -8,7 +8,7 @@ from scipy.interpolate import BPoly
 from cspr_jax.curves.interpolation import continuous, interpolated
 from cspr_jax.errors import InputError
 from cspr_jax.paths.corners import Corners, tracks_of
-from cspr_jax.paths.elements import Straight
+from cspr_jax.paths.elements import SAME_PLACE, Straight
 from cspr_jax.paths.section import SAME_ORIENTATION, Track, half_angles
 
 # Part of the speed along the chords below which a spline stands still, and samples of each of its pieces.
@@ -33,11 +33,10 @@ def chords(points: np.ndarray, quaternions: np.ndarray | None = None) -> np.ndar
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     if quaternions is not None:
         halves = half_angles(continuous(quaternions))
-        lengths = np.where((lengths == 0.0) & (halves > SAME_ORIENTATION), 2.0 * halves, lengths)
-    same = np.flatnonzero(lengths == 0.0)
+        lengths = np.where((lengths <= SAME_PLACE) & (halves > SAME_ORIENTATION), 2.0 * halves, lengths)
+    same = np.flatnonzero(lengths <= SAME_PLACE)
     if len(same):
-        i = int(same[0])
-        raise InputError(f"points[{i + 1}]", points[i + 1].tolist(), f"another place than points[{i}]")
+        raise InputError("points", points[same[0] + 1].tolist(), "another place than the point before it")
     return lengths
 
 

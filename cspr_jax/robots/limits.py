@@ -34,6 +34,8 @@ class Limits:
         cable_length_max: (n_cables,) largest lengths, m.
         cable_speed_max: (n_cables,) largest speeds of paying out and of winding in, m/s.
         cable_acceleration_max: (n_cables,) largest accelerations of either sign, m/s^2.
+        speed_max: () largest speed of the mass centre, m/s.
+        acceleration_max: () largest acceleration of the mass centre, m/s^2.
         uncertainty: uncertainty within which every robot must meet the limits with taut cables.
     """
 
@@ -43,6 +45,8 @@ class Limits:
     cable_length_max: Array | None = None
     cable_speed_max: Array | None = None
     cable_acceleration_max: Array | None = None
+    speed_max: Array | None = None
+    acceleration_max: Array | None = None
     uncertainty: Uncertainty | None = None
 
 

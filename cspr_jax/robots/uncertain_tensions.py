@@ -21,7 +21,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jax import Array, lax
 
-from cspr_jax.arithmetic.affine_bounds import AffineBounds, constant, cross, dot, norm_bound, turned
+from cspr_jax.arithmetic.affine_bounds import AffineBounds, constant, cross, dot, norm, turned
 from cspr_jax.arithmetic.elementary import solved
 from cspr_jax.robots.cables import AnyRobot, wrench_units
 from cspr_jax.robots.patterns import PATTERNS
@@ -115,7 +115,7 @@ class _UnitBlock(NamedTuple):
         radius = self.matrix.radius + rounding * jnp.sum(jnp.abs(self.matrix.middle), axis=0, keepdims=True)
         within = jnp.abs(rows @ self.matrix.slope) + jnp.abs(rows) @ radius
         ways = turned(self.across.each(lambda x: x.reshape(dof, -1).T[None]), rows)
-        return within, norm_bound(ways.each(lambda x: x.reshape(len(rows), count, 3))) * self.tilt[None]
+        return within, norm(ways.each(lambda x: x.reshape(len(rows), count, 3))).high() * self.tilt[None]
 
 
 def _closer(block: _UnitBlock, displaced: Array, rest: Array, least: Array, centre: Array) -> tuple[Array, Array]:
@@ -212,7 +212,7 @@ def _centre_change(robot: AnyRobot, state: StateBounds, inverse: Array, size: Ar
     moments = balanced_part(robot, state.rotation, constant(jnp.zeros((3, 3))), constant(jnp.eye(3)))
     turning = turned(moments.each(lambda x: x.T[None]), inverse)
     whirl = jnp.linalg.norm(_whirl(state).size()) * robot.mass
-    return size * (norm_bound(turned(influence, inverse)) + size * whirl * norm_bound(turning))
+    return size * (norm(turned(influence, inverse)).high() + size * whirl * norm(turning).high())
 
 
 def _solution(matrix: Array, right: Array) -> Array:

@@ -33,6 +33,7 @@ class Family:
         knows_obstacles: whether its own verdicts take obstacles and the shape of the platform into account; if not,
             its motions are judged once more in plans.
         knows_pulleys: whether its own verdicts are right for cables that leave from pulleys; if not, likewise.
+        knows_mass_centre: whether its verdicts take limits of the mass centre's speed and acceleration into account.
     """
 
     name: str
@@ -50,6 +51,7 @@ class Family:
     uncertain_redundancy: bool = False
     knows_obstacles: bool = False
     knows_pulleys: bool = False
+    knows_mass_centre: bool = False
 
     def leg(self, pattern: str) -> Any:
         """Class that joins the poses of a robot.
@@ -129,6 +131,7 @@ _ROWS = (
         uncertain_redundancy=True,
         knows_obstacles=True,
         knows_pulleys=True,
+        knows_mass_centre=True,
         keys=("motion", "interpolation", "ends", "smooth", "stretch", "point"),
         pose_keys=("motion",),
         end_keys=("time", "velocity", "acceleration"),
@@ -158,6 +161,7 @@ _ROWS = (
         uncertain_redundancy=True,
         knows_obstacles=True,
         knows_pulleys=True,
+        knows_mass_centre=True,
         keys=("path",),
         pose_keys=("path",),
     ),

@@ -71,7 +71,22 @@ class Limit:
     @property
     def allowed(self) -> str:
         """Allowed values, in words."""
-        return "a number: z of the floor" if not self.per_cable else f"a number {'>=' if self.from_zero else '>'} 0"
+        return "a number: z of the floor" if self.is_height else f"a number {'>=' if self.from_zero else '>'} 0"
+
+    @property
+    def is_height(self) -> bool:
+        """Tell whether it is a height, of any sign, and not the size of something."""
+        return self.quantity == "depth"
+
+    @property
+    def of_mass_centre(self) -> bool:
+        """Tell whether it bounds how fast the mass centre moves, which the proof of any motion alone judges."""
+        return self.quantity.startswith("mass_centre")
+
+
+def _of_mass_centre(name: str, flag: Verdict, quantity: str, unit: str) -> Limit:
+    words = f"largest {quantity} of the mass centre"
+    return Limit(name, flag, "most", f"mass_centre_{quantity}", unit, False, True, False, words)
 
 
 def _of_cables(name: str, flag: Verdict, quantity: str, unit: str, *, of_motion: bool) -> Limit:
@@ -86,4 +101,6 @@ LIMITS = (
     _of_cables("cable_length_max", Verdict.CABLE_TOO_LONG, "length", "m", of_motion=False),
     _of_cables("cable_speed_max", Verdict.CABLE_TOO_FAST, "speed", "m/s", of_motion=True),
     _of_cables("cable_acceleration_max", Verdict.CABLE_OVER_ACCELERATION, "acceleration", "m/s^2", of_motion=True),
+    _of_mass_centre("speed_max", Verdict.TOO_FAST, "speed", "m/s"),
+    _of_mass_centre("acceleration_max", Verdict.OVER_ACCELERATION, "acceleration", "m/s^2"),
 )

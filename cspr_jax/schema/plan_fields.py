@@ -104,6 +104,11 @@ SEGMENT = {
         "1",
         "Likewise: smallest normalised pseudotension, or depth over that of the centre, on the ellipse itself.",
     ),
+    "lower_bound": (
+        "s",
+        "Paths: proved lower bound of the least time along the parts between stops that end on the segment, each from "
+        "the stop before it.",
+    ),
     "rotation_frequencies": (
         "rad s-1",
         "Ellipses of platforms: the three natural frequencies of rotation at rest in its centre; null: not stable.",

@@ -30,6 +30,8 @@ class Verdict(enum.IntFlag):
     WRENCH_INFEASIBLE = 32768
     OBSTACLE = 65536
     UNCERTAINTY = 131072
+    TOO_FAST = 262144
+    OVER_ACCELERATION = 524288
 
     @property
     def text(self) -> str:
@@ -60,6 +62,8 @@ SENTENCES = {
     Verdict.WRENCH_INFEASIBLE: "Within their limits of tension the cables cannot supply a wrench that they must.",
     Verdict.OBSTACLE: "A cable or the platform touches an obstacle.",
     Verdict.UNCERTAINTY: "Feasible for the robot as it is described, but not for every robot within its uncertainty.",
+    Verdict.TOO_FAST: "The mass centre exceeds its largest speed.",
+    Verdict.OVER_ACCELERATION: "The mass centre exceeds its largest acceleration.",
 }
 
 

@@ -87,7 +87,7 @@ def _bent(over: _OverInterval, limit: Array) -> Array:
     return (cube + bend.curvature / (limit * over.time**2)) / over.z0**3
 
 
-# Every row of `schema.limits.LIMITS` has an entry.
+# Every row of `schema.limits.LIMITS` has an entry, but those of the mass centre, which swings do not take.
 CLOSED = {
     "tension_min": _Closed(lambda state, limit: state.lift - limit / state.weight * state.eta, _lifted),
     "tension_max": _Closed(lambda state, limit: limit / state.weight * state.eta - state.lift, _lifted),

@@ -42,6 +42,7 @@ OPERATIONS = {
     "cross": lambda f, g, of: of.cross(f, g),
     "dot": lambda f, g, of: of.dot(f, g),
     "norm_squared": lambda f, g, of: of.norm_squared(f),
+    "norm": lambda f, g, of: of.norm(f - 0.5 * g),
     "turned": lambda f, g, of: of.turned(TURN, of.cross(f, g)),
 }
 TURN = np.array([[0.0, 1.0, 2.0], [-1.0, 3.0, 0.5], [0.2, -0.4, 0.0]])
@@ -68,6 +69,10 @@ class Exact:
     @staticmethod
     def norm_squared(f):
         return (f**2).sum(-1)
+
+    @staticmethod
+    def norm(f):
+        return (f**2).sum(-1) ** 0.5
 
     @staticmethod
     def turned(matrix, f):
@@ -101,6 +106,16 @@ def test_bands_shrink_with_the_square(name):
 def test_a_narrower_band_is_left(name):
     """What a mistake in the remainder would do: a test above sees it."""
     assert max(excess(name, seed, 1.0, 0.7)[0] for seed in range(40)) > 0.0
+
+
+def test_lengths_of_vectors_that_vanish():
+    """A motion begins at rest: its speed is bounded there too."""
+    for seed in range(40):
+        f, f_bounds = functions(seed, 0.3)
+        f, f_bounds = f - f[200], f_bounds - f[200].astype(float)
+        band = jax.tree.map(np.asarray, bounds.norm(f_bounds))
+        assert (np.abs(Exact.norm(f) - band.middle - band.slope * S) <= band.radius).all()
+        assert np.asarray(band.high()) <= 3.0 * Exact.norm(f).max() + 0.1
 
 
 def test_nothing_is_known_where_a_function_may_vanish():

@@ -47,7 +47,7 @@ def inline(points: str = "[[0, 0, 0], [1, 0, 0], [0, 1, 0]]", mass: str = "mass 
 
 # What stands in the good file, what takes its place, and what the line must hold.
 PLANS = {
-    "unknown": (Z0, f"{Z0}\nquux = 1", "unknown key quux = 1", "allowed: amplitude", "z0"),
+    "unknown": (Z0, f"{Z0}\nquux = 1", "unknown key quux = 1", "allowed: acceleration_max", "z0"),
     "near": (Z0, f"{Z0}\nmax_arc = 3", "unknown key max_arc = 3", "did you mean max_arcs?"),
     "near in a pose": (POSE, "positon = [1, 1, 1]", "pose[1].positon", "did you mean position?"),
     "near in a robot": (ROBOT, inline(mass="mas = 1.0"), "robot.mas = 1.0", "did you mean mass?"),

@@ -185,7 +185,8 @@ def with_problem(examples: dict, function) -> dict:
     is_platform = ".platform" in function.__module__ or PlatformRobot in typing.get_type_hints(function).values()
     robot = examples[PlatformRobot if is_platform else PointMassRobot]
     each = array(len(robot.base_points))
-    limits = Limits(**{f.name: array() if f.name == "floor" else each for f in dataclasses.fields(Limits)})
+    names = [f.name for f in dataclasses.fields(Limits) if f.name not in ("speed_max", "acceleration_max")]
+    limits = Limits(**{name: array() if name == "floor" else each for name in names})
     return examples | {Limits: limits, Problem: Problem(robot, limits, examples[Amplitude])}
 
 

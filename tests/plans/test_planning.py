@@ -292,7 +292,7 @@ def test_hints_go_to_stderr_and_change_nothing_else(tmp_path):
 
 def test_all_errors(tmp_path):
     text = ONE.replace("max_arcs = 30", "max_arcs = 0\nmax_tension = 3.0")
-    line = "unknown key max_tension = 3.0: did you mean tension_max? allowed: amplitude,"
+    line = "unknown key max_tension = 3.0: did you mean tension_max? allowed: acceleration_max,"
     for arguments, count in (((), 1), (("--all-errors",), 2)):
         code, out, err = plan(tmp_path, text, *arguments)
         assert (code, out, len(err.splitlines())) == (2, "", count) and line in err

@@ -188,9 +188,8 @@ def test_the_key_is_checked_when_the_file_is_read(tmp_path):
     assert "robot.translation_only = true: must be absent: cables 3 and 4 are not parallel" in err and "0.001 m" in err
     code, _, err = plan(tmp_path, PLAN.format(robot='"laval-mssm"', family="transition", limits=""))
     assert code == 2 and len(err.splitlines()) == 1
-    assert (
-        'must be "hypocycloid-standard" or "hypocycloid" or "spline" or "ellipse" for a platform ("laval-mssm")' in err
-    )
+    names = " or ".join(f'"{name}"' for name in ("hypocycloid-standard", "hypocycloid", "spline", "ellipse", "path"))
+    assert f'must be {names} for a platform ("laval-mssm")' in err
     assert "nor do three parallel pairs of cables keep it from turning: cables" in err
     (tmp_path / "sweep.toml").write_text(SWEEP.format(kind="feasible-acceleration", robot='"laval-mssm"'))
     code, _, err = cspr("run", tmp_path / "sweep.toml", "-o", tmp_path / "run")

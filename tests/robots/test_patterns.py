@@ -197,11 +197,11 @@ def test_what_only_rigid_platforms_have_is_refused_in_one_line(tmp_path, capsys)
     for robot, wanted in (
         (
             f'{flat}\npattern = "1R2T"\n{bodies}',
-            ('must be "spline" for a planar platform', 'pattern = "1R2T": must be "2T"'),
+            ('must be "spline" or "path" for a planar platform', 'pattern = "1R2T": must be "2T"'),
         ),
         (
             f'{three}\npattern = "3R"\n{bodies}',
-            ('must be "spline" for a platform on a', 'pattern = "3R": must be "2T"'),
+            ('must be "spline" or "path" for a platform on a', 'pattern = "3R": must be "2T"'),
         ),
         (f"{three}\npulley_radius = 0.1", (None, "pulley_radius: pulleys: must be absent")),
         (f"{three}\ntension_max = [inf, 5.0, 5.0]", ("tension_max = [inf, 5.0, 5.0]: must be finite",) * 2),

@@ -91,7 +91,7 @@ def limits_of(robot_file: RobotFile, plan: PlanFile, quantity: str = "tension") 
         if row.quantity != quantity or limit is None:
             continue
         values = np.unique(np.atleast_1d(np.asarray(limit, float)))
-        values = values[np.isfinite(values) & ((values > 0.0) | (not row.per_cable))]
-        words = ("smallest allowed" if row.sense == "least" else "largest allowed") if row.per_cable else "floor"
+        values = values[np.isfinite(values) & ((values > 0.0) | row.is_height)]
+        words = ("smallest allowed" if row.sense == "least" else "largest allowed") if not row.is_height else "floor"
         limits += [(words, value) for value in values.tolist()]
     return limits

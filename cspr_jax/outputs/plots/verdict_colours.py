@@ -20,6 +20,8 @@ REASONS = {
     Verdict.CABLE_TOO_LONG: ("cable too long", "#8c6d31"),
     Verdict.CABLE_TOO_FAST: ("cable too fast", "#7b4173"),
     Verdict.CABLE_OVER_ACCELERATION: ("cable acceleration", "#bd9e39"),
+    Verdict.TOO_FAST: ("too fast", "#A05195"),
+    Verdict.OVER_ACCELERATION: ("acceleration", "#D9B44A"),
     Verdict.UNCERTAINTY: ("not every robot", "#B3CDE3"),
     Verdict.UNDECIDED: ("undecided", "#F0E442"),
     Verdict.NOT_FINITE: ("not finite", "#000000"),

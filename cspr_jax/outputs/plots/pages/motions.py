@@ -124,7 +124,8 @@ def _bound(quantity: str, limits: list[tuple[str, float]]) -> str:
         if values:
             each = f" to {values[-1]:.4g}, by cable" if len(values) > 1 else ""
             parts.append(f"{phrase} {values[0]:.4g}{each}")
-    name = quantity if quantity == "tension" else f"cable {quantity}"
+    is_plain = quantity == "tension" or quantity.startswith("mass_centre")
+    name = quantity.replace("_", " ") if is_plain else f"cable {quantity}"
     return f"{name} {' and '.join(parts)} {UNITS[quantity]}" if parts else ""
 
 

@@ -1,0 +1,96 @@
+"""Limits of the speed and the acceleration of the mass centre, proved for splines; the margin that tensions keep."""
+
+import numpy as np
+import pytest
+from support.commands import plan
+
+import cspr_jax
+from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.motions.given_limits import limits_over
+
+# Up by a quintic law within a second: largest speed 1.875 times the way, largest acceleration 10 / sqrt(3) times.
+WAY, SPEED, ACCELERATION = 0.1, 1.875, 10.0 / np.sqrt(3.0)
+TIMES = np.linspace(0.0, 1.0, 201)
+LAW = TIMES**3 * (10.0 - 15.0 * TIMES + 6.0 * TIMES**2)
+RATE = 30.0 * TIMES**2 * (1.0 - TIMES) ** 2
+BEND = 60.0 * TIMES * (1.0 - TIMES) * (1.0 - 2.0 * TIMES)
+DIRECTION = np.array([0.3, 0.2, -np.sqrt(1.0 - 0.13)])
+MOTION = {
+    "times": TIMES,
+    "positions": [0.0, 0.0, 1.4] + WAY * LAW[:, None] * DIRECTION,
+    "velocities": WAY * RATE[:, None] * DIRECTION,
+    "accelerations": WAY * BEND[:, None] * DIRECTION,
+}
+
+
+def checked(robot="prototype", **limits):
+    return cspr_jax.check(robot, **MOTION, limits=limits)
+
+
+@pytest.mark.parametrize(
+    ("name", "largest", "flag"),
+    [("speed_max", SPEED, "too_fast"), ("acceleration_max", ACCELERATION, "over_acceleration")],
+)
+def test_a_motion_is_proved_up_to_its_largest_value(name, largest, flag):
+    value = WAY * largest
+    above, below = checked(**{name: value * 1.0001}), checked(**{name: value * 0.9999})
+    assert above.verdict == "feasible" and below.verdict == flag
+    demand = above.to_dict()["demands"][name]
+    assert demand["value"] == pytest.approx(value, rel=1e-4) and value <= demand["bound"] <= value * 1.0001
+    cause = below.to_dict()["cause"][0]
+    assert cause["criterion"] == flag and cause["needed"] == pytest.approx(value, rel=1e-4) and cause["cable"] is None
+    # It fails exactly where the law exceeds the limit.
+    rates = {"speed_max": RATE, "acceleration_max": np.abs(BEND)}[name] * WAY
+    times = TIMES[rates > value * 0.9999]
+    start, end = below.failing[0][0], below.failing[-1][1]
+    assert start == pytest.approx(times[0], abs=0.01) and end == pytest.approx(times[-1], abs=0.01)
+
+
+def test_platforms_too():
+    """The mass centre of a platform that turns, and not another point of it."""
+    quaternions = np.stack([np.cos(0.2 * LAW), 0.0 * LAW, 0.0 * LAW, np.sin(0.2 * LAW)], axis=1)
+    motion = {"times": TIMES, "positions": [0.0, 0.0, 1.5] + WAY * LAW[:, None] * DIRECTION, "quaternions": quaternions}
+    for share, verdict in ((1.001, "feasible"), (0.999, "too_fast")):
+        assert cspr_jax.check("cogiro", **motion, limits={"speed_max": share * WAY * SPEED}).verdict == verdict
+
+
+def test_tensions_keep_a_margin():
+    bare = checked(tension_min=0.05, tension_max=2.0)
+    for margin in (0.1, 0.2):
+        kept = checked(tension_min=0.05, tension_max=2.0, tension_margin=margin)
+        same = checked(tension_min=0.05 + margin, tension_max=2.0 - margin)
+        assert kept.margin == pytest.approx(bare.margin - margin, abs=1e-3) == pytest.approx(same.margin, abs=1e-3)
+    alone = checked(tension_margin=0.1)
+    assert alone.margin == pytest.approx(checked(tension_min=0.1).margin, abs=1e-3)
+    with pytest.raises(ConfigError, match=r"tension_margin = 1\.0: must be less than half of the range"):
+        cspr_jax.check("prototype", **MOTION, limits={"tension_min": 0.05, "tension_max": 2.0, "tension_margin": 1.0})
+
+
+POSES = "[[pose]]\nrest = true\n[[pose]]\nposition = [0.5, 0, 1.4]\n"
+
+
+@pytest.mark.parametrize(
+    ("family", "keys", "line"),
+    [
+        ("hypocycloid-standard", "z0 = 1.4", "speed_max = 1.0: must be absent but for the families spline, path"),
+        ("s-curve", "", "speed_max = 1.0: must be absent but for the families spline, path"),
+        ("bezier", "", "speed_max = 1.0: must be absent but for the families spline, path"),
+    ],
+)
+def test_other_families_refuse_them(tmp_path, family, keys, line):
+    text = f'schema = 1\nrobot = "prototype"\nfamily = "{family}"\nspeed_max = 1.0\n{keys}\n{POSES}'
+    code, out, err = plan(tmp_path, text)
+    assert (code, out) == (2, "") and line in err and err.count("\n") == 1
+
+
+def test_python_refuses_them_elsewhere():
+    robot = cspr_jax.load_robot("prototype")
+    for families in ((), ("ellipse",), ("spline", "bezier")):
+        with pytest.raises(InputError, match=r"acceleration_max = 1\.0: must be absent but for the families"):
+            limits_over(robot, cspr_jax.Limits(acceleration_max=1.0), families=families)
+
+
+@pytest.mark.parametrize("value", ["0", "-1.0", "nan", "[1.0, 1.0]"])
+def test_values_that_are_none(tmp_path, value):
+    code, _, err = plan(tmp_path, f'schema = 1\nrobot = "prototype"\nspeed_max = {value}\n{POSES}')
+    assert code == 2 and "speed_max = " in err and err.count("\n") == 1
