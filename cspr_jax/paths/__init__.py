@@ -23,6 +23,7 @@ Files, each importing only from those above it:
     bound               the same from a section on its grid
     timed               motions in time from path speeds
     tightening          what a motion misses between nodes, and what binds it
+    jumping             the fastest motions of several sections, whose accelerations jump
     least_time          the fastest motion along a section
     leg                 poses joined along paths, as a leg of plans
 """

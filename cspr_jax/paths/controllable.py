@@ -65,7 +65,6 @@ class Fastest(NamedTuple):
         high: likewise, the largest.
         x: (n_cells + 1, n_paths) squared path speeds, 1/s^2 times the unit of s^2.
         u: (n_cells, n_paths) path accelerations in the middle of the cells.
-        binding: (n_cells, n_paths) number of the half-plane that bounds u; n_rows: the next set.
         empty: (n_paths,) number of the last cell without a controllable x; -1: there is none.
         meeting: (2, n_paths) numbers of the half-planes that bound u from above and below there; n_rows and n_rows + 1
             are those of the next set.
@@ -76,58 +75,59 @@ class Fastest(NamedTuple):
     high: Array
     x: Array
     u: Array
-    binding: Array
     empty: Array
     meeting: Array
     is_start: Array
 
 
-class _Sides(NamedTuple):
-    # Bounds of u at x, their changes with x, the size of the numbers in them, and the half-planes that give them.
-    beta: Array
-    beta_slope: Array
-    alpha: Array
-    alpha_slope: Array
+class _Bounds(NamedTuple):
+    # Bounds of u as lines in x, offset - slope x: from above, inf of half-planes that are none, and from below, -inf.
+    upper: Array
+    lower: Array
+    slope: Array
     size: Array
-    above: Array
-    below: Array
 
 
-def _sides(u: Array, x_share: Array, most: Array, x: Array) -> _Sides:
+def _bounds_of(u: Array, x_share: Array, most: Array) -> _Bounds:
     over = jnp.where(jnp.abs(u) > FLAT, u, 1.0)
-    value, slope = (most - x_share * x) / over, -x_share / over
-    upper, lower = jnp.where(u > FLAT, value, jnp.inf), jnp.where(u < -FLAT, value, -jnp.inf)
-    above, below = jnp.argmin(upper, axis=0), jnp.argmax(lower, axis=0)
-
-    def at(array: Array, row: Array) -> Array:
-        return jnp.take_along_axis(array, row[None], axis=0)[0]
-
-    terms = (jnp.abs(most) + jnp.abs(x_share * x)) / jnp.abs(over)
-    size = at(terms, above) + at(terms, below)
-    return _Sides(at(upper, above), at(slope, above), at(lower, below), at(slope, below), size, above, below)
+    offset, slope = most / over, jnp.where(jnp.abs(u) > FLAT, x_share / over, 0.0)
+    upper, lower = jnp.where(u > FLAT, offset, jnp.inf), jnp.where(u < -FLAT, offset, -jnp.inf)
+    return _Bounds(upper, lower, slope, jnp.abs(offset))
 
 
-def _edge(u: Array, x_share: Array, most: Array, x: Array, sign: float) -> tuple[Array, _Sides]:
-    # Follow h from outside to where it is no longer negative; a NaN says that it is so nowhere.
-    def evaluate(x: Array) -> tuple[Array, Array, Array, _Sides]:
-        sides = _sides(u, x_share, most, x)
-        gap = sides.beta - sides.alpha
-        return gap, sides.beta_slope - sides.alpha_slope, ~(gap >= -CLOSE * sides.size), sides
+def _gap(bounds: _Bounds, x: Array) -> tuple[Array, Array, Array]:
+    # h at x, its change with x, and the rounding in it. Reductions alone, since searches for places are slow.
+    upper, lower = bounds.upper - bounds.slope * x, bounds.lower - bounds.slope * x
+    beta, alpha = jnp.min(upper, axis=0), jnp.max(lower, axis=0)
+    falls = jnp.max(jnp.where(upper <= beta, bounds.slope, -jnp.inf), axis=0)
+    rises = jnp.min(jnp.where(lower >= alpha, bounds.slope, jnp.inf), axis=0)
+    size = jnp.abs(bounds.slope * x) + bounds.size
+    largest = jnp.max(jnp.where((upper <= beta) | (lower >= alpha), size, 0.0), axis=0)
+    return beta - alpha, rises - falls, CLOSE * largest
 
+
+def _edge(bounds: _Bounds, x: Array, sign: float) -> tuple[Array, Array]:
+    # Follow h from outside to where it is no longer negative: NaN if it is so nowhere, and the last x.
     def is_open(carry) -> Array:
         _, is_outside, step = carry
         return is_outside.any() & (step < STEPS)
 
     def follow(carry):
         x, is_outside, step = carry
-        gap, slope, outside, _ = evaluate(x)
-        leads = slope * sign < 0.0
+        gap, slope, rounding = _gap(bounds, x)
+        outside, leads = ~(gap >= -rounding), slope * sign < 0.0
         moved = jnp.where(leads, x - gap / jnp.where(leads, slope, 1.0), jnp.nan)
-        return jnp.where(is_outside & outside, moved, x), is_outside & outside & leads, step + 1
+        return jnp.where(is_outside & outside, moved, x), is_outside & outside, step + 1
 
-    x, is_outside, _ = lax.while_loop(is_open, follow, (x, jnp.isfinite(x), 0))
-    sides = evaluate(x)[3]
-    return jnp.where(is_outside, jnp.nan, x), sides
+    def next_one(carry):
+        x, is_outside, step = follow(carry)
+        # Where no step leads on, the last x stays.
+        is_lost = is_outside & jnp.isnan(x)
+        return jnp.where(is_lost, carry[0], x), is_outside & ~is_lost, step
+
+    x, _, _ = lax.while_loop(is_open, next_one, (x, jnp.isfinite(x), 0))
+    gap, _, rounding = _gap(bounds, x)
+    return jnp.where(gap >= -rounding, x, jnp.nan), x
 
 
 def _flat_range(u: Array, x_share: Array, most: Array, cap: Array) -> tuple[Array, Array]:
@@ -169,12 +169,15 @@ def fastest(sides: tuple[Rows, Rows], width: Array, bend: Array, cap: Array, end
         low, high, empty, meeting, index = following
         rows = rows_of(cell, low, high)
         floor, ceiling = _flat_range(*rows, cell.cap)
-        top, sides = _edge(*rows, jnp.where(ceiling >= floor, ceiling, jnp.nan), 1.0)
-        bottom, _ = _edge(*rows, floor, -1.0)
+        bounds = _bounds_of(*rows)
+        top, last_x = _edge(bounds, jnp.where(ceiling >= floor, ceiling, jnp.nan), 1.0)
+        bottom, _ = _edge(bounds, floor, -1.0)
         is_empty = ~(bottom <= top)
         is_last = is_empty & (empty < 0) & jnp.isfinite(low)
         empty = jnp.where(is_last, index, empty)
-        meeting = jnp.where(is_last, jnp.stack([sides.above, sides.below]), meeting)
+        line = bounds.slope * last_x
+        both = jnp.stack([jnp.argmin(bounds.upper - line, axis=0), jnp.argmax(bounds.lower - line, axis=0)])
+        meeting = jnp.where(is_last, both, meeting)
         bottom, top = (jnp.where(is_empty, jnp.nan, side) for side in (bottom, top))
         return (bottom, top, empty, meeting, index - 1), (bottom, top)
 
@@ -190,27 +193,26 @@ def fastest(sides: tuple[Rows, Rows], width: Array, bend: Array, cap: Array, end
 
     def ahead(x: Array, step):
         cell, low, high = step
-        sides = _sides(*rows_of(cell, low, high), x)
-        after = jnp.clip(x + 2.0 * cell.width * sides.beta, low, high)
-        return after, (after, 0.5 * (after - x) / cell.width, jnp.minimum(sides.above, n_rows))
+        bounds = _bounds_of(*rows_of(cell, low, high))
+        after = jnp.clip(x + 2.0 * cell.width * jnp.min(bounds.upper - bounds.slope * x, axis=0), low, high)
+        return after, (after, 0.5 * (after - x) / cell.width)
 
     beginning = jnp.clip(start, low[0], high[0])
-    _, (x, u, binding) = lax.scan(ahead, beginning, (steps, low[1:], high[1:]))
-    return Fastest(low, high, jnp.concatenate([beginning[None], x]), u, binding, empty, meeting, is_start)
+    _, (x, u) = lax.scan(ahead, beginning, (steps, low[1:], high[1:]))
+    return Fastest(low, high, jnp.concatenate([beginning[None], x]), u, empty, meeting, is_start)
 
 
 def smallest_of_slopes(u: np.ndarray, width: np.ndarray) -> np.ndarray:
     """Changes of u within cells: of the changes to both neighbours the smaller one, 0 where their signs differ.
 
     Args:
-        u: (n_cells, n_paths) in the middle of the cells.
-        width: (n_cells, n_paths) m.
+        u: (n_cells,) in the middle of the cells.
+        width: (n_cells,) m.
 
     Returns:
-        (n_cells, n_paths) 0 in the first and the last cell.
+        (n_cells,) 0 in the first and the last cell.
     """
-    steps = np.diff(u, axis=0) / (0.5 * (width[1:] + width[:-1]))
+    steps = np.diff(u) / (0.5 * (width[1:] + width[:-1]))
     before, after = steps[:-1], steps[1:]
     slopes = np.where(before * after > 0.0, np.sign(before) * np.minimum(np.abs(before), np.abs(after)), 0.0)
-    nothing = np.zeros((1, u.shape[1]))
-    return np.concatenate([nothing, slopes, nothing])
+    return np.concatenate([[0.0], slopes, [0.0]])

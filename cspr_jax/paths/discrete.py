@@ -1,13 +1,13 @@
 """A section of a path on its grid: half-planes at both sides of all cells, with margins, as solvers take them."""
 
 import dataclasses
+from collections.abc import Sequence
 from typing import NamedTuple
 
-import jax
 import numpy as np
 
+from cspr_jax.curves.spline import Spline
 from cspr_jax.motions.problem import Problem
-from cspr_jax.paths.controllable import Fastest, fastest
 from cspr_jax.paths.multipliers import SideRows
 from cspr_jax.paths.nodes import Grid, grid_of, side_rows
 from cspr_jax.paths.rows import Rows, face_count
@@ -95,19 +95,6 @@ class Discrete:
         both = np.append(self.start.cap, np.inf), np.insert(self.end.cap, 0, np.inf)
         return np.minimum(np.minimum(*both), self.largest)
 
-    def fastest(self, bend: np.ndarray) -> Fastest:
-        """The fastest motion on the grid.
-
-        Args:
-            bend: (n_cells,) change of u within the cells, over their widths.
-
-        Returns:
-            the motion, of one path.
-        """
-        sizes = self.grid.width, bend, self.cap(), tuple(np.asarray(x) for x in self.ends)
-        one = jax.tree.map(lambda leaf: np.asarray(leaf)[..., None], ((self.start, self.end), *sizes))
-        return jax.tree.map(np.asarray, fastest(*one))
-
     def node_rows(self) -> NodeRows:
         """Half-planes at the nodes; where those of both sides differ, all of them.
 
@@ -138,30 +125,36 @@ class Discrete:
         )
 
 
-def discrete(problem: Problem, section: Section, settings: SectionSettings) -> Discrete:
-    """A section on its grid.
+def discretes(problem: Problem, sections: Sequence[Section], settings: Sequence[SectionSettings]) -> list[Discrete]:
+    """Sections on their grids.
 
     Args:
         problem: robot and limits.
-        settings: of the section.
+        settings: of the sections.
 
     Returns:
-        the section, without margins.
+        the sections, without margins.
     """
-    robot, curve, most = problem.robot, section.curve, problem.limits.speed_max
+    robot, most = problem.robot, problem.limits.speed_max
     if most is not None:
-        section = section._replace(speed=np.minimum(section.speed, most))
-    speeds = settings.start_speed, settings.end_speed
-    grid = grid_of(section, settings.grid, (speeds[0] == 0.0, speeds[1] == 0.0))
-    start, end = side_rows(robot, problem.limits, curve, grid)
-    points, knots = np.asarray(curve.position), np.asarray(curve.knots)
-    steep = [
-        (points.shape[1] - 1) * float(np.linalg.norm(step)) / width
-        for step, width in (
-            (points[0, 1] - points[0, 0], knots[1] - knots[0]),
-            (points[-1, -1] - points[-1, -2], knots[-1] - knots[-2]),
-        )
+        sections = [section._replace(speed=np.minimum(section.speed, most)) for section in sections]
+    grids = [
+        grid_of(section, each.grid, (each.start_speed == 0.0, each.end_speed == 0.0))
+        for section, each in zip(sections, settings, strict=True)
     ]
-    ends = tuple((speed / slope) ** 2 if speed else 0.0 for speed, slope in zip(speeds, steep, strict=True))
-    largest = FASTER**2 * float(robot.gravity) * float(knots[-1])
-    return Discrete(section, grid, start, end, face_count(robot), (ends[0], ends[1]), largest)
+    sides = side_rows(robot, problem.limits, [section.curve for section in sections], grids)
+    paths = []
+    for section, each, grid, (start, end) in zip(sections, settings, grids, sides, strict=True):
+        speeds = zip((each.start_speed, each.end_speed), _steepness(section.curve), strict=True)
+        first, last = ((speed / slope) ** 2 if speed else 0.0 for speed, slope in speeds)
+        largest = FASTER**2 * float(robot.gravity) * float(section.curve.knots[-1])
+        paths.append(Discrete(section, grid, start, end, face_count(robot), (first, last), largest))
+    return paths
+
+
+def _steepness(curve: Spline) -> tuple[float, float]:
+    # Lengths of the path a unit of s, at both ends.
+    points, knots = np.asarray(curve.position), np.asarray(curve.knots)
+    steps = (points[0, 1] - points[0, 0], knots[1] - knots[0]), (points[-1, -1] - points[-1, -2], knots[-1] - knots[-2])
+    first, last = ((points.shape[1] - 1) * float(np.linalg.norm(step)) / float(width) for step, width in steps)
+    return first, last

@@ -2,15 +2,16 @@
 
 import dataclasses
 import itertools
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 
 from cspr_jax.curves.spline import Spline
 from cspr_jax.motions.problem import Problem
 from cspr_jax.paths.bound import path_bound
-from cspr_jax.paths.controllable import Fastest, smallest_of_slopes
-from cspr_jax.paths.discrete import FASTER, Discrete, discrete
+from cspr_jax.paths.controllable import Fastest
+from cspr_jax.paths.discrete import FASTER, Discrete, discretes
+from cspr_jax.paths.jumping import again, jumping_motions
 from cspr_jax.paths.nodes import derivatives, places_on
 from cspr_jax.paths.section import Section, SectionSettings
 from cspr_jax.paths.smooth import Ends, Smooth, below_ramps, smooth
@@ -100,11 +101,10 @@ def least_time_motion(problem: Problem, scene: Scene | None, section: Section, s
     Returns:
         the motion; where tightening ends before all is proved, the last one.
     """
-    path = discrete(problem, section, settings)
-    first = path.fastest(np.zeros_like(path.grid.width))
-    if first.empty[0] >= 0 or not first.is_start[0]:
+    path = discretes(problem, [section], [settings])[0]
+    jumping, bend, first = jumping_motions([path])[0]
+    if jumping is None:
         return _without_motion(path, first)
-    jumping, bend = _bent(path, first)
     bound = path_bound(problem, path, jumping.x)
     run, jerk = _ramped(path, jumping, settings.ramp_time)
     margins, weight = path.no_margins, float(problem.robot.mass * problem.robot.gravity)
@@ -137,19 +137,19 @@ def least_time_motion(problem: Problem, scene: Scene | None, section: Section, s
 
 def _plane(path: Discrete, solution: Fastest, speed: np.ndarray) -> PhasePlane:
     with np.errstate(invalid="ignore"):  # of the square roots of unknown speeds
-        low, high = np.sqrt(solution.low[:, 0]), np.sqrt(solution.high[:, 0])
+        low, high = np.sqrt(solution.low), np.sqrt(solution.high)
     cap = path.cap()
     return PhasePlane(path.grid.nodes, low, high, np.where(cap < path.largest, np.sqrt(cap), np.inf), speed)
 
 
 def _without_motion(path: Discrete, solution: Fastest) -> LeastTime:
     # Tell the place that no speed passes, or the end that is not reached.
-    cell, n_cells = int(solution.empty[0]), len(path.grid.width)
+    cell, n_cells = int(solution.empty), len(path.grid.width)
     end = "end" if cell == n_cells else "start" if cell < 0 else ""
     node = max(cell, 0)
     n_rows = path.start.u.shape[1]
     # Half-planes of both ends of a cell follow each other; what is beyond them leads into the next set.
-    rows = () if end else tuple(int(row) % n_rows for row in solution.meeting[:, 0] if row < 2 * n_rows)
+    rows = () if end else tuple(int(row) % n_rows for row in solution.meeting if row < 2 * n_rows)
     place = np.asarray(
         derivatives(places_on(path.section.curve, path.grid.nodes[[node]], ahead=node < n_cells))[0][0][0]
     )
@@ -179,31 +179,6 @@ def _slow(path: Discrete) -> Run:
     return Run(x, u, u)
 
 
-def _run_of(solution: Fastest, path: Discrete, bend: np.ndarray) -> Run | None:
-    if solution.empty[0] >= 0 or not solution.is_start[0]:
-        return None
-    half = 0.5 * bend * path.grid.width
-    return Run(solution.x[:, 0], solution.u[:, 0] - half, solution.u[:, 0] + half)
-
-
-def _jumping(path: Discrete, bend: np.ndarray) -> Run | None:
-    return _run_of(path.fastest(bend), path, bend)
-
-
-def _bent(path: Discrete, solution: Fastest) -> tuple[Run, np.ndarray]:
-    # Let the path acceleration change within cells as it does from cell to cell, twice; the changes that it has then.
-    bend = np.zeros_like(path.grid.width)
-    run = _run_of(solution, path, bend)
-    for _ in range(2):
-        change = smallest_of_slopes(solution.u, path.grid.width[:, None])[:, 0]
-        following = path.fastest(change)
-        better = _run_of(following, path, change)
-        if better is None:
-            break
-        run, bend, solution = better, change, following
-    return cast(Run, run), bend
-
-
 def _ramped(path: Discrete, jumping: Run, ramp_time: float) -> tuple[Run, float]:
     # The fastest motion with ramps, half as long where there is none, and the largest path jerk.
     if ramp_time > 0.0:
@@ -226,6 +201,6 @@ def _smoothed(path: Discrete, start: Smooth, ends: Ends, jerk: float, times: int
 def _slower(path: Discrete, run: Run, bend: np.ndarray, jerk: float) -> Run | None:
     # The fastest motion within tighter limits.
     if not np.isfinite(jerk):
-        return _jumping(path, bend)
+        return again([path], [bend])[0]
     start = Smooth(run.x, np.append(run.before, run.after[-1]))
     return _smoothed(path, start, Ends(path.ends, run.rests), jerk, 1)

@@ -1,5 +1,6 @@
 """Nodes of a section of a path: between them the path acceleration is sought, and at both sides of them half-planes."""
 
+from collections.abc import Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -18,8 +19,9 @@ from cspr_jax.runtime import compile_options
 
 # Part of the nodes over which cells become wider, from an end at zero speed on; cells there that are narrower still.
 RAMP, SMALLER = 0.25, 5
-# Places that are computed together. Pieces are raised to one degree, so that all sections share what is compiled.
-BATCH, DEGREE = 64, 5
+# Places that are computed together, of one section and of several. Pieces are raised to one degree, so that all
+# sections share what is compiled.
+BATCH, MANY, DEGREE = 64, 512, 5
 # A node that is nearer to the end of a piece than this part of its width lies there.
 NEAR = 1e-9
 
@@ -155,26 +157,49 @@ def _rows(robot: AnyRobot, limits: Limits, arguments: tuple[Places, Array]) -> R
     return jax.vmap(lambda place, speed: path_rows(robot, limits, state_at(place), speed))(*arguments)
 
 
-def side_rows(robot: AnyRobot, limits: Limits, curve: Spline, grid: Grid) -> tuple[Rows, Rows]:
-    """Half-planes at the starts and at the ends of the cells.
+def side_rows(
+    robot: AnyRobot, limits: Limits, curves: Sequence[Spline], grids: Sequence[Grid]
+) -> list[tuple[Rows, Rows]]:
+    """Half-planes at the starts and at the ends of the cells of several sections.
 
     Args:
         robot: centred, z down.
-        curve: NumPy leaves.
-        grid: of it.
+        curves: NumPy leaves.
+        grids: of them.
 
     Returns:
-        leaves (n_cells, ...) each.
+        for each section two sets, leaves (n_cells, ...).
     """
-    places = [
-        places_on(curve, grid.nodes[:-1], ahead=True),
-        places_on(curve, grid.nodes[1:], ahead=False),
-    ]
-    both = jax.tree.map(lambda *x: np.concatenate(x), *places)
-    rows = in_batches(partial(_rows, robot, limits), (both, np.concatenate([grid.speed, grid.speed])), size=BATCH)
-    count = len(grid.speed)
-    start, end = (jax.tree.map(lambda leaf, s=s: leaf[s], rows) for s in (slice(count), slice(count, None)))
-    return start, end
+    places, speeds, apart = [], [], []
+    for curve, grid in zip(curves, grids, strict=True):
+        # One computation will do for both sides of a node, but where something jumps.
+        jumps = np.flatnonzero(np.isin(grid.nodes, curve.jumps()) | np.pad(grid.speed[1:] != grid.speed[:-1], 1))
+        places += [
+            places_on(curve, grid.nodes[:-1], ahead=True),
+            places_on(curve, grid.nodes[[*jumps.tolist(), -1]], ahead=False),
+        ]
+        speeds += [grid.speed, grid.speed[[*(jumps - 1).tolist(), -1]]]
+        apart.append(jumps)
+    every = jax.tree.map(lambda *leaves: np.concatenate(leaves), *places)
+    size = BATCH if len(curves) == 1 else MANY
+    rows = in_batches(partial(_rows, robot, limits), (every, np.concatenate(speeds)), size=size)
+    sides, first = [], 0
+    for grid, jumps in zip(grids, apart, strict=True):
+        count = len(grid.speed)
+        last = first + count + len(jumps) + 1
+        start = jax.tree.map(lambda leaf, part=slice(first, first + count): leaf[part], rows)
+        before = jax.tree.map(lambda leaf, part=slice(first + count, last): leaf[part], rows)
+        end = jax.tree.map(lambda s, b, j=jumps: _ended(s, b, j), start, before)
+        sides.append((start, end))
+        first = last
+    return sides
+
+
+def _ended(start: np.ndarray, before: np.ndarray, jumps: np.ndarray) -> np.ndarray:
+    # Values at the ends of cells: those at the next starts, but where they jump, and at the last node.
+    end = np.concatenate([start[1:], before[-1:]])
+    end[jumps - 1] = before[:-1]
+    return end
 
 
 @partial(jax.jit, compiler_options=compile_options.least())

@@ -1,0 +1,115 @@
+"""The fastest motions along sections, whose accelerations jump: of several sections together."""
+
+from collections import defaultdict
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import jax
+import numpy as np
+
+from cspr_jax.arithmetic.batches import padded, room
+from cspr_jax.paths.controllable import Fastest, fastest, smallest_of_slopes
+from cspr_jax.paths.discrete import Discrete
+from cspr_jax.paths.timed import Run
+
+# Sections that are solved together, beside one alone; how often changes of u within cells are taken from the solution.
+TOGETHER, BENT = 32, 2
+
+
+class Jumping(NamedTuple):
+    """The fastest motion along a section.
+
+    Fields:
+        run: path speeds and accelerations; None if there is no motion.
+        bend: (n_cells,) change of u along each cell, over its width.
+        first: solution with u constant in each cell.
+    """
+
+    run: Run | None
+    bend: np.ndarray
+    first: Fastest
+
+
+def solved_together(paths: Sequence[Discrete], bends: Sequence[np.ndarray]) -> list[Fastest]:
+    """Solutions on the grids of sections.
+
+    Args:
+        bends: (n_cells,) of each section, change of u within its cells over their widths.
+
+    Returns:
+        one a section, without the axis of paths.
+    """
+    solutions: list[Fastest] = [None] * len(paths)  # type: ignore[list-item]
+    groups = defaultdict(list)
+    for k, path in enumerate(paths):
+        groups[path.start.u.shape].append(k)
+    for members in groups.values():
+        size = room(TOGETHER)
+        for first in range(0, len(members), size):
+            chosen = members[first : first + size]
+            columns = [
+                ((p.start, p.end), p.grid.width, bends[k], p.cap(), tuple(np.asarray(x) for x in p.ends))
+                for k, p in ((k, paths[k]) for k in chosen)
+            ]
+            rows = jax.tree.map(lambda *leaves: np.stack(leaves), *columns)
+            rows = rows if len(chosen) == 1 else padded(rows, size)
+            answer = fastest(*jax.tree.map(lambda leaf: np.moveaxis(leaf, 0, -1), rows))
+            answer = jax.tree.map(np.asarray, answer)
+            for i, k in enumerate(chosen):
+                solutions[k] = jax.tree.map(lambda leaf, i=i: leaf[..., i], answer)
+    return solutions
+
+
+def run_of(solution: Fastest, path: Discrete, bend: np.ndarray) -> Run | None:
+    """Path speeds and accelerations of a solution.
+
+    Args:
+        path: the section.
+        bend: (n_cells,) with which it was solved.
+
+    Returns:
+        them; None if there is no motion.
+    """
+    if solution.empty >= 0 or not solution.is_start:
+        return None
+    half = 0.5 * bend * path.grid.width
+    return Run(solution.x, solution.u - half, solution.u + half)
+
+
+def jumping_motions(paths: Sequence[Discrete]) -> list[Jumping]:
+    """The fastest motions along sections.
+
+    Within cells u changes as it does from cell to cell, where there is a motion that does.
+
+    Returns:
+        one a section.
+    """
+    bends = [np.zeros_like(path.grid.width) for path in paths]
+    solutions = solved_together(paths, bends)
+    motions = [
+        Jumping(run_of(solution, path, bend), bend, solution)
+        for solution, path, bend in zip(solutions, paths, bends, strict=True)
+    ]
+    going = [k for k, motion in enumerate(motions) if motion.run is not None]
+    for _ in range(BENT):
+        changes = [smallest_of_slopes(solutions[k].u, paths[k].grid.width) for k in going]
+        following = solved_together([paths[k] for k in going], changes)
+        better = [run_of(s, paths[k], change) for k, s, change in zip(going, following, changes, strict=True)]
+        for k, solution, change, run in zip(going, following, changes, better, strict=True):
+            if run is not None:
+                solutions[k], motions[k] = solution, motions[k]._replace(run=run, bend=change)
+        going = [k for k, run in zip(going, better, strict=True) if run is not None]
+    return motions
+
+
+def again(paths: Sequence[Discrete], bends: Sequence[np.ndarray]) -> list[Run | None]:
+    """The fastest motions with changes of u within cells that are known.
+
+    Args:
+        bends: (n_cells,) of each section.
+
+    Returns:
+        one a section, None where there is no motion.
+    """
+    solutions = solved_together(paths, bends)
+    return [run_of(*case) for case in zip(solutions, paths, bends, strict=True)]
