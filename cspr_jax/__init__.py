@@ -39,6 +39,7 @@ _MODULES = {
     "keep_compiled_code": "api.sweeps",
     "launch_range": "api.beziers",
     "least_time": "api.lines",
+    "least_time_paths": "api.paths",
     "list_examples": "api.listings",
     "list_quantities": "api.listings",
     "list_robots": "api.listings",

@@ -25,5 +25,6 @@ Files, each importing only from those above it:
     tightening          what a motion misses between nodes, and what binds it
     jumping             the fastest motions of several sections, whose accelerations jump
     least_time          the fastest motion along a section
+    many                least times along many paths
     leg                 poses joined along paths, as a leg of plans
 """

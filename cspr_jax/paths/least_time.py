@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from cspr_jax.motions.problem import Problem
 from cspr_jax.paths.bound import path_bound
 from cspr_jax.paths.controllable import Fastest
 from cspr_jax.paths.discrete import FASTER, Discrete, discretes
-from cspr_jax.paths.jumping import again, jumping_motions
+from cspr_jax.paths.jumping import Jumping, again, jumping_motions
 from cspr_jax.paths.nodes import derivatives, places_on
 from cspr_jax.paths.section import Section, SectionSettings
 from cspr_jax.paths.smooth import Ends, Smooth, below_ramps, smooth
@@ -101,12 +102,34 @@ def least_time_motion(problem: Problem, scene: Scene | None, section: Section, s
     Returns:
         the motion; where tightening ends before all is proved, the last one.
     """
-    path = discretes(problem, [section], [settings])[0]
-    jumping, bend, first = jumping_motions([path])[0]
+    return least_time_motions(problem, scene, [section], [settings])[0]
+
+
+def least_time_motions(
+    problem: Problem, scene: Scene | None, sections: Sequence[Section], settings: Sequence[SectionSettings]
+) -> list[LeastTime]:
+    """Find the fastest motions along sections.
+
+    Args:
+        scene: as for `least_time_motion`.
+        settings: of the sections.
+
+    Returns:
+        the motions, as `least_time_motion` finds them.
+    """
+    paths = discretes(problem, sections, settings)
+    ramps = [each.ramp_time for each in settings]
+    return [_proved(problem, scene, *case) for case in zip(paths, jumping_motions(paths), ramps, strict=True)]
+
+
+def _proved(problem: Problem, scene: Scene | None, path: Discrete, start: Jumping, ramp_time: float) -> LeastTime:
+    # Tighten the limits on the grid until the motion keeps them everywhere.
+    jumping, bend, first = start
     if jumping is None:
         return _without_motion(path, first)
+    section = path.section
     bound = path_bound(problem, path, jumping.x)
-    run, jerk = _ramped(path, jumping, settings.ramp_time)
+    run, jerk = _ramped(path, jumping, ramp_time)
     margins, weight = path.no_margins, float(problem.robot.mass * problem.robot.gravity)
     for _ in range(ROUNDS):
         motion = timed(section, path.grid, run)

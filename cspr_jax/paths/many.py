@@ -1,0 +1,65 @@
+"""Least times along many paths together."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from cspr_jax.curves.spline import Spline, chained
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.proved_answers import ProvedAnswers, proved_answers
+from cspr_jax.paths.least_time import LeastTime, least_time_motions
+from cspr_jax.paths.section import Section, SectionSettings
+from cspr_jax.robots.clearance import Scene
+
+# Sections that are computed together.
+PART = 64
+
+
+@dataclasses.dataclass(frozen=True)
+class LeastTimes:
+    """The fastest motions along n paths.
+
+    Fields:
+        answers: verdicts and margins, proved.
+        duration: (n,) s; inf where no motion is proved feasible.
+        lower_bound: (n,) rigorous lower bound of the time of any motion along the path that stops where this one does,
+            s; NaN where none is known.
+        motions: over time, from the centroid of the spools; slow ones where none is feasible.
+        sections: (n,) for each path the motions along its sections.
+    """
+
+    answers: ProvedAnswers
+    duration: np.ndarray
+    lower_bound: np.ndarray
+    motions: list[Spline]
+    sections: list[list[LeastTime]]
+
+
+def least_times(
+    problem: Problem, scene: Scene | None, paths: Sequence[Sequence[Section]], grid: int, ramp_time: float
+) -> LeastTimes:
+    """Find the fastest motions along paths.
+
+    Args:
+        scene: bodies that can meet.
+        paths: sections of each, with a stop between them.
+        grid: cells of each section.
+        ramp_time: in which accelerations rise and fall, s; 0: they jump.
+
+    Returns:
+        the motions.
+    """
+    flat = [section for path in paths for section in path]
+    settings = SectionSettings(grid, ramp_time)
+    found: list[LeastTime] = []
+    for first in range(0, len(flat), PART):
+        part = flat[first : first + PART]
+        found += least_time_motions(problem, scene, part, [settings] * len(part))
+    ends = np.cumsum([len(path) for path in paths])
+    sections = [found[end - len(path) : end] for path, end in zip(paths, ends.tolist(), strict=True)]
+    motions = [chained([section.motion for section in path]) for path in sections]
+    answers = proved_answers(problem, motions, scene)
+    duration = np.where(answers.verdict == 0, answers.duration, np.inf)
+    bounds = np.array([sum(section.lower_bound for section in path) for path in sections], float)
+    return LeastTimes(answers, duration, bounds, motions, sections)
