@@ -19,7 +19,7 @@ import numpy as np
 from . import any_motion, least_time, path_rows, sampled_motion
 
 SAFETY = 2.0
-INNER = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
+INNER = tuple(np.linspace(0.0, 1.0, 11))
 FEW_SIDES = 16
 
 
