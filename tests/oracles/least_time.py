@@ -15,7 +15,8 @@ import dataclasses
 import math
 
 import numpy as np
-from scipy.optimize import linprog
+import scipy.sparse
+from scipy.optimize import linprog, minimize_scalar
 
 from . import path_rows
 
@@ -168,6 +169,53 @@ def solved(problem_, way=span):
         u = steepest(*problem_.cell(i, sets[i + 1]), x[i] / unit) * problem_.units[0]
         x[i + 1] = np.clip(x[i] + 2.0 * step * u, *sets[i + 1])
     return Solution("feasible", problem_.nodes, sets, x, np.diff(x) / (2.0 * steps), duration(problem_.nodes, x))
+
+
+def optimum(problem_, solution, rounds=15, gap=1e-6):
+    """Least T of the problem on its grid, from a solution: bounds of it, and x (N + 1,).
+
+    T is convex in x, and rows are linear in it: linear programs of its tangents bound it from below, and T along the
+    way to their solutions leads to it (Frank and Wolfe). A greedy solution takes a little longer.
+    """
+    unit_u, unit_x = problem_.units
+    steps, count = np.diff(problem_.nodes), len(problem_.nodes)
+    parts, most = [], []
+    for i, step in enumerate(steps):
+        a, b, c = (v[:-2] for v in problem_.cell(i, (0.0, math.inf)))
+        ahead = 2.0 * step * unit_u / unit_x
+        rows = np.stack([b - a / ahead, a / ahead], axis=1)
+        size = np.maximum(np.abs(rows).max(1), 1e-300)
+        parts.append(rows / size[:, None])
+        most.append(c / size)
+    columns = np.concatenate([np.tile([i, i + 1], len(part)) for i, part in enumerate(parts)])
+    values, most = np.concatenate([part.ravel() for part in parts]), np.concatenate(most)
+    at = np.repeat(np.arange(len(most)), 2)
+    keep = np.isfinite(most)
+    matrix = scipy.sparse.csr_matrix((values, (at, columns)), shape=(len(most), count))[keep]
+    bounds = [(0.0, None)] * count
+    bounds[0], bounds[-1] = ((end / unit_x,) * 2 for end in problem_.ends)
+    x, below = solution.x / unit_x, 0.0
+
+    def time(x):
+        return duration(problem_.nodes, np.maximum(x, 0.0) * unit_x)
+
+    for _ in range(rounds):
+        speed = np.maximum(np.sqrt(x * unit_x), 1e-9 * math.sqrt(unit_x))
+        both = (speed[:-1] + speed[1:]) ** 2
+        slope = np.zeros(count)
+        slope[:-1] -= steps * unit_x / (speed[:-1] * both)
+        slope[1:] -= steps * unit_x / (speed[1:] * both)
+        slope[[0, -1]] = 0.0
+        answer = linprog(slope / np.abs(slope).max(), matrix, most[keep], bounds=bounds, method="highs")
+        if answer.status:
+            raise RuntimeError(answer.message)
+        below = max(below, time(x) + slope @ (answer.x - x))
+        share = minimize_scalar(lambda k, y=answer.x, x=x: time(x + k * (y - x)), bounds=(0.0, 1.0), method="bounded").x
+        if time(x + share * (answer.x - x)) < time(x):
+            x = x + share * (answer.x - x)
+        if time(x) - below < gap * time(x):
+            break
+    return below, time(x), x * unit_x
 
 
 class ByTensions:

@@ -112,12 +112,16 @@ def above(robot, limits, path, count=1000, rounds=20):
     return None, math.inf
 
 
-def estimate(robot, limits, path, count=1000):
-    """Least time by the midpoint scheme and Richardson's extrapolation, and the change from half as many cells, s."""
-    coarse, fine = (
-        least_time.solved(least_time.problem(robot, limits, path, n, "midpoint")).time for n in (count // 2, count)
-    )
-    return fine + (fine - coarse) / 3.0, abs(fine - coarse)
+def estimate(robot, limits, path, count=400):
+    """Least time by the optimum of the midpoint scheme, and its change from half as many cells, s; no bound."""
+    times = []
+    for cells in (count // 2, count):
+        problem_ = least_time.problem(robot, limits, path, cells, "midpoint")
+        solution = least_time.solved(problem_)
+        if solution.verdict != "feasible":
+            return math.inf, math.inf
+        times.append(least_time.optimum(problem_, solution)[1])
+    return times[1], abs(times[1] - times[0])
 
 
 @dataclasses.dataclass(frozen=True)

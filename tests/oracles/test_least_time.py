@@ -84,6 +84,53 @@ def test_three_ways_agree(kind, scheme, cases):
         assert ours.time == pytest.approx(programs.time, rel=1e-7)
 
 
+@pytest.mark.parametrize("kind, seed", [("2T-2", 5), ("3R3T-7", 0)])
+def test_three_ways_agree_where_a_least_speed_is_needed(kind, seed):
+    case = least_time_cases.case(kind, seed, outside=True)
+    problem = least_time.problem(case.robot, case.limits, case.path, 14)
+    ours, corners = least_time.solved(problem), least_time.solved(problem, least_time.vertex_span)
+    programs = least_time.ByTensions(case.robot, case.limits, case.path, 14).solve()
+    assert ours.sets[:, 0].max() > 0.1
+    np.testing.assert_allclose(corners.sets, ours.sets, rtol=1e-10, atol=1e-9)
+    np.testing.assert_allclose(programs.sets, ours.sets, rtol=1e-6, atol=1e-7)
+
+
+@pytest.mark.parametrize("kind", ["2T-3", "3T-4", "3R3T-6"])
+@pytest.mark.parametrize("scheme", ["interpolation", "midpoint"])
+def test_greedy_solutions_take_little_longer_than_the_optimum(kind, scheme, cases):
+    case = cases[kind]
+    problem = least_time.problem(case.robot, case.limits, case.path, 100, scheme)
+    greedy = least_time.solved(problem)
+    below, time, x = least_time.optimum(problem, greedy)
+    assert below <= time <= greedy.time
+    assert below > (1.0 - 2e-5) * time
+    assert greedy.time < (1.002 if scheme == "interpolation" else 1.02) * time
+    assert (x <= greedy.sets[:, 1] * (1.0 + 1e-6) + 1e-6).all()
+    u = np.diff(x) / (2.0 * np.diff(problem.nodes))
+    for share, rows in zip(problem.shares, problem.rows, strict=True):
+        slack = path_rows.slack(rows, u, x[:-1] + 2.0 * share * np.diff(problem.nodes) * u)
+        assert (slack > -1e-5 * np.abs(rows.c)).all()
+
+
+@pytest.mark.parametrize("kind", ["2T-3", "3T-4", "1R2T-4", "3R3T-6"])
+def test_motions_meet_the_necessary_rows(kind, cases):
+    """Any motion whose limits hold does, on cells of which each has eight of the motion's."""
+    case = cases[kind]
+    nodes = case.path.nodes(16)
+    motion, _ = least_time_bounds.above(case.robot, case.limits, case.path, 128)
+    rows = least_time_bounds.necessary(
+        case.robot, case.limits, case.path, nodes, least_time_bounds.fastest(case.robot, case.limits, case.path, nodes)
+    )
+    x = np.interp(nodes, motion.nodes, motion.x)
+    u = np.diff(x) / (2.0 * np.diff(nodes))
+    assert (rows.a * u[:, None] + rows.b * 0.5 * (x[1:] + x[:-1])[:, None] <= rows.c).all()
+    inner = np.diff(motion.x) / (2.0 * np.diff(motion.nodes))
+    cell = np.searchsorted(nodes, 0.5 * (motion.nodes[1:] + motion.nodes[:-1])) - 1
+    assert (inner >= rows.low[cell] - 1e-9).all()
+    assert (inner <= rows.high[cell] + 1e-9).all()
+    assert (x <= rows.caps).all()
+
+
 @pytest.mark.parametrize("ends", [(0.6, 1.5), (1.5, 0.6)])
 def test_vertical_line(ends):
     exact, _ = least_time_forms.vertical(RING, LOW, HIGH, *ends)
@@ -127,12 +174,15 @@ def test_level_circle_under_many_spools():
     assert bounds[1] / bounds[0] < 1.004
 
 
-@pytest.mark.parametrize("kind", ["2T-3", "3T-3", "1R2T-4", "3R3T-7"])
-def test_bounds_enclose_the_estimate(kind, cases):
+@pytest.mark.parametrize("kind, share", [("2T-3", 0.945), ("3T-3", 0.985), ("1R2T-4", 0.965), ("3R3T-7", 0.988)])
+def test_bounds_enclose_the_estimate(kind, share, cases):
     case = cases[kind]
     motion, above = least_time_bounds.above(case.robot, case.limits, case.path, 150)
     below = least_time_bounds.below(case.robot, case.limits, case.path, 150)
-    assert 0.9 * above < below < above
+    time, change = least_time_bounds.estimate(case.robot, case.limits, case.path, 200)
+    assert share * above < below < time + change
+    assert time - change < above < 1.01 * time
+    assert change < 2e-3 * time
     slacks = least_time_bounds.slacks(case.robot, case.limits, motion, np.linspace(*motion.times, 400))
     weight = case.robot["mass"] * case.robot["gravity"]
     for name, slack in slacks.items():

@@ -137,13 +137,15 @@ def check_case(case, samples, count):
     answer = solve(case.robot, case.path, case.limits)
     below = least_time_bounds.below(case.robot, case.limits, case.path, count)
     above = least_time_bounds.above(case.robot, case.limits, case.path, 2 * count)[1]
+    time, change = least_time_bounds.estimate(case.robot, case.limits, case.path, 2 * count)
     assert (answer.motion is None) == (answer.time == math.inf)
     if below == math.inf:
         assert answer.motion is None
     if above < math.inf:
         assert answer.verdict == "feasible"
         assert answer.lower <= above * (1.0 + 1e-6)
-        assert answer.time <= (1.0 + LONGER) * above
+        assert answer.lower <= time + 3.0 * change
+        assert time - 3.0 * change <= answer.time <= (1.0 + LONGER) * min(above, time + 3.0 * change)
     if answer.motion is not None:
         assert (1.0 - SHORTER) * answer.time - LONGER * answer.time <= answer.lower <= answer.time
         assert answer.time >= below * (1.0 - 1e-6)
