@@ -37,7 +37,7 @@ def frame(kind):
     """Unit robot, z up: spools at z = 0 or so, platform points (None: a point), reference position, half ranges."""
     pattern, count = kind.split("-")
     if pattern == "2T":
-        base = [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.15, 0.0, 0.3]][: int(count)]
+        base = [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.15, 0.0, 0.3], [-0.4, 0.0, 0.25]][: int(count)]
         return np.array(base), None, [0.0, 0.0, -1.0], [0.5, 0.0, 0.4]
     if kind == "3T-3":
         return ring(3, 1.0, 0.2), None, [0.0, 0.0, -1.1], [0.3, 0.3, 0.4]

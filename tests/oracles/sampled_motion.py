@@ -40,10 +40,11 @@ class Spline:
     knots: np.ndarray
     coefficients: np.ndarray
 
-    def __call__(self, times, order=0):
-        """Derivatives of one order at times, (k, d)."""
+    def __call__(self, times, order=0, within=None):
+        """Derivatives of one order at times, (k, d); one-sided, in the pieces that hold the times `within`."""
         times = np.asarray(times, float)
-        piece = np.clip(np.searchsorted(self.knots, times, "right") - 1, 0, len(self.knots) - 2)
+        within = times if within is None else np.asarray(within, float)
+        piece = np.clip(np.searchsorted(self.knots, within, "right") - 1, 0, len(self.knots) - 2)
         since = (times - self.knots[piece])[:, None]
         total = np.zeros((len(times), self.coefficients.shape[2]))
         for power in range(self.coefficients.shape[1] - 1, order - 1, -1):
