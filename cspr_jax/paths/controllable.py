@@ -97,12 +97,12 @@ def _bounds_of(u: Array, x_share: Array, most: Array) -> _Bounds:
 
 def _gap(bounds: _Bounds, x: Array) -> tuple[Array, Array, Array]:
     # h at x, its change with x, and the rounding in it. Reductions alone, since searches for places are slow.
-    upper, lower = bounds.upper - bounds.slope * x, bounds.lower - bounds.slope * x
+    upper, lower = bounds.upper - bounds.slope * x[None], bounds.lower - bounds.slope * x[None]
     beta, alpha = jnp.min(upper, axis=0), jnp.max(lower, axis=0)
-    falls = jnp.max(jnp.where(upper <= beta, bounds.slope, -jnp.inf), axis=0)
-    rises = jnp.min(jnp.where(lower >= alpha, bounds.slope, jnp.inf), axis=0)
-    size = jnp.abs(bounds.slope * x) + bounds.size
-    largest = jnp.max(jnp.where((upper <= beta) | (lower >= alpha), size, 0.0), axis=0)
+    falls = jnp.max(jnp.where(upper <= beta[None], bounds.slope, -jnp.inf), axis=0)
+    rises = jnp.min(jnp.where(lower >= alpha[None], bounds.slope, jnp.inf), axis=0)
+    size = jnp.abs(bounds.slope * x[None]) + bounds.size
+    largest = jnp.max(jnp.where((upper <= beta[None]) | (lower >= alpha[None]), size, 0.0), axis=0)
     return beta - alpha, rises - falls, CLOSE * largest
 
 
@@ -175,9 +175,9 @@ def fastest(sides: tuple[Rows, Rows], width: Array, bend: Array, cap: Array, end
         is_empty = ~(bottom <= top)
         is_last = is_empty & (empty < 0) & jnp.isfinite(low)
         empty = jnp.where(is_last, index, empty)
-        line = bounds.slope * last_x
+        line = bounds.slope * last_x[None]
         both = jnp.stack([jnp.argmin(bounds.upper - line, axis=0), jnp.argmax(bounds.lower - line, axis=0)])
-        meeting = jnp.where(is_last, both, meeting)
+        meeting = jnp.where(is_last[None], both, meeting)
         bottom, top = (jnp.where(is_empty, jnp.nan, side) for side in (bottom, top))
         return (bottom, top, empty, meeting, index - 1), (bottom, top)
 
@@ -194,7 +194,7 @@ def fastest(sides: tuple[Rows, Rows], width: Array, bend: Array, cap: Array, end
     def ahead(x: Array, step):
         cell, low, high = step
         bounds = _bounds_of(*rows_of(cell, low, high))
-        after = jnp.clip(x + 2.0 * cell.width * jnp.min(bounds.upper - bounds.slope * x, axis=0), low, high)
+        after = jnp.clip(x + 2.0 * cell.width * jnp.min(bounds.upper - bounds.slope * x[None], axis=0), low, high)
         return after, (after, 0.5 * (after - x) / cell.width)
 
     beginning = jnp.clip(start, low[0], high[0])

@@ -182,7 +182,7 @@ def tangent_directions(velocity: Array, acceleration: Array) -> Array:
     bend = acceleration - jnp.dot(acceleration, along) * along
     across = bend / jnp.sqrt(jnp.maximum(jnp.sum(bend**2), TINY))
     angles = np.linspace(0.0, np.pi, TANGENTS + 1)
-    return np.cos(angles)[:, None] * along + np.sin(angles)[:, None] * across
+    return np.cos(angles)[:, None] * along[None] + np.sin(angles)[:, None] * across[None]
 
 
 def _tangents(velocity: Array, acceleration: Array, most: Array) -> tuple[Array, ...]:

@@ -2,6 +2,25 @@
 
 import dataclasses
 from collections.abc import Callable
+from functools import partial
+
+import jax
+import numpy as np
+from oracles.sampled_motion import State
+
+import cspr_jax
+from cspr_jax.arithmetic.elementary import double_precision, leaf
+from cspr_jax.arithmetic.piecewise_bounds import bernstein_of_powers
+from cspr_jax.curves.spline import Spline
+from cspr_jax.motions.amplitudes import named
+from cspr_jax.motions.motion import Placed
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.proved_answers import proved_answers
+from cspr_jax.paths.least_time import least_time_motion
+from cspr_jax.paths.section import Section, SectionSettings
+from cspr_jax.robots.kernel_axes import centred
+from cspr_jax.robots.limits import Limits
+from cspr_jax.schema.verdicts import Verdict
 
 
 @dataclasses.dataclass(frozen=True)
@@ -31,4 +50,58 @@ def solve(robot, path, limits, grid=500, ramp_time=0.0):
         grid: number of cells.
         ramp_time: s, 0 for accelerations that may jump.
     """
-    raise NotImplementedError("least times along paths")
+    with double_precision():
+        prepared, frame = centred(robot_of(robot))
+        sizes = {name: np.ones(prepared.n_cables) for name in limits if name not in ("speed_max", "acceleration_max")}
+        problem = Problem(prepared, Limits(**{k: leaf(v * sizes.get(k, 1.0)) for k, v in limits.items()}), named("A1"))
+        section = section_of(path, frame)
+        least = least_time_motion(problem, None, section, SectionSettings(grid, ramp_time))
+        # The reference knows no bodies.
+        flags = Verdict(int(proved_answers(problem, [least.motion], None).verdict[0]))
+        verdict = flags & ~(Verdict.CABLE_CABLE | Verdict.CABLE_PLATFORM)
+    if least.failure is not None:
+        return Answer(verdict.text, np.inf, np.inf, None)
+    motion = partial(_states, Placed(least.motion, frame))
+    return Answer(verdict.text if verdict else "feasible", least.duration, least.lower_bound, motion)
+
+
+def section_of(path, frame):
+    """The section of a path of the reference, in the axes of the kernels."""
+    knots = np.asarray(path.positions.knots) - path.positions.knots[0]
+    width = np.diff(knots)[:, None, None]
+
+    def table(spline):
+        powers = np.asarray(spline.coefficients)
+        return bernstein_of_powers(powers * width ** np.arange(powers.shape[1])[:, None])
+
+    quaternion = None
+    if path.quaternions is not None:
+        quaternion = leaf(table(path.quaternions) * np.concatenate([[1.0], frame.signs]))
+    curve = Spline(leaf(knots), leaf(frame.inward(table(path.positions))), quaternion)
+    return Section(curve, np.full(len(knots) - 1, np.inf), knots)
+
+
+def _states(motion, times):
+    # Compiled for one number of instants at a time; the last instant belongs to the motion.
+    with double_precision():
+        tau = np.clip(np.asarray(times) / float(motion.duration()), 0.0, 1.0)
+        states = jax.tree.map(np.asarray, _at(motion, tau))
+    count = len(tau)
+    if states.rotation is None:
+        eye, none = np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))
+        return State(states.position, states.velocity, states.acceleration, eye, none, none)
+    return State(*states[:3], states.rotation, states.angular_velocity, states.angular_acceleration)
+
+
+@jax.jit
+def _at(motion, tau):
+    return jax.vmap(motion.state)(tau)
+
+
+def robot_of(robot):
+    """The robot of the reference's dict."""
+    numbers = {name: robot[name] for name in ("mass", "gravity", "z_axis") if name in robot}
+    if robot["platform_points"] is None:
+        return cspr_jax.point_mass(robot["base_points"], planar=robot["pattern"] == "2T", **numbers)
+    numbers |= {"inertia": robot["inertia"], "centre_of_mass": robot["centre_of_mass"]}
+    return cspr_jax.platform(robot["base_points"], robot["platform_points"], pattern=robot["pattern"], **numbers)
