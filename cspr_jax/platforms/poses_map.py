@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.build.orientations import given_quaternion, orientations
 from cspr_jax.build.problems import motion_kind
 from cspr_jax.config.robot import RobotFile
@@ -68,7 +69,7 @@ class PosesMap(PlatformMap):
             answers = self._answers(cases, arcs)
             chosen = cases._replace(beta_hats=(answers.beta_hat[:, 0], answers.beta_hat[:, 1]))
             segments = segments_with(self._problem.robot, chosen, answers.tried_arcs)
-            each = PlatformMotion(segments, self._problem.amplitude, answers.tried_arcs.astype(float), kind)
+            each = PlatformMotion(segments, self._problem.amplitude, leaf(answers.tried_arcs), kind)
             return answers, SeveralMotions(each, answers.duration, partial(several_bounds, kind=kind), orders=4)
 
         most = self._keys.trajectory.max_arcs

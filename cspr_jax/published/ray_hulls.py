@@ -13,6 +13,7 @@ import jax
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.published.chapter_1 import Key
 from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.limits import Limits
@@ -94,7 +95,7 @@ def _conditions() -> tuple[Inside, Inside]:
     # The conditions of the closed form and of all tensions. Without a wrench mass and inertia do not matter.
     robot, frame = centred(platform_robot(BASE, PLATFORM, mass=1.0, inertia=np.eye(3), z_axis="up"))
     wrenches = required_wrenches(robot, frame, points=np.zeros((1, 6)))
-    demand = requirement(robot, FEASIBLE, Limits(tension_min=LOW, tension_max=HIGH), wrenches)
+    demand = requirement(robot, FEASIBLE, Limits(tension_min=leaf(LOW), tension_max=leaf(HIGH)), wrenches)
     search, upright = WorkspaceSearch(robot, demand), frame.turned_quaternions(np.array([[1.0, 0.0, 0.0, 0.0]]))
     rule = jax.vmap(lambda matrix: closed_form(matrix, np.zeros(6), LOW, HIGH).is_within)
 
