@@ -1,8 +1,8 @@
 """Legs of families that know neither surroundings nor pulleys: each motion is judged with both once it is made.
 
 See `motions.judged`. Where numbers of arcs are free, point masses take the smallest number that is proved, over pulleys
-only those on as many cables as degrees of freedom. Without pulleys platforms on six cables do so in legs of one
-segment. Others keep the number that their family chooses.
+only those on as many cables as degrees of freedom. Without pulleys platforms do so in legs of one segment. Others keep
+the number that their family chooses.
 """
 
 import copy
@@ -121,7 +121,7 @@ class JudgedLeg(Leg):
         is_determined, has_pulleys = robot.n_cables == robot.dof, judge.has_pulleys
         is_searched = is_determined or not has_pulleys
         if stops.robot_file.is_platform:  # whose motion depends on those before and behind it
-            is_searched = is_determined and not has_pulleys and len(self) == 1
+            is_searched = not has_pulleys and len(self) == 1
         most = stops.max_arcs if is_searched else 0
         judged = judge.smallest(join, prescribed, step=self._leg.step, max_arcs=most)
         motions = join(np.arange(len(self)), judged.arcs)[1]

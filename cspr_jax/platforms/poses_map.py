@@ -1,17 +1,23 @@
 """Maps of smallest numbers of arcs of platforms to poses."""
 
+from functools import partial
+from typing import Any
+
 import numpy as np
 
+from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.build.orientations import given_quaternion, orientations
 from cspr_jax.build.problems import motion_kind
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.maps.grid_map import PlatformMap
-from cspr_jax.platforms.arcs import Candidates
+from cspr_jax.platforms.answers import PlatformMotionAnswers
+from cspr_jax.platforms.arcs import Candidates, segments_with
 from cspr_jax.platforms.checkers import pose_checker
 from cspr_jax.platforms.end_acceleration import AT_REST
 from cspr_jax.platforms.motion_checker import MANY
+from cspr_jax.platforms.platform_segment import PlatformMotion, several_bounds
 from cspr_jax.platforms.pose_targets import Poses, pose_arcs, rest_poses, start_beta_hat
 from cspr_jax.robots.reference_pose import reference_pose
 from cspr_jax.schema.quantities import TILT_TORSION
@@ -33,6 +39,7 @@ class PosesMap(PlatformMap):
         )
         from_rest = start is None or start.rest
         self._checker = pose_checker(self._problem, motion_kind(keys.trajectory, from_rest=from_rest), batch=MANY)
+        self._scene = self._surroundings(robot_file)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
@@ -40,15 +47,33 @@ class PosesMap(PlatformMap):
         angles = np.stack([cells.get(name, np.zeros(len(z0))) for name in TILT_TORSION], axis=1)
         starts, beta_hats = self._starts(z0)
         ends = (targets, orientations(self._frame, targets, angles))
+        cell = np.arange(len(z0))
+        motions = Candidates(starts, ends, z0, cell, (beta_hats, beta_hats))
+        columns = vars(self._answers(motions)) if self._scene is None else self._clear(motions)
+        return columns | {"beta_hat": columns["beta_hat"][:, 1]}
+
+    def _answers(self, motions: Candidates, arcs: np.ndarray | None = None) -> PlatformMotionAnswers:
         trajectory = self._keys.trajectory
-        answers = pose_arcs(
-            self._checker,
-            Candidates(starts, ends, z0, np.arange(len(z0)), (beta_hats, beta_hats)),
-            beta_hat=trajectory.beta_hat,
-            beat=trajectory.beat,
-            max_arcs=trajectory.max_arcs,
-        )
-        return vars(answers) | {"beta_hat": answers.beta_hat[:, 1]}
+        how: dict[str, Any] = {name: getattr(trajectory, name) for name in ("beta_hat", "beat", "max_arcs")}
+        return pose_arcs(self._checker, motions, fixed=arcs, **how)
+
+    def _clear(self, motions: Candidates) -> dict[str, np.ndarray]:
+        # Return the columns among obstacles, by which a motion is proved as its plan is.
+        from cspr_jax.maps.clear_motions import clear_motions  # with the proofs of any motion, which others need not
+        from cspr_jax.motions.several import SeveralMotions
+
+        kind = self._checker.kind._replace(from_rest=False)
+
+        def join(rows: np.ndarray, arcs: np.ndarray) -> tuple[PlatformMotionAnswers, SeveralMotions]:
+            cases = motions.motions(rows)
+            answers = self._answers(cases, arcs)
+            chosen = cases._replace(beta_hats=(answers.beta_hat[:, 0], answers.beta_hat[:, 1]))
+            segments = segments_with(self._problem.robot, chosen, answers.tried_arcs)
+            each = PlatformMotion(segments, self._problem.amplitude, leaf(answers.tried_arcs), kind)
+            return answers, SeveralMotions(each, answers.duration, partial(several_bounds, kind=kind), orders=4)
+
+        most = self._keys.trajectory.max_arcs
+        return clear_motions(self._problem, self._scene, join, len(motions.z0), max_arcs=most)
 
     def _starts(self, z0: np.ndarray) -> tuple[Poses, np.ndarray]:
         # Return the poses at the starts, and the values of beta-hat there.

@@ -3,6 +3,7 @@
 from cspr_jax.schema.quantities import REFUSALS
 
 TOLERATED = ("tolerated", "not_tolerated")
+SURROUNDINGS = ("obstacle", "platform_box", "platform_hull")
 UNCERTAIN = (("limits.uncertainty", TOLERATED),)
 COMMON = ("verdict", "duration", "margin", "margin_bound", "limit_margin", "feasible_at_infinity")
 OF_TRANSITIONS = ("least_oscillations", "inclination_gain", "used_inclination", "used_z0")

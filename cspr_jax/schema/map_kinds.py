@@ -166,7 +166,7 @@ MAP_KINDS: dict[str, MapKind] = {
             description="smallest number of arcs of a platform to each pose",
             implementation="cspr_jax.platforms.poses_map:PosesMap",
             cost=CellCost(seconds=1.5e-3, limits=5.0),
-            quantities=columns.OF_POSES,
+            quantities=(*columns.OF_POSES, "clearance"),
             stored=columns.POSES_STORED,
             pictured=("arcs",),
             families=_OF_PLATFORMS,
@@ -177,9 +177,11 @@ MAP_KINDS: dict[str, MapKind] = {
             needs=("axes.z0",),
             takes=(
                 *("axes.tilt_azimuth", "axes.tilt", "axes.torsion", "trajectory.beta_hat", "trajectory.beat"),
-                *("limits", "limits.uncertainty"),
+                *("limits", "limits.uncertainty", *columns.SURROUNDINGS),
             ),
-            stored_with=columns.UNCERTAIN,
+            stored_with=(*columns.UNCERTAIN, *((key, ("clearance",)) for key in columns.SURROUNDINGS)),
+            only_with=((("clearance",), columns.SURROUNDINGS),),
+            rows=(MOTION_CLEARANCE,),
         ),
         MapKind(
             name="orientations",

@@ -27,11 +27,15 @@ SWEEP = {
 }
 
 
-def clearance_of(positions, base=SPOOLS):
-    """Smallest distance of the ball from cables to positions (n, 3)."""
-    ways, centre = positions[:, None] - base, np.array(BALL["centre"])
-    along = np.clip(((centre - base) * ways).sum(2) / (ways**2).sum(2), 0.0, 1.0)
-    return (np.linalg.norm(base + along[..., None] * ways - centre, axis=2) - BALL["radius"]).min()
+# Beside a cable, where two arcs do not help.
+BEHIND = {"kind": "sphere", "centre": [0.015, 0.025, 1.421], "radius": 0.006}
+
+
+def clearance_of(positions, ball=BALL):
+    """Smallest distance of a ball from cables to positions (n, 3)."""
+    ways, centre = positions[:, None] - SPOOLS, np.array(ball["centre"])
+    along = np.clip(((centre - SPOOLS) * ways).sum(2) / (ways**2).sum(2), 0.0, 1.0)
+    return (np.linalg.norm(SPOOLS + along[..., None] * ways - centre, axis=2) - ball["radius"]).min()
 
 
 def plan_of(place, arcs=None, **more):
@@ -77,6 +81,18 @@ def test_cells_have_the_smallest_number_whose_motion_keeps_clear(result):
         assert clear or cell["tried_arcs"] == first
         kinds.add((bool(clear), bool(clear) and cell["arcs"] > first))
     assert kinds == {(True, False), (True, True), (False, False)}
+
+
+def test_numbers_of_arcs_are_tried_one_after_the_other():
+    """To the last place one arc and two are feasible alone, and meet the ball; three keep clear."""
+    axes = {"x": [-0.1], "y": [0.05], "z": [1.53, 1.62], "z0": [1.7]}
+    result = cspr_jax.compute_sweep(SWEEP | {"axes": axes, "obstacle": [BEHIND]})
+    for (_, cell), smallest in zip(cells_of(result), (2, 3), strict=True):
+        assert (cell["arcs"], cell["verdict"]) == (smallest, 0)
+    plans = [plan_of({"x": -0.1, "y": 0.05, "z": 1.62, "z0": 1.7}, arcs) for arcs in (1, 2, 3)]
+    assert all(plan.feasible for plan in plans)
+    near = [clearance_of(plan.rows()["position"], BEHIND) for plan in plans]
+    assert max(near[:2]) < 0.0 < near[2] == pytest.approx(cell["clearance"], rel=0.01)
 
 
 def test_a_run_goes_on_and_belongs_to_its_obstacles(result, tmp_path):
