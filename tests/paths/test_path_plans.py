@@ -6,6 +6,8 @@ from scipy.spatial.transform import Rotation
 from support.commands import plan
 
 import cspr_jax
+from cspr_jax.config.catalogue import CATALOGUE
+from cspr_jax.config.reading import read_toml
 from cspr_jax.errors import ConfigError
 
 ROBOT = {"schema": 1, "robot": "prototype", "family": "path", "samples": 201}
@@ -262,3 +264,21 @@ def test_a_robot_on_a_joint_turns_along_its_path():
         assert np.abs(rows["quaternion"] @ turn).max() > 1.0 - 1e-6
     with pytest.raises(ConfigError, match=r"path.positions: they differ by 0\.5 m: must be those of the joint"):
         cspr_jax.plan(keys | {"pose": [{"position": place}, {"position": [0.5, 0.1, 0.2]}]})
+
+
+@pytest.mark.thorough
+def test_orientations_of_files_are_those_of_motions(tmp_path):
+    """Of the platform's own axes, also where these are turned from the reference ones."""
+    robot = read_toml(CATALOGUE / "nist-robocrane.toml")
+    turn = Rotation.from_euler("z", 0.3)
+    robot |= {"platform_points": turn.apply(robot["platform_points"]), "inertia": np.diag([0.09375, 0.09375, 0.1875])}
+    units = np.roll(Rotation.from_euler("z", [[-0.3], [-0.1]]).as_quat(), 1, axis=1)
+    rows = np.column_stack([[0.0, 1.0], [[0.0, 0.0, -3.0], [0.2, 0.1, -3.0]], units])
+    for name, columns in (("motion", rows), ("path", rows[:, 1:])):
+        np.savetxt(tmp_path / f"{name}.csv", columns, delimiter=",")
+    keys = {"schema": 1, "robot": robot}
+    motion = cspr_jax.plan(keys | {"family": "spline", "motion": str(tmp_path / "motion.csv")})
+    path = cspr_jax.plan(keys | {"family": "path", "path": {"kind": "csv", "file": str(tmp_path / "path.csv")}})
+    for name in ("position", "quaternion"):
+        ends = (result.rows()[name][[0, -1]] for result in (motion, path))
+        np.testing.assert_allclose(*ends, atol=1e-12)
