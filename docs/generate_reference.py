@@ -8,6 +8,7 @@ from pydantic import BaseModel
 from cspr_jax.config.launch import LaunchSearch
 from cspr_jax.config.limits import LimitTable
 from cspr_jax.config.obstacles import ObstacleTable
+from cspr_jax.config.path import PathTable
 from cspr_jax.config.plan import DepthRule, PlanFile
 from cspr_jax.config.pose import Pose
 from cspr_jax.config.robot import RobotFile
@@ -58,7 +59,13 @@ FILES = {
         ("[limits]", LimitTable),
         ("[run]", RunTable),
     ],
-    "Plan files": [("", PlanFile), ("[[pose]]", Pose), ("z0, chosen", DepthRule), ("[limits]", LimitTable)],
+    "Plan files": [
+        ("", PlanFile),
+        ("[[pose]]", Pose),
+        ("[path], and path of a pose", PathTable),
+        ("z0, chosen", DepthRule),
+        ("[limits]", LimitTable),
+    ],
     "Amplitude functions": [
         ("amplitude, with a parameter", NamedAmplitude),
         ("amplitude, your own", PolynomialAmplitude),

@@ -22,6 +22,9 @@ _WORDS = {
     Verdict.UNDECIDED: "neither proved nor refuted{when}: {needed} {unit}, and {allowed} {unit} is the limit",
     Verdict.UNCERTAINTY: "it stands {allowed} of the uncertainty, {needed} needed",
 }
+_WORDS |= dict.fromkeys(
+    (row.flag for row in LIMITS if row.of_mass_centre), "the mass centre needs {needed} {unit}{when}, {allowed} allowed"
+)
 UNITS = {row.flag: row.unit for row in LIMITS} | {Verdict.UNCERTAINTY: "1", Verdict.WRENCH_INFEASIBLE: "N"}
 _USUAL = "{cable} needs {needed} {unit}{when}, {allowed} allowed"
 

@@ -6,6 +6,7 @@ from support.commands import plan
 
 import cspr_jax
 from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.motions.cause import Cause
 from cspr_jax.motions.given_limits import limits_over
 
 # Up by a quintic law within a second: largest speed 1.875 times the way, largest acceleration 10 / sqrt(3) times.
@@ -39,6 +40,8 @@ def test_a_motion_is_proved_up_to_its_largest_value(name, largest, flag):
     assert demand["value"] == pytest.approx(value, rel=1e-4) and value <= demand["bound"] <= value * 1.0001
     cause = below.to_dict()["cause"][0]
     assert cause["criterion"] == flag and cause["needed"] == pytest.approx(value, rel=1e-4) and cause["cable"] is None
+    text = Cause(flag, t=0.5, needed=0.2, allowed=0.1, unit=cause["unit"]).text.replace("²", "^2")
+    assert text == f"the mass centre needs 0.2 {cause['unit']} at t = 0.50 s, 0.1 allowed"
     # It fails exactly where the law exceeds the limit.
     rates = {"speed_max": RATE, "acceleration_max": np.abs(BEND)}[name] * WAY
     times = TIMES[rates > value * 0.9999]

@@ -6,6 +6,8 @@ from scipy.spatial.transform import Rotation
 from support.commands import plan
 
 import cspr_jax
+from cspr_jax.config.catalogue import CATALOGUE
+from cspr_jax.config.reading import read_toml
 from cspr_jax.errors import ConfigError
 
 ROBOT = {"schema": 1, "robot": "prototype", "family": "path", "samples": 201}
@@ -242,7 +244,41 @@ def test_mistakes_of_files(tmp_path):
         assert (code, out) == (2, "") and line in err and err.count("\n") == 1
 
 
-def test_planar_and_jointed_robots(tmp_path):
-    planar = {"schema": 1, "robot": "boralugoda-planar-two", "family": "path", "path": {"grid": 20}}
-    with pytest.raises(ConfigError, match=r"positions: y reaches 0\.1 m"):
-        cspr_jax.plan(planar | {"path": {"points": [[0.0, 0.0, 1.0], [0.1, 0.1, 1.0]]}})
+def test_a_planar_robot_stays_in_its_plane():
+    keys = {"schema": 1, "robot": "boralugoda-planar-two", "family": "path"}
+    with pytest.raises(ConfigError, match=r"path.positions: y reaches 0\.1 m"):
+        cspr_jax.plan(keys | {"path": {"points": [[0.0, 0.0, 1.0], [0.1, 0.1, 1.0]]}})
+
+
+def test_a_robot_on_a_joint_turns_along_its_path():
+    """The joint stays; the path is that of orientations, and one that moves the joint is refused."""
+    ends = np.array([[0.3, 0.0, 0.2], [0.0, 0.3, 0.2], [-0.3, -0.3, 0.2], [0.2, -0.3, 0.2]])
+    robot = {"name": "joint", "pattern": "3R", "z_axis": "up", "mass": 1.0, "inertia": 0.1 * np.eye(3)}
+    robot |= {"base_points": 2.0 * ends, "platform_points": ends, "centre_of_mass": [0.1, 0.0, 0.3]}
+    turns = [[1.0, 0.0, 0.0, 0.0], [0.96, 0.28, 0.0, 0.0], [0.96, 0.0, 0.28, 0.0]]
+    place = [0.0, 0.1, 0.2]
+    keys = {"schema": 1, "robot": robot, "family": "path", "samples": 101, "path": {"kind": "cubic", "grid": 30}}
+    rows = cspr_jax.plan(keys | {"pose": [{"position": place, "quaternion": turn} for turn in turns]}).rows()
+    np.testing.assert_allclose(rows["position"], np.tile(place, (len(rows["position"]), 1)), atol=1e-12)
+    for turn in turns:
+        assert np.abs(rows["quaternion"] @ turn).max() > 1.0 - 1e-6
+    with pytest.raises(ConfigError, match=r"path.positions: they differ by 0\.5 m: must be those of the joint"):
+        cspr_jax.plan(keys | {"pose": [{"position": place}, {"position": [0.5, 0.1, 0.2]}]})
+
+
+@pytest.mark.thorough
+def test_orientations_of_files_are_those_of_motions(tmp_path):
+    """Of the platform's own axes, also where these are turned from the reference ones."""
+    robot = read_toml(CATALOGUE / "nist-robocrane.toml")
+    turn = Rotation.from_euler("z", 0.3)
+    robot |= {"platform_points": turn.apply(robot["platform_points"]), "inertia": np.diag([0.09375, 0.09375, 0.1875])}
+    units = np.roll(Rotation.from_euler("z", [[-0.3], [-0.1]]).as_quat(), 1, axis=1)
+    rows = np.column_stack([[0.0, 1.0], [[0.0, 0.0, -3.0], [0.2, 0.1, -3.0]], units])
+    for name, columns in (("motion", rows), ("path", rows[:, 1:])):
+        np.savetxt(tmp_path / f"{name}.csv", columns, delimiter=",")
+    keys = {"schema": 1, "robot": robot}
+    motion = cspr_jax.plan(keys | {"family": "spline", "motion": str(tmp_path / "motion.csv")})
+    path = cspr_jax.plan(keys | {"family": "path", "path": {"kind": "csv", "file": str(tmp_path / "path.csv")}})
+    for name in ("position", "quaternion"):
+        ends = (result.rows()[name][[0, -1]] for result in (motion, path))
+        np.testing.assert_allclose(*ends, atol=1e-12)
