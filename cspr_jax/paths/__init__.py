@@ -23,6 +23,9 @@ Files, each importing only from those above it:
     bound               the same from a section on its grid
     timed               motions in time from path speeds
     tightening          what a motion misses between nodes, and what binds it
+    row_names           names of half-planes
+    refusals            the place that no path speed passes
     least_time          the fastest motion along a section
+    answers             what segments of plans tell of it
     leg                 poses joined along paths, as a leg of plans
 """

@@ -79,14 +79,14 @@ class _Sides(NamedTuple):
 
 def _sides(u: Array, x_share: Array, most: Array, x: Array) -> _Sides:
     over = jnp.where(jnp.abs(u) > FLAT, u, 1.0)
-    value, slope = (most - x_share * x) / over, -x_share / over
+    value, slope = (most - x_share * x[None]) / over, -x_share / over
     upper, lower = jnp.where(u > FLAT, value, jnp.inf), jnp.where(u < -FLAT, value, -jnp.inf)
     above, below = jnp.argmin(upper, axis=0), jnp.argmax(lower, axis=0)
 
     def at(array: Array, row: Array) -> Array:
         return jnp.take_along_axis(array, row[None], axis=0)[0]
 
-    terms = (jnp.abs(most) + jnp.abs(x_share * x)) / jnp.abs(over)
+    terms = (jnp.abs(most) + jnp.abs(x_share * x[None])) / jnp.abs(over)
     size = at(terms, above) + at(terms, below)
     return _Sides(at(upper, above), at(slope, above), at(lower, below), at(slope, below), size, above, below)
 
