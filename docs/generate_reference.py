@@ -17,7 +17,7 @@ from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude
 from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.errors import ExitCode
 from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind
-from cspr_jax.schema.plan_fields import CHECK, LAUNCH, SCATTER, SEGMENT, WHOLE
+from cspr_jax.schema.plan_fields import CHECK, LAUNCH, SCATTER, SECTION, SEGMENT, WHOLE
 from cspr_jax.schema.quantities import (
     ACROSS,
     AXES,
@@ -196,6 +196,7 @@ def plan_text() -> str:
     tables = {
         "The object:\n\n": WHOLE,
         "Each of `segments`:\n\n": SEGMENT,
+        "Each of the `sections` of a path:\n\n": SECTION,
         "`launch`:\n\n": LAUNCH,
         "Its `scatter`:\n\n": SCATTER,
         "The object of `cspr check --json`:\n\n": CHECK,

@@ -72,8 +72,11 @@ class Spline:
         """Breaks; see `Motion.breaks`."""
         return self.knots[1:-1] / self.knots[-1]
 
-    def jumps(self) -> np.ndarray:
+    def jumps(self, share: float = SAME) -> np.ndarray:
         """Instants at which the acceleration jumps.
+
+        Args:
+            share: of the largest one by which it changes there at least.
 
         Returns:
             (n,) s, increasing.
@@ -85,7 +88,7 @@ class Spline:
             if table is not None and degree >= 2:
                 bends = np.diff(np.asarray(table), 2, axis=1) * (degree * (degree - 1)) / width[:, None] ** 2
                 size = np.abs(bends).max(initial=0.0)
-                is_jump |= (np.abs(bends[1:, 0] - bends[:-1, -1]) > SAME * size).any(1)
+                is_jump |= (np.abs(bends[1:, 0] - bends[:-1, -1]) > share * size).any(1)
         return np.asarray(self.knots)[1:-1][is_jump]
 
     def bounds(self, start: np.ndarray, end: np.ndarray) -> StateBounds:

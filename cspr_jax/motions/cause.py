@@ -26,6 +26,14 @@ _WORDS |= dict.fromkeys(
     (row.flag for row in LIMITS if row.of_mass_centre), "the mass centre needs {needed} {unit}{when}, {allowed} allowed"
 )
 UNITS = {row.flag: row.unit for row in LIMITS} | {Verdict.UNCERTAINTY: "1", Verdict.WRENCH_INFEASIBLE: "N"}
+# By flag: its limit, in words.
+_LIMITS = {
+    Verdict.SLACK_CABLE: "the smallest tension",
+    Verdict.OVER_TENSION: "the largest tension",
+    Verdict.WRENCH_INFEASIBLE: "the range of the tensions",
+    Verdict.CABLE_TOO_FAST: "the largest speed",
+    Verdict.CABLE_OVER_ACCELERATION: "the largest acceleration",
+}
 _USUAL = "{cable} needs {needed} {unit}{when}, {allowed} allowed"
 
 
@@ -81,6 +89,20 @@ class Cause:
             unit=self.unit.replace("^2", "²"),
             when=f" at t = {self.t:.2f} s" if math.isfinite(self.t) else "",
         )
+
+
+def limit_words(criterion: str, cable: int | None) -> str:
+    """A limit in words, such as "the smallest tension of cable 1".
+
+    Args:
+        criterion: name of its flag.
+        cable: from 0 on; None: of no single cable.
+
+    Returns:
+        the words.
+    """
+    words = _LIMITS.get(Verdict[criterion.upper()], criterion.replace("_", " "))
+    return words if cable is None else f"{words} of cable {cable + 1}"
 
 
 def _told_apart(first: float, second: float) -> tuple[str, str]:

@@ -5,6 +5,7 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from cspr_jax.outputs.path_lines import path_lines
 from cspr_jax.outputs.table_layout import two_digits
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.runtime.terminal import cell
@@ -74,6 +75,10 @@ _OF_SOME = (
     "pseudotension_margin",
     "rotation_frequencies",
     "rotation_modes",
+    "lower_bound",
+    "gap",
+    "binding",
+    "sections",
 )
 
 
@@ -144,8 +149,9 @@ def plan_table(plan: PlannedMotions):
     words = [", ".join(plan.keys.families), plan.problem.amplitude.name if plan.keys.takes_amplitude else ""]
     words += [f"z0 = {plan.z0:.{DIGITS}g} m"] if math.isfinite(plan.z0) else []
     title = f"{plan.robot_file.name}: {', '.join(filter(None, words))}"
-    lines = [*_caption(plan).splitlines(), *(line for outcome in plan.outcomes for line in outcome.lines())]
     segments = plan_object(plan)["segments"]
+    lines = [*_caption(plan).splitlines(), *path_lines(segments)]
+    lines += [line for outcome in plan.outcomes for line in outcome.lines()]
     table = Table(title=cell(title, style="table.title"), title_justify="left", caption_justify="left")
     table.caption = cell(*lines, style="table.caption")
     columns = {**_places(plan), **_numbers(segments), "verdict": lambda segment: segment["verdict"]}
@@ -178,6 +184,8 @@ def _numbers(segments: list[dict[str, Any]]) -> dict[str, Column]:
     columns = _times() if lines else _durations() if beziers else _counts(swings)
     if proved:
         columns = _proved({} if not any(segment["tried_arcs"] for segment in segments) else columns)
+    if any(segment["sections"] is not None for segment in segments):
+        columns = _bounded(columns)
     columns["tension (N)"] = lambda segment: " .. ".join(
         _number(segment[name], ".3f") for name in ("tension_min", "tension_max")
     )
@@ -222,6 +230,15 @@ def _proved(counts: dict[str, Column]) -> dict[str, Column]:
         "margin (N)": _two_digits("margin"),
         "proved (N)": _two_digits("margin_bound"),
     }
+
+
+def _bounded(columns: dict[str, Column]) -> dict[str, Column]:
+    # Lower bounds of the least time stand behind the time.
+    def gap(segment: dict[str, Any]) -> str:
+        return "-" if segment["gap"] is None else two_digits(100.0 * segment["gap"])
+
+    bounds = {"at least (s)": _of("lower_bound", ".4f"), "gap (%)": gap}
+    return {"T (s)": columns["T (s)"]} | bounds | {name: columns[name] for name in columns if name != "T (s)"}
 
 
 def _counts(swings: bool) -> dict[str, Column]:

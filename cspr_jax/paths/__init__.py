@@ -24,7 +24,10 @@ Files, each importing only from those above it:
     timed               motions in time from path speeds
     tightening          what a motion misses between nodes, and what binds it
     jumping             the fastest motions of several sections, whose accelerations jump
+    row_names           names of half-planes
+    refusals            the place that no path speed passes
     least_time          the fastest motion along a section
     many                least times along many paths
+    answers             what segments of plans tell of it
     leg                 poses joined along paths, as a leg of plans
 """

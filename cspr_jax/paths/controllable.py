@@ -66,8 +66,6 @@ class Fastest(NamedTuple):
         x: (n_cells + 1, n_paths) squared path speeds, 1/s^2 times the unit of s^2.
         u: (n_cells, n_paths) path accelerations in the middle of the cells.
         empty: (n_paths,) number of the last cell without a controllable x; -1: there is none.
-        meeting: (2, n_paths) numbers of the half-planes that bound u from above and below there; n_rows and n_rows + 1
-            are those of the next set.
         is_start: (n_paths,) whether the start is controllable.
     """
 
@@ -76,7 +74,6 @@ class Fastest(NamedTuple):
     x: Array
     u: Array
     empty: Array
-    meeting: Array
     is_start: Array
 
 
@@ -106,8 +103,8 @@ def _gap(bounds: _Bounds, x: Array) -> tuple[Array, Array, Array]:
     return beta - alpha, rises - falls, CLOSE * largest
 
 
-def _edge(bounds: _Bounds, x: Array, sign: float) -> tuple[Array, Array]:
-    # Follow h from outside to where it is no longer negative: NaN if it is so nowhere, and the last x.
+def _edge(bounds: _Bounds, x: Array, sign: float) -> Array:
+    # Follow h from outside to where it is no longer negative; NaN if it is so nowhere.
     def is_open(carry) -> Array:
         _, is_outside, step = carry
         return is_outside.any() & (step < STEPS)
@@ -115,19 +112,13 @@ def _edge(bounds: _Bounds, x: Array, sign: float) -> tuple[Array, Array]:
     def follow(carry):
         x, is_outside, step = carry
         gap, slope, rounding = _gap(bounds, x)
-        outside, leads = ~(gap >= -rounding), slope * sign < 0.0
-        moved = jnp.where(leads, x - gap / jnp.where(leads, slope, 1.0), jnp.nan)
-        return jnp.where(is_outside & outside, moved, x), is_outside & outside, step + 1
-
-    def next_one(carry):
-        x, is_outside, step = follow(carry)
         # Where no step leads on, the last x stays.
-        is_lost = is_outside & jnp.isnan(x)
-        return jnp.where(is_lost, carry[0], x), is_outside & ~is_lost, step
+        is_outside &= ~(gap >= -rounding) & (slope * sign < 0.0)
+        return jnp.where(is_outside, x - gap / jnp.where(is_outside, slope, 1.0), x), is_outside, step + 1
 
-    x, _, _ = lax.while_loop(is_open, next_one, (x, jnp.isfinite(x), 0))
+    x, _, _ = lax.while_loop(is_open, follow, (x, jnp.isfinite(x), 0))
     gap, _, rounding = _gap(bounds, x)
-    return jnp.where(gap >= -rounding, x, jnp.nan), x
+    return jnp.where(gap >= -rounding, x, jnp.nan)
 
 
 def _flat_range(u: Array, x_share: Array, most: Array, cap: Array) -> tuple[Array, Array]:
@@ -156,7 +147,6 @@ def fastest(sides: tuple[Rows, Rows], width: Array, bend: Array, cap: Array, end
     """
     cells = _cells_of(sides, width, bend, cap)
     start, end = ends
-    n_rows = cells.u.shape[1]
 
     def rows_of(cell: Cells, low: Array, high: Array) -> tuple[Array, Array, Array]:
         # With the half-planes that lead into the next set.
@@ -166,28 +156,25 @@ def fastest(sides: tuple[Rows, Rows], width: Array, bend: Array, cap: Array, end
         return u, x, jnp.concatenate([cell.most, high[None], -low[None]])
 
     def back(following, cell: Cells):
-        low, high, empty, meeting, index = following
+        low, high, empty, index = following
         rows = rows_of(cell, low, high)
         floor, ceiling = _flat_range(*rows, cell.cap)
         bounds = _bounds_of(*rows)
-        top, last_x = _edge(bounds, jnp.where(ceiling >= floor, ceiling, jnp.nan), 1.0)
-        bottom, _ = _edge(bounds, floor, -1.0)
+        top = _edge(bounds, jnp.where(ceiling >= floor, ceiling, jnp.nan), 1.0)
+        bottom = _edge(bounds, floor, -1.0)
         is_empty = ~(bottom <= top)
         is_last = is_empty & (empty < 0) & jnp.isfinite(low)
         empty = jnp.where(is_last, index, empty)
-        line = bounds.slope * last_x[None]
-        both = jnp.stack([jnp.argmin(bounds.upper - line, axis=0), jnp.argmax(bounds.lower - line, axis=0)])
-        meeting = jnp.where(is_last[None], both, meeting)
         bottom, top = (jnp.where(is_empty, jnp.nan, side) for side in (bottom, top))
-        return (bottom, top, empty, meeting, index - 1), (bottom, top)
+        return (bottom, top, empty, index - 1), (bottom, top)
 
     n_cells, n_paths = cells.width.shape
     is_end = end <= cells.cap[-1]
     last = jnp.where(is_end, end, jnp.nan)
     none = jnp.full(n_paths, -1)
-    first = (last, last, jnp.where(is_end, none, n_cells), jnp.full((2, n_paths), n_rows), n_cells - 1)
+    first = (last, last, jnp.where(is_end, none, n_cells), n_cells - 1)
     steps = cells._replace(cap=cells.cap[:-1])
-    (_, _, empty, meeting, _), (low, high) = lax.scan(back, first, steps, reverse=True)
+    (_, _, empty, _), (low, high) = lax.scan(back, first, steps, reverse=True)
     low, high = jnp.concatenate([low, last[None]]), jnp.concatenate([high, last[None]])
     is_start = (start >= low[0] - CLOSE * (1.0 + start)) & (start <= high[0] + CLOSE * (1.0 + start))
 
@@ -199,7 +186,7 @@ def fastest(sides: tuple[Rows, Rows], width: Array, bend: Array, cap: Array, end
 
     beginning = jnp.clip(start, low[0], high[0])
     _, (x, u) = lax.scan(ahead, beginning, (steps, low[1:], high[1:]))
-    return Fastest(low, high, jnp.concatenate([beginning[None], x]), u, empty, meeting, is_start)
+    return Fastest(low, high, jnp.concatenate([beginning[None], x]), u, empty, is_start)
 
 
 def smallest_of_slopes(u: np.ndarray, width: np.ndarray) -> np.ndarray:

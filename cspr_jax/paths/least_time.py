@@ -13,7 +13,7 @@ from cspr_jax.paths.bound import path_bound
 from cspr_jax.paths.controllable import Fastest
 from cspr_jax.paths.discrete import FASTER, Discrete, discretes
 from cspr_jax.paths.jumping import Jumping, again, jumping_motions
-from cspr_jax.paths.nodes import derivatives, places_on
+from cspr_jax.paths.refusals import NoMotion, refusal
 from cspr_jax.paths.section import Section, SectionSettings
 from cspr_jax.paths.smooth import Ends, Smooth, below_ramps, smooth
 from cspr_jax.paths.tightening import cell_slacks
@@ -49,22 +49,6 @@ class PhasePlane(NamedTuple):
     speed: np.ndarray
 
 
-class NoMotion(NamedTuple):
-    """Why a section cannot be run along.
-
-    Fields:
-        coordinate: s of the place at which it fails, m.
-        position: (3,) the place, in the axes of the kernels, m.
-        rows: numbers of the two half-planes that leave no path speed there; () where the speed at an end is refused.
-        end: "start" or "end" where the speed there is not possible, else "".
-    """
-
-    coordinate: float
-    position: np.ndarray
-    rows: tuple[int, ...]
-    end: str
-
-
 @dataclasses.dataclass(frozen=True)
 class LeastTime:
     """The fastest motion along a section.
@@ -77,7 +61,8 @@ class LeastTime:
         jumping: duration of the fastest motion without ramps on the same grid, before margins, s.
         ramp_time: of the motion, s; 0 where its accelerations jump.
         deviation: largest distance of the motion from the path at samples, m.
-        binding: what binds: name of a flag, cable from 0 on or None, share of the duration.
+        names: of the criteria that can bind: name of a flag, cable from 0 on or None.
+        binds: (n_cells,) number of the one that binds in each cell; -1: none.
         plane: path speeds.
         failure: why there is no motion, or None.
     """
@@ -89,7 +74,8 @@ class LeastTime:
     jumping: float
     ramp_time: float
     deviation: float
-    binding: tuple[tuple[str, int | None, float], ...]
+    names: tuple[tuple[str, int | None], ...]
+    binds: np.ndarray
     plane: PhasePlane
     failure: NoMotion | None
 
@@ -130,7 +116,7 @@ def _proved(
     # Tighten the limits on the grid until the motion keeps them everywhere.
     jumping, bend, first = start
     if jumping is None:
-        return _without_motion(path, first)
+        return _without_motion(problem, path, first)
     section = path.section
     fastest_time = float(cell_times(jumping, path.grid.width).sum())
     bound = _bound(problem, path, settings, jumping.x, fastest_time)
@@ -157,7 +143,8 @@ def _proved(
         jumping=fastest_time,
         ramp_time=float(np.ptp(np.concatenate([jumping.before, jumping.after])) / jerk),
         deviation=distance_from_path(section, path.grid, run, motion),
-        binding=slacks.binding(times),
+        names=slacks.names,
+        binds=slacks.binding(),
         plane=_plane(path, first, speed),
         failure=None,
     )
@@ -181,17 +168,7 @@ def _plane(path: Discrete, solution: Fastest, speed: np.ndarray) -> PhasePlane:
     return PhasePlane(path.grid.nodes, low, high, np.where(cap < path.largest, np.sqrt(cap), np.inf), speed)
 
 
-def _without_motion(path: Discrete, solution: Fastest) -> LeastTime:
-    # Tell the place that no speed passes, or the end that is not reached.
-    cell, n_cells = int(solution.empty), len(path.grid.width)
-    end = "end" if cell == n_cells else "start" if cell < 0 else ""
-    node = max(cell, 0)
-    n_rows = path.start.u.shape[1]
-    # Half-planes of both ends of a cell follow each other; what is beyond them leads into the next set.
-    rows = () if end else tuple(int(row) % n_rows for row in solution.meeting if row < 2 * n_rows)
-    place = np.asarray(
-        derivatives(places_on(path.section.curve, path.grid.nodes[[node]], ahead=node < n_cells))[0][0][0]
-    )
+def _without_motion(problem: Problem, path: Discrete, solution: Fastest) -> LeastTime:
     run = _slow(path)
     motion = timed(path.section, path.grid, run)
     return LeastTime(
@@ -202,9 +179,10 @@ def _without_motion(path: Discrete, solution: Fastest) -> LeastTime:
         jumping=np.nan,
         ramp_time=np.nan,
         deviation=distance_from_path(path.section, path.grid, run, motion),
-        binding=(),
-        plane=_plane(path, solution, np.full(n_cells + 1, np.nan)),
-        failure=NoMotion(float(path.grid.nodes[node]), place, rows, end),
+        names=(),
+        binds=np.full(len(path.grid.width), -1),
+        plane=_plane(path, solution, np.full(len(path.grid.nodes), np.nan)),
+        failure=refusal(problem, path, solution),
     )
 
 

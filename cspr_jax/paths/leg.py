@@ -2,7 +2,7 @@
 
 import dataclasses
 import itertools
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,8 +18,9 @@ from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.leg import Leg
 from cspr_jax.motions.motion import Motion
 from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.proved_answers import ProvedAnswers, proved_answers
+from cspr_jax.motions.proved_answers import proved_answers
 from cspr_jax.motions.waypoints import Waypoints
+from cspr_jax.paths.answers import PathAnswers, SectionAnswer
 from cspr_jax.paths.courses import Course, CourseEnds, FileAxes, course_of, course_through
 from cspr_jax.paths.least_time import LeastTime, least_time_motion
 from cspr_jax.paths.section import Section, SectionSettings
@@ -59,27 +60,13 @@ class Ride(NamedTuple):
     segments: np.ndarray
 
 
-@dataclasses.dataclass(frozen=True)
-class PathAnswers(ProvedAnswers):
-    """Answers of segments of paths.
-
-    Fields:
-        least: (n,) for each segment the motions of the sections that end in it.
-    """
-
-    least: np.ndarray
-
-    def details(self, i: int) -> dict[str, Any]:
-        """Bounds of the least time, and details of proofs; see `Answers.details`."""
-        return super().details(i) | {"lower_bound": sum(motion.lower_bound for motion in self.least[i])}
-
-
 class Paths(Leg):
     """Poses joined along paths in the least time; see `Leg`."""
 
     def __init__(self, stops: Waypoints) -> None:
         """Refuse keys of other families, and what a path and its poses say twice."""
         super().__init__(stops)
+        self._notes: list[str] = []
         for i, pose in enumerate(stops.poses):
             for key in _OTHERS if i else ():
                 if getattr(pose, key) is not None:
@@ -92,17 +79,25 @@ class Paths(Leg):
         stops = self.stops
         scene = scene_of(problem.robot, stops.robot_file, stops.frame, stops.keys, stops.path, trajectory=stops.keys)
         parts: list[list[Spline]] = [[] for _ in range(len(self))]
-        least = np.empty(len(self), object)
-        least[:] = [[] for _ in range(len(self))]
+        through = np.empty(len(self), object)
+        through[:] = [[] for _ in range(len(self))]
         for ride in self._rides(problem, z0):
             fastest = least_time_motion(problem, scene, ride.section, ride.settings)
             for segment, motion in _cut(fastest, ride):
                 parts[segment].append(motion)
-            least[ride.segments[-1]].append(fastest)
+            section = _answered(fastest, ride, stops.first)
+            for segment in range(section.ends[0], section.ends[1] + 1):
+                through[segment].append(section)
         motions = [chained(splines) for splines in parts]
         answers = proved_answers(problem, motions, scene)
         columns = {field.name: getattr(answers, field.name) for field in dataclasses.fields(answers)}
-        return PathAnswers(**columns, least=least), list(motions)
+        paths = PathAnswers(**columns, sections=through)
+        self._notes = paths.notes()
+        return paths, list(motions)
+
+    def warnings(self, problem: Problem) -> list[str]:
+        """Ramps that are shorter than asked for; see `Leg.warnings`."""
+        return self._notes
 
     def _rides(self, problem: Problem, z0: float) -> list[Ride]:
         # Sections of all runs, in the axes of the kernels.
@@ -227,6 +222,13 @@ def _settled(run: CourseRun, sections: list[Section], segments: np.ndarray) -> l
         rides.append(Ride(section, SectionSettings(grid, ramp_time, start, end), segments[first:last]))
         first = last
     return rides
+
+
+def _answered(fastest: LeastTime, ride: Ride, before: int) -> SectionAnswer:
+    # A motion with the segments in which its cells lie, and how many segments the plan has before the leg.
+    middles = 0.5 * (fastest.coordinate[1:] + fastest.coordinate[:-1])
+    parts = np.clip(np.searchsorted(ride.section.marks, middles) - 1, 0, len(ride.segments) - 1)
+    return SectionAnswer(fastest, ride.segments[parts], ride.settings.ramp_time, before)
 
 
 def _cut(fastest: LeastTime, ride: Ride) -> list[tuple[int, Spline]]:

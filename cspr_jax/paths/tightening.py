@@ -59,22 +59,19 @@ class CellSlacks(NamedTuple):
         others = (lacking([row.unit == unit for row in self.rows]) for unit in (ACCELERATIONS, SPEEDS))
         return Margins(*(old + more for old, more in zip(margins, (tension, *others), strict=True)))
 
-    def binding(self, times: np.ndarray) -> tuple[tuple[str, int | None, float], ...]:
-        """What binds, and for which share of the time.
+    @property
+    def names(self) -> tuple[tuple[str, int | None], ...]:
+        """Names of the criteria: of the flag, and the cable from 0 on, or None."""
+        return tuple((row.flag.text, row.cables[0] if row.cables else None) for row in self.rows)
 
-        Args:
-            times: (n_cells,) durations of the cells, s.
+    def binding(self) -> np.ndarray:
+        """What binds in each cell.
 
         Returns:
-            names of flags, cables from 0 on or None, and shares, the largest first.
+            (n_cells,) number of the criterion that is nearest to its limit; -1 where none binds.
         """
         nearest = self.high.argmin(1)
-        binds = self.high[np.arange(len(nearest)), nearest] < BINDING
-        shares = np.bincount(nearest[binds], times[binds], len(self.rows)) / times.sum()
-        order = [k for k in np.argsort(-shares, kind="stable").tolist() if shares[k] > 0.0]
-        rows = [self.rows[k] for k in order]
-        names = [(row.flag.text, row.cables[0] if row.cables else None) for row in rows]
-        return tuple((*name, float(shares[k])) for name, k in zip(names, order, strict=True))
+        return np.where(self.high[np.arange(len(nearest)), nearest] < BINDING, nearest, -1)
 
 
 def cell_slacks(problem: Problem, motion: Spline, scene: Scene | None = None) -> CellSlacks:

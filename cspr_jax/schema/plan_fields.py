@@ -51,7 +51,11 @@ SEGMENT = {
         "",
         "Causes why the segment is not feasible, the worst first: `criterion` (name of a flag), `cable` (from 0 on; "
         "null: none), `t` (s from the start of the segment), `needed` and `allowed` (of `unit`), and `cables` where "
-        "two touch; null where the segment is feasible.",
+        "two touch; null where the segment is feasible. Paths without a motion: also `s`, m, and `position`, m, of the "
+        "place that no path speed passes, where the criterion needs an acceleration along the path, `needed`, and "
+        "`against` (`criterion` and `cable`; null: the speeds from which the way on is possible) allows no more than "
+        '`allowed`, or, with `needs` false, the other way round; or `end` ("start" or "end") with its possible '
+        "`speeds`, smallest and largest.",
     ),
     "fewer_arcs_undecided": (
         "",
@@ -104,11 +108,6 @@ SEGMENT = {
         "1",
         "Likewise: smallest normalised pseudotension, or depth over that of the centre, on the ellipse itself.",
     ),
-    "lower_bound": (
-        "s",
-        "Paths: proved lower bound of the least time along the parts between stops that end on the segment, each from "
-        "the stop before it.",
-    ),
     "rotation_frequencies": (
         "rad s-1",
         "Ellipses of platforms: the three natural frequencies of rotation at rest in its centre; null: not stable.",
@@ -117,6 +116,39 @@ SEGMENT = {
         "",
         "Ellipses of platforms: for each of these the displacement of the mass centre, m, beside a rotation of length "
         "1, rad; six numbers.",
+    ),
+    "lower_bound": (
+        "s",
+        "Paths: proved lower bound of the time of any motion along the segment, from stop to stop; null where a "
+        "section without a stop runs on through a pose, or has no motion.",
+    ),
+    "gap": ("1", "Paths: 1 - `lower_bound` / `duration`."),
+    "binding": (
+        "",
+        "Paths: limits that bind, those that do so longest first: `criterion` (name of a flag), `cable` (from 0 on; "
+        "null: none), `share` of the time of the segment.",
+    ),
+    "sections": ("", "Paths: one object for each section, from stop to stop, that ends in the segment, below."),
+}
+# Each section of a path, from stop to stop.
+SECTION = {
+    "segments": ("1", "Numbers of the segments in which it begins and ends."),
+    "length": ("m", "Length of the way of the mass centre."),
+    "duration": ("s", "Duration."),
+    "lower_bound": ("s", "Proved lower bound of the time of any motion along it; null without a motion."),
+    "gap": ("1", "1 - `lower_bound` / `duration`."),
+    "ramp_time": (
+        "s",
+        "Time in which accelerations rise and fall, `path.ramp_time` or shorter; 0: they jump; null: no motion.",
+    ),
+    "ramp_cost": ("1", "Duration over that of the fastest motion without ramps, less 1; null without ramps."),
+    "path_deviation": ("m", "Largest distance of the motion from the path at samples."),
+    "least_speed": ("m s-1", "Speed along the path that is needed somewhere to come to the end; null: none is."),
+    "binding": ("", "As of a segment."),
+    "jumps": (
+        "1",
+        "Number of instants at which the acceleration changes at once by more than 1 % of the largest one, those of "
+        "the start and the end of a motion from or to rest included.",
     ),
 }
 LAUNCH = {

@@ -1,0 +1,171 @@
+"""What plans tell of paths: bounds, what binds, and, where there is no motion, the place and the limits that meet."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from support.commands import plan
+
+import cspr_jax
+from cspr_jax.motions.amplitudes import named
+from cspr_jax.motions.problem import Problem
+from cspr_jax.paths.row_names import row_names
+from cspr_jax.paths.rows import path_rows
+from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.state import State
+from cspr_jax.schema.verdicts import Verdict
+
+SPOOLS = np.array([[0.22516660498395405, -0.13, 0.0], [-0.22516660498395405, -0.13, 0.0], [0.0, 0.26, 0.0]])
+MASS, GRAVITY, LEAST, LARGEST = 0.198, 9.81, 0.1, 4.0
+CORNER = [[-0.1, -0.1, 1.0], [0.05, -0.05, 1.1], [0.05, 0.05, 1.0]]
+OUTSIDE = [[0.0, -0.9, 1.0], [0.1, -0.9, 1.1]]
+
+
+def planned(**path):
+    keys = {"schema": 1, "robot": "prototype", "family": "path", "tension_min": LEAST, "tension_max": LARGEST}
+    return cspr_jax.plan(keys | {"path": {"grid": 60, "ramp_time": 0.0, "kind": "line"} | path})
+
+
+def tensions_for(place: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
+    """Tensions that give an acceleration, by the balance of forces, z down."""
+    ways = SPOOLS - place
+    pulls = (ways / np.linalg.norm(ways, axis=1, keepdims=True)).T
+    return np.linalg.solve(pulls, MASS * (acceleration - np.array([0.0, 0.0, GRAVITY])))
+
+
+def test_names_of_half_planes():
+    robot = cspr_jax.load_robot("prototype")
+    limits = Limits(tension_min=LEAST, tension_max=LARGEST, cable_acceleration_max=5.0)
+    place, rate, bend = np.array([0.05, -0.03, 1.0]), np.array([0.6, 0.0, 0.8]), np.array([0.2, 1.0, -0.15])
+    state = State(jnp.asarray(place), jnp.asarray(rate), jnp.asarray(bend))
+    rows = jax.tree.map(np.asarray, path_rows(robot, limits, state, jnp.asarray(jnp.inf)))
+    names = row_names(Problem(robot, limits, named("quintic")), state, rows.u, rows.x)
+    assert len(names) == len(rows.u) == 12
+    for (flag, cable), u, x, most in list(zip(names, rows.u, rows.x, rows.most, strict=True))[:6]:
+        speed = 0.7  # squared; any one
+        values = tensions_for(place, rate * (most - x * speed) / u + bend * speed)
+        limit = {Verdict.SLACK_CABLE: LEAST, Verdict.OVER_TENSION: LARGEST}[flag]
+        assert values[cable] == pytest.approx(limit, abs=1e-9)
+    assert sorted(names[:6]) == sorted(
+        (flag, k) for flag in (Verdict.SLACK_CABLE, Verdict.OVER_TENSION) for k in range(3)
+    )
+    assert names[6:] == [(Verdict.CABLE_OVER_ACCELERATION, k) for k in range(3)] * 2
+
+
+@pytest.fixture(scope="module")
+def stopping():
+    """A plan of two lines with a stop between them, in one segment."""
+    return planned(points=CORNER)
+
+
+def test_bounds_of_sections_with_a_stop_between_them(stopping):
+    (segment,) = stopping.to_dict()["segments"]
+    first, last = segment["sections"]
+    assert segment["verdict"] == "feasible"
+    assert segment["duration"] == pytest.approx(first["duration"] + last["duration"], abs=1e-12)
+    assert segment["lower_bound"] == pytest.approx(first["lower_bound"] + last["lower_bound"], abs=1e-12)
+    for part in (segment, first, last):
+        assert part["gap"] == pytest.approx(1.0 - part["lower_bound"] / part["duration"], abs=1e-12)
+        assert 0.0 < part["gap"] < 0.02
+    assert [part["segments"] for part in (first, last)] == [[0, 0], [0, 0]]
+    lengths = np.linalg.norm(np.diff(CORNER, axis=0), axis=1)
+    assert [part["length"] for part in (first, last)] == pytest.approx(lengths, rel=1e-9)
+    assert all(part["ramp_time"] == 0.0 and part["ramp_cost"] is None for part in (first, last))
+
+
+def test_what_binds(stopping):
+    (segment,) = stopping.to_dict()["segments"]
+    rows = stopping.rows(rate=2000.0)
+    # A limit binds within 1 % of the weight of it.
+    near = rows["tension"] < LEAST + 0.01 * MASS * GRAVITY
+    shares = {(row["criterion"], row["cable"]): row["share"] for row in segment["binding"]}
+    assert sum(shares.values()) <= 1.0
+    assert list(shares.values()) == sorted(shares.values(), reverse=True)
+    for k in range(3):
+        assert shares.get(("slack_cable", k), 0.0) == pytest.approx(near[:, k].mean(), abs=0.06)
+
+
+def test_jumps_and_ramps(stopping):
+    with_ramps = planned(points=CORNER[:2], ramp_time=0.05)
+    (section,) = with_ramps.to_dict()["segments"][0]["sections"]
+    assert section["ramp_time"] == pytest.approx(0.05)
+    assert section["jumps"] == 0
+    assert 0.0 < section["ramp_cost"] < 0.1
+    # From rest, to rest, and where it begins to brake.
+    assert stopping.to_dict()["segments"][0]["sections"][0]["jumps"] >= 3
+
+
+def test_section_through_poses():
+    keys = {"schema": 1, "robot": "prototype", "family": "path", "tension_min": LEAST, "tension_max": LARGEST}
+    poses = [{"position": place} for place in (*CORNER, [0.0, 0.1, 1.0])]
+    poses[-1]["path"] = {"kind": "line"}
+    result = cspr_jax.plan(keys | {"path": {"grid": 60, "ramp_time": 0.0, "kind": "quintic"}, "pose": poses})
+    first, second, line = result.to_dict()["segments"]
+    assert first["lower_bound"] is None and second["lower_bound"] is None
+    assert first["sections"] == []
+    (section,) = second["sections"]
+    assert section["segments"] == [0, 1]
+    assert section["duration"] == pytest.approx(first["duration"] + second["duration"], abs=1e-12)
+    assert section["lower_bound"] < section["duration"]
+    assert line["lower_bound"] == line["sections"][0]["lower_bound"]
+    # What binds in a segment is of its own time.
+    shares = [sum(row["share"] for row in part["binding"]) for part in (first, second, section)]
+    mean = (shares[0] * first["duration"] + shares[1] * second["duration"]) / section["duration"]
+    assert shares[2] == pytest.approx(mean, abs=1e-9)
+
+
+@pytest.fixture(scope="module")
+def outside():
+    """A plan between two places outside of the spools' triangle, in which nothing can rest."""
+    return planned(points=OUTSIDE)
+
+
+def test_place_that_no_speed_passes(outside):
+    (segment,) = outside.to_dict()["segments"]
+    cause = segment["cause"][0]
+    place, way = np.array(cause["position"]), np.diff(OUTSIDE, axis=0)[0]
+    assert (cause["criterion"], cause["cable"], cause["needs"]) == ("slack_cable", 2, True)
+    assert cause["against"] == {"criterion": "over_tension", "cable": 0}
+    assert cause["unit"] == "m/s^2"
+    assert place == pytest.approx(OUTSIDE[0] + cause["s"] * way / np.linalg.norm(way), abs=1e-9)
+    # As a body that stands still there is pushed by as much, each of the two tensions is at its limit.
+    ahead = np.array(OUTSIDE[1])
+    for name, limit, cable in (("needed", LEAST, 2), ("allowed", LARGEST, 0)):
+        values = tensions_for(ahead, cause[name] * way / np.linalg.norm(way))
+        assert values[cable] == pytest.approx(limit, abs=1e-3)
+    assert cause["needed"] > cause["allowed"]
+
+
+def test_refused_speed_at_an_end():
+    way = {"points": [[0.0, 0.0, 1.0], OUTSIDE[0]]}
+    (cause,) = planned(**way).to_dict()["segments"][0]["cause"]
+    low, high = cause["speeds"]
+    assert (cause["end"], cause["needed"], cause["allowed"], cause["unit"]) == ("start", 0.0, low, "m/s")
+    for speed, is_possible in ((1.02 * low, True), (0.98 * low, False), (0.98 * high, True), (1.02 * high, False)):
+        (segment,) = planned(**way, start_speed=speed).to_dict()["segments"]
+        assert (segment["lower_bound"] is not None) == is_possible
+
+
+def test_text(tmp_path, outside):
+    text = """schema = 1
+robot = "prototype"
+family = "path"
+tension_min = 0.1
+tension_max = 4.0
+[path]
+grid = 60
+ramp_time = {ramp_time}
+points = {points}
+"""
+    code, out, err = plan(tmp_path, text.format(points=CORNER, ramp_time=10.0))
+    words = " ".join(out.split())
+    assert "at least (s)" in out and "gap (%)" in out
+    assert "binds: smallest tension of cable" in words and "% of the time)" in words
+    assert "path.ramp_time = 10 s: no ramps of that length were found in 2 of 2 sections" in err
+    line = outside.causes[0][0].text
+    assert line.startswith("no path speed passes s = 0.14")
+    assert "the smallest tension of cable 3 needs" in line and "the largest tension of cable 1 allows" in line
+    code, out, err = plan(tmp_path, text.format(points=OUTSIDE, ramp_time=0.0))
+    assert code == 1
+    assert line in " ".join(out.split())
+    assert "the numbers are those of a slow one" in " ".join(out.split())
