@@ -134,6 +134,7 @@ def test_orientations_of_platforms(tmp_path):
     rows = cspr_jax.plan(PLATFORM | {"path": {"grid": 30}, "pose": onward}).rows()
     corner = int(np.argmin(np.linalg.norm(rows["position"] - [-0.4, 0.1, 1.0], axis=1)))
     np.testing.assert_allclose(np.abs(rows["quaternion"][: corner + 1] @ units[1]), 1.0, atol=1e-9)
+    np.testing.assert_allclose(np.abs(rows["quaternion"][: corner + 4] @ units[1]), 1.0, atol=1e-4)
     assert abs(rows["quaternion"][-1] @ units[2]) == pytest.approx(1.0) and (np.abs(rows["omega"]) < 1.0).all()
     # On the spot: the place stays, and the turn is the shortest.
     spot = [{"position": places[0]}, {"position": places[0], "quaternion": units[1]}]
