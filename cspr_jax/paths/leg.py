@@ -123,12 +123,12 @@ class Paths(Leg):
 
     @property
     def _runs(self) -> list[CourseRun]:
-        # A course ends where a pose has a path of its own, behind one, and at rest; straight lines end everywhere.
+        # A course ends where a pose has a path of its own, before one, and at rest.
         poses, keys, first, runs = self.stops.poses, self.stops.keys, 0, list[CourseRun]()
         usual = PathTable() if keys.path is None or keys.is_one_path else keys.path
         for i, pose in enumerate(poses[1:], start=1):
             following = poses[i + 1] if i < len(self) else None
-            ends = following is None or following.path is not None or pose.rest or usual.kind == "line"
+            ends = following is None or following.path is not None or pose.rest
             if pose.path is not None:
                 runs.append(CourseRun(i - 1, i, pose.path.beside(keys.path)))
             elif ends:

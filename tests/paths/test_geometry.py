@@ -213,6 +213,8 @@ def test_more_orientations_are_a_smooth_curve_through_them():
         values = curve_of(section, "quaternion")(section.marks)
         np.testing.assert_allclose(np.abs(np.sum(values * units, axis=1)), 1.0, atol=1e-14)
         assert max(jumps(section, order, "quaternion").max() for order in range(3)) < 1e-7
+        ends = curve_of(section, "quaternion")(section.marks[[0, -1]], 2)
+        assert np.abs(ends).max() < 1e-9
     same = section_of(track, np.tile(units[1], (5, 1)))
     np.testing.assert_allclose(
         same.curve.quaternion, np.broadcast_to(units[1], same.curve.quaternion.shape), atol=1e-15

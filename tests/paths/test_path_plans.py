@@ -112,7 +112,7 @@ def test_files(tmp_path):
         np.testing.assert_allclose(walked(cspr_jax.plan(path)), whole, atol=1e-12)
 
 
-def test_orientations_of_platforms():
+def test_orientations_of_platforms(tmp_path):
     places = [[-0.5, 0.0, 1.0], [0.5, 0.0, 1.0], [0.5, 0.6, 1.2]]
     turns = Rotation.from_euler("z", [[0.1], [0.3], [-0.2]])
     units = np.roll(turns.as_quat(), 1, axis=1)
@@ -126,6 +126,16 @@ def test_orientations_of_platforms():
         for place, unit in zip(places, units, strict=True):
             i = int(np.argmin(np.linalg.norm(rows["position"] - place, axis=1)))
             assert abs(np.dot(rows["quaternion"][i], unit)) > 1.0 - 1e-5
+    # G-code keeps the orientation, from which the next path turns on.
+    moves = tmp_path / "moves.nc"
+    moves.write_text("G91 G1 X100\nY100\n")
+    before, after = {"position": places[0], "quaternion": units[1]}, {"position": places[1], "quaternion": units[2]}
+    onward = [before, {"path": {"kind": "gcode", "file": str(moves)}}, after]
+    rows = cspr_jax.plan(PLATFORM | {"path": {"grid": 30}, "pose": onward}).rows()
+    corner = int(np.argmin(np.linalg.norm(rows["position"] - [-0.4, 0.1, 1.0], axis=1)))
+    np.testing.assert_allclose(np.abs(rows["quaternion"][: corner + 1] @ units[1]), 1.0, atol=1e-9)
+    np.testing.assert_allclose(np.abs(rows["quaternion"][: corner + 4] @ units[1]), 1.0, atol=1e-4)
+    assert abs(rows["quaternion"][-1] @ units[2]) == pytest.approx(1.0) and (np.abs(rows["omega"]) < 1.0).all()
     # On the spot: the place stays, and the turn is the shortest.
     spot = [{"position": places[0]}, {"position": places[0], "quaternion": units[1]}]
     rows = cspr_jax.plan(PLATFORM | {"path": {"grid": 30}, "pose": spot}).rows()
