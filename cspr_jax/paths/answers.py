@@ -34,7 +34,7 @@ class SectionAnswer(NamedTuple):
     Fields:
         least: its motion.
         segments: (n_cells,) number of the segment in which each cell lies.
-        ramp_time: that was asked for, s.
+        ramp_time: of the plan, s.
         before: number of segments of the plan before the leg.
     """
 
@@ -93,7 +93,7 @@ class SectionAnswer(NamedTuple):
 
 
 def _binding(parts: Iterable[tuple[LeastTime, np.ndarray]]) -> list[dict[str, Any]]:
-    # What binds, the longest first, over cells that take these times.
+    # Tell what binds, the longest first, over cells that take these times.
     shares, total = dict[tuple[str, int | None], float](), 0.0
     for least, times in parts:
         total += float(times.sum())
@@ -181,7 +181,7 @@ class PathAnswers(ProvedAnswers):
         }
 
     def notes(self) -> list[str]:
-        """Say in one line where ramps are shorter than asked for.
+        """Say in one line where ramps are shorter than the plan says.
 
         Returns:
             the line, if there is one to say.
@@ -195,8 +195,8 @@ class PathAnswers(ProvedAnswers):
         where = f" in {len(missing)} of {len(known)} sections" if len(known) > 1 else ""
         words = [f"shorter ones, of {_shown(shortest)} s or more, stand in for them"] if shortest else []
         words += ["accelerations jump" + (f" in {jumping}" if jumping < len(missing) else "")] if jumping else []
-        asked = f"path.ramp_time = {_shown(missing[0].ramp_time)} s"
-        return [f"{asked}: no ramps of that length were found{where}: {'; '.join(words)}"]
+        name = f"path.ramp_time = {_shown(missing[0].ramp_time)} s"
+        return [f"{name}: no ramps of that length were found{where}: {'; '.join(words)}"]
 
     def proved_causes(self, i: int, frame: Frame) -> tuple[Cause, ...]:
         """Places that no path speed passes, then what no other speed mends; see `Answers.proved_causes`."""

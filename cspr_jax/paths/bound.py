@@ -10,7 +10,7 @@ from jax import Array
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.motions.problem import Problem
 from cspr_jax.paths.discrete import Discrete
-from cspr_jax.paths.duality import Multipliers, Rates, lower_bound
+from cspr_jax.paths.duality import Multipliers, SpeedMultipliers, lower_bound
 from cspr_jax.paths.multipliers import dual_multipliers
 from cspr_jax.paths.nodes import BATCH, Places, places_on, state_at
 from cspr_jax.paths.rows import TINY, tangent_directions, tension_faces, unit_wrenches
@@ -40,7 +40,7 @@ def path_bound(problem: Problem, path: Discrete, x: np.ndarray) -> float:
     values = in_batches(partial(_of_nodes, robot, limits), (nodes, of_nodes.T), size=BATCH)
     centres = places_on(curve, 0.5 * (grid.nodes[1:] + grid.nodes[:-1]), ahead=True)
     rates = in_batches(partial(_of_cells, robot, limits), (centres, grid.speed, of_cells), size=BATCH)
-    return lower_bound(robot, limits, path, Multipliers(*values), Rates(*rates))
+    return lower_bound(robot, limits, path, Multipliers(*values), SpeedMultipliers(*rates))
 
 
 @partial(jax.jit, compiler_options=compile_options.least())

@@ -26,7 +26,7 @@ FLAT, STEPS = 1e-12, 40
 CLOSE = 1e-13
 
 
-class Cells(NamedTuple):
+class GridCells(NamedTuple):
     """Half-planes of n_cells cells of n_paths paths.
 
     Fields:
@@ -44,11 +44,11 @@ class Cells(NamedTuple):
     cap: Array
 
 
-def _cells_of(sides: tuple[Rows, Rows], width: Array, bend: Array, cap: Array) -> Cells:
+def _cells_of(sides: tuple[Rows, Rows], width: Array, bend: Array, cap: Array) -> GridCells:
     # At the end of a cell x is that at its start and what u in the middle adds.
     start, end = sides
     half = (0.5 * bend * width)[:, None]
-    return Cells(
+    return GridCells(
         u=jnp.concatenate([start.u, end.u + 2.0 * width[:, None] * end.x], axis=1),
         x=jnp.concatenate([start.x, end.x], axis=1),
         most=jnp.concatenate([start.most + start.u * half, end.most - end.u * half], axis=1),
@@ -57,7 +57,7 @@ def _cells_of(sides: tuple[Rows, Rows], width: Array, bend: Array, cap: Array) -
     )
 
 
-class Fastest(NamedTuple):
+class GridSolution(NamedTuple):
     """Fastest motions on the grid.
 
     Fields:
@@ -112,7 +112,7 @@ def _edge(bounds: _Bounds, x: Array, sign: float) -> Array:
     def follow(carry):
         x, is_outside, step = carry
         gap, slope, rounding = _gap(bounds, x)
-        # Where no step leads on, the last x stays.
+        # The last x stays where no step leads on.
         is_outside &= ~(gap >= -rounding) & (slope * sign < 0.0)
         return jnp.where(is_outside, x - gap / jnp.where(is_outside, slope, 1.0), x), is_outside, step + 1
 
@@ -132,7 +132,7 @@ def _flat_range(u: Array, x_share: Array, most: Array, cap: Array) -> tuple[Arra
 
 
 @partial(jax.jit, compiler_options=compile_options.least())
-def fastest(sides: tuple[Rows, Rows], width: Array, bend: Array, cap: Array, ends: tuple[Array, Array]) -> Fastest:
+def fastest(sides: tuple[Rows, Rows], width: Array, bend: Array, cap: Array, ends: tuple[Array, Array]) -> GridSolution:
     """Fastest motions along paths.
 
     Args:
@@ -148,14 +148,14 @@ def fastest(sides: tuple[Rows, Rows], width: Array, bend: Array, cap: Array, end
     cells = _cells_of(sides, width, bend, cap)
     start, end = ends
 
-    def rows_of(cell: Cells, low: Array, high: Array) -> tuple[Array, Array, Array]:
+    def rows_of(cell: GridCells, low: Array, high: Array) -> tuple[Array, Array, Array]:
         # With the half-planes that lead into the next set.
         twice, one = 2.0 * cell.width, jnp.ones_like(cell.width)
         u = jnp.concatenate([cell.u, twice[None], -twice[None]])
         x = jnp.concatenate([cell.x, one[None], -one[None]])
         return u, x, jnp.concatenate([cell.most, high[None], -low[None]])
 
-    def back(following, cell: Cells):
+    def back(following, cell: GridCells):
         low, high, empty, index = following
         rows = rows_of(cell, low, high)
         floor, ceiling = _flat_range(*rows, cell.cap)
@@ -186,7 +186,7 @@ def fastest(sides: tuple[Rows, Rows], width: Array, bend: Array, cap: Array, end
 
     beginning = jnp.clip(start, low[0], high[0])
     _, (x, u) = lax.scan(ahead, beginning, (steps, low[1:], high[1:]))
-    return Fastest(low, high, jnp.concatenate([beginning[None], x]), u, empty, is_start)
+    return GridSolution(low, high, jnp.concatenate([beginning[None], x]), u, empty, is_start)
 
 
 def smallest_of_slopes(u: np.ndarray, width: np.ndarray) -> np.ndarray:

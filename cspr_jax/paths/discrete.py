@@ -9,7 +9,7 @@ import numpy as np
 from cspr_jax.curves.spline import Spline
 from cspr_jax.motions.problem import Problem
 from cspr_jax.paths.multipliers import SideRows
-from cspr_jax.paths.nodes import Grid, grid_of, side_rows
+from cspr_jax.paths.nodes import PathGrid, grid_of, side_rows
 from cspr_jax.paths.rows import Rows, face_count
 from cspr_jax.paths.section import Section, SectionSettings
 from cspr_jax.paths.smooth import NodeRows
@@ -20,7 +20,7 @@ FASTER = 1e2
 SAME = 1e-6
 
 
-class Margins(NamedTuple):
+class GridMargins(NamedTuple):
     """Margins that half-planes keep in each cell, (n_cells,) each.
 
     Fields:
@@ -33,13 +33,13 @@ class Margins(NamedTuple):
     acceleration: np.ndarray
     speed: np.ndarray
 
-    def at_nodes(self) -> "Margins":
+    def at_nodes(self) -> "GridMargins":
         """At each node the larger of the margins of both cells.
 
         Returns:
             the margins, (n_cells + 1,) each.
         """
-        return Margins(*(np.fmax(np.append(x, x[-1]), np.insert(x, 0, x[0])) for x in self))
+        return GridMargins(*(np.fmax(np.append(x, x[-1]), np.insert(x, 0, x[0])) for x in self))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Discrete:
     """
 
     section: Section
-    grid: Grid
+    grid: PathGrid
     start: Rows
     end: Rows
     n_faces: int
@@ -65,16 +65,20 @@ class Discrete:
     largest: float
 
     @property
-    def no_margins(self) -> Margins:
+    def no_margins(self) -> GridMargins:
         """Margins of zero."""
-        return Margins(*np.zeros((3, len(self.grid.width))))
+        return GridMargins(*np.zeros((3, len(self.grid.width))))
 
     def can_rest(self) -> tuple[bool, bool]:
-        """Tell whether tensions within their limits hold the effector at the start, and at the end."""
+        """Tell whether tensions within their limits hold the effector at rest.
+
+        Returns:
+            at the start, and at the end.
+        """
         first, last = ((rows.most[k] >= 0.0).all() for rows, k in ((self.start, 0), (self.end, -1)))
         return bool(first), bool(last)
 
-    def with_margins(self, margins: Margins) -> "Discrete":
+    def with_margins(self, margins: GridMargins) -> "Discrete":
         """The same with tighter half-planes and caps.
 
         Returns:
@@ -130,7 +134,6 @@ def discretes(problem: Problem, sections: Sequence[Section], settings: Sequence[
 
     Args:
         problem: robot and limits.
-        settings: of the sections.
 
     Returns:
         the sections, without margins.

@@ -61,7 +61,7 @@ class Multipliers(NamedTuple):
     turn: np.ndarray
 
 
-class Rates(NamedTuple):
+class SpeedMultipliers(NamedTuple):
     """Multipliers of squared speeds, one a cell, a metre of path; none is negative.
 
     Fields:
@@ -74,15 +74,17 @@ class Rates(NamedTuple):
 
 
 class _Cell(NamedTuple):
-    # What belongs to one cell: multipliers at both ends, its width, and its largest Cartesian speed.
+    # Multipliers at both ends of one cell, its width, and its largest Cartesian speed.
     start: Multipliers
     end: Multipliers
-    rates: Rates
+    rates: SpeedMultipliers
     width: Array
     most: Array
 
 
-def lower_bound(robot: AnyRobot, limits: Limits, path: Discrete, multipliers: Multipliers, rates: Rates) -> float:
+def lower_bound(
+    robot: AnyRobot, limits: Limits, path: Discrete, multipliers: Multipliers, rates: SpeedMultipliers
+) -> float:
     """Lower bound of the time of all motions along a section.
 
     Args:
@@ -134,7 +136,7 @@ def _boundary(robot: AnyRobot, path: Discrete, multipliers: Multipliers) -> floa
 
 
 def _smoothed(multipliers: Multipliers, unknown: np.ndarray) -> Multipliers:
-    # Where multipliers change so fast that the bound fails, means of neighbours.
+    # Means of neighbours, where multipliers change so fast that the bound fails.
     near = np.convolve(unknown, np.ones(2 * REACH), mode="full")[REACH - 1 : len(unknown) + REACH] > 0.0
     near[[0, -1]] = False
 
@@ -169,7 +171,7 @@ def _along(start: Array, end: Array, width: Array, momentum: AffineBounds, bend:
 
 @partial(jax.jit, compiler_options=compile_options.least())
 def _kernel(robot: AnyRobot, limits: Limits, blocks: tuple[StateBounds, _Cell]) -> tuple[Array, Array, Array]:
-    # What each cell adds to the bound, what it takes from it, and how much weight its multipliers lack.
+    # Tell what each cell adds to the bound, what it takes from it, and how much weight its multipliers lack.
     def one(state: StateBounds, cell: _Cell) -> tuple[Array, Array, Array]:
         twice, lost, lack = _of_wrenches(robot, limits, state, cell)
         cables = cable_bounds(robot, state)
@@ -235,7 +237,7 @@ def _of_wrenches(robot: AnyRobot, limits: Limits, state: StateBounds, cell: _Cel
 
 
 def _turning_axes(robot: AnyRobot, pushed: StateBounds, cables: CableBounds) -> AffineBounds:
-    # What of the momentum's derivative only comes from axes that turn with the platform: e' . L = e . (L x omega).
+    # Bound what axes that turn with the platform add to the momentum's derivative: e' . L = e . (L x omega).
     whole = balance_bounds(dataclasses.replace(robot, pattern=RIGID), pushed, cables)[1].each(lambda x: x[3:])
     moment = cross(whole, pushed.angular_acceleration).each(lambda x: x[:, None])
     return balanced_part(robot, pushed.rotation, moment * 0.0, moment).each(lambda x: x[:, 0])

@@ -11,7 +11,7 @@ import numpy as np
 # Steps at most; part of the objective by which the optimum may be missed; part of the way to a bound that a step goes;
 # part of the mean product of slacks and pressures at which each step aims.
 STEPS, GAP, SHARE, AIM = 120, 1e-7, 0.99, 0.1
-# What constraints and equations may be missed by, in their own scales.
+# By how much constraints and equations may be missed, in their scales.
 MISSED, LEVEL = 1e-9, 1e-6
 
 

@@ -8,9 +8,9 @@ import jax
 import numpy as np
 
 from cspr_jax.arithmetic.batches import padded, room
-from cspr_jax.paths.controllable import Fastest, fastest, smallest_of_slopes
+from cspr_jax.paths.controllable import GridSolution, fastest, smallest_of_slopes
 from cspr_jax.paths.discrete import Discrete
-from cspr_jax.paths.timed import Run
+from cspr_jax.paths.timed import PathSpeeds
 
 # Sections that are solved together, beside one alone; how often changes of u within cells are taken from the solution.
 TOGETHER, BENT = 32, 2
@@ -25,12 +25,12 @@ class Jumping(NamedTuple):
         first: solution with u constant in each cell.
     """
 
-    run: Run | None
+    run: PathSpeeds | None
     bend: np.ndarray
-    first: Fastest
+    first: GridSolution
 
 
-def solved_together(paths: Sequence[Discrete], bends: Sequence[np.ndarray]) -> list[Fastest]:
+def solved_together(paths: Sequence[Discrete], bends: Sequence[np.ndarray]) -> list[GridSolution]:
     """Solutions on the grids of sections.
 
     Args:
@@ -39,7 +39,7 @@ def solved_together(paths: Sequence[Discrete], bends: Sequence[np.ndarray]) -> l
     Returns:
         one a section, without the axis of paths.
     """
-    solutions: list[Fastest] = [None] * len(paths)  # type: ignore[list-item]
+    solutions: list[GridSolution] = [None] * len(paths)  # type: ignore[list-item]
     groups = defaultdict(list)
     for k, path in enumerate(paths):
         groups[path.start.u.shape].append(k)
@@ -60,7 +60,7 @@ def solved_together(paths: Sequence[Discrete], bends: Sequence[np.ndarray]) -> l
     return solutions
 
 
-def run_of(solution: Fastest, path: Discrete, bend: np.ndarray) -> Run | None:
+def run_of(solution: GridSolution, path: Discrete, bend: np.ndarray) -> PathSpeeds | None:
     """Path speeds and accelerations of a solution.
 
     Args:
@@ -73,7 +73,7 @@ def run_of(solution: Fastest, path: Discrete, bend: np.ndarray) -> Run | None:
     if solution.empty >= 0 or not solution.is_start:
         return None
     half = 0.5 * bend * path.grid.width
-    return Run(solution.x, solution.u - half, solution.u + half)
+    return PathSpeeds(solution.x, solution.u - half, solution.u + half)
 
 
 def jumping_motions(paths: Sequence[Discrete]) -> list[Jumping]:
@@ -102,7 +102,7 @@ def jumping_motions(paths: Sequence[Discrete]) -> list[Jumping]:
     return motions
 
 
-def again(paths: Sequence[Discrete], bends: Sequence[np.ndarray]) -> list[Run | None]:
+def again(paths: Sequence[Discrete], bends: Sequence[np.ndarray]) -> list[PathSpeeds | None]:
     """The fastest motions with changes of u within cells that are known.
 
     Args:

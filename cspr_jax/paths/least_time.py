@@ -10,14 +10,14 @@ import numpy as np
 from cspr_jax.curves.spline import Spline
 from cspr_jax.motions.problem import Problem
 from cspr_jax.paths.bound import path_bound
-from cspr_jax.paths.controllable import Fastest
+from cspr_jax.paths.controllable import GridSolution
 from cspr_jax.paths.discrete import FASTER, Discrete, discretes
 from cspr_jax.paths.jumping import Jumping, again, jumping_motions
 from cspr_jax.paths.refusals import NoMotion, refusal
 from cspr_jax.paths.section import Section, SectionSettings
-from cspr_jax.paths.smooth import Ends, Smooth, below_ramps, smooth
+from cspr_jax.paths.smooth import SectionEnds, Smooth, below_ramps, smooth
 from cspr_jax.paths.tightening import cell_slacks
-from cspr_jax.paths.timed import Run, cell_times, distance_from_path, timed
+from cspr_jax.paths.timed import PathSpeeds, cell_times, distance_from_path, timed
 from cspr_jax.robots.clearance import Scene
 
 # Rounds of proof and tightening; how often ramps are shortened by half where none of their length exist.
@@ -85,7 +85,6 @@ def least_time_motion(problem: Problem, scene: Scene | None, section: Section, s
 
     Args:
         scene: bodies that can meet; they are judged with the motion, and do not change it.
-        settings: of this section.
 
     Returns:
         the motion; where tightening ends before all is proved, the last one.
@@ -100,7 +99,6 @@ def least_time_motions(
 
     Args:
         scene: as for `least_time_motion`.
-        settings: of the sections.
 
     Returns:
         the motions, as `least_time_motion` finds them.
@@ -151,7 +149,7 @@ def _proved(
 
 
 def _bound(problem: Problem, path: Discrete, settings: SectionSettings, x: np.ndarray, duration: float) -> float:
-    # Where the lower bound is not close to the duration, from finer grids.
+    # From finer grids where the lower bound is not close to the duration.
     bound = path_bound(problem, path, x)
     for finer in FINER:
         if bound >= (1.0 - APART) * duration:
@@ -161,14 +159,14 @@ def _bound(problem: Problem, path: Discrete, settings: SectionSettings, x: np.nd
     return bound
 
 
-def _plane(path: Discrete, solution: Fastest, speed: np.ndarray) -> PhasePlane:
+def _plane(path: Discrete, solution: GridSolution, speed: np.ndarray) -> PhasePlane:
     with np.errstate(invalid="ignore"):  # of the square roots of unknown speeds
         low, high = np.sqrt(solution.low), np.sqrt(solution.high)
     cap = path.cap()
     return PhasePlane(path.grid.nodes, low, high, np.where(cap < path.largest, np.sqrt(cap), np.inf), speed)
 
 
-def _without_motion(problem: Problem, path: Discrete, solution: Fastest) -> LeastTime:
+def _without_motion(problem: Problem, path: Discrete, solution: GridSolution) -> LeastTime:
     run = _slow(path)
     motion = timed(path.section, path.grid, run)
     return LeastTime(
@@ -186,21 +184,21 @@ def _without_motion(problem: Problem, path: Discrete, solution: Fastest) -> Leas
     )
 
 
-def _slow(path: Discrete) -> Run:
+def _slow(path: Discrete) -> PathSpeeds:
     # A slow motion, whose tensions are about those at rest, to be shown where none is feasible.
     share = path.grid.nodes / path.grid.nodes[-1]
     bump = 4.0 * SLOW**2 * path.largest / FASTER**2
     x = (1.0 - share) * path.ends[0] + share * path.ends[1] + bump * share * (1.0 - share)
     x[[0, -1]] = path.ends
     u = 0.5 * np.diff(x) / path.grid.width
-    return Run(x, u, u)
+    return PathSpeeds(x, u, u)
 
 
-def _ramped(path: Discrete, jumping: Run, ramp_time: float) -> tuple[Run, float]:
+def _ramped(path: Discrete, jumping: PathSpeeds, ramp_time: float) -> tuple[PathSpeeds, float]:
     # The fastest motion with ramps, half as long where there is none, and the largest path jerk.
     if ramp_time > 0.0:
         rests = path.can_rest()
-        ends = Ends(path.ends, (rests[0] and path.ends[0] == 0.0, rests[1] and path.ends[1] == 0.0))
+        ends = SectionEnds(path.ends, (rests[0] and path.ends[0] == 0.0, rests[1] and path.ends[1] == 0.0))
         for time, slower in itertools.product(0.5 ** np.arange(SHORTER) * ramp_time, STARTS):
             jerk = float(np.ptp(np.concatenate([jumping.before, jumping.after])) / time)
             start = below_ramps(slower * jumping.x, path.grid.width, jerk, ends)
@@ -210,14 +208,14 @@ def _ramped(path: Discrete, jumping: Run, ramp_time: float) -> tuple[Run, float]
     return jumping, np.inf
 
 
-def _smoothed(path: Discrete, start: Smooth, ends: Ends, jerk: float, times: int) -> Run | None:
+def _smoothed(path: Discrete, start: Smooth, ends: SectionEnds, jerk: float, times: int) -> PathSpeeds | None:
     motion = smooth(path.node_rows(), ends, start, jerk, times)
-    return None if motion is None else Run(motion.x, motion.u[:-1], motion.u[1:], ends.rests)
+    return None if motion is None else PathSpeeds(motion.x, motion.u[:-1], motion.u[1:], ends.rests)
 
 
-def _slower(path: Discrete, run: Run, bend: np.ndarray, jerk: float) -> Run | None:
+def _slower(path: Discrete, run: PathSpeeds, bend: np.ndarray, jerk: float) -> PathSpeeds | None:
     # The fastest motion within tighter limits.
     if not np.isfinite(jerk):
         return again([path], [bend])[0]
     start = Smooth(run.x, np.append(run.before, run.after[-1]))
-    return _smoothed(path, start, Ends(path.ends, run.rests), jerk, 1)
+    return _smoothed(path, start, SectionEnds(path.ends, run.rests), jerk, 1)

@@ -17,7 +17,7 @@ PART = 64
 
 
 @dataclasses.dataclass(frozen=True)
-class LeastTimes:
+class PathTimes:
     """The fastest motions along n paths.
 
     Fields:
@@ -38,7 +38,7 @@ class LeastTimes:
 
 def least_times(
     problem: Problem, scene: Scene | None, paths: Sequence[Sequence[Section]], grid: int, ramp_time: float
-) -> LeastTimes:
+) -> PathTimes:
     """Find the fastest motions along paths.
 
     Args:
@@ -52,14 +52,14 @@ def least_times(
     """
     flat = [section for path in paths for section in path]
     settings = SectionSettings(grid, ramp_time)
-    found: list[LeastTime] = []
+    motions_along: list[LeastTime] = []
     for first in range(0, len(flat), PART):
         part = flat[first : first + PART]
-        found += least_time_motions(problem, scene, part, [settings] * len(part))
+        motions_along += least_time_motions(problem, scene, part, [settings] * len(part))
     ends = np.cumsum([len(path) for path in paths])
-    sections = [found[end - len(path) : end] for path, end in zip(paths, ends.tolist(), strict=True)]
+    sections = [motions_along[end - len(path) : end] for path, end in zip(paths, ends.tolist(), strict=True)]
     motions = [chained([section.motion for section in path]) for path in sections]
     answers = proved_answers(problem, motions, scene)
     duration = np.where(answers.verdict == 0, answers.duration, np.inf)
     bounds = np.array([sum(section.lower_bound for section in path) for path in sections], float)
-    return LeastTimes(answers, duration, bounds, motions, sections)
+    return PathTimes(answers, duration, bounds, motions, sections)

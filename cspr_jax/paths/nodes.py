@@ -26,7 +26,7 @@ BATCH, MANY, DEGREE = 64, 512, 5
 NEAR = 1e-9
 
 
-class Grid(NamedTuple):
+class PathGrid(NamedTuple):
     """Nodes of one section.
 
     Fields:
@@ -62,7 +62,7 @@ class Places(NamedTuple):
     offset: np.ndarray | None
 
 
-def grid_of(section: Section, count: int, slow: tuple[bool, bool]) -> Grid:
+def grid_of(section: Section, count: int, slow: tuple[bool, bool]) -> PathGrid:
     """Nodes of a section: close together where it is slow, as instants of a motion that speeds up and slows down are.
 
     Args:
@@ -83,7 +83,7 @@ def grid_of(section: Section, count: int, slow: tuple[bool, bool]) -> Grid:
             nodes[nearest] = place
         else:
             nodes = np.insert(nodes, np.searchsorted(nodes, place), place)
-    return Grid(nodes, section.speed[_pieces(knots, 0.5 * (nodes[1:] + nodes[:-1]))])
+    return PathGrid(nodes, section.speed[_pieces(knots, 0.5 * (nodes[1:] + nodes[:-1]))])
 
 
 def _pieces(knots: np.ndarray, places: np.ndarray) -> np.ndarray:
@@ -158,7 +158,7 @@ def _rows(robot: AnyRobot, limits: Limits, arguments: tuple[Places, Array]) -> R
 
 
 def side_rows(
-    robot: AnyRobot, limits: Limits, curves: Sequence[Spline], grids: Sequence[Grid]
+    robot: AnyRobot, limits: Limits, curves: Sequence[Spline], grids: Sequence[PathGrid]
 ) -> list[tuple[Rows, Rows]]:
     """Half-planes at the starts and at the ends of the cells of several sections.
 
@@ -180,9 +180,9 @@ def side_rows(
         ]
         speeds += [grid.speed, grid.speed[[*(jumps - 1).tolist(), -1]]]
         apart.append(jumps)
-    every = jax.tree.map(lambda *leaves: np.concatenate(leaves), *places)
+    together = jax.tree.map(lambda *leaves: np.concatenate(leaves), *places)
     size = BATCH if len(curves) == 1 else MANY
-    rows = in_batches(partial(_rows, robot, limits), (every, np.concatenate(speeds)), size=size)
+    rows = in_batches(partial(_rows, robot, limits), (together, np.concatenate(speeds)), size=size)
     sides, first = [], 0
     for grid, jumps in zip(grids, apart, strict=True):
         count = len(grid.speed)

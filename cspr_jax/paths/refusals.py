@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import linprog
 
 from cspr_jax.motions.problem import Problem
-from cspr_jax.paths.controllable import FLAT, Fastest
+from cspr_jax.paths.controllable import FLAT, GridSolution
 from cspr_jax.paths.discrete import Discrete
 from cspr_jax.paths.nodes import places_on, state_at
 from cspr_jax.paths.row_names import RowName, row_names
@@ -40,7 +40,7 @@ class NoMotion(NamedTuple):
     speeds: tuple[float, float] = (np.nan, np.nan)
 
 
-def refusal(problem: Problem, path: Discrete, solution: Fastest) -> NoMotion:
+def refusal(problem: Problem, path: Discrete, solution: GridSolution) -> NoMotion:
     """Tell why there is no motion.
 
     Args:
@@ -70,7 +70,7 @@ def refusal(problem: Problem, path: Discrete, solution: Fastest) -> NoMotion:
     return NoMotion(coordinate, position, (), speed, nearest, "start" if is_start else "end", (low, high))
 
 
-def _meeting(path: Discrete, solution: Fastest, cell: int) -> tuple[float, float, tuple[int, ...]]:
+def _meeting(path: Discrete, solution: GridSolution, cell: int) -> tuple[float, float, tuple[int, ...]]:
     # The path speed that is nearest to possible: the path acceleration that one half-plane needs there, the largest
     # one that another leaves, and their numbers.
     start, end, twice = path.start, path.end, 2.0 * float(path.grid.width[cell])

@@ -23,7 +23,7 @@ BANDS, REGULAR, LEAST = 4, 1e-14, 1e-12
 NEAREST, SLOWER, FLAT, MISSED, MORE_ROWS = 6, 0.8, 1e-12, 1e-9, 4
 
 
-class Ends(NamedTuple):
+class SectionEnds(NamedTuple):
     """Start and end of a section.
 
     Fields:
@@ -110,7 +110,7 @@ class Smooth(NamedTuple):
     u: np.ndarray
 
 
-def smooth(rows: NodeRows, ends: Ends, start: Smooth, jerk: float, times: int = 1) -> Smooth | None:
+def smooth(rows: NodeRows, ends: SectionEnds, start: Smooth, jerk: float, times: int = 1) -> Smooth | None:
     """Least time with a continuous path acceleration.
 
     Args:
@@ -136,7 +136,7 @@ def smooth(rows: NodeRows, ends: Ends, start: Smooth, jerk: float, times: int = 
     return None
 
 
-def below_ramps(x: np.ndarray, width: np.ndarray, jerk: float, ends: Ends) -> Smooth:
+def below_ramps(x: np.ndarray, width: np.ndarray, jerk: float, ends: SectionEnds) -> Smooth:
     """Motion that is no faster than another one, nor than ramps from rest and to rest are.
 
     Args:
@@ -199,7 +199,7 @@ def _tangents(x: np.ndarray, width: np.ndarray, jerk: float, rests: tuple[bool, 
 
 class _Problem:
     # Unknowns are x, u, and the multiplier of the equation of the cell that follows, (n_nodes, 3).
-    def __init__(self, rows: NodeRows, ends: Ends, jerk: float, x: np.ndarray) -> None:
+    def __init__(self, rows: NodeRows, ends: SectionEnds, jerk: float, x: np.ndarray) -> None:
         self.ends, self.width = ends, rows.width
         self.tangents = _tangents(x, rows.width, jerk, ends.rests)
         self.u, self.x, self.most = rows.with_cap()
@@ -260,36 +260,38 @@ class _Problem:
     def solved(self, z: np.ndarray, weights: np.ndarray, right: np.ndarray) -> np.ndarray:
         # Matrix of neighbouring nodes: (row, column) of one node, and (row of one, column of the next).
         count, of_rows = len(z), weights[: self.u.size].reshape(self.u.shape)
-        own, next_ = np.zeros((3, 3, count)), np.zeros((3, 3, count - 1))
+        here, ahead = np.zeros((3, 3, count)), np.zeros((3, 3, count - 1))
         time = _time(z[:, 0], self.width, self.ends.rests)
-        own[0, 0] = time.bend + np.sum(of_rows * self.x**2, axis=0)
-        own[0, 1] = np.sum(of_rows * self.x * self.u, axis=0)
-        own[1, 1] = np.sum(of_rows * self.u**2, axis=0) + REGULAR
-        next_[0, 0] = time.coupling
+        here[0, 0] = time.bend + np.sum(of_rows * self.x**2, axis=0)
+        here[0, 1] = np.sum(of_rows * self.x * self.u, axis=0)
+        here[1, 1] = np.sum(of_rows * self.u**2, axis=0) + REGULAR
+        ahead[0, 0] = time.coupling
         up, down = weights[self.u.size :].reshape(2, -1)
         share, level = self.tangents
         of_level, of_share, mixed = (up + down) * level**2, (up + down) * share**2, (up - down) * level * share
         for near, sign in ((slice(None, -1), -1.0), (slice(1, None), 1.0)):
-            own[0, 0, near] += of_level
-            own[1, 1, near] += of_share
-            own[0, 1, near] += sign * mixed
-        next_[:2, :2] += np.array([[of_level, mixed], [-mixed, -of_share]])
-        own[1, 0] = own[0, 1]
-        own[2, :2, :-1] = own[:2, 2, :-1] = self.cells[0]
-        own[2, 2, -1] = 1.0
-        next_[2, :2] = self.cells[1]
-        return solve_banded((BANDS, BANDS), self._bands(own, next_), right.ravel(), check_finite=False).reshape(z.shape)
+            here[0, 0, near] += of_level
+            here[1, 1, near] += of_share
+            here[0, 1, near] += sign * mixed
+        ahead[:2, :2] += np.array([[of_level, mixed], [-mixed, -of_share]])
+        here[1, 0] = here[0, 1]
+        here[2, :2, :-1] = here[:2, 2, :-1] = self.cells[0]
+        here[2, 2, -1] = 1.0
+        ahead[2, :2] = self.cells[1]
+        return solve_banded((BANDS, BANDS), self._bands(here, ahead), right.ravel(), check_finite=False).reshape(
+            z.shape
+        )
 
-    def _bands(self, own: np.ndarray, next_: np.ndarray) -> np.ndarray:
+    def _bands(self, here: np.ndarray, ahead: np.ndarray) -> np.ndarray:
         # Bands as SciPy takes them: row 4 + i - j, column j. Rows and columns of fixed unknowns are those of 1.
         free = self.free.T
-        own = np.where(free[:, None] & free[None], own, np.eye(3)[:, :, None])
-        next_ = np.where(free[:, None, :-1] & free[None, :, 1:], next_, 0.0)
-        bands = np.zeros((2 * BANDS + 1, own.shape[2], 3))
+        here = np.where(free[:, None] & free[None], here, np.eye(3)[:, :, None])
+        ahead = np.where(free[:, None, :-1] & free[None, :, 1:], ahead, 0.0)
+        bands = np.zeros((2 * BANDS + 1, here.shape[2], 3))
         for row in range(3):
             for column in range(3):
-                bands[BANDS + row - column, :, column] += own[row, column]
+                bands[BANDS + row - column, :, column] += here[row, column]
                 if column < 2:  # nothing depends on the multiplier of the cell after next
-                    bands[BANDS + row - column - 3, 1:, column] += next_[row, column]
-                    bands[BANDS + column + 3 - row, :-1, row] += next_[row, column]
+                    bands[BANDS + row - column - 3, 1:, column] += ahead[row, column]
+                    bands[BANDS + column + 3 - row, :-1, row] += ahead[row, column]
         return bands.reshape(2 * BANDS + 1, -1)

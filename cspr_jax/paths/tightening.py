@@ -1,4 +1,4 @@
-"""What a motion along a path misses of its limits between the nodes, by proof, and what binds it."""
+"""Limits that a motion along a path misses between the nodes, by proof, and those that bind it."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ from cspr_jax.curves.spline import Spline
 from cspr_jax.motions.block_slacks import block_slacks
 from cspr_jax.motions.criteria import Criterion, criteria
 from cspr_jax.motions.problem import Problem
-from cspr_jax.paths.discrete import Margins
+from cspr_jax.paths.discrete import GridMargins
 from cspr_jax.robots.clearance import Scene
 from cspr_jax.schema.verdicts import Verdict
 
@@ -40,7 +40,7 @@ class CellSlacks(NamedTuple):
         """Tell whether all criteria are met in all cells."""
         return bool((self.low > 0.0).all())
 
-    def grown(self, margins: Margins, weight: float) -> Margins:
+    def grown(self, margins: GridMargins, weight: float) -> GridMargins:
         """Margins with which what is missed will be met.
 
         Args:
@@ -57,7 +57,7 @@ class CellSlacks(NamedTuple):
 
         tension = weight * lacking([bool(row.flag & TENSIONS) for row in self.rows])
         others = (lacking([row.unit == unit for row in self.rows]) for unit in (ACCELERATIONS, SPEEDS))
-        return Margins(*(old + more for old, more in zip(margins, (tension, *others), strict=True)))
+        return GridMargins(*(old + more for old, more in zip(margins, (tension, *others), strict=True)))
 
     @property
     def names(self) -> tuple[tuple[str, int | None], ...]:
@@ -65,7 +65,7 @@ class CellSlacks(NamedTuple):
         return tuple((row.flag.text, row.cables[0] if row.cables else None) for row in self.rows)
 
     def binding(self) -> np.ndarray:
-        """What binds in each cell.
+        """The criterion that binds in each cell.
 
         Returns:
             (n_cells,) number of the criterion that is nearest to its limit; -1 where none binds.

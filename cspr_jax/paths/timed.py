@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cspr_jax.curves.spline import Spline
-from cspr_jax.paths.nodes import Grid, derivatives, places_on
+from cspr_jax.paths.nodes import PathGrid, derivatives, places_on
 from cspr_jax.paths.section import Section
 
 # Instants in a cell at which the distance from the path is taken.
@@ -18,7 +18,7 @@ SHARES = (0.25, 0.5, 0.75)
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 
 
-class Run(NamedTuple):
+class PathSpeeds(NamedTuple):
     """How fast a section is run along.
 
     Fields:
@@ -34,7 +34,7 @@ class Run(NamedTuple):
     rests: tuple[bool, bool] = (False, False)
 
 
-def cell_times(run: Run, width: np.ndarray) -> np.ndarray:
+def cell_times(run: PathSpeeds, width: np.ndarray) -> np.ndarray:
     """Times that the cells take, where the path acceleration changes at a constant rate along each.
 
     Args:
@@ -58,7 +58,7 @@ def cell_times(run: Run, width: np.ndarray) -> np.ndarray:
     return times
 
 
-def timed(section: Section, grid: Grid, run: Run) -> Spline:
+def timed(section: Section, grid: PathGrid, run: PathSpeeds) -> Spline:
     """The motion.
 
     Args:
@@ -97,7 +97,7 @@ def _quintic(start: tuple, end: tuple, width: np.ndarray) -> np.ndarray:
     return np.stack([p, p + one * v, p + 2.0 * one * v + two * a, q - 2.0 * one * w + two * b, q - one * w, q], axis=1)
 
 
-def distance_from_path(section: Section, grid: Grid, run: Run, motion: Spline) -> float:
+def distance_from_path(section: Section, grid: PathGrid, run: PathSpeeds, motion: Spline) -> float:
     """Largest distance of the motion from the path, at some instants of each cell.
 
     Returns:
