@@ -180,13 +180,21 @@ class PathAnswers(ProvedAnswers):
             "sections": [section.to_dict() for section in through if section.ends[1] == i],
         }
 
+    def every_section(self) -> list[SectionAnswer]:
+        """All sections of the leg, in their order.
+
+        Returns:
+            the sections.
+        """
+        return [section for i, through in enumerate(self.sections) for section in through if section.ends[0] == i]
+
     def notes(self) -> list[str]:
         """Say in one line where ramps are shorter than asked for.
 
         Returns:
             the line, if there is one to say.
         """
-        known = list({id(section): section for through in self.sections for section in through}.values())
+        known = self.every_section()
         missing = [s for s in known if s.least.failure is None and s.least.ramp_time < (1.0 - JUMP) * s.ramp_time]
         if not missing:
             return []
