@@ -14,8 +14,9 @@ from cspr_jax.paths.least_time import LeastTime
 from cspr_jax.paths.refusals import NoMotion
 from cspr_jax.schema.verdicts import Verdict
 
-# An acceleration jumps where it changes by more than this part of the largest one; digits of numbers in lines.
-JUMP, DIGITS = 0.01, 4
+# An acceleration jumps where it changes by more than this part of the largest one; digits of numbers in lines, and
+# decimals of places, m.
+JUMP, DIGITS, PLACES = 0.01, 4, 5
 # Criteria that are named at most for what binds.
 MOST_BINDING = 10
 # Flags of what a slower motion may mend.
@@ -135,7 +136,7 @@ class PathCause(Cause):
     @property
     def text(self) -> str:
         """The cause in words, in one line."""
-        place = ", ".join(_shown(value) for value in self.position)
+        place = ", ".join(_shown(round(value, PLACES)) for value in self.position)
         if self.end:
             low, high = (_shown(speed) for speed in self.speeds)
             return (

@@ -77,16 +77,22 @@ def test_bounds_of_sections_with_a_stop_between_them(stopping):
     assert all(part["ramp_time"] == 0.0 and part["ramp_cost"] is None for part in (first, last))
 
 
-def test_what_binds(stopping):
-    (segment,) = stopping.to_dict()["segments"]
-    rows = stopping.rows(rate=2000.0)
-    # A limit binds within 1 % of the weight of it.
+def check_shares(result) -> None:
+    """Shares of segments against rows: a limit binds within 1 % of the weight of it."""
+    rows, start = result.rows(rate=2000.0), 0.0
     near = rows["tension"] < LEAST + 0.01 * MASS * GRAVITY
-    shares = {(row["criterion"], row["cable"]): row["share"] for row in segment["binding"]}
-    assert sum(shares.values()) <= 1.0
-    assert list(shares.values()) == sorted(shares.values(), reverse=True)
-    for k in range(3):
-        assert shares.get(("slack_cable", k), 0.0) == pytest.approx(near[:, k].mean(), abs=0.06)
+    for segment in result.to_dict()["segments"]:
+        inside = (rows["t"] >= start) & (rows["t"] < start + segment["duration"])
+        start += segment["duration"]
+        shares = {(row["criterion"], row["cable"]): row["share"] for row in segment["binding"]}
+        assert sum(shares.values()) <= 1.0
+        assert list(shares.values()) == sorted(shares.values(), reverse=True)
+        for k in range(3):
+            assert shares.get(("slack_cable", k), 0.0) == pytest.approx(near[inside, k].mean(), abs=0.06)
+
+
+def test_what_binds(stopping):
+    check_shares(stopping)
 
 
 def test_jumps_and_ramps(stopping):
@@ -112,7 +118,7 @@ def test_section_through_poses():
     assert section["duration"] == pytest.approx(first["duration"] + second["duration"], abs=1e-12)
     assert section["lower_bound"] < section["duration"]
     assert line["lower_bound"] == line["sections"][0]["lower_bound"]
-    # What binds in a segment is of its own time.
+    check_shares(result)
     shares = [sum(row["share"] for row in part["binding"]) for part in (first, second, section)]
     mean = (shares[0] * first["duration"] + shares[1] * second["duration"]) / section["duration"]
     assert shares[2] == pytest.approx(mean, abs=1e-9)
@@ -199,6 +205,8 @@ def test_phase_plane_in_files_and_pictures(tmp_path, stopping, outside):
     assert "the end can be reached" in words and "stop" in words
     assert {f"smallest tension of cable {cable}" for _, cable in names} <= set(words)
     outside.save(file, anyway=True)
+    # The cause is in m/s^2, and its flag of tensions, in N.
+    assert np.isnan(cspr_jax.open_result(file).data["segment_needed"]).all()
     words = phase_plane_figure(cspr_jax.open_result(file)).axes[0].get_legend_handles_labels()[1]
     assert "no path speed passes" in words and "motion, nothing binds" not in words
 

@@ -67,7 +67,7 @@ def _top(low: np.ndarray, high: np.ndarray, speed: np.ndarray) -> float:
     # Without a motion all speeds from which the end can be reached, unless a few are far larger.
     finite = high[np.isfinite(high) & (high > 0.0)]
     usual = 3.0 * float(np.median(finite)) if len(finite) else 1.0
-    return HIGHEST * max(float(np.nanmax(low, initial=0.0)), min(usual, float(finite.max(initial=0.0))))
+    return HIGHEST * max(float(np.nanmax(low, initial=0.0)), min(usual, float(finite.max(initial=0.0)))) or 1.0
 
 
 def _names(data) -> list[tuple[int, int]]:
