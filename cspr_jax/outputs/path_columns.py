@@ -1,8 +1,9 @@
 """Path speeds of a plan, as its motion file has them: from which the end can be reached, and what limits allow."""
 
+from typing import Any
+
 import numpy as np
 
-from cspr_jax.paths.answers import PathAnswers, SectionAnswer
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
@@ -15,10 +16,9 @@ def path_columns(plan: PlannedMotions) -> dict[str, np.ndarray]:
     """
     parts, start = list[dict[str, np.ndarray]](), 0.0
     for leg in plan.legs:
-        if isinstance(leg.answers, PathAnswers):
-            for section in leg.answers.every_section():
-                parts.append(_of_section(section, len(parts) + 1, start))
-                start = float(parts[-1]["path_coordinate"][-1])
+        for section in leg.answers.every_section():
+            parts.append(_of_section(section, len(parts) + 1, start))
+            start = float(parts[-1]["path_coordinate"][-1])
     if not parts:
         return {}
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
@@ -27,7 +27,7 @@ def path_columns(plan: PlannedMotions) -> dict[str, np.ndarray]:
     return {"path_node": numbers, "segment_lower_bound": np.array(bounds, float)} | columns
 
 
-def _of_section(section: SectionAnswer, number: int, start: float) -> dict[str, np.ndarray]:
+def _of_section(section: Any, number: int, start: float) -> dict[str, np.ndarray]:
     least, plane = section.least, section.least.plane
     flags = np.array([0, *(Verdict[name.upper()].value for name, _ in least.names)], FLAGS)
     cables = np.array([0, *(0 if cable is None else cable + 1 for _, cable in least.names)], np.int16)

@@ -182,11 +182,7 @@ class PathAnswers(ProvedAnswers):
         }
 
     def every_section(self) -> list[SectionAnswer]:
-        """All sections of the leg, in their order.
-
-        Returns:
-            the sections.
-        """
+        """All sections; see `Answers.every_section`."""
         return [section for i, through in enumerate(self.sections) for section in through if section.ends[0] == i]
 
     def notes(self) -> list[str]:

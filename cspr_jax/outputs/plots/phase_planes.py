@@ -1,5 +1,7 @@
 """Phase plane of paths: path speeds over the path, from which the end can be reached, and what binds the motion."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -13,7 +15,7 @@ from cspr_jax.store.result import Result
 
 # Height of the picture, over the largest speed of the motion; what lies higher leaves it.
 HIGHEST = 1.25
-FREE = {"color": "black"}
+FREE: dict[str, Any] = {"color": "black"}
 # Limits that have a colour each.
 MOST_NAMED = 12
 
@@ -35,9 +37,9 @@ def phase_plane_figure(result: Result) -> Figure:
     first = [0, *(np.flatnonzero(np.diff(sections)) + 1).tolist(), len(s)]
     top = _top(low, high, speed)
     for i, rows in enumerate(map(slice, first[:-1], first[1:])):
-        words = "_" if i else "the end can be reached"
+        label = "_" if i else "the end can be reached"
         panel.fill_between(
-            s[rows], low[rows], np.minimum(high[rows], 2.0 * top), color=BAND, linewidth=0.0, label=words
+            s[rows], low[rows], np.minimum(high[rows], 2.0 * top), color=BAND, linewidth=0.0, label=label
         )
         for side in (low, high):
             panel.plot(s[rows], np.minimum(side[rows], 2.0 * top), color=EDGE, linewidth=0.8)
