@@ -26,6 +26,7 @@ from cspr_jax.schema.quantities import (
     FLIGHT,
     OTHER_DIMS,
     PARTS,
+    PATHS,
     QUANTITIES,
     SEGMENTS,
     TRAJECTORY,
@@ -168,7 +169,7 @@ def motion_text() -> str:
         f"| `{q.name}` | {_columns(q.name)} | {q.units} | {cell_text(q.description)} |\n" for q in TRAJECTORY.values()
     )
     scales = {*ACROSS.values(), *(dim for dims in OTHER_DIMS.values() for dim in dims)}
-    scales -= {*TRAJECTORY, *FLIGHT, *FAILURES}
+    scales -= {*TRAJECTORY, *FLIGHT, *FAILURES, *PATHS}
     words = [
         f"`{name}` ({', '.join(PARTS[name])})" if name in PARTS else f"`{name}` (from 1 on)" for name in sorted(scales)
     ]
@@ -176,6 +177,7 @@ def motion_text() -> str:
         f"| name | columns in CSV | units | meaning |\n|---|---|---|---|\n{rows}\n"
         f"For each segment, in HDF5 files:\n\n{quantities_text(SEGMENTS)}\n"
         f"For an object that is released, in HDF5 files:\n\n{quantities_text(FLIGHT)}\n"
+        f"For paths in the least time, in HDF5 files:\n\n{quantities_text(PATHS)}\n"
         f"For a motion that fails in known intervals, in HDF5 files:\n\n{quantities_text(FAILURES)}\n"
         + textwrap.fill(f"Further dimensions of HDF5 files, as datasets: {', '.join(words)}.", 120)
         + "\n"

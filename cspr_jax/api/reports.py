@@ -13,6 +13,7 @@ from cspr_jax.api.plans import Plan
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.outputs import motion_files
+from cspr_jax.outputs.path_columns import path_columns
 from cspr_jax.outputs.plots.fitting import shortened
 from cspr_jax.outputs.plots.labels import heading, robot_name, value
 from cspr_jax.outputs.plots.motion_source import keeps_plan, robot_and_plan, with_plan
@@ -127,7 +128,7 @@ def _planned(planned: Plan, title: str) -> dict[str, Any]:
     with double_precision():
         length = float(np.sum(planned.answers.duration))
         columns = motion_files.rows(planned, rate=min(RATE, MOST_ROWS / length))
-        columns |= planned.outcome_columns | motion_files.failures(planned)
+        columns |= planned.outcome_columns | motion_files.failures(planned) | path_columns(planned)
         return motion_content(title, columns, motion_files.segments(planned), planned.robot_file, planned.keys)
 
 

@@ -68,6 +68,14 @@ class Answers(Columns):
         """
         return {}
 
+    def every_section(self) -> list[Any]:
+        """Sections of paths that the segments run along.
+
+        Returns:
+            `paths.answers.SectionAnswer` of each, in their order; none of other families.
+        """
+        return []
+
     def proved_causes(self, i: int, frame: Frame) -> tuple[Cause, ...] | None:
         """Causes why a segment is not feasible, where the family knows them itself.
 

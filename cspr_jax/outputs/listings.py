@@ -10,7 +10,7 @@ from cspr_jax.config.catalogue import FAULTS, catalogue_keys, catalogue_names
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.runtime.terminal import cell
 from cspr_jax.schema.limits import LIMITS
-from cspr_jax.schema.quantities import AXES, FAILURES, FLIGHT, QUANTITIES, SEGMENTS, TRAJECTORY
+from cspr_jax.schema.quantities import AXES, FAILURES, FLIGHT, PATHS, QUANTITIES, SEGMENTS, TRAJECTORY
 
 PLACEHOLDER = "placeholder"
 
@@ -115,7 +115,7 @@ def quantities() -> list[dict[str, Any]]:
         group, name, units and description of each.
     """
     groups = {"axis": AXES, "map": QUANTITIES, "motion": TRAJECTORY, "segment": SEGMENTS}
-    groups |= {"flight": FLIGHT, "failure": FAILURES}
+    groups |= {"flight": FLIGHT, "failure": FAILURES, "path": PATHS}
     return [{"group": group, **dataclasses.asdict(q)} for group, table in groups.items() for q in table.values()]
 
 

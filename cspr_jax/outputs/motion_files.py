@@ -18,6 +18,7 @@ from cspr_jax.lines.motion import TimedLine
 from cspr_jax.motions.acceleration_sets import along
 from cspr_jax.motions.motion import Motion, outward
 from cspr_jax.motions.proved_answers import united
+from cspr_jax.outputs.path_columns import path_columns
 from cspr_jax.plans.causes import cause_columns
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.robots import cables
@@ -223,7 +224,7 @@ def _write_hdf5(plan: PlannedMotions, path: Path, columns: dict[str, np.ndarray]
             if name != "segment":
                 data.dims[0].attach_scale(file["segment"])
         set_attributes(file["segment_verdict"], flag_attributes())
-        _write_others(file, plan.outcome_columns | failures(plan))
+        _write_others(file, plan.outcome_columns | failures(plan) | path_columns(plan))
 
 
 def _write_others(file: h5py.File, columns: dict[str, np.ndarray]) -> None:

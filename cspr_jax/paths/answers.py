@@ -14,8 +14,9 @@ from cspr_jax.paths.least_time import LeastTime
 from cspr_jax.paths.refusals import NoMotion
 from cspr_jax.schema.verdicts import Verdict
 
-# An acceleration jumps where it changes by more than this part of the largest one; digits of numbers in lines.
-JUMP, DIGITS = 0.01, 4
+# An acceleration jumps where it changes by more than this part of the largest one; digits of numbers in lines, and
+# decimals of places, m.
+JUMP, DIGITS, PLACES = 0.01, 4, 5
 # Criteria that are named at most for what binds.
 MOST_BINDING = 10
 # Flags of what a slower motion may mend.
@@ -135,7 +136,7 @@ class PathCause(Cause):
     @property
     def text(self) -> str:
         """The cause in words, in one line."""
-        place = ", ".join(_shown(value) for value in self.position)
+        place = ", ".join(_shown(round(value, PLACES)) for value in self.position)
         if self.end:
             low, high = (_shown(speed) for speed in self.speeds)
             return (
@@ -180,13 +181,17 @@ class PathAnswers(ProvedAnswers):
             "sections": [section.to_dict() for section in through if section.ends[1] == i],
         }
 
+    def every_section(self) -> list[SectionAnswer]:
+        """All sections; see `Answers.every_section`."""
+        return [section for i, through in enumerate(self.sections) for section in through if section.ends[0] == i]
+
     def notes(self) -> list[str]:
         """Say in one line where ramps are shorter than the plan says.
 
         Returns:
             the line, if there is one to say.
         """
-        known = list({id(section): section for through in self.sections for section in through}.values())
+        known = self.every_section()
         missing = [s for s in known if s.least.failure is None and s.least.ramp_time < (1.0 - JUMP) * s.ramp_time]
         if not missing:
             return []

@@ -26,13 +26,18 @@ def cause_columns(each: Sequence[tuple[Cause, ...]]) -> dict[str, np.ndarray]:
     Returns:
         (n,) by the names of `schema.quantities.SEGMENTS`.
     """
+
+    def is_usual(cause: Cause) -> bool:
+        return cause.unit == UNITS.get(Verdict[cause.criterion.upper()], cause.unit)
+
     worst = [segment_causes[0] if segment_causes else Cause("feasible") for segment_causes in each]
     return {
         "segment_cause": np.array([Verdict[cause.criterion.upper()].value for cause in worst]),
         "segment_cause_cable": np.array([cause.cables[0] + 1 if len(cause.cables) == 1 else 0 for cause in worst]),
         "segment_cause_time": np.array([cause.t for cause in worst]),
-        "segment_needed": np.array([cause.needed for cause in worst]),
-        "segment_allowed": np.array([cause.allowed for cause in worst]),
+        # The flag alone says what the unit is: numbers in another one stay out.
+        "segment_needed": np.array([cause.needed if is_usual(cause) else np.nan for cause in worst]),
+        "segment_allowed": np.array([cause.allowed if is_usual(cause) else np.nan for cause in worst]),
     }
 
 

@@ -64,7 +64,7 @@ def motion(arrays: Mapping[str, np.ndarray], attributes: Mapping[str, Any]) -> "
     """A motion: rows over time, and what there is of its segments.
 
     Args:
-        arrays: by the names of `schema.quantities.TRAJECTORY`, `SEGMENTS`, `FLIGHT` and `FAILURES`.
+        arrays: by the names of `schema.quantities.TRAJECTORY`, `SEGMENTS`, `FLIGHT`, `FAILURES` and `PATHS`.
 
     Returns:
         the dataset, over "t" with "axis", "component", "cable" or "couple", and over "segment".
@@ -77,7 +77,7 @@ def motion(arrays: Mapping[str, np.ndarray], attributes: Mapping[str, Any]) -> "
     used = {ACROSS.get(name) for name in arrays} | {part for name in arrays for part in OTHER_DIMS.get(name, ())}
     for part in PARTS.keys() - used:
         del axes[part]
-    axes |= {name: arrays[name] for name in ("segment", "flight_t", "throw", "failure") if name in arrays}
+    axes |= {name: arrays[name] for name in ("segment", "flight_t", "throw", "failure", "path_node") if name in arrays}
     dims_of = dict.fromkeys(SEGMENTS, ("segment",)) | OTHER_DIMS
     variables = {
         name: (dims_of[name] if name in dims_of else ("t", ACROSS[name]) if name in ACROSS else ("t",), values)

@@ -261,8 +261,49 @@ FAILURES = {
         ),
     )
 }
+# A motion file holds these for the nodes of the grids on which the least time along paths was sought.
+PATHS = {
+    q.name: q
+    for q in (
+        Quantity("path_node", "1", "node of the path", "Number of a node, over all sections of the plan, from 1 on."),
+        Quantity("path_coordinate", "m", "path coordinate s", "Coordinate along the paths of the plan."),
+        Quantity(
+            "path_section",
+            "1",
+            "section of the path",
+            "Number of the section, from stop to stop, from 1 on; where two meet there is a node of each.",
+            "int16",
+        ),
+        Quantity("path_segment", "1", "segment of the node", "Number of the segment behind the node.", "int16"),
+        Quantity(
+            "path_speed",
+            "m s-1",
+            "path speed s'",
+            "Path speeds: the least and the largest from which the end of the section can be reached on the grid "
+            "(NaN: none), that of the motion (NaN: none), and the largest that limits of speeds allow (infinite: any).",
+        ),
+        Quantity(
+            "segment_lower_bound",
+            "s",
+            "lower bound of the time",
+            "Proved lower bound of the time of any motion along the segment, from stop to stop; NaN where a section "
+            "without a stop runs on through a pose, or has no motion.",
+        ),
+        Quantity("path_binds", "1", "what binds", f"Bit flag of the limit that binds behind the node{HOW}.", "uint32"),
+        Quantity(
+            "path_binding_cable",
+            "1",
+            "cable that binds",
+            "Number of its cable, from 1 on; 0: no single cable.",
+            "int16",
+        ),
+    )
+}
 # Dimensions of what a file holds beside rows and segments.
 OTHER_DIMS = {
+    **dict.fromkeys(PATHS, ("path_node",)),
+    "path_speed": ("path_node", "speed"),
+    "segment_lower_bound": ("segment",),
     "failure": ("failure",),
     "failing": ("failure", "edge"),
     "flight_t": ("flight_t",),
@@ -287,6 +328,7 @@ PARTS = {
     "couple": ("12", "23", "34", "41"),
     "bound": ("least", "actual", "largest"),
     "edge": ("start", "end"),
+    "speed": ("least", "largest", "actual", "allowed"),
 }
 # Maps of poses have this row in place of the verdict of motions.
 POSE_VERDICT = Quantity(
@@ -843,7 +885,7 @@ QUANTITIES = {
         ),
     )
 }
-EVERY = ChainMap(AXES, QUANTITIES, BEST, TRAJECTORY, SEGMENTS, FLIGHT, FAILURES)
+EVERY = ChainMap(AXES, QUANTITIES, BEST, TRAJECTORY, SEGMENTS, FLIGHT, FAILURES, PATHS)
 _OWN = frozenset(QUANTITIES)
 
 

@@ -15,7 +15,17 @@ import h5py
 import numpy as np
 
 from cspr_jax.errors import StoreError
-from cspr_jax.schema.quantities import AXES, FAILURES, FLIGHT, QUANTITIES, SEGMENTS, TRAJECTORY, Quantity, register
+from cspr_jax.schema.quantities import (
+    AXES,
+    FAILURES,
+    FLIGHT,
+    PATHS,
+    QUANTITIES,
+    SEGMENTS,
+    TRAJECTORY,
+    Quantity,
+    register,
+)
 from cspr_jax.store import guard
 from cspr_jax.store.consolidation import content_of
 from cspr_jax.store.netcdf import UNREADABLE, reason
@@ -28,7 +38,7 @@ LARGEST_DATA, DENSEST = 8e9, 50
 _LOOK, _PER_BYTE, _PER_CHUNK = 1.0, 1.0 / 25e6, 1e-4
 _MEMORY = 256 << 20
 # Names of parts of vectors, for other programs.
-_MARKS = (b"axis", b"cable", b"component", b"each", b"couple", b"bound", b"level", b"edge")
+_MARKS = (b"axis", b"cable", b"component", b"each", b"couple", b"bound", b"level", b"edge", b"speed")
 _LONG = ("settings", "environment_settings", "plan", "robot_settings")
 _TEXTS = (
     *("Conventions", "title", "map", "identity", "z_axis", "robot", "software", "environment", "environments"),
@@ -91,7 +101,7 @@ def _exactly(channel: socket.socket, count: int) -> bytes:
 def _result(path: Path, words: dict[str, Any], out: BinaryIO) -> None:
     with h5py.File(path, "r") as file:
         attributes = _attributes(file)
-        tables = (AXES, QUANTITIES) if "map" in attributes else (TRAJECTORY, SEGMENTS, FLIGHT, FAILURES)
+        tables = (AXES, QUANTITIES) if "map" in attributes else (TRAJECTORY, SEGMENTS, FLIGHT, FAILURES, PATHS)
         datasets = guard.datasets(file, [name for table in tables for name in table])
         marks = [name for name in _MARKS if "map" not in attributes and file.id.links.exists(name)]
         guard.refuse_others(file, len(datasets) + len(marks), len(attributes))

@@ -248,7 +248,7 @@ def _map(
 # Quantities of a motion that may be infinite.
 _OPEN = (
     *("tension", "tension_residual", "tension_each", "tension_couple", "path_acceleration", "landing"),
-    *("segment_cause_time", "segment_needed", "segment_allowed"),
+    *("segment_cause_time", "segment_needed", "segment_allowed", "path_speed", "segment_lower_bound"),
 )
 
 

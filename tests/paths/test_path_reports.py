@@ -1,5 +1,8 @@
 """What plans tell of paths: bounds, what binds, and, where there is no motion, the place and the limits that meet."""
 
+import json
+import re
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -9,6 +12,7 @@ from support.commands import plan
 import cspr_jax
 from cspr_jax.motions.amplitudes import named
 from cspr_jax.motions.problem import Problem
+from cspr_jax.outputs.plots.phase_planes import phase_plane_figure
 from cspr_jax.paths.row_names import row_names
 from cspr_jax.paths.rows import path_rows
 from cspr_jax.robots.limits import Limits
@@ -73,16 +77,22 @@ def test_bounds_of_sections_with_a_stop_between_them(stopping):
     assert all(part["ramp_time"] == 0.0 and part["ramp_cost"] is None for part in (first, last))
 
 
-def test_what_binds(stopping):
-    (segment,) = stopping.to_dict()["segments"]
-    rows = stopping.rows(rate=2000.0)
-    # A limit binds within 1 % of the weight of it.
+def check_shares(result) -> None:
+    """Shares of segments against rows: a limit binds within 1 % of the weight of it."""
+    rows, start = result.rows(rate=2000.0), 0.0
     near = rows["tension"] < LEAST + 0.01 * MASS * GRAVITY
-    shares = {(row["criterion"], row["cable"]): row["share"] for row in segment["binding"]}
-    assert sum(shares.values()) <= 1.0
-    assert list(shares.values()) == sorted(shares.values(), reverse=True)
-    for k in range(3):
-        assert shares.get(("slack_cable", k), 0.0) == pytest.approx(near[:, k].mean(), abs=0.06)
+    for segment in result.to_dict()["segments"]:
+        inside = (rows["t"] >= start) & (rows["t"] < start + segment["duration"])
+        start += segment["duration"]
+        shares = {(row["criterion"], row["cable"]): row["share"] for row in segment["binding"]}
+        assert sum(shares.values()) <= 1.0
+        assert list(shares.values()) == sorted(shares.values(), reverse=True)
+        for k in range(3):
+            assert shares.get(("slack_cable", k), 0.0) == pytest.approx(near[inside, k].mean(), abs=0.06)
+
+
+def test_what_binds(stopping):
+    check_shares(stopping)
 
 
 def test_jumps_and_ramps(stopping):
@@ -108,7 +118,7 @@ def test_section_through_poses():
     assert section["duration"] == pytest.approx(first["duration"] + second["duration"], abs=1e-12)
     assert section["lower_bound"] < section["duration"]
     assert line["lower_bound"] == line["sections"][0]["lower_bound"]
-    # What binds in a segment is of its own time.
+    check_shares(result)
     shares = [sum(row["share"] for row in part["binding"]) for part in (first, second, section)]
     mean = (shares[0] * first["duration"] + shares[1] * second["duration"]) / section["duration"]
     assert shares[2] == pytest.approx(mean, abs=1e-9)
@@ -169,3 +179,43 @@ points = {points}
     assert code == 1
     assert line in " ".join(out.split())
     assert "the numbers are those of a slow one" in " ".join(out.split())
+
+
+def test_phase_plane_in_files_and_pictures(tmp_path, stopping, outside):
+    file, sections = tmp_path / "motion.h5", stopping.to_dict()["segments"][0]["sections"]
+    stopping.save(file)
+    result = cspr_jax.open_result(file)
+    data, (low, high, speed, cap) = result.data, result.data["path_speed"].T
+    assert data["segment_lower_bound"] == pytest.approx([sum(section["lower_bound"] for section in sections)])
+    assert np.unique(data["path_section"]).tolist() == [1, 2]
+    # The accelerations of the motion change within cells, those of the sets do not.
+    assert (low <= speed + 1e-9).all() and (speed <= 1.01 * high + 1e-9).all() and (speed <= cap).all()
+    for number, section in enumerate(sections, start=1):
+        rows = data["path_section"] == number
+        assert np.ptp(data["path_coordinate"][rows]) == pytest.approx(section["length"], rel=1e-9)
+        # Time along the path by the path speeds: midpoints of cells, the speed being a root at the ends.
+        time = (2.0 * np.diff(data["path_coordinate"][rows]) / (speed[rows][1:] + speed[rows][:-1])).sum()
+        assert time == pytest.approx(section["duration"], rel=1e-3)
+    names = {(row["criterion"], row["cable"] + 1) for section in sections for row in section["binding"]}
+    binds = data["path_binds"] != 0
+    rows = zip(data["path_binds"][binds].tolist(), data["path_binding_cable"][binds].tolist(), strict=True)
+    assert {(Verdict(flag).text, cable) for flag, cable in rows} == names
+    panel = phase_plane_figure(result).axes[0]
+    words = panel.get_legend_handles_labels()[1]
+    assert "the end can be reached" in words and "stop" in words
+    assert {f"smallest tension of cable {cable}" for _, cable in names} <= set(words)
+    outside.save(file, anyway=True)
+    # The cause is in m/s^2, and its flag of tensions, in N.
+    assert np.isnan(cspr_jax.open_result(file).data["segment_needed"]).all()
+    words = phase_plane_figure(cspr_jax.open_result(file)).axes[0].get_legend_handles_labels()[1]
+    assert "no path speed passes" in words and "motion, nothing binds" not in words
+
+
+def test_page(tmp_path, stopping):
+    cspr_jax.report(stopping, tmp_path / "page.html")
+    text = (tmp_path / "page.html").read_text("utf-8")
+    content = json.loads(re.search(r'id="content">(.*?)</script>', text, re.DOTALL)[1])["motions"][0]
+    count = len(content["paths"]["s"])
+    assert {len(content["paths"][name]) for name in ("least", "largest", "actual", "binds", "sections")} == {count}
+    assert "smallest tension of cable 3" in content["paths"]["binds"]
+    assert "proved" in dict(content["facts"])["least time"]

@@ -9,8 +9,17 @@ from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.landings import landing_figure
 from cspr_jax.outputs.plots.motion import motion_figure
 from cspr_jax.outputs.plots.motion_source import robot_and_plan
-from cspr_jax.outputs.plots.options import ACCELERATION, LANDING, PATH_ACCELERATION, SUMMARY, TENSIONS, TRAJECTORY
+from cspr_jax.outputs.plots.options import (
+    ACCELERATION,
+    LANDING,
+    PATH_ACCELERATION,
+    PHASE_PLANE,
+    SUMMARY,
+    TENSIONS,
+    TRAJECTORY,
+)
 from cspr_jax.outputs.plots.path_accelerations import path_figure
+from cspr_jax.outputs.plots.phase_planes import phase_plane_figure
 from cspr_jax.outputs.plots.summary import summary_figure
 from cspr_jax.outputs.plots.tensions import tensions_figure
 from cspr_jax.outputs.plots.trajectory import trajectory_figure
@@ -45,6 +54,7 @@ MOTION_PICTURES = {
     SUMMARY: MotionPicture(lambda result, file, _: summary_figure(result, *robot_and_plan(result, file, SUMMARY))),
     ACCELERATION: MotionPicture(_acceleration, at_instant=True),
     PATH_ACCELERATION: MotionPicture(lambda result, file, _: path_figure(result, file), needs=PATH_ACCELERATION),
+    PHASE_PLANE: MotionPicture(lambda result, *_: phase_plane_figure(result), needs="path_speed"),
     LANDING: MotionPicture(lambda result, *_: landing_figure(result), needs=LANDING),
 }
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 # Names that `--quantity` takes for motions.
 ACCELERATION, PATH_ACCELERATION, LANDING = "acceleration", "path_acceleration", "landing"
+PHASE_PLANE = "phase_plane"
 TRAJECTORY, TENSIONS, SUMMARY = "trajectory", "tensions", "summary"
 
 
@@ -18,7 +19,8 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
         "--quantity",
         help="map: a quantity (default arcs or oscillations; see `cspr quantities`); motion: trajectory, the path in "
         "space; tensions, with their limits; summary, all on one page; acceleration, beside all that are feasible at "
-        "an instant; path_acceleration, over the path, between its bounds; or landing, of a sample of throws",
+        "an instant; path_acceleration, over the path, between its bounds; phase_plane, path speeds over the path and "
+        "what binds; or landing, of a sample of throws",
     )
     add_best(parser)
     parser.add_argument("--lines", metavar="AXIS", help="draw a map as lines, one for each point of this axis")

@@ -163,6 +163,39 @@ function drawOverTime([place, name, words, unit]) {
   })), CHARTS);
 }
 
+// Path speeds over the path: from which the end can be reached, of the motion, and what binds it.
+function drawPaths() {
+  const { paths } = motion.own;
+  element("paths").hidden = !paths;
+  if (!paths) return;
+  const { s, least, largest, actual, allowed, binds, sections } = paths, known = actual.filter((speed) => speed !== null);
+  const high = largest.filter((speed) => speed !== null), top = 1.25 * Math.max(...(known.length ? known : high), 1e-9);
+  const capped = (values) => values.map((speed) => (speed === null ? null : Math.min(speed, 2 * top)));
+  const cut = (values) => values.flatMap((value, k) => (k && sections[k] !== sections[k - 1] ? [null, value] : [value]));
+  const along = cut(s), line = (values, extra) => ({ type: "scatter", mode: "lines", x: along, y: cut(values),
+    hoverinfo: "skip", ...extra });
+  const edge = { color: PALETTE[0], width: 1 }, stops = s.filter((_, k) => k && sections[k] !== sections[k - 1]);
+  const limit = allowed.some((speed) => speed !== null && speed < top) ? [line(allowed, { name: "limits of speeds",
+    line: { color: colours().mark, width: 1.5, dash: "dash" } })] : [];
+  const named = [...new Set(binds)].filter((words) => words !== "nothing");
+  const behind = (k, words) => binds[k] === words || (k && binds[k - 1] === words && sections[k] === sections[k - 1]);
+  const bound = named.map((words, i) => line(actual.map((speed, k) => (behind(k, words) ? speed : null)),
+    { name: words, line: { color: PALETTE[(i + 1) % PALETTE.length], width: 3 } }));
+  Plotly.react("paths", [
+    line(capped(least), { line: edge, showlegend: false }),
+    line(capped(largest), { name: "the end can be reached", line: edge, fill: "tonexty", fillcolor: "rgba(0, 114, 178, 0.18)" }),
+    ...limit, line(actual, { name: "motion", line: { color: colours().ink, width: 1.5 }, hoverinfo: "all", text: cut(binds),
+      hovertemplate: "%{y:.4g} m/s; binds: %{text}<extra></extra>" }), ...bound,
+  ], layoutOf((axis, theme) => ({
+    hovermode: "x", legend: { orientation: "h", x: 0, y: 1.02, yanchor: "bottom", font: { size: 11 } },
+    showlegend: true, margin: { l: 60, r: 30, t: 30, b: 45 }, modebar: { orientation: "v" },
+    xaxis: { ...axis, title: { text: "path coordinate s (m)" }, hoverformat: ".4g" },
+    yaxis: { ...axis, title: { text: "path speed s' (m/s)" }, range: [0, top] },
+    shapes: stops.map((x) => ({ type: "line", yref: "paper", y0: 0, y1: 1, x0: x, x1: x,
+      line: { color: theme.soft, width: 1, dash: "dot" } })),
+  })), CHARTS);
+}
+
 const charts = () => OVER_TIME.filter(([, name]) => motion.own[name]);
 
 function tellSegments() {
@@ -222,6 +255,7 @@ function drawMotion() {
   drawRobot();
   OVER_TIME.forEach(([place, name]) => { element(place).hidden = !motion.own[name]; });
   charts().forEach(drawOverTime);
+  drawPaths();
   rowsInto(element("facts"), motion.own.facts);
   setRow(motion.row);
 }

@@ -7,6 +7,7 @@ import numpy as np
 
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
+from cspr_jax.motions.cause import limit_words
 from cspr_jax.outputs.plots.bodies_in_space import lines_on
 from cspr_jax.outputs.plots.fitting import shortened
 from cspr_jax.outputs.plots.labels import WRITTEN, cable_names
@@ -22,6 +23,8 @@ from cspr_jax.schema.verdicts import Verdict
 
 # Rows of a motion in a page, at most.
 MOST_ROWS = 1200
+# Nodes of paths in a page, at most.
+MOST_NODES = 50_000
 # Intervals of failure that the page names; it shades all of them.
 MOST_INTERVALS = 12
 # Columns of cables, each with the quantity of its limits; units of all quantities that limits bound.
@@ -39,7 +42,8 @@ def motion_content(
     """Content of the page of a motion.
 
     Args:
-        columns: rows by the names of `schema.quantities.TRAJECTORY`, and what there is of `FLIGHT` and `FAILURES`.
+        columns: rows by the names of `schema.quantities.TRAJECTORY`, and what there is of `FLIGHT`, `FAILURES` and
+            `PATHS`.
         segments: by the names of `schema.quantities.SEGMENTS`.
         robot_file: the robot whose cables have these tensions; None: the file does not keep it.
         keys: the plan, for limits, obstacles and the shape of the platform; None: the file does not keep it.
@@ -51,7 +55,11 @@ def motion_content(
     robot = moving(columns, robot_file, rows, keys)
     return {
         "title": title,
-        "facts": [*_facts(np.asarray(columns["t"]), segments, robot_file, keys), *_failures(columns)],
+        "facts": [
+            *_facts(np.asarray(columns["t"]), segments, robot_file, keys),
+            *_bounds(columns),
+            *_failures(columns),
+        ],
         "isDown": robot_file is None or robot_file.z_axis == "down",
         "count": len(rows),
         "cables": cable_names(columns),
@@ -68,6 +76,7 @@ def motion_content(
         "flight": np.asarray(columns["flight_position"]).tolist() if "flight_position" in columns else None,
         "limits": {name: _limits(robot_file, keys, quantity) for name, quantity in OF_CABLES.items()},
         "segments": _segments(segments),
+        "paths": _paths(columns),
         "failing": np.asarray(columns.get("failing", ())).tolist(),
         "bodies": [_surface(body) for body in ([] if keys is None else keys.bodies)],
     }
@@ -100,6 +109,34 @@ def _failures(columns: Mapping[str, np.ndarray]) -> list[tuple[str, str]]:
     named = [f"{start:.6f} to {end:.6f} s" for start, end in intervals[:MOST_INTERVALS]]
     more = [f"{len(intervals) - MOST_INTERVALS} more"] if len(intervals) > MOST_INTERVALS else []
     return [("fails", f"{', '.join(named + more)}; shaded in the charts")] if intervals else []
+
+
+def _bounds(columns: Mapping[str, np.ndarray]) -> list[tuple[str, str]]:
+    # The least time that any motion along the paths takes.
+    bounds, time = np.asarray(columns.get("segment_lower_bound", ())), np.asarray(columns["t"])
+    if not len(bounds) or not np.isfinite(bounds).all():
+        return []
+    gap = 100.0 * (1.0 - float(bounds.sum()) / float(time[-1] - time[0]))
+    return [("least time", f"at least {bounds.sum():.4g} s, proved; the motion takes {gap:.2g} % more")]
+
+
+def _paths(columns: Mapping[str, np.ndarray]) -> dict[str, Any] | None:
+    # Path speeds, and for each node the words of the limit that binds behind it.
+    if "path_speed" not in columns or len(columns["path_speed"]) > MOST_NODES:
+        return None
+    least, largest, actual, allowed = np.asarray(columns["path_speed"]).T
+    flags, cables = (np.asarray(columns[name]).tolist() for name in ("path_binds", "path_binding_cable"))
+    words = [
+        limit_words(Verdict(flag).text, cable - 1 if cable else None).removeprefix("the ") if flag else "nothing"
+        for flag, cable in zip(flags, cables, strict=True)
+    ]
+    speeds = {"least": least, "largest": largest, "actual": actual, "allowed": allowed}
+    return {
+        "s": np.round(np.asarray(columns["path_coordinate"], float), 6).tolist(),
+        **{name: [_number(round(value, 6)) for value in values.tolist()] for name, values in speeds.items()},
+        "binds": words,
+        "sections": np.asarray(columns["path_section"]).tolist(),
+    }
 
 
 def _surface(body: Obstacle) -> dict[str, Any]:
