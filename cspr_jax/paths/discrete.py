@@ -95,7 +95,11 @@ class Discrete:
         return dataclasses.replace(self, start=first, end=last)
 
     def cap(self) -> np.ndarray:
-        """Largest x at the nodes, (n_cells + 1,), finite."""
+        """Largest x at the nodes.
+
+        Returns:
+            (n_cells + 1,) finite.
+        """
         both = np.append(self.start.cap, np.inf), np.insert(self.end.cap, 0, np.inf)
         return np.minimum(np.minimum(*both), self.largest)
 

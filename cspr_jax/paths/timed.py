@@ -111,7 +111,9 @@ def distance_from_path(section: Section, grid: PathGrid, run: PathSpeeds, motion
     for share in SHARES:
         values = [_at(table, share) for table in (way, np.asarray(motion.position))]
         place, first, _ = derivatives(places_on(section.curve, values[0][:, 0], ahead=True))[0]
-        off, along = values[1] - place, first / np.linalg.norm(first, axis=1, keepdims=True)
+        # A body that turns on the spot has no direction.
+        slopes = np.linalg.norm(first, axis=1, keepdims=True)
+        off, along = values[1] - place, first / np.where(slopes > 0.0, slopes, 1.0)
         off = off - np.sum(off * along, axis=1, keepdims=True) * along
         largest = max(largest, float(np.linalg.norm(off, axis=1).max()))
     return largest

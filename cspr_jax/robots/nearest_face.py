@@ -97,7 +97,7 @@ def one_sided_faces(matrix: Array, kernel: Array) -> Array:
 
     Args:
         matrix: (dof, n_cables) unit columns.
-        kernel: (n_cables - dof, n_cables) orthonormal tensions without a wrench.
+        kernel: (n_more, n_cables) orthonormal tensions without a wrench, one for each cable beyond dof.
 
     Returns:
         (n_choices, n_cables - dof + 1), the cables as `beside_faces` has them; 0 for cables in the face.
