@@ -18,7 +18,7 @@ true. Over each cell all functions lie in bands around lines (`arithmetic.affine
 
 import dataclasses
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -56,9 +56,9 @@ class Multipliers(NamedTuple):
         turn: (n_nodes, 3) of the Cartesian acceleration, likewise.
     """
 
-    wrench: np.ndarray
-    bend: np.ndarray
-    turn: np.ndarray
+    wrench: Any
+    bend: Any
+    turn: Any
 
 
 class SpeedMultipliers(NamedTuple):
@@ -78,8 +78,8 @@ class _Cell(NamedTuple):
     start: Multipliers
     end: Multipliers
     rates: SpeedMultipliers
-    width: Array
-    most: Array
+    width: Any
+    most: Any
 
 
 def lower_bound(
@@ -236,7 +236,7 @@ def _of_wrenches(robot: AnyRobot, limits: Limits, state: StateBounds, cell: _Cel
     return _along(*ends, cell.width, momentum, bend), support - (held.middle - held.radius), lack
 
 
-def _turning_axes(robot: AnyRobot, pushed: StateBounds, cables: CableBounds) -> AffineBounds:
+def _turning_axes(robot: Any, pushed: StateBounds, cables: CableBounds) -> AffineBounds:
     # Bound what axes that turn with the platform add to the momentum's derivative: e' . L = e . (L x omega).
     whole = balance_bounds(dataclasses.replace(robot, pattern=RIGID), pushed, cables)[1].each(lambda x: x[3:])
     moment = cross(whole, pushed.angular_acceleration).each(lambda x: x[:, None])

@@ -73,7 +73,8 @@ def run_of(solution: GridSolution, path: Discrete, bend: np.ndarray) -> PathSpee
     if solution.empty >= 0 or not solution.is_start:
         return None
     half = 0.5 * bend * path.grid.width
-    return PathSpeeds(solution.x, solution.u - half, solution.u + half)
+    u = np.asarray(solution.u)
+    return PathSpeeds(np.asarray(solution.x), u - half, u + half)
 
 
 def jumping_motions(paths: Sequence[Discrete]) -> list[Jumping]:
@@ -92,7 +93,7 @@ def jumping_motions(paths: Sequence[Discrete]) -> list[Jumping]:
     ]
     going = [k for k, motion in enumerate(motions) if motion.run is not None]
     for _ in range(BENT):
-        changes = [smallest_of_slopes(solutions[k].u, paths[k].grid.width) for k in going]
+        changes = [smallest_of_slopes(np.asarray(solutions[k].u), paths[k].grid.width) for k in going]
         following = solved_together([paths[k] for k in going], changes)
         better = [run_of(s, paths[k], change) for k, s, change in zip(going, following, changes, strict=True)]
         for k, solution, change, run in zip(going, following, changes, better, strict=True):

@@ -55,11 +55,11 @@ class Places(NamedTuple):
         offset: (k, 3) as of `Spline`, or None.
     """
 
-    position: np.ndarray
-    quaternion: np.ndarray | None
-    share: np.ndarray
-    width: np.ndarray
-    offset: np.ndarray | None
+    position: Any
+    quaternion: Any
+    share: Any
+    width: Any
+    offset: Any
 
 
 def grid_of(section: Section, count: int, slow: tuple[bool, bool]) -> PathGrid:

@@ -125,7 +125,8 @@ def path_rows(robot: AnyRobot, limits: Limits, state: State, speed: Array) -> Ro
         cap = jnp.minimum(cap, jnp.min(jnp.square(limits.cable_speed_max) / jnp.maximum(rate**2, TINY)))
     if limits.acceleration_max is not None:
         parts.append(_tangents(state.velocity, state.acceleration, limits.acceleration_max))
-    return Rows(*(jnp.concatenate(column) for column in zip(*parts, strict=True)), cap)
+    u, x, most_of, size = (jnp.concatenate(column) for column in zip(*parts, strict=True))
+    return Rows(u, x, most_of, size, cap)
 
 
 class TensionFaces(NamedTuple):

@@ -71,8 +71,8 @@ class NodeRows(NamedTuple):
                 bounds = np.where(sign * self.u > FLAT, sign * value, np.inf)
                 chosen.append(np.argpartition(bounds, NEAREST, axis=0)[:NEAREST])
         places = np.concatenate(chosen)
-        sides = (np.take_along_axis(side, places, axis=0) for side in (self.u, self.x, self.most))
-        return NodeRows(*sides, cap=self.cap, width=self.width)
+        u, x, most = (np.take_along_axis(side, places, axis=0) for side in (self.u, self.x, self.most))
+        return NodeRows(u, x, most, self.cap, self.width)
 
     def beside(self, others: "NodeRows") -> "NodeRows":
         """These half-planes and others.
@@ -83,8 +83,8 @@ class NodeRows(NamedTuple):
         Returns:
             all of them.
         """
-        pairs = zip(self[:3], others[:3], strict=True)
-        return NodeRows(*(np.concatenate(pair) for pair in pairs), cap=self.cap, width=self.width)
+        u, x, most = (np.concatenate(pair) for pair in zip(self[:3], others[:3], strict=True))
+        return NodeRows(u, x, most, self.cap, self.width)
 
     def with_cap(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Half-planes with the cap as the last one.

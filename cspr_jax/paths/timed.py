@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.curves.spline import Spline
 from cspr_jax.paths.nodes import PathGrid, derivatives, places_on
 from cspr_jax.paths.section import Section
@@ -84,10 +85,11 @@ def timed(section: Section, grid: PathGrid, run: PathSpeeds) -> Spline:
                 (end, speeds[1:], run.after),
             )
         ]
-        tables.append(_quintic(*rates, times[:, None]))
+        tables.append(_quintic(rates[0], rates[1], times[:, None]))
     position, quaternion = tables[0], tables[1] if len(tables) > 1 else None
     knots = np.concatenate([[0.0], np.cumsum(times)])
-    return dataclasses.replace(section.curve, knots=knots, position=position, quaternion=quaternion)
+    turning = None if quaternion is None else leaf(quaternion)
+    return dataclasses.replace(section.curve, knots=leaf(knots), position=leaf(position), quaternion=turning)
 
 
 def _quintic(start: tuple, end: tuple, width: np.ndarray) -> np.ndarray:
@@ -106,14 +108,15 @@ def distance_from_path(section: Section, grid: PathGrid, run: PathSpeeds, motion
     times, speeds = np.diff(motion.knots), np.sqrt(run.x)
     # The path coordinate as a quintic in time too; across the path its error is of no account.
     ends = (grid.nodes[:-1], speeds[:-1], run.before), (grid.nodes[1:], speeds[1:], run.after)
-    way = _quintic(*(tuple(x[:, None] for x in end) for end in ends), times[:, None])
+    first, last = (tuple(x[:, None] for x in end) for end in ends)
+    way = _quintic(first, last, times[:, None])
     largest = 0.0
     for share in SHARES:
         values = [_at(table, share) for table in (way, np.asarray(motion.position))]
-        place, first, _ = derivatives(places_on(section.curve, values[0][:, 0], ahead=True))[0]
+        place, ahead, _ = derivatives(places_on(section.curve, values[0][:, 0], ahead=True))[0]
         # A body that turns on the spot has no direction.
-        slopes = np.linalg.norm(first, axis=1, keepdims=True)
-        off, along = values[1] - place, first / np.where(slopes > 0.0, slopes, 1.0)
+        slopes = np.linalg.norm(ahead, axis=1, keepdims=True)
+        off, along = values[1] - place, ahead / np.where(slopes > 0.0, slopes, 1.0)
         off = off - np.sum(off * along, axis=1, keepdims=True) * along
         largest = max(largest, float(np.linalg.norm(off, axis=1).max()))
     return largest

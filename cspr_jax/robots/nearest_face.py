@@ -97,10 +97,10 @@ def one_sided_faces(matrix: Array, kernel: Array) -> Array:
 
     Args:
         matrix: (dof, n_cables) unit columns.
-        kernel: (n_more, n_cables) orthonormal tensions without a wrench, one for each cable beyond dof.
+        kernel: (n, n_cables) orthonormal tensions without a wrench, one for each cable beyond dof.
 
     Returns:
-        (n_choices, n_cables - dof + 1), the cables as `beside_faces` has them; 0 for cables in the face.
+        (n_choices, ...), the cables as `beside_faces` has them; 0 for cables in the face.
     """
     dof, count = matrix.shape
     chosen = beside_faces(count, dof)

@@ -72,8 +72,8 @@ def witness_tensions(matrix: AffineBounds, wrench: AffineBounds, low: Array, hig
         smallest = jnp.min(jnp.minimum(tension.high() - low, high - tension.low()))
         above = jnp.broadcast_to(jnp.where(is_regular, smallest, jnp.inf), (2,))
     else:
-        at_ends = [jnp.stack([x.middle - x.slope, x.middle + x.slope]) for x in (matrix, wrench)]
-        faces = jax.vmap(nearest_face, (0, 0, None, None))(*at_ends, low, high)
+        matrices, wrenches = (jnp.stack([x.middle - x.slope, x.middle + x.slope]) for x in (matrix, wrench))
+        faces = jax.vmap(nearest_face, (0, 0, None, None))(matrices, wrenches, low, high)
         before, after = faces.tensions
         tension, is_regular = _solution(matrix, inverse, wrench, 0.5 * (before + after), 0.5 * (after - before))
         nearer = jnp.argmin(jnp.min(jnp.minimum(faces.tensions - low[None], high[None] - faces.tensions), axis=1))
