@@ -109,25 +109,22 @@ def _gap(bounds: _Bounds, x: Array) -> tuple[Array, Array, Array]:
 def _edge(bounds: _Bounds, x: Array, sign: float) -> tuple[Array, Array]:
     # Follow h from outside to where it is no longer negative: NaN if it is so nowhere, and the last x.
     def is_open(carry) -> Array:
-        _, is_outside, step = carry
+        _, is_outside, _, step = carry
         return is_outside.any() & (step < STEPS)
 
     def follow(carry):
-        x, is_outside, step = carry
+        x, is_outside, is_lost, step = carry
         gap, slope, rounding = _gap(bounds, x)
-        outside, leads = ~(gap >= -rounding), slope * sign < 0.0
-        moved = jnp.where(leads, x - gap / jnp.where(leads, slope, 1.0), jnp.nan)
-        return jnp.where(is_outside & outside, moved, x), is_outside & outside, step + 1
-
-    def next_one(carry):
-        x, is_outside, step = follow(carry)
+        is_outside &= ~(gap >= -rounding)
+        leads = slope * sign < 0.0
         # Where no step leads on, the last x stays.
-        is_lost = is_outside & jnp.isnan(x)
-        return jnp.where(is_lost, carry[0], x), is_outside & ~is_lost, step
+        is_lost |= is_outside & ~leads
+        is_outside &= leads
+        return jnp.where(is_outside, x - gap / jnp.where(leads, slope, 1.0), x), is_outside, is_lost, step + 1
 
-    x, _, _ = lax.while_loop(is_open, next_one, (x, jnp.isfinite(x), 0))
-    gap, _, rounding = _gap(bounds, x)
-    return jnp.where(gap >= -rounding, x, jnp.nan), x
+    is_number = jnp.isfinite(x)
+    x, is_outside, is_lost, _ = lax.while_loop(is_open, follow, (x, is_number, ~is_number, 0))
+    return jnp.where(is_outside | is_lost, jnp.nan, x), x
 
 
 def _flat_range(u: Array, x_share: Array, most: Array, cap: Array) -> tuple[Array, Array]:
@@ -166,7 +163,7 @@ def fastest(sides: tuple[Rows, Rows], width: Array, bend: Array, cap: Array, end
         return u, x, jnp.concatenate([cell.most, high[None], -low[None]])
 
     def back(following, cell: Cells):
-        low, high, empty, meeting, index = following
+        low, high, empty, index = following
         rows = rows_of(cell, low, high)
         floor, ceiling = _flat_range(*rows, cell.cap)
         bounds = _bounds_of(*rows)
@@ -175,20 +172,27 @@ def fastest(sides: tuple[Rows, Rows], width: Array, bend: Array, cap: Array, end
         is_empty = ~(bottom <= top)
         is_last = is_empty & (empty < 0) & jnp.isfinite(low)
         empty = jnp.where(is_last, index, empty)
-        line = bounds.slope * last_x[None]
-        both = jnp.stack([jnp.argmin(bounds.upper - line, axis=0), jnp.argmax(bounds.lower - line, axis=0)])
-        meeting = jnp.where(is_last[None], both, meeting)
         bottom, top = (jnp.where(is_empty, jnp.nan, side) for side in (bottom, top))
-        return (bottom, top, empty, meeting, index - 1), (bottom, top)
+        return (bottom, top, empty, index - 1), (bottom, top, last_x)
 
     n_cells, n_paths = cells.width.shape
     is_end = end <= cells.cap[-1]
     last = jnp.where(is_end, end, jnp.nan)
     none = jnp.full(n_paths, -1)
-    first = (last, last, jnp.where(is_end, none, n_cells), jnp.full((2, n_paths), n_rows), n_cells - 1)
+    first = last, last, jnp.where(is_end, none, n_cells), n_cells - 1
     steps = cells._replace(cap=cells.cap[:-1])
-    (_, _, empty, meeting, _), (low, high) = lax.scan(back, first, steps, reverse=True)
+    (_, _, empty, _), (low, high, last_x) = lax.scan(back, first, steps, reverse=True)
     low, high = jnp.concatenate([low, last[None]]), jnp.concatenate([high, last[None]])
+
+    def at_failure(leaf: Array, after: int = 0) -> Array:
+        # Searches for places are slow: the half-planes that meet are sought in one cell of each path.
+        cell = jnp.clip(empty, 0, n_cells - 1) + after
+        return jnp.take_along_axis(leaf, jnp.expand_dims(cell, tuple(range(leaf.ndim - 1))), axis=0)[0]
+
+    bounds = _bounds_of(*rows_of(jax.tree.map(at_failure, steps), at_failure(low, 1), at_failure(high, 1)))
+    line = bounds.slope * at_failure(last_x)[None]
+    both = jnp.stack([jnp.argmin(bounds.upper - line, axis=0), jnp.argmax(bounds.lower - line, axis=0)])
+    meeting = jnp.where((empty >= 0) & (empty < n_cells), both, n_rows)
     is_start = (start >= low[0] - CLOSE * (1.0 + start)) & (start <= high[0] + CLOSE * (1.0 + start))
 
     def ahead(x: Array, step):

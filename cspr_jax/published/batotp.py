@@ -67,7 +67,7 @@ def least_time(cells: int = CELLS) -> dict[Key, float | None]:
 
 
 def _limits(keys: dict[str, float], n_cables: int) -> Limits:
-    # Of an effector of 1 kg: its tensions are those over the mass.
+    # The effector has 1 kg, so that tensions over the mass are tensions.
     def of_cables(name: str):
         return leaf(np.full(n_cables, keys[name]))
 
