@@ -8,7 +8,7 @@ from typing import Any
 import jax
 
 from cspr_jax.arithmetic.batches import room
-from cspr_jax.bench import ellipses, hand_written, motions, six_cables, three_cables, timing, workspaces
+from cspr_jax.bench import ellipses, hand_written, motions, paths, six_cables, three_cables, timing, workspaces
 
 SCHEMA = 1
 
@@ -46,6 +46,7 @@ def bench(kernels: Path | None = None) -> dict[str, Any]:
         "workspaces": workspaces.rates(),
         "ellipses": ellipses.rates(),
         "motions": motions.rates(),
+        "paths": paths.rates(),
         "ratio_to_numpy": _ratios(rates, {name: row["numpy"] for name, row in rates.items()}),
         "ratio_to_hand_written": None if written is None else _ratios(rates, written),
         "cores": timing.cores(),
@@ -83,7 +84,7 @@ def lines(report: dict[str, Any]) -> list[str]:
                 words += f"  {report['ratio_to_hand_written'][name][dtype]:5.2f} x hand-written C++ in float32"
             text.append(f"  {dtype:8s} {rate / 1e6:8.2f} M/s{words}")
     text += workspaces.lines(report["workspaces"]) + ellipses.lines(report["ellipses"])
-    text += motions.lines(report["motions"])
+    text += motions.lines(report["motions"]) + paths.lines(report["paths"])
     if report["operations_per_check"] is None or not report["device"].startswith("cpu"):
         return text
     for dtype in ("float32", "float64"):

@@ -45,18 +45,31 @@ THREE = Region("prototype", (0.0, 0.0, 1.0), 0.12, 0.0, (0.1, 4.0))
 EIGHT = Region("cogiro", (0.0, 0.0, 4.0), 1.5, 0.05, (100.0, 5000.0))
 
 
-def _problem(region: Region) -> Problem:
+def problem(region: Region) -> Problem:
+    """Robot and limits of a region.
+
+    Returns:
+        them, in the axes of the kernels.
+    """
     robot = centred(load_robot(region.robot))[0]
     low, high = (leaf(np.full(robot.n_cables, value)) for value in region.tensions)
     return Problem(robot, Limits(tension_min=low, tension_max=high), named("quintic"))
 
 
-def _motion(region: Region, rng: np.random.Generator) -> Spline:
-    # Quintic spline through random poses.
+def poses(region: Region, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray | None]:
+    """Random poses in a region.
+
+    Returns:
+        positions (PLACES, 3), m, and quaternions (PLACES, 4), scalar first; None for a point mass.
+    """
     places = np.array(region.middle) + region.reach * rng.uniform(-1.0, 1.0, (PLACES, 3))
     turns = np.concatenate([np.ones((PLACES, 1)), region.tilt * rng.uniform(-1.0, 1.0, (PLACES, 3))], axis=1)
-    times = np.linspace(0.0, DURATION, PLACES)
-    return interpolated(times, places, turns if region.tilt else None, interpolation="quintic")
+    return places, turns if region.tilt else None
+
+
+def _motion(region: Region, rng: np.random.Generator) -> Spline:
+    # Quintic spline through random poses.
+    return interpolated(np.linspace(0.0, DURATION, PLACES), *poses(region, rng), interpolation="quintic")
 
 
 def _decided(proofs: list[MotionProof]) -> None:
@@ -74,10 +87,10 @@ def record_rate() -> float:
     Raises:
         SelfCheckError: a motion is left undecided.
     """
-    problem, spline = _problem(THREE), _motion(THREE, np.random.default_rng(0))
+    judged, spline = problem(THREE), _motion(THREE, np.random.default_rng(0))
     times = np.linspace(0.0, DURATION, ROWS)
     places = np.asarray(jax.jit(jax.vmap(spline.state))(times / DURATION).position)
-    return 1.0 / best(lambda: _decided([proof_of(problem, interpolated(times, places))]))
+    return 1.0 / best(lambda: _decided([proof_of(judged, interpolated(times, places))]))
 
 
 def together_rate() -> float:
@@ -89,9 +102,9 @@ def together_rate() -> float:
     Raises:
         SelfCheckError: a motion is left undecided.
     """
-    problem, rng = _problem(EIGHT), np.random.default_rng(0)
+    judged, rng = problem(EIGHT), np.random.default_rng(0)
     several = SeveralSplines([_motion(EIGHT, rng) for _ in range(TOGETHER)])
-    prove = partial(proofs_of, problem, several.bounds, several.durations, jumps=several.jumps)
+    prove = partial(proofs_of, judged, several.bounds, several.durations, jumps=several.jumps)
     return TOGETHER / best(lambda: _decided(prove()))
 
 

@@ -106,19 +106,22 @@ def _gap(bounds: _Bounds, x: Array) -> tuple[Array, Array, Array]:
 def _edge(bounds: _Bounds, x: Array, sign: float) -> Array:
     # Follow h from outside to where it is no longer negative; NaN if it is so nowhere.
     def is_open(carry) -> Array:
-        _, is_outside, step = carry
+        _, is_outside, _, step = carry
         return is_outside.any() & (step < STEPS)
 
     def follow(carry):
-        x, is_outside, step = carry
+        x, is_outside, is_lost, step = carry
         gap, slope, rounding = _gap(bounds, x)
+        is_outside &= ~(gap >= -rounding)
+        leads = slope * sign < 0.0
         # The last x stays where no step leads on.
-        is_outside &= ~(gap >= -rounding) & (slope * sign < 0.0)
-        return jnp.where(is_outside, x - gap / jnp.where(is_outside, slope, 1.0), x), is_outside, step + 1
+        is_lost |= is_outside & ~leads
+        is_outside &= leads
+        return jnp.where(is_outside, x - gap / jnp.where(leads, slope, 1.0), x), is_outside, is_lost, step + 1
 
-    x, _, _ = lax.while_loop(is_open, follow, (x, jnp.isfinite(x), 0))
-    gap, _, rounding = _gap(bounds, x)
-    return jnp.where(gap >= -rounding, x, jnp.nan)
+    is_number = jnp.isfinite(x)
+    x, is_outside, is_lost, _ = lax.while_loop(is_open, follow, (x, is_number, ~is_number, 0))
+    return jnp.where(is_outside | is_lost, jnp.nan, x)
 
 
 def _flat_range(u: Array, x_share: Array, most: Array, cap: Array) -> tuple[Array, Array]:

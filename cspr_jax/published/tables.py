@@ -8,7 +8,7 @@ from typing import Any
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.outputs.table_layout import Cell, grid
 from cspr_jax.plans.planning import plan
-from cspr_jax.published import boralugoda, chapter_1, chapter_3, peers, ray_hulls, table_3_2, table_3_4
+from cspr_jax.published import batotp, boralugoda, chapter_1, chapter_3, peers, ray_hulls, table_3_2, table_3_4
 from cspr_jax.published.chapter_1 import Key
 from cspr_jax.published.chapter_3 import TableSettings
 from cspr_jax.runtime.stages import within
@@ -127,10 +127,11 @@ TABLES = {
     "peers": TableSource(
         "Workspaces in papers on other tools: poses, and microseconds a pose here (compiling included), by linear "
         "programs and by least squares; for all poses of the first row CASPR prints 89 to 455 s (IROS 2016, Table I). "
-        "Last, WireX's hull of IPAnema1Design by the closed form (its README), and larger ones: where the tensions in "
-        "closed form break the limits, others may keep them",
-        ray_hulls.PUBLISHED,
-        lambda: peers.peers() | ray_hulls.hulls(),
+        "Then WireX's hull of IPAnema1Design by the closed form (its README), and larger ones: where the tensions in "
+        "closed form break the limits, others may keep them. Last, batotp's sample CSPR3DOF: the time of a motion "
+        "that is proved to keep all limits, and a lower bound of the time of all motions along its path",
+        ray_hulls.PUBLISHED | batotp.PUBLISHED,
+        lambda: peers.peers() | ray_hulls.hulls() | batotp.least_time(),
     ),
 }
 

@@ -11,7 +11,7 @@ from outputs.test_outputs import cspr, strict_json
 
 from cspr_jax import load_robot
 from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.bench import ellipses, motions, six_cables, three_cables, timing, workspaces
+from cspr_jax.bench import ellipses, motions, paths, six_cables, three_cables, timing, workspaces
 from cspr_jax.cli import main
 from cspr_jax.ellipses import harmonics
 from cspr_jax.errors import SelfCheckError
@@ -41,9 +41,10 @@ def test_bench(capsys, small_bench, kernels):
     assert 300 < found["operations_per_check"] < 900
     assert found["workspaces"]["8 cables"]["first_s"] == 1.0
     assert all(rate > 0 for row in found["ellipses"].values() for rate in row.values())
-    assert found["motions"] == {"3 cables, 10001 rows": 12.0}
+    assert found["motions"] == {"3 cables, 10001 rows": 12.0} and found["paths"] == {"3 cables": 500.0}
     text = cspr(capsys, "bench", *options)
     assert "x NumPy" in text and "proofs of motions a second" in text
+    assert "least times along paths a second\n  3 cables " in text
 
 
 @pytest.fixture
@@ -84,6 +85,16 @@ def test_rates_of_motions(monkeypatch):
     monkeypatch.setattr(motions, "TOGETHER", 3)
     found = motions.rates()
     assert len(found) == 2 and all(rate > 0.0 for rate in found.values()) and len(motions.lines(found)) == 3
+
+
+def test_the_rate_of_paths(monkeypatch):
+    """What is timed has motions, else it is no rate."""
+    for name, few in (("TOGETHER", 2), ("CELLS", 40)):
+        monkeypatch.setattr(paths, name, few)
+    monkeypatch.setattr(timing, "REPEATS", 1)
+    assert paths.rate(motions.THREE) > 0.0 and paths.lines({"3 cables": 5.0})[1].split()[-1] == "5"
+    with pytest.raises(SelfCheckError, match="cannot be run along"):
+        paths.rate(motions.THREE._replace(tensions=(3.9, 4.0)))
 
 
 @with_compiler

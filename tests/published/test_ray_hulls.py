@@ -1,15 +1,12 @@
 """Hulls along rays: of bodies whose volume is known, of WireX's robot as WireX prints it, and by linear programs."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from oracles import workspaces as oracle
-from scipy.interpolate import CubicSpline
 
 from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.config.reading import read_toml
 from cspr_jax.published import ray_hulls, tables
 
 
@@ -30,7 +27,7 @@ def test_the_closed_form_gives_the_printed_hull():
         whole = ray_hulls.hull(by_all, 1)
     assert got == pytest.approx((5.731436529861277, 17.789244457956457), rel=1e-12)
     assert got == pytest.approx([float(text) for text in ray_hulls.PUBLISHED.values()], abs=5e-8)
-    assert tables.TABLES["peers"].published == ray_hulls.PUBLISHED
+    assert ray_hulls.PUBLISHED.items() <= tables.TABLES["peers"].published.items()
 
     def by_programs(positions):
         # Largest distance that all tensions can have from their limits, without a wrench.
@@ -48,14 +45,3 @@ def test_all_tensions_hold_a_larger_hull():
         cells = {row: value for (row, column, _), value in ray_hulls.hulls().items() if column == "volume, m3"}
     form, whole, fine = cells.values()
     assert whole == pytest.approx(9.338946479502656, rel=1e-9) and form < whole < fine < 9.8
-
-
-def test_the_sample_of_batotp_is_a_path_within_its_robot():
-    """Its points lie below the triangle of its spools, as its script asks, and its spools have their centroid at 0."""
-    keys = read_toml(Path(tables.__file__).with_name("batotp_sample.toml"))
-    points, base = np.array(keys["points"]), np.array(keys["base_points"])
-    assert points.shape == (20, 3)
-    np.testing.assert_allclose(base.mean(0), 0.0, atol=1e-9)
-    path = CubicSpline(np.arange(20.0), points)(np.linspace(0.0, 19.0, 1901))
-    shares = np.linalg.solve(np.c_[base[:, :2], np.ones(3)].T, np.c_[path[:, :2], np.ones(len(path))].T)
-    assert shares.min() > 0.0 and path[:, 2].min() > base[:, 2].max()

@@ -1,0 +1,66 @@
+"""The fastest motions along random paths a second, together, from paths to path speeds on their grids."""
+
+import numpy as np
+
+from cspr_jax.bench import motions
+from cspr_jax.bench.timing import best
+from cspr_jax.curves.interpolation import interpolated
+from cspr_jax.errors import SelfCheckError
+from cspr_jax.paths.discrete import discretes
+from cspr_jax.paths.jumping import jumping_motions
+from cspr_jax.paths.section import Section, SectionSettings
+
+# Paths that are solved together; cells of each.
+TOGETHER, CELLS = 64, 500
+
+
+def _section(region: motions.Region, rng: np.random.Generator) -> Section:
+    # A quintic spline through random poses, over the length of their polygon.
+    places, turns = motions.poses(region, rng)
+    marks = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1)))
+    curve = interpolated(marks, places, turns, interpolation="quintic", ends="natural")
+    return Section(curve, np.full(len(marks) - 1, np.inf), marks)
+
+
+def rate(region: motions.Region) -> float:
+    """Paths a second, `TOGETHER` at once.
+
+    Args:
+        region: in which the paths lie.
+
+    Returns:
+        the rate.
+
+    Raises:
+        SelfCheckError: a path cannot be run along.
+    """
+    problem, rng = motions.problem(region), np.random.default_rng(0)
+    sections = [_section(region, rng) for _ in range(TOGETHER)]
+    settings = [SectionSettings(CELLS, 0.0)] * TOGETHER
+
+    def solve() -> None:
+        if any(motion.run is None for motion in jumping_motions(discretes(problem, sections, settings))):
+            raise SelfCheckError("a path of the bench cannot be run along")
+
+    return TOGETHER / best(solve)
+
+
+def rates() -> dict[str, float]:
+    """Rates of all of this work.
+
+    Returns:
+        paths a second by number of cables.
+    """
+    return {"3 cables": rate(motions.THREE), "8 cables": rate(motions.EIGHT)}
+
+
+def lines(measured: dict[str, float]) -> list[str]:
+    """Lines for people.
+
+    Args:
+        measured: of `rates`.
+
+    Returns:
+        the lines.
+    """
+    return ["least times along paths a second", *(f"  {name:26s} {rate:8.3g}" for name, rate in measured.items())]

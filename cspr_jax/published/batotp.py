@@ -1,0 +1,80 @@
+"""Sample CSPR3DOF of batotp: a point mass on three cables along a cubic spline, from rest to rest in the least time.
+
+Data and settings are in `batotp_sample.toml`, with their source. That batotp's motion breaks limits was seen in the
+output of that program, which is not here; what is shown here is a motion that is proved to keep all of them and takes
+less time, and a bound that no motion along the same path goes below.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.arithmetic.piecewise_bounds import bernstein_of_powers
+from cspr_jax.config.reading import read_toml
+from cspr_jax.curves.spline import Spline
+from cspr_jax.motions.amplitudes import named
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.proved_answers import proved_answers
+from cspr_jax.paths.least_time import least_time_motion
+from cspr_jax.paths.section import Section, SectionSettings
+from cspr_jax.published.chapter_1 import Key
+from cspr_jax.robots.kernel_axes import centred
+from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.point_mass import point_mass_robot
+
+# 200 cells for each segment, as many as its file has.
+CELLS = 3800
+VARIANT = "batotp's sample CSPR3DOF"
+PUBLISHED = {
+    ("least time along the path", "T, s, as shipped", VARIANT): "19.900",
+    ("least time along the path", "T, s, finest step", VARIANT): "19.876",
+}
+
+
+def sample() -> dict[str, Any]:
+    """Data of the sample.
+
+    Returns:
+        keys of the file.
+    """
+    return read_toml(Path(__file__).with_name("batotp_sample.toml"))
+
+
+def least_time(cells: int = CELLS) -> dict[Key, float | None]:
+    """The proved time along the path, beside both printed ones, and the lower bound of all motions' times.
+
+    Args:
+        cells: of the grid.
+
+    Returns:
+        computed cells, by row, column and variant; None for what is not proved.
+    """
+    keys = sample()
+    robot, frame = centred(point_mass_robot(keys["base_points"], mass=1.0, gravity=keys["gravity"]))
+    problem = Problem(robot, _limits(keys["limits"], robot.n_cables), named("quintic"))
+    segments = np.arange(float(len(keys["points"])))
+    powers = np.moveaxis(CubicSpline(segments, keys["points"]).c[::-1], 0, 1)
+    curve = Spline(leaf(segments), leaf(frame.inward(bernstein_of_powers(powers))), None)
+    section = Section(curve, np.full(len(powers), np.inf), segments)
+    least = least_time_motion(problem, None, section, SectionSettings(cells, 0.0))
+    is_proved = proved_answers(problem, [least.motion], None).verdict[0] == 0
+    values = dict.fromkeys(PUBLISHED, least.duration if is_proved else None)
+    bound = least.lower_bound if np.isfinite(least.lower_bound) else None
+    return values | {("least time along the path", "lower bound, s", VARIANT): bound}
+
+
+def _limits(keys: dict[str, float], n_cables: int) -> Limits:
+    # The effector has 1 kg, so that tensions over the mass are tensions.
+    def of_cables(name: str):
+        return leaf(np.full(n_cables, keys[name]))
+
+    return Limits(
+        tension_min=of_cables("tension_min_per_mass"),
+        tension_max=of_cables("tension_max_per_mass"),
+        cable_speed_max=of_cables("cable_speed_max"),
+        cable_acceleration_max=of_cables("cable_acceleration_max"),
+        speed_max=leaf(keys["speed_max"]),
+    )
