@@ -100,7 +100,7 @@ def one_sided_faces(matrix: Array, kernel: Array) -> Array:
         kernel: (n, n_cables) orthonormal tensions without a wrench, one for each cable beyond dof.
 
     Returns:
-        (n_choices, ...), the cables as `beside_faces` has them; 0 for cables in the face.
+        (n_choices, n_others), the cables as `beside_faces` has them; 0 for cables in the face.
     """
     dof, count = matrix.shape
     chosen = beside_faces(count, dof)
