@@ -33,6 +33,8 @@ _LIMITS = {
     Verdict.WRENCH_INFEASIBLE: "the range of the tensions",
     Verdict.CABLE_TOO_FAST: "the largest speed",
     Verdict.CABLE_OVER_ACCELERATION: "the largest acceleration",
+    Verdict.TOO_FAST: "the largest speed of the mass centre",
+    Verdict.OVER_ACCELERATION: "the largest acceleration of the mass centre",
 }
 _USUAL = "{cable} needs {needed} {unit}{when}, {allowed} allowed"
 

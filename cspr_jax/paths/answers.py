@@ -26,6 +26,8 @@ OF_SPEED = (
     | Verdict.WRENCH_INFEASIBLE
     | Verdict.CABLE_TOO_FAST
     | Verdict.CABLE_OVER_ACCELERATION
+    | Verdict.TOO_FAST
+    | Verdict.OVER_ACCELERATION
 )
 
 
