@@ -170,10 +170,16 @@ function drawPaths() {
   if (!paths) return;
   const { s, least, largest, actual, allowed, binds, sections } = paths, known = actual.filter((speed) => speed !== null);
   const high = largest.filter((speed) => speed !== null), top = 1.25 * Math.max(...(known.length ? known : high), 1e-9);
-  const capped = (values) => values.map((speed) => (speed === null ? null : Math.min(speed, 2 * top)));
   const cut = (values) => values.flatMap((value, k) => (k && sections[k] !== sections[k - 1] ? [null, value] : [value]));
   const along = cut(s), line = (values, extra) => ({ type: "scatter", mode: "lines", x: along, y: cut(values),
     hoverinfo: "skip", ...extra });
+  // Around the area of each section: along its largest speeds, and back along its least ones.
+  const places = s.map((_, k) => k).filter((k) => least[k] !== null);
+  const around = [...new Set(sections)].flatMap((section) => {
+    const inside = places.filter((k) => sections[k] === section), back = [...inside].reverse();
+    return [...inside.map((k) => ({ s: s[k], speed: Math.min(largest[k], 2 * top) })),
+      ...back.map((k) => ({ s: s[k], speed: least[k] })), { s: null, speed: null }];
+  });
   const edge = { color: PALETTE[0], width: 1 }, stops = s.filter((_, k) => k && sections[k] !== sections[k - 1]);
   const limit = allowed.some((speed) => speed !== null && speed < top) ? [line(allowed, { name: "limits of speeds",
     line: { color: colours().mark, width: 1.5, dash: "dash" } })] : [];
@@ -182,8 +188,8 @@ function drawPaths() {
   const bound = named.map((words, i) => line(actual.map((speed, k) => (behind(k, words) ? speed : null)),
     { name: words, line: { color: PALETTE[(i + 1) % PALETTE.length], width: 3 } }));
   Plotly.react("paths", [
-    line(capped(least), { line: edge, showlegend: false }),
-    line(capped(largest), { name: "the end can be reached", line: edge, fill: "tonexty", fillcolor: "rgba(0, 114, 178, 0.18)" }),
+    { type: "scatter", mode: "lines", x: around.map((k) => k.s), y: around.map((k) => k.speed), hoverinfo: "skip", line: edge,
+      name: "the end can be reached", fill: "toself", fillcolor: "rgba(0, 114, 178, 0.18)" },
     ...limit, line(actual, { name: "motion", line: { color: colours().ink, width: 1.5 }, hoverinfo: "all", text: cut(binds),
       hovertemplate: "%{y:.4g} m/s; binds: %{text}<extra></extra>" }), ...bound,
   ], layoutOf((axis, theme) => ({
