@@ -116,7 +116,8 @@ def _edge(bounds: _Bounds, x: Array, sign: float) -> tuple[Array, Array]:
         x, is_outside, is_lost, step = carry
         gap, slope, rounding = _gap(bounds, x)
         is_outside &= ~(gap >= -rounding)
-        leads = slope * sign < 0.0
+        # A gap that is NaN, beyond an empty set, leads nowhere.
+        leads = (gap < 0.0) & (slope * sign < 0.0)
         # Where no step leads on, the last x stays.
         is_lost |= is_outside & ~leads
         is_outside &= leads
