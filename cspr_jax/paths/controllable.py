@@ -113,8 +113,8 @@ def _edge(bounds: _Bounds, x: Array, sign: float) -> Array:
         x, is_outside, is_lost, step = carry
         gap, slope, rounding = _gap(bounds, x)
         is_outside &= ~(gap >= -rounding)
-        leads = slope * sign < 0.0
-        # The last x stays where no step leads on.
+        # A gap that is NaN, beyond an empty set, leads nowhere. The last x stays where no step leads on.
+        leads = (gap < 0.0) & (slope * sign < 0.0)
         is_lost |= is_outside & ~leads
         is_outside &= leads
         return jnp.where(is_outside, x - gap / jnp.where(leads, slope, 1.0), x), is_outside, is_lost, step + 1
