@@ -27,4 +27,5 @@ Files, each importing only from those above it:
     least_time          the fastest motion along a section
     many                least times along many paths
     leg                 poses joined along paths, as a leg of plans
+    map                 maps of least durations along paths
 """
