@@ -8,7 +8,7 @@ from pydantic import BaseModel
 from cspr_jax.config.launch import LaunchSearch
 from cspr_jax.config.limits import LimitTable
 from cspr_jax.config.obstacles import ObstacleTable
-from cspr_jax.config.path import PathTable
+from cspr_jax.config.path import PathTable, TargetPath
 from cspr_jax.config.plan import DepthRule, PlanFile
 from cspr_jax.config.pose import Pose
 from cspr_jax.config.robot import RobotFile
@@ -53,6 +53,7 @@ FILES = {
         ("an axis", AxisRange),
         ("[trajectory]", SweepTrajectory),
         ("trajectory.from", From),
+        ("trajectory.path", TargetPath),
         ("[orientations]", Orientations),
         ("[launch]", LaunchSearch),
         ("[workspace]", WorkspaceTable),
@@ -146,7 +147,7 @@ def reference_text() -> str:
             parts.append((f"`{place}`: " if place else "") + (model.__doc__ or "").split("\n")[0] + "\n")
             parts.append(_keys(model))
     parts.append(MAPS)
-    parts += [kind_text(kind) for kind in MAP_KINDS.values()]
+    parts += [kind_text(form) for kind in MAP_KINDS.values() for form in kind.forms]
     parts.append("## Quantities of a result\n\n" + quantities_text(QUANTITIES) + "\nAxes:\n\n" + quantities_text(AXES))
     parts.append(BEST_POINTS + quantities_text(BEST))
     parts.append(MOTION)

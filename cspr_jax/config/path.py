@@ -1,9 +1,12 @@
 """Keys of paths that a motion runs along in the least time, in a plan or in one of its poses; without jax."""
 
+import math
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from cspr_jax.config.gcode import SAME_PLACE
 from cspr_jax.config.limits import NotNegative, Point, Positive
 from cspr_jax.config.reading import Table
 from cspr_jax.config.trajectory import Angle, Quaternion
@@ -27,7 +30,10 @@ _KINDS = {
 }
 _NEEDED = {"arc": ("centre", "angle"), "circle": ("centre",), "csv": ("file",), "gcode": ("file",)}
 GRID, RAMP_TIME = 500, 0.1
+# Number of cells of a grid in maps, where many paths are asked.
+MAP_GRID = 200
 MOST_POINTS = 100_000
+GridSize = Annotated[int, Field(ge=2, le=100_000)]
 
 
 class PathTable(Table):
@@ -73,7 +79,7 @@ class PathTable(Table):
     )
     start_speed: NotNegative | None = Field(None, description="speed where the path begins, m/s (default 0)")
     end_speed: NotNegative | None = Field(None, description="speed where the path ends, m/s (default 0)")
-    grid: Annotated[int, Field(ge=2, le=100_000)] | None = Field(
+    grid: GridSize | None = Field(
         None, description=f"number of cells into which each part of the path without a stop is cut (default {GRID})"
     )
     ramp_time: NotNegative | None = Field(
@@ -137,3 +143,54 @@ class PathTable(Table):
         """
         common: dict[str, Any] = {} if plan is None else {name: getattr(plan, name) for name in ("grid", "ramp_time")}
         return self.model_copy(update={name: value for name, value in common.items() if getattr(self, name) is None})
+
+
+class TargetPath(Table):
+    """Path to each target of a map."""
+
+    lift: Positive | None = Field(
+        None,
+        description="height, m, by which paths go straight up from the start, then straight across to above the "
+        "target, and down to it; absent: straight lines",
+    )
+    blend_tolerance: Positive | None = Field(
+        None,
+        description="largest distance of a path from the corners above start and target, m, with lift; absent: stops "
+        "there",
+    )
+    grid: GridSize | None = Field(
+        None, description=f"number of cells into which each part of a path without a stop is cut (default {MAP_GRID})"
+    )
+    ramp_time: NotNegative | None = Field(
+        None, description=f"time in which accelerations rise and fall, s (default {RAMP_TIME}); 0: they jump"
+    )
+
+    @model_validator(mode="after")
+    def _blends_a_lift(self) -> "TargetPath":
+        if self.lift is None and self.blend_tolerance is not None:
+            raise fault("blend_tolerance", self.blend_tolerance, "absent without lift: straight lines have no corners")
+        return self
+
+    def between(self, start: Sequence[float], end: Sequence[float], z_axis: str) -> PathTable | None:
+        """Path from the start to a target, as plans have it.
+
+        Args:
+            start: [x, y, z] in the axes of the robot file, m.
+            end: of the target, likewise.
+            z_axis: direction of their z, "up" or "down".
+
+        Returns:
+            the table of a pose at the target; None: a straight line without a length.
+        """
+        keys: dict[str, Any] = {
+            "grid": MAP_GRID if self.grid is None else self.grid,
+            "ramp_time": RAMP_TIME if self.ramp_time is None else self.ramp_time,
+        }
+        stays = math.dist(start, end) <= SAME_PLACE
+        if self.lift is None:
+            return None if stays else PathTable(kind="line", **keys)
+        rise = self.lift if z_axis == "up" else -self.lift
+        above = [[float(x), float(y), float(z) + rise] for x, y, z in ([start] if stays else [start, end])]
+        if self.blend_tolerance is not None:
+            keys |= {"corner": "blend", "blend_tolerance": self.blend_tolerance}
+        return PathTable(kind="polyline", points=above, **keys)

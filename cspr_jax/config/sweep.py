@@ -9,6 +9,7 @@ from cspr_jax.config.ellipse import SweepEllipse
 from cspr_jax.config.launch import LaunchSearch
 from cspr_jax.config.limits import Coordinate, LimitTable, Point
 from cspr_jax.config.obstacles import Obstacles, SurroundingsKeys
+from cspr_jax.config.path import TargetPath
 from cspr_jax.config.reading import Table
 from cspr_jax.config.trajectory import BetaHat, Quaternion, TiltTorsion, TrajectoryKeys
 from cspr_jax.config.wording import either, name_of
@@ -110,7 +111,9 @@ class From(Table):
     position: Point | None = Field(None, description="start point [x, y, z], m")
     rest: bool = Field(False, description="true: at rest in P0")
     tilt_torsion: TiltTorsion | None = Field(None, description="poses: orientation at the start, as in a plan")
-    quaternion: Quaternion | None = Field(None, description="poses: orientation at the start, in place of tilt_torsion")
+    quaternion: Quaternion | None = Field(
+        None, description="poses: orientation at the start, in place of tilt_torsion; path: of the whole path"
+    )
     beta_hat: BetaHat | None = Field(None, description="poses: beta-hat at the start; absent: the preferred one (3.91)")
 
     @property
@@ -141,6 +144,10 @@ class SweepTrajectory(TrajectoryKeys):
         None,
         description='poses: beta-hat at the targets, a number, or "preferred" (3.91); absent: several are tried, the '
         "preferred one first",
+    )
+    path: TargetPath | None = Field(
+        None,
+        description="path: { lift, blend_tolerance, grid, ramp_time } of the paths; absent: straight lines",
     )
 
 

@@ -1,13 +1,25 @@
 """Base of maps of motions that start at rest in a given place, which need not be P0."""
 
-import numpy as np
-
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
 from cspr_jax.maps.grid_map import PointMassMap
-from cspr_jax.robots.point_mass import PLANAR
-from cspr_jax.schema.tiles import Grid
+
+
+def check_place(robot_file: RobotFile, keys: SweepFile, file: object) -> None:
+    """Refuse a start that is no place of a robot.
+
+    Args:
+        file: named in errors.
+
+    Raises:
+        ConfigError: such a start.
+    """
+    start = keys.trajectory.start
+    if robot_file.is_planar and start is not None and start.position is not None and start.position[1] != 0.0:
+        raise ConfigError(file, "trajectory.from.position: must have y = 0: a planar robot")
+    if start is not None and start.rest:
+        raise ConfigError(file, "trajectory.from: must be { position = [x, y, z] } in this map, or axes from_x, ...")
 
 
 class FromPlacesMap(PointMassMap):
@@ -16,15 +28,4 @@ class FromPlacesMap(PointMassMap):
     def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
         """Refuse starts that are no places."""
         super().__init__(robot_file, keys, file)
-        start = keys.trajectory.start
-        if robot_file.is_planar and start is not None and start.position is not None and start.position[1] != 0.0:
-            raise ConfigError(file, "trajectory.from.position: must have y = 0: a planar robot")
-        if start is not None and start.rest:
-            raise ConfigError(
-                file, "trajectory.from: must be { position = [x, y, z] } in this map, or axes from_x, ..."
-            )
-
-    def _refuse_out_of_plane(self, grid: Grid) -> None:
-        super()._refuse_out_of_plane(grid)
-        if self._problem.robot.dof == PLANAR and grid.axes.get("from_y", np.zeros(1)).any():
-            raise ConfigError(self._file, "axes.from_y: must be [0] for a planar robot")
+        check_place(robot_file, keys, file)

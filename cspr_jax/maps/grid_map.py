@@ -12,7 +12,8 @@ from cspr_jax.config.hints import axis_question
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
-from cspr_jax.robots.point_mass import AT_P0, is_planar, plane_normal, rest_point, spool_radius
+from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.robots.point_mass import AT_P0, plane_normal, rest_point, spool_radius
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
@@ -108,8 +109,12 @@ class GridMap(abc.ABC):
         self._refuse_out_of_reach(self._targets(self._corners(grid, _OF_TARGETS)), "axes")
 
     def _refuse_out_of_plane(self, grid: Grid) -> None:
-        if is_planar(self._problem.robot) and ("y" not in grid.axes or (grid.axes["y"] != 0.0).any()):
+        if not PATTERNS[self._problem.robot.pattern].is_planar:
+            return
+        if "y" not in grid.axes or grid.axes["y"].any():
             raise ConfigError(self._file, "axes.y: must be [0] for a planar robot")
+        if grid.axes.get("from_y", np.zeros(1)).any():
+            raise ConfigError(self._file, "axes.from_y: must be [0] for a planar robot")
 
     def _targets(self, cells: dict[str, np.ndarray]) -> np.ndarray:
         # In the kernels' coordinates. Radius and azimuth are about the vertical through the centroid of the spools.
@@ -118,6 +123,13 @@ class GridMap(abc.ABC):
         radius, azimuth = cells["radius"], cells["azimuth"]
         level = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), np.zeros_like(radius)], axis=1)
         return np.c_[self._frame.turned(level)[:, :2], self._frame.depth(cells["z"])]
+
+    def _start_places(self, cells: dict[str, np.ndarray]) -> np.ndarray:
+        # In the kernels' coordinates, of axes and of `trajectory.from`.
+        start, count = self._keys.trajectory.start, len(next(iter(cells.values())))
+        fixed = start.position if start is not None and start.position is not None else [0.0, 0.0, 0.0]
+        columns = [cells.get(f"from_{name}", np.full(count, fixed[i])) for i, name in enumerate("xyz")]
+        return self._frame.inward(np.stack(columns, axis=1))
 
     def _corners(self, grid: Grid, names: tuple[str, ...]) -> dict[str, np.ndarray]:
         # Return cells among which depths and heights have their extremes. Among azimuths the one down the slope of the
@@ -166,7 +178,7 @@ class PlatformMap(GridMap):
         return {
             "a feasible cell with a margin below zero": feasible & ~(smallest > 0.0),
             "a feasible cell that breaks a limit": feasible & ~(answers["limit_margin"] > -TOUCHED),
-            "a margin below its proved bound": _exceeds(answers["margin_bound"], margin),
+            "a margin below its proved bound": exceeds(answers["margin_bound"], margin),
             "an infeasible cell whose verdict is 0": ~feasible & (answers["verdict"] == 0),
             "a feasible cell without a duration": feasible & ~(answers["duration"] > 0.0),
             "a feasible cell that touches an obstacle": feasible & (answers.get("clearance", margin) <= -ROUNDING),
@@ -187,12 +199,8 @@ class PointMassMap(GridMap):
 
     def _starts(self, cells: dict[str, np.ndarray]) -> np.ndarray:
         # In the kernels' coordinates.
-        start, count = self._keys.trajectory.start, len(next(iter(cells.values())))
-        if start is not None and start.rest:
-            return rest_point(np.asarray(cells["z0"]))
-        fixed = start.position if start is not None and start.position is not None else [0.0, 0.0, 0.0]
-        columns = [cells.get(f"from_{name}", np.full(count, fixed[i])) for i, name in enumerate("xyz")]
-        return self._frame.inward(np.stack(columns, axis=1))
+        start = self._keys.trajectory.start
+        return rest_point(np.asarray(cells["z0"])) if start is not None and start.rest else self._start_places(cells)
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
@@ -203,13 +211,21 @@ class PointMassMap(GridMap):
             "a feasible cell with a margin below zero": feasible & ~(margin > -ROUNDING),
             "a feasible cell whose verdict is not": feasible & ((verdict & ~unsure) != 0),
             "an infeasible cell whose verdict is 0": ~feasible & (verdict == 0),
-            "a margin below its proved bound": _exceeds(answers["margin_bound"], margin),
+            "a margin below its proved bound": exceeds(answers["margin_bound"], margin),
             "a feasible cell without a duration": feasible & ~lasts,
             "a feasible cell that touches an obstacle": feasible & (answers.get("clearance", margin) <= -ROUNDING),
         }
 
 
-def _exceeds(bound: np.ndarray, margin: np.ndarray) -> np.ndarray:
-    # Tell where a bound is above its margin, but for rounding; cables that span too little have a margin of -inf.
+def exceeds(bound: np.ndarray, margin: np.ndarray) -> np.ndarray:
+    """Tell where a bound is above its margin, but for rounding; cables that span too little have a margin of -inf.
+
+    Args:
+        bound: (n,) proved.
+        margin: (n,) in the same unit.
+
+    Returns:
+        (n,) whether it is.
+    """
     with np.errstate(invalid="ignore"):
         return bound > margin + ROUNDING * (1.0 + np.abs(margin))

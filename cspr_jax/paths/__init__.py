@@ -30,4 +30,5 @@ Files, each importing only from those above it:
     many                least times along many paths
     answers             what segments of plans tell of it
     leg                 poses joined along paths, as a leg of plans
+    map                 maps of least durations along paths
 """

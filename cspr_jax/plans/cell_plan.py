@@ -8,6 +8,7 @@ import numpy as np
 from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.config.ellipse import SweepEllipse, cell_axes
 from cspr_jax.config.obstacles import SurroundingsKeys
+from cspr_jax.config.path import TargetPath
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.schema.map_kinds import MAP_KINDS
@@ -31,7 +32,7 @@ def cell_plan(
 
     Returns:
         what a plan file holds; None of a kind of map whose cells are no motions from pose to pose, and of a cell
-        without a motion: an ellipse without a size, or without a frequency.
+        without a motion: an ellipse without a size, or without a frequency, a straight line without a length.
     """
     kind = MAP_KINDS[settings["map"]]
     if not kind.planned:
@@ -41,6 +42,8 @@ def cell_plan(
     trajectory_keys = {name: value for name, value in trajectory.items() if name in shared}
     if settings.get("limits"):
         trajectory_keys["limits"] = settings["limits"]
+    if trajectory.get("family") == "path":
+        return _path(settings, place, {"samples": samples, **trajectory_keys})
     if "ellipse" in kind.takes:
         return _turn(settings, place, values, {"samples": samples, **trajectory_keys})
     depth = {name: place[name] for name in ("z0", "inclination") if name in place}
@@ -83,10 +86,24 @@ def _turn(
     return {"schema": 1, "robot": robot, **keys, "ellipse": {**ellipse, "frequency": frequency}, "turns": 1.0}
 
 
+def _path(settings: Mapping[str, Any], place: Mapping[str, float], keys: Mapping[str, Any]) -> dict[str, Any] | None:
+    # The path to the target of a cell.
+    start, end = _start(settings, place), _target(settings, place)
+    robot, table = settings["robot"], TargetPath.model_validate(settings["trajectory"].get("path") or {})
+    path = table.between(start["position"], end, robot.get("z_axis", "down"))
+    if path is None:
+        return None
+    target = {**start, "position": end, "path": path.model_dump(mode="json", exclude_none=True)}
+    surroundings = {name: settings[name] for name in SurroundingsKeys.model_fields if name in settings}
+    return {"schema": 1, "robot": robot, **keys, "pose": [start, target], **surroundings}
+
+
 def _start(settings: Mapping[str, Any], place: Mapping[str, float]) -> dict[str, Any]:
-    if "from_x" in place:
-        return {"position": [float(place[f"from_{name}"]) for name in "xyz"]}
-    return dict(settings.get("trajectory", {}).get("from") or {"rest": True})
+    start = dict(settings.get("trajectory", {}).get("from") or {})
+    if any(f"from_{name}" in place for name in "xyz"):
+        fixed = start.get("position", [0.0, 0.0, 0.0])
+        start["position"] = [float(place.get(f"from_{name}", fixed[i])) for i, name in enumerate("xyz")]
+    return start or {"rest": True}
 
 
 def _target(settings: Mapping[str, Any], place: Mapping[str, float]) -> list[float]:

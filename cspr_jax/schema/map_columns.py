@@ -34,6 +34,7 @@ OF_LINES = (
     *("verdict", "duration", "acceleration_time", "least_duration", "duration_ratio", "rest_margin"),
     *("active_up", "active_down"),
 )
+OF_PATHS = ("verdict", "duration", "lower_bound", "tension_margin", "tension_margin_bound")
 OF_LAUNCHES = (
     *("verdict", "release_speed", "largest_margin", "duration", "release_time", "flight_time"),
     *("release_x", "release_y", "release_z"),

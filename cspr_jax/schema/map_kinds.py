@@ -15,7 +15,16 @@ from typing import Any, Literal
 from cspr_jax.errors import InputError
 from cspr_jax.schema import map_columns as columns
 from cspr_jax.schema import workspace_columns as of_workspaces
-from cspr_jax.schema.quantities import EVERY, MOTION_CLEARANCE, OF_ELLIPSES, POSE_VERDICT, QUANTITIES, Quantity
+from cspr_jax.schema.families import ANY_PATTERN
+from cspr_jax.schema.quantities import (
+    EVERY,
+    MOTION_CLEARANCE,
+    OF_ELLIPSES,
+    OF_PATHS,
+    POSE_VERDICT,
+    QUANTITIES,
+    Quantity,
+)
 from cspr_jax.schema.quantities import register as register_quantity
 from cspr_jax.schema.tiles import LARGEST_TILE, ORDINARY_COST, CellCost
 
@@ -55,6 +64,7 @@ class MapKind:
             which robot that is; none: robots go to its class as their files have them.
         by_processes: whether the command line has several processes compute its tiles, where nobody says how many: much
             of the work is outside of XLA, where threads of one process wait for each other.
+        variants: rows of the same name for further trajectory families.
     """
 
     name: str
@@ -80,6 +90,20 @@ class MapKind:
     rows: tuple[Quantity, ...] = ()
     planned: bool = False
     by_processes: bool = False
+    variants: tuple["MapKind", ...] = ()
+
+    @property
+    def forms(self) -> tuple["MapKind", ...]:
+        """The row and its variants."""
+        return (self, *self.variants)
+
+    def of(self, family: str) -> "MapKind":
+        """The row of a trajectory family.
+
+        Returns:
+            the row; this one for families that none of them takes.
+        """
+        return next((form for form in self.forms if family in form.families), self)
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -262,6 +286,29 @@ MAP_KINDS: dict[str, MapKind] = {
             patterns=("2T", "3T"),
             start="point",
             takes=("axes.from_x", "axes.from_y", "axes.from_z", "trajectory.max_acceleration", "limits"),
+            variants=(
+                MapKind(
+                    name="least-time",
+                    title="Least durations along paths",
+                    description="least duration of all motions along the path to each target, and a lower bound of it",
+                    implementation="cspr_jax.paths.map:PathsMap",
+                    cost=CellCost(seconds=0.5),
+                    quantities=(*columns.OF_PATHS, *columns.TOLERATED, "clearance"),
+                    stored=columns.OF_PATHS,
+                    pictured=("duration",),
+                    families=("path",),
+                    planned=True,
+                    patterns=ANY_PATTERN,
+                    start="pose",
+                    takes=(
+                        *("axes.from_x", "axes.from_y", "axes.from_z", "trajectory.path"),
+                        *("limits", "limits.uncertainty", *columns.SURROUNDINGS),
+                    ),
+                    stored_with=(*columns.UNCERTAIN, *((key, ("clearance",)) for key in columns.SURROUNDINGS)),
+                    only_with=((("clearance",), columns.SURROUNDINGS),),
+                    rows=OF_PATHS,
+                ),
+            ),
         ),
         MapKind(
             name="launch-range",
@@ -353,8 +400,8 @@ def quantity_of(kind: object, name: str) -> Quantity:
     Returns:
         the row.
     """
-    quantities = MAP_KINDS[kind].rows if isinstance(kind, str) and kind in MAP_KINDS else ()
-    return next((row for row in quantities if row.name == name), EVERY[name])
+    forms = MAP_KINDS[kind].forms if isinstance(kind, str) and kind in MAP_KINDS else ()
+    return next((row for form in forms for row in form.rows if row.name == name), EVERY[name])
 
 
 def register(kind: MapKind, *quantities: Quantity) -> None:
@@ -412,4 +459,4 @@ def kinds_with(key: str) -> list[str]:
     Returns:
         their names.
     """
-    return [kind.name for kind in MAP_KINDS.values() if key in kind.keys]
+    return [kind.name for kind in MAP_KINDS.values() if any(key in form.keys for form in kind.forms)]

@@ -366,6 +366,33 @@ OF_ELLIPSES = (
         "size, speeds and accelerations over what is allowed; NaN where only formulas are used.",
     ),
 )
+# Maps of lines and paths have these rows in place of those of arcs and of ellipses.
+OF_PATHS = (
+    Quantity(
+        "duration",
+        "s",
+        "duration",
+        "Duration of the motion to the target; NaN where none is feasible, 0 where the target is the start.",
+        better="smaller",
+    ),
+    Quantity(
+        "tension_margin",
+        "N",
+        "smallest distance of a tension from its limits",
+        "Smallest along the motion, of redundant cables that of the tensions that keep it largest; negative where they "
+        "break a limit; along a slow motion where none is feasible.",
+        signed=True,
+    ),
+    Quantity(
+        "clearance",
+        "m",
+        "clearance of the motion",
+        "Smallest distance of cables, and of a platform of known shape, from obstacles and from each other, along the "
+        "motion, less the cables' thickness; NaN where something else is in the way of the motion.",
+        signed=True,
+        better="larger",
+    ),
+)
 # Maps of motions among obstacles have this row in place of the clearance of poses.
 MOTION_CLEARANCE = Quantity(
     "clearance",
@@ -757,6 +784,13 @@ QUANTITIES = {
             "least duration of any motion",
             "Duration of the fastest motion along the line, which accelerates at the bound, then brakes at the bound.",
         ),
+        Quantity(
+            "lower_bound",
+            "s",
+            "lower bound of the least time",
+            "Proved: no motion along the path, with the same stops, takes less time within the limits; NaN where no "
+            "bound is known.",
+        ),
         Quantity("duration_ratio", "1", "duration over the least one", "Duration of the law over `least_duration`."),
         Quantity(
             "rest_margin",
@@ -882,6 +916,12 @@ QUANTITIES = {
             "Smallest along a turn, of redundant cables that of the tensions that keep it largest; negative where they "
             "break a limit; NaN where only formulas are used.",
             signed=True,
+        ),
+        Quantity(
+            "tension_margin_bound",
+            "N",
+            "proved lower bound of the distance of tensions from their limits",
+            "Proved: at no instant of the motion is `tension_margin` smaller.",
         ),
     )
 }

@@ -20,7 +20,7 @@ _START = ("from_x", "from_y", "from_z")
 _SPECIAL = (
     *(f"axes.{name}" for name in Axes.model_fields if name not in _TARGETS),
     *("trajectory.inclination", "trajectory.beta_hat", "trajectory.beat"),
-    *("trajectory.max_acceleration", "trajectory.rule"),
+    *("trajectory.max_acceleration", "trajectory.rule", "trajectory.path"),
     *("limits", "limits.uncertainty", "orientations", "orientations.values", "launch", "workspace", "ellipse"),
     *SurroundingsKeys.model_fields,
 )
@@ -43,12 +43,15 @@ def check_map(kind: MapKind, keys: SweepFile, path: Path) -> None:
     if kind.families:
         if "trajectory" not in keys.model_fields_set:
             raise ConfigError(path, f"trajectory is missing: {SweepFile.model_fields['trajectory'].description}")
-        _check_choice(keys.trajectory.family, "trajectory.family", kind.families, path)
+        families = tuple(name for form in MAP_KINDS[keys.map].forms for name in form.families)
+        _check_choice(keys.trajectory.family, "trajectory.family", families, path)
     elif "family" in keys.trajectory.model_fields_set:
         raise ConfigError(path, "trajectory.family: must be absent in this map, whose cells are places")
     for name in _SPECIAL:
         if name not in kind.keys and _missing(keys, name) is None:
-            raise ConfigError(path, f"{name}: must be absent in this map{_hint(kinds_with(name))}")
+            others = any(name in form.keys for form in MAP_KINDS[keys.map].forms)
+            where = f'with family = "{keys.trajectory.family}"' if others else f"in this map{_hint(kinds_with(name))}"
+            raise ConfigError(path, f"{name}: must be absent {where}")
     if keys.orientations is not None and keys.orientations.definition is not None:
         _check_choice(keys.orientations.definition, "orientations.definition", kind.definitions, path)
     for missing in filter(None, (_missing(keys, name) for name in kind.needs)):

@@ -106,7 +106,7 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
     refuse_other_kinds(data, "sweep", path)
     keys = checked(SweepFile, data, path)
     robot = resolve_robot(keys.robot, path, path.parent)
-    kind = MAP_KINDS[keys.map]
+    kind = MAP_KINDS[keys.map].of(keys.trajectory.family)
     check_map(kind, keys, path)
     robot = as_moved(robot, [kind.patterns]) if kind.patterns else robot
     orientation_axes = _orientation_axes(keys) if kind.is_over_orientations else {}
