@@ -82,7 +82,7 @@ class PathsMap(GridMap):
             still = proved_answers(self._problem, [self._still(end) for end in ends[~moves]], self._scene)
             for column in columns.values():
                 column[~moves] = np.where(still.feasible, 0.0, np.nan)
-        parts = [(moves, fastest and fastest.answers), (~moves, still)]
+        parts = [(moves, None if fastest is None else fastest.answers), (~moves, still)]
         return columns | _joined([(rows, _columns(answers)) for rows, answers in parts if answers is not None])
 
     def _sections(self, table: PathTable, start: np.ndarray, end: np.ndarray) -> list[Section]:
