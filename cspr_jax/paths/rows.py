@@ -165,8 +165,11 @@ def _of_tensions(robot: AnyRobot, limits: Limits, wrenches: UnitWrenches) -> tup
     faces, weight = tension_faces(robot, limits, wrenches.matrix), robot.mass * robot.gravity
     inverse, bounds = right_inverse(wrenches.matrix), jnp.isfinite(faces.least)
     momentum, bend, rest = (jnp.sum(faces.along * (inverse @ x)[None], axis=1) / weight for x in wrenches[1:])
-    most = jnp.where(bounds, rest - jnp.where(bounds, faces.least, 0.0) / weight, 1.0)
-    return -momentum, -bend, most, jnp.where(bounds, jnp.sum(jnp.abs(faces.along), axis=1) / weight, 0.0)
+    most = rest - jnp.where(bounds, faces.least, 0.0) / weight
+    size = jnp.sum(jnp.abs(faces.along), axis=1) / weight
+    # A face without a bound is 0 <= 1.
+    momentum, bend, size = (jnp.where(bounds, x, 0.0) for x in (-momentum, -bend, size))
+    return momentum, bend, jnp.where(bounds, most, 1.0), size
 
 
 def tangent_directions(velocity: Array, acceleration: Array) -> Array:
