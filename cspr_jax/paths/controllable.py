@@ -118,7 +118,7 @@ def _edge(bounds: _Bounds, x: Array, sign: float) -> tuple[Array, Array]:
         is_outside &= ~(gap >= -rounding)
         # A gap that is NaN, beyond an empty set, leads nowhere.
         leads = (gap < 0.0) & (slope * sign < 0.0)
-        # Where no step leads on, the last x stays.
+        # The last x stays where no step leads on.
         is_lost |= is_outside & ~leads
         is_outside &= leads
         return jnp.where(is_outside, x - gap / jnp.where(leads, slope, 1.0), x), is_outside, is_lost, step + 1
