@@ -92,9 +92,10 @@ def test_the_rate_of_paths(monkeypatch):
     for name, few in (("TOGETHER", 2), ("CELLS", 40)):
         monkeypatch.setattr(paths, name, few)
     monkeypatch.setattr(timing, "REPEATS", 1)
-    assert paths.rate(motions.THREE) > 0.0 and paths.lines({"3 cables": 5.0})[1].split()[-1] == "5"
+    region = paths.REGIONS["3 cables"]
+    assert paths.rate(region) > 0.0 and paths.lines({"3 cables": 5.0})[1].split()[-1] == "5"
     with pytest.raises(SelfCheckError, match="cannot be run along"):
-        paths.rate(motions.THREE._replace(tensions=(3.9, 4.0)))
+        paths.rate(region._replace(tensions=(3.9, 4.0)))
 
 
 @with_compiler
