@@ -6,7 +6,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from cspr_jax.config.gcode import SAME_PLACE
 from cspr_jax.config.limits import NotNegative, Point, Positive
 from cspr_jax.config.reading import Table
 from cspr_jax.config.trajectory import Angle, Quaternion
@@ -30,6 +29,8 @@ _KINDS = {
 }
 _NEEDED = {"arc": ("centre", "angle"), "circle": ("centre",), "csv": ("file",), "gcode": ("file",)}
 GRID, RAMP_TIME = 500, 0.1
+# Places less far apart are one, m.
+SAME_PLACE = 1e-9
 # Number of cells of a grid in maps, where many paths are asked.
 MAP_GRID = 200
 MOST_POINTS = 100_000
