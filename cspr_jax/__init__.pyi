@@ -27,7 +27,6 @@ from cspr_jax.api.motions import slacks as slacks
 from cspr_jax.api.motions import spline as spline
 from cspr_jax.api.motions import tensions as tensions
 from cspr_jax.api.motions import transition as transition
-from cspr_jax.api.paths import LeastTimePaths as LeastTimePaths
 from cspr_jax.api.paths import least_time_paths as least_time_paths
 from cspr_jax.api.pictures import plot as plot
 from cspr_jax.api.plans import plan as plan

@@ -107,7 +107,7 @@ def good():
     values |= dict.fromkeys(("spool_radius", "platform_radius", "drum_radius", "pulses", "cable_error"), 1.0)
     values |= {"base_points": robot.base_points, "platform_points": robot.base_points, "inertia": np.eye(3)}
     values |= dict.fromkeys(("given", "path", "output", "results", "result", "directory", "names", "reference"), "a")
-    values |= {"times": [0.0, 1.0]}
+    values |= {"times": [0.0, 1.0], "paths": [[[0.4, 0.1, 1.5], [0.3, 0.1, 1.5]]]}
     values |= {"durations": [1.0], "name": "quintic", "what": "robot", "errors": cspr_jax.LaunchErrors()}
     return values
 

@@ -17,7 +17,7 @@ from cspr_jax.errors import ConfigError, InputError, StoreError
 from cspr_jax.outputs.plan_report import plan_object
 from cspr_jax.outputs.plots.draw import _map_figure
 from cspr_jax.outputs.plots.sections import NONE_COLOUR
-from cspr_jax.schema.quantities import AXES, FAILURES, FLIGHT, QUANTITIES, SEGMENTS, TRAJECTORY, flag_attributes
+from cspr_jax.schema.quantities import AXES, FAILURES, FLIGHT, PATHS, QUANTITIES, SEGMENTS, TRAJECTORY, flag_attributes
 from cspr_jax.schema.verdicts import SENTENCES
 from cspr_jax.store.netcdf import make_datasets, new_hdf5
 from cspr_jax.store.result import Result
@@ -95,7 +95,7 @@ def test_robots(capsys):
 def test_quantities(capsys):
     found = {(row["group"], row["name"]): row for row in strict_json(cspr(capsys, "quantities", "--json"))}
     tables = {"axis": AXES, "map": QUANTITIES, "motion": TRAJECTORY, "segment": SEGMENTS}
-    tables |= {"flight": FLIGHT, "failure": FAILURES}
+    tables |= {"flight": FLIGHT, "failure": FAILURES, "path": PATHS}
     assert set(found) == {(group, name) for group, table in tables.items() for name in table}
     assert found["map", "duration"]["units"] == "s" and found["motion", "tension"]["units"] == "N"
     people = cspr(capsys, "quantities")

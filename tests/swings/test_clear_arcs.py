@@ -139,7 +139,7 @@ def test_surroundings_that_are_refused():
         (
             {"map": "least-time", "trajectory": {"family": "s-curve", "from": {"position": [0.1, 0.05, 1.5]}}}
             | {"axes": {"x": [0.0], "y": [0.0], "z": [1.5]}},
-            'obstacle: must be absent in this map; it is for map = "minimum-arcs"',
+            'obstacle: must be absent with family = "s-curve"',
         ),
         ({"robot": "launch-robot"}, "obstacle: must be absent, but in plans"),
     ):
