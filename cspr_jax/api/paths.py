@@ -127,9 +127,7 @@ def least_time_paths(
 
 def _sections(i: int, file: RobotFile, table: PathTable, points: Any, quaternions: Sequence | None) -> list[Section]:
     # Sections of one path, in the axes of the robot.
-    places = np.asarray(points, float)
-    if places.ndim != 2 or places.shape[1] != 3 or not np.isfinite(places).all():
-        raise InputError(f"paths[{i}]", None, "finite points of shape (k, 3), m", fault=f"shape {places.shape}")
+    places = _numbers(f"paths[{i}]", points, 3)
     units = None
     if file.is_platform:
         units = np.tile([1.0, 0.0, 0.0, 0.0], (len(places), 1))
@@ -147,6 +145,19 @@ def _sections(i: int, file: RobotFile, table: PathTable, points: Any, quaternion
         return course_through(table, places, units).sections()
     except InputError as error:
         raise InputError(f"paths[{i}], {error.key}", error.value, error.allowed, fault=error.fault) from error
+
+
+def _numbers(name: str, values: Any, width: int) -> np.ndarray:
+    # Rows of finite numbers.
+    try:
+        array = np.asarray(values)
+    except ValueError as error:  # of rows of several lengths
+        raise InputError(
+            name, None, f"finite numbers of shape (k, {width})", fault="rows of several lengths"
+        ) from error
+    if array.ndim != 2 or array.shape[1] != width or array.dtype.kind not in "iuf" or not np.isfinite(array).all():
+        raise InputError(name, None, f"finite numbers of shape (k, {width})", fault=f"shape {array.shape}")
+    return array.astype(float)
 
 
 def _placed(file: RobotFile, section: Section, axes: Any, reference: np.ndarray) -> Section:

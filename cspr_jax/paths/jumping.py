@@ -10,7 +10,7 @@ import numpy as np
 from cspr_jax.arithmetic.batches import padded, room
 from cspr_jax.paths.controllable import GridSolution, fastest, smallest_of_slopes
 from cspr_jax.paths.discrete import Discrete
-from cspr_jax.paths.timed import PathSpeeds
+from cspr_jax.paths.timed import PathSpeeds, moving
 
 # Sections that are solved together, beside one alone; how often changes of u within cells are taken from the solution.
 TOGETHER, BENT = 32, 2
@@ -74,7 +74,7 @@ def run_of(solution: GridSolution, path: Discrete, bend: np.ndarray) -> PathSpee
         return None
     half = 0.5 * bend * path.grid.width
     u = np.asarray(solution.u)
-    return PathSpeeds(np.asarray(solution.x), u - half, u + half)
+    return moving(PathSpeeds(np.asarray(solution.x), u - half, u + half), path.grid.width)
 
 
 def jumping_motions(paths: Sequence[Discrete]) -> list[Jumping]:

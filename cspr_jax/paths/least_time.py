@@ -17,14 +17,15 @@ from cspr_jax.paths.refusals import NoMotion, refusal
 from cspr_jax.paths.section import Section, SectionSettings
 from cspr_jax.paths.smooth import SectionEnds, Smooth, below_ramps, smooth
 from cspr_jax.paths.tightening import cell_slacks
-from cspr_jax.paths.timed import PathSpeeds, cell_times, distance_from_path, timed
+from cspr_jax.paths.timed import PathSpeeds, cell_times, distance_from_path, moving, timed
 from cspr_jax.robots.clearance import Scene
 
 # Rounds of proof and tightening; how often ramps are shortened by half where none of their length exist.
 ROUNDS, SHORTER = 8, 4
 # Speed of a motion that counts as slow, over that of a fall along the path.
 SLOW = 0.01
-# How many times as fine grids are for lower bounds that are further below the duration than this part of it.
+# How many times as fine grids are for motions that are not proved, and for lower bounds that are further below the
+# duration than this part of it.
 FINER, APART = (2, 4), 0.002
 # Shares of x of the motion without ramps from which the search for one with ramps begins; optima, each with tangents
 # at the one before.
@@ -105,35 +106,43 @@ def least_time_motions(
     """
     paths = discretes(problem, sections, settings)
     cases = zip(paths, jumping_motions(paths), settings, strict=True)
-    return [_proved(problem, scene, *case) for case in cases]
+    answers = [_proved(problem, scene, *case) for case in cases]
+    for finer in FINER:
+        # A motion that is not proved on its grid may be on a finer one.
+        rows = [k for k, (answer, is_met) in enumerate(answers) if answer.failure is None and not is_met]
+        if not rows:
+            break
+        closer = [settings[k]._replace(grid=finer * settings[k].grid) for k in rows]
+        paths = discretes(problem, [sections[k] for k in rows], closer)
+        for k, path, start, each in zip(rows, paths, jumping_motions(paths), closer, strict=True):
+            answers[k] = _proved(problem, scene, path, start, each)
+    return [answer for answer, _ in answers]
 
 
 def _proved(
     problem: Problem, scene: Scene | None, path: Discrete, start: Jumping, settings: SectionSettings
-) -> LeastTime:
-    # Tighten the limits on the grid until the motion keeps them everywhere.
+) -> tuple[LeastTime, bool]:
+    # Tighten the limits on the grid until the motion keeps them everywhere, and tell whether it does.
     jumping, bend, first = start
     if jumping is None:
-        return _without_motion(problem, path, first)
+        return _without_motion(problem, path, first), False
     section = path.section
     fastest_time = float(cell_times(jumping, path.grid.width).sum())
     bound = _bound(problem, path, settings, jumping.x, fastest_time)
     run, jerk = _ramped(path, jumping, settings.ramp_time)
     margins, weight = path.no_margins, float(problem.robot.mass * problem.robot.gravity)
+    slower: PathSpeeds | None = run
     for _ in range(ROUNDS):
-        motion = timed(section, path.grid, run)
-        slacks = cell_slacks(problem, motion, scene)
-        if slacks.is_met:
-            break
-        margins = slacks.grown(margins, weight)
-        tighter = path.with_margins(margins)
-        slower = _slower(tighter, run, bend, jerk)
         if slower is None:
             break
         run = slower
+        motion = timed(section, path.grid, run)
+        slacks = cell_slacks(problem, motion, scene)
+        margins = slacks.grown(margins, weight)
+        slower = None if slacks.is_met else _slower(path.with_margins(margins), run, bend, jerk)
     times = np.diff(np.asarray(motion.knots))
     speed = np.sqrt(run.x)
-    return LeastTime(
+    answer = LeastTime(
         motion=motion,
         coordinate=path.grid.nodes,
         duration=float(times.sum()),
@@ -146,6 +155,7 @@ def _proved(
         plane=_plane(path, first, speed),
         failure=None,
     )
+    return answer, slacks.is_met
 
 
 def _bound(problem: Problem, path: Discrete, settings: SectionSettings, x: np.ndarray, duration: float) -> float:
@@ -210,7 +220,11 @@ def _ramped(path: Discrete, jumping: PathSpeeds, ramp_time: float) -> tuple[Path
 
 def _smoothed(path: Discrete, start: Smooth, ends: SectionEnds, jerk: float, times: int) -> PathSpeeds | None:
     motion = smooth(path.node_rows(), ends, start, jerk, times)
-    return None if motion is None else PathSpeeds(motion.x, motion.u[:-1], motion.u[1:], ends.rests)
+    return (
+        None
+        if motion is None
+        else moving(PathSpeeds(motion.x, motion.u[:-1], motion.u[1:], ends.rests), path.grid.width)
+    )
 
 
 def _slower(path: Discrete, run: PathSpeeds, bend: np.ndarray, jerk: float) -> PathSpeeds | None:

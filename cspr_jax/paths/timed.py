@@ -59,6 +59,18 @@ def cell_times(run: PathSpeeds, width: np.ndarray) -> np.ndarray:
     return times
 
 
+def moving(run: PathSpeeds, width: np.ndarray) -> PathSpeeds | None:
+    """Path speeds that run through all cells.
+
+    Args:
+        width: (n_cells,) m.
+
+    Returns:
+        the speeds; None if the motion stops, or turns back, within a cell.
+    """
+    return run if np.isfinite(cell_times(run, width)).all() else None
+
+
 def timed(section: Section, grid: PathGrid, run: PathSpeeds) -> Spline:
     """The motion.
 

@@ -86,7 +86,7 @@ def is_good(function: str, key: str, kind: str) -> bool:
     parameter = inspect.signature(TAKING[function]).parameters[key]
     if kind == "None":
         return parameter.default is None or (function, key) in NONE
-    if kind == "string" and function in ("check", "check_many"):
+    if kind == "string" and function in ("check", "check_many", "least_time_paths"):
         return key == "robot" or (function, key) == ("check", "times")
     return kind == "string" and key in TEXTS | PATHS
 
