@@ -69,8 +69,8 @@ def least_time_paths(
     paths,
     quaternions=None,
     *,
-    kind: str = "cubic",
-    corner: str = "stop",
+    kind: str | None = None,
+    corner: str | None = None,
     blend_tolerance: float | None = None,
     grid: int = GRID,
     ramp_time: float = 0.0,
@@ -82,8 +82,8 @@ def least_time_paths(
         robot: a robot, the name of one of the catalogue, or the path of a robot file.
         paths: n arrays (k, 3) of points of the mass centre, in the axes of the robot, m; or one array (n, k, 3).
         quaternions: n arrays (k, 4) of orientations at the points, scalar first; None: the platform's own axes.
-        kind: "line" (a stop at every point), "polyline", "cubic" or "quintic": how points are joined.
-        corner: of polylines, "stop" or "blend".
+        kind: "line" (a stop at every point), "polyline", "cubic" or "quintic": how points are joined; None: "cubic".
+        corner: of polylines, "stop" or "blend"; None: "stop".
         blend_tolerance: largest distance of a blended path from the corner, m.
         grid: number of cells into which each part of a path without a stop is cut.
         ramp_time: time in which accelerations rise and fall, s; 0: they jump.
@@ -96,8 +96,13 @@ def least_time_paths(
         InputError: points that make no path, or an impossible argument.
     """
     keys = plan_keys(check_keys(robot, limits), NAME)
-    settings = {"kind": kind, "grid": grid, "ramp_time": ramp_time, "blend_tolerance": blend_tolerance}
-    settings |= {"corner": corner} if kind == "polyline" else {}
+    settings = {
+        "kind": kind or "cubic",
+        "corner": corner,
+        "grid": grid,
+        "ramp_time": ramp_time,
+        "blend_tolerance": blend_tolerance,
+    }
     table = checked_table(PathTable, {key: value for key, value in settings.items() if value is not None}, NAME)
     if not len(paths):
         raise InputError("paths", None, "must hold at least one path", fault="none")
@@ -132,12 +137,11 @@ def _sections(i: int, file: RobotFile, table: PathTable, points: Any, quaternion
     if file.is_platform:
         units = np.tile([1.0, 0.0, 0.0, 0.0], (len(places), 1))
         if quaternions is not None:
-            units = np.asarray(quaternions[i], float)
+            name = f"quaternions[{i}]"
+            units = _numbers(name, quaternions[i] if i < len(quaternions) else [], 4)
             sizes = np.linalg.norm(units, axis=-1, keepdims=True)
-            if units.shape != (len(places), 4) or not (np.isfinite(units).all() and (sizes > 0.0).all()):
-                raise InputError(
-                    f"quaternions[{i}]", None, f"({len(places)}, 4) numbers, none of length 0", fault="not"
-                )
+            if len(units) != len(places) or not (sizes > 0.0).all():
+                raise InputError(name, None, f"must be {len(places)}, none of them zero", fault=f"{len(units)} of them")
             units = units / sizes
     elif quaternions is not None:
         raise InputError("quaternions", None, "must be absent for a point mass", fault="given")
