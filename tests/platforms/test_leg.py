@@ -15,6 +15,7 @@ from oracles import platform as oracle
 from support.commands import cspr, plan
 from support.platforms import (
     FROM_REST,
+    JUDGED,
     MSSM,
     SHORT,
     Z0,
@@ -37,7 +38,6 @@ from cspr_jax.platforms.platform_segment import motion
 from cspr_jax.platforms.slacks import pose_slacks
 from cspr_jax.published import table_3_2
 from cspr_jax.robots.interference import cable_directions, cables_cross, contacts, gaps, platform_hit
-from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import Verdict
 
 
@@ -239,8 +239,8 @@ def test_limits_of_a_platform():
         "cable_speed_max": np.abs(speeds).max(),
         "cable_acceleration_max": np.abs(bends).max(),
     }
-    loose = {row.name: values[row.name] * (2.0 if row.sense == "most" else 0.5) for row in LIMITS}
-    for row in LIMITS:
+    loose = {row.name: values[row.name] * (2.0 if row.sense == "most" else 0.5) for row in JUDGED}
+    for row in JUDGED:
         for factor, broken in ((0.999, row.sense == "most"), (1.001, row.sense == "least")):
             limits = limits_of(**loose | {row.name: values[row.name] * factor})
             found = checked(checker_of(kind=FROM_REST, limits=limits), [(start, end, (-1.0, -1.0), 5)])
