@@ -39,8 +39,8 @@ class LeastTimePaths(Columns):
     Fields:
         verdict: (n,) `Verdict` flags; 0 is feasible, proved.
         duration: (n,) s; inf where no motion is proved feasible.
-        lower_bound: (n,) rigorous lower bound of the time of any motion along the path with the same stops, s; NaN
-            where none is known.
+        lower_bound: (n,) rigorous lower bound of the time of any motion forward along the path, with the same
+            stops, s; NaN where none is known.
         margin: (n,) smallest distance of a tension from its limits, N.
         margin_bound: (n,) proved lower bound of the margin, N.
         motions: n motions in the axes of the robot, slow ones where none is feasible.

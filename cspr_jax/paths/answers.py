@@ -1,7 +1,9 @@
 """Answers of segments of paths: durations beside lower bounds, what binds, and where no motion passes."""
 
 import dataclasses
+import functools
 import math
+import operator
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
@@ -12,6 +14,7 @@ from cspr_jax.motions.cause import Cause, limit_words
 from cspr_jax.motions.proved_answers import ProvedAnswers
 from cspr_jax.paths.least_time import LeastTime
 from cspr_jax.paths.refusals import NoMotion
+from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import Verdict
 
 # An acceleration jumps where it changes by more than this part of the largest one; digits of numbers in lines, and
@@ -20,15 +23,7 @@ JUMP, DIGITS, PLACES = 0.01, 4, 5
 # Criteria that are named at most for what binds.
 MOST_BINDING = 10
 # Flags of what a slower motion may mend.
-OF_SPEED = (
-    Verdict.SLACK_CABLE
-    | Verdict.OVER_TENSION
-    | Verdict.WRENCH_INFEASIBLE
-    | Verdict.CABLE_TOO_FAST
-    | Verdict.CABLE_OVER_ACCELERATION
-    | Verdict.TOO_FAST
-    | Verdict.OVER_ACCELERATION
-)
+OF_SPEED = functools.reduce(operator.or_, (row.flag for row in LIMITS if row.of_motion), Verdict.WRENCH_INFEASIBLE)
 
 
 class SectionAnswer(NamedTuple):

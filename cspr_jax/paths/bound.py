@@ -24,7 +24,7 @@ LEAST = 1e-9
 
 
 def path_bound(problem: Problem, path: Discrete, x: np.ndarray) -> float:
-    """Rigorous lower bound of the time of any motion along a section.
+    """Rigorous lower bound of the time of any motion that goes forward along a section.
 
     Args:
         problem: robot and limits.

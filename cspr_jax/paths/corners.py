@@ -43,7 +43,7 @@ def tracks_of(elements: Sequence[Element], corners: Corners = "stop", tolerance:
     stops = [i + 1 for i, cut in enumerate(cuts) if cut is None]
     tracks = []
     for first, last in zip([0, *stops], [*stops, len(elements)], strict=True):
-        tracks.append(_track(elements[first:last], [0.0, *cuts[first : last - 1], 0.0]))  # type: ignore[list-item]
+        tracks.append(_track(elements[first:last], [0.0, *(cut or 0.0 for cut in cuts[first : last - 1]), 0.0]))
     return tracks
 
 

@@ -1,8 +1,8 @@
 """Rigorous lower bound of the least time along a path, by weak duality.
 
-A motion along a path obeys d(a s')/dt + r in K(s): a(s) is the momentum of a unit path speed, r the weight, K the
-wrenches that the cables can give. With u = s'' and x = s'^2, that is a u + a' x + r in K. For any continuous y(s), with
-S(y, s) the largest product of y with a wrench of K,
+A motion along a path that never turns back obeys d(a s')/dt + r in K(s): a(s) is the momentum of a unit path speed, r
+the weight, K the wrenches that the cables can give. With u = s'' and x = s'^2, that is a u + a' x + r in K. For any
+continuous y(s), with S(y, s) the largest product of y with a wrench of K,
 
     0 <= integral of S - y . (a u + a' x + r) = integral of S - y . r - (y . a' - y' . a) x / 2, less [y . a x / 2],
 
@@ -12,7 +12,7 @@ by parts, since u is half of the derivative of x along the path. The time is the
     T >= [y . a x / 2] + integral of 1.5 (y . a' - y' . a)^(1/3) + y . r - S(y, s).
 
 The limits of cables' accelerations (a = l') and of the Cartesian one (a = p') are of the same form; a limit of speed
-adds a multiplier times what it leaves. The multipliers of `paths.smooth` make the bound close; any others leave it
+adds a multiplier times what it leaves. The multipliers of `paths.multipliers` make the bound close; any others leave it
 true. Over each cell all functions lie in bands around lines (`arithmetic.affine_bounds`).
 """
 
@@ -29,7 +29,7 @@ from cspr_jax.arithmetic.affine_bounds import ROUNDING, AffineBounds, cross, dot
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.paths.discrete import Discrete
 from cspr_jax.paths.nodes import places_on, state_at
-from cspr_jax.paths.rows import unit_wrenches
+from cspr_jax.paths.rows import still, unit_wrenches
 from cspr_jax.robots.cables import AnyRobot, cable_motion, wrench_units
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.patterns import PATTERNS
@@ -85,7 +85,7 @@ class _Cell(NamedTuple):
 def lower_bound(
     robot: AnyRobot, limits: Limits, path: Discrete, multipliers: Multipliers, rates: SpeedMultipliers
 ) -> float:
-    """Lower bound of the time of all motions along a section.
+    """Lower bound of the time of all motions that go forward along a section, with its speeds at the ends.
 
     Args:
         robot: centred, z down.
@@ -200,14 +200,7 @@ def _kernel(robot: AnyRobot, limits: Limits, blocks: tuple[StateBounds, _Cell]) 
 def _of_wrenches(robot: AnyRobot, limits: Limits, state: StateBounds, cell: _Cell) -> tuple[AffineBounds, Array, Array]:
     # y . a' - y' . a of the wrench balance, the mean of S - y . r over the cell, and what y lacks of weight.
     unit = 1.0 / wrench_units(robot)
-    still = state.velocity * 0.0
-    rest, pushed = (
-        state._replace(velocity=still, acceleration=still),
-        state._replace(velocity=still, acceleration=state.velocity),
-    )
-    if state.rotation is not None:
-        rest = rest._replace(angular_velocity=still, angular_acceleration=still)
-        pushed = pushed._replace(angular_velocity=still, angular_acceleration=state.angular_velocity)
+    rest, pushed = still(state, pushed=False), still(state, pushed=True)
     cables = cable_bounds(robot, rest)
     matrix, weight = balance_bounds(robot, rest, cables)
     momentum = balance_bounds(robot, pushed, cables)[1] - weight

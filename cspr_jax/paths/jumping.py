@@ -39,7 +39,7 @@ def solved_together(paths: Sequence[Discrete], bends: Sequence[np.ndarray]) -> l
     Returns:
         one a section, without the axis of paths.
     """
-    solutions: list[GridSolution] = [None] * len(paths)  # type: ignore[list-item]
+    solutions: dict[int, GridSolution] = {}
     groups = defaultdict(list)
     for k, path in enumerate(paths):
         groups[path.start.u.shape].append(k)
@@ -57,7 +57,7 @@ def solved_together(paths: Sequence[Discrete], bends: Sequence[np.ndarray]) -> l
             answer = jax.tree.map(np.asarray, answer)
             for i, k in enumerate(chosen):
                 solutions[k] = jax.tree.map(lambda leaf, i=i: leaf[..., i], answer)
-    return solutions
+    return [solutions[k] for k in range(len(paths))]
 
 
 def run_of(solution: GridSolution, path: Discrete, bend: np.ndarray) -> PathSpeeds | None:

@@ -58,7 +58,8 @@ class LeastTime:
         motion: over time; its knots are those of the grid; a slow one if none is feasible.
         coordinate: (n_nodes,) s at these knots, m.
         duration: of it, s.
-        lower_bound: rigorous lower bound of the time of any motion along the section, s; NaN where none is known.
+        lower_bound: rigorous lower bound of the time of any motion that goes forward along the section, s; NaN where
+            none is known.
         jumping: duration of the fastest motion without ramps on the same grid, before margins, s.
         ramp_time: of the motion, s; 0 where its accelerations jump.
         deviation: largest distance of the motion from the path at samples, m.

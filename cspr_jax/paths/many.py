@@ -23,7 +23,7 @@ class PathTimes:
     Fields:
         answers: verdicts and margins, proved.
         duration: (n,) s; inf where no motion is proved feasible.
-        lower_bound: (n,) rigorous lower bound of the time of any motion along the path that stops where this one does,
+        lower_bound: (n,) rigorous lower bound of the time of any motion forward along the path, with the same stops,
             s; NaN where none is known.
         motions: over time, from the centroid of the spools; slow ones where none is feasible.
         sections: (n,) for each path the motions along its sections.

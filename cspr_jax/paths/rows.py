@@ -6,7 +6,7 @@ the set of wrenches that the cables can give, each limit of a cable's accelerati
 Cartesian acceleration is one half-plane (Bobrow, Dubowsky and Gibson 1985; Verscheure et al. 2009; Pham and Pham 2018).
 """
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import jax.numpy as jnp
 import numpy as np
@@ -16,6 +16,7 @@ from cspr_jax.robots.cables import AnyRobot, cable_motion, wrench_units
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.nearest_face import beside_faces, one_sided_faces
 from cspr_jax.robots.state import State
+from cspr_jax.robots.state_bounds import StateBounds
 from cspr_jax.robots.tension_distribution import all_tensions
 from cspr_jax.robots.witness_tensions import right_inverse
 from cspr_jax.robots.wrench_sets import spanning, tension_range
@@ -24,6 +25,7 @@ from cspr_jax.robots.wrench_sets import spanning, tension_range
 TANGENTS = 24
 # Squared sizes that are taken to be no smaller, so that quotients stay finite.
 TINY = 1e-30
+StateKind = TypeVar("StateKind", State, StateBounds)
 
 
 class Rows(NamedTuple):
@@ -69,17 +71,17 @@ class UnitWrenches(NamedTuple):
     rest: Array
 
 
-def still(state: State, *, pushed: bool) -> State:
+def still(state: StateKind, *, pushed: bool) -> StateKind:
     """State of a path that stands still, or sets off from there at a unit path acceleration.
 
     Args:
-        state: of the path, run along at a unit path speed.
+        state: of the path, run along at a unit path speed; or its bounds.
         pushed: whether it sets off.
 
     Returns:
         the state.
     """
-    none = jnp.zeros_like(state.velocity)
+    none = state.velocity * 0.0
     changes = {"velocity": none, "acceleration": state.velocity if pushed else none}
     if state.rotation is not None:
         changes |= {"angular_velocity": none, "angular_acceleration": state.angular_velocity if pushed else none}

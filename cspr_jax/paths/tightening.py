@@ -8,11 +8,10 @@ from cspr_jax.curves.spline import Spline
 from cspr_jax.motions.block_slacks import block_slacks
 from cspr_jax.motions.criteria import Criterion, criteria
 from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.proved_answers import TENSIONS
 from cspr_jax.paths.discrete import GridMargins
 from cspr_jax.robots.clearance import Scene
-from cspr_jax.schema.verdicts import Verdict
 
-TENSIONS = Verdict.SLACK_CABLE | Verdict.OVER_TENSION | Verdict.WRENCH_INFEASIBLE
 # Slack, over its scale, that is left where a limit is met; by what more than is missed, and by how
 # much at least, margins grow; below which a criterion binds.
 LEFT, MORE, STEP, BINDING = 1e-7, 1.3, 1e-5, 0.01

@@ -119,8 +119,8 @@ SEGMENT = {
     ),
     "lower_bound": (
         "s",
-        "Paths: proved lower bound of the time of any motion along the segment, from stop to stop; null where a "
-        "section without a stop runs on through a pose, or has no motion.",
+        "Paths: proved lower bound of the time of any motion forward along the segment, from stop to stop; null where "
+        "a section without a stop runs on through a pose, or has no motion.",
     ),
     "gap": ("1", "Paths: 1 - `lower_bound` / `duration`."),
     "binding": (
@@ -135,7 +135,7 @@ SECTION = {
     "segments": ("1", "Numbers of the segments in which it begins and ends."),
     "length": ("m", "Length of the way of the mass centre."),
     "duration": ("s", "Duration."),
-    "lower_bound": ("s", "Proved lower bound of the time of any motion along it; null without a motion."),
+    "lower_bound": ("s", "Proved lower bound of the time of any motion forward along it; null without a motion."),
     "gap": ("1", "1 - `lower_bound` / `duration`."),
     "ramp_time": (
         "s",

@@ -286,8 +286,8 @@ PATHS = {
             "segment_lower_bound",
             "s",
             "lower bound of the time",
-            "Proved lower bound of the time of any motion along the segment, from stop to stop; NaN where a section "
-            "without a stop runs on through a pose, or has no motion.",
+            "Proved lower bound of the time of any motion forward along the segment, from stop to stop; NaN where a "
+            "section without a stop runs on through a pose, or has no motion.",
         ),
         Quantity("path_binds", "1", "what binds", f"Bit flag of the limit that binds behind the node{HOW}.", "uint32"),
         Quantity(

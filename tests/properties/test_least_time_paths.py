@@ -197,6 +197,17 @@ def test_verdicts_are_those_of_linear_programs(kind):
     assert differ == {}
 
 
+def test_no_largest_tension_is_a_very_large_one():
+    """Faces without a bound bound no motion, and the lower bound holds beside them."""
+    path = path_rows.through(np.array([[-0.15, 0.0, 0.8], [0.0, 0.12, 1.1], [0.15, -0.05, 0.9]]))
+    least, speeds = {"tension_min": np.full(3, LOW)}, {"cable_speed_max": np.full(3, 1.5)}
+    large = solve(RING, path, {**least, **speeds, "tension_max": np.full(3, 1e6)}, 150)
+    none = solve(RING, path, {**least, **speeds}, 150)
+    assert none.verdict == "feasible"
+    assert none.time == pytest.approx(large.time, rel=1e-3)
+    assert (1.0 - 2.0 * SHORTER) * none.time <= none.lower <= none.time
+
+
 @pytest.mark.parametrize("kind", ["2T-3", pytest.param("3R3T-7", marks=pytest.mark.thorough)])
 def test_backwards_it_takes_as_long(kind):
     case = least_time_cases.case(kind, 1)
