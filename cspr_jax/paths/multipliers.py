@@ -12,6 +12,9 @@ from scipy.linalg import solveh_banded
 
 from cspr_jax.paths.interior_point import interior_point
 
+# Shares of the x of a motion from which the search begins, one after the other: next to limits it may come to a halt.
+STARTS = (0.8, 0.4, 1.0)
+
 
 class SideRows(NamedTuple):
     """Half-planes at the nodes, of both sides where they differ: u_share u + x_share x <= most, and caps of the cells.
@@ -44,7 +47,11 @@ def dual_multipliers(rows: SideRows, ends: tuple[float, float], start: np.ndarra
         (n_rows, n_nodes) and (n_nodes - 1,), a metre of path.
     """
     problem = _Staggered(rows, ends)
-    of_nodes, of_cells = problem.parts(interior_point(problem, start).pressures)
+    for share in STARTS:
+        optimum = interior_point(problem, share * start)
+        if optimum.is_optimal:
+            break
+    of_nodes, of_cells = problem.parts(optimum.pressures)
     return of_nodes / problem.weights, of_cells / (rows.cap * rows.width)
 
 
