@@ -45,9 +45,7 @@ class Beziers(Leg):
     def __init__(self, stops: Waypoints) -> None:
         """Refuse numbers of arcs, of which a segment has none."""
         super().__init__(stops)
-        for i, pose in enumerate(stops.poses[1:], start=1):
-            if pose.arcs is not None:
-                raise ConfigError(stops.path, f'{stops.name(i)}.arcs: must be absent with family = "bezier"')
+        self._refuse("arcs")
         if stops.keys.least == "total" and None not in self._durations:
             raise ConfigError(stops.path, 'least = "total": must be absent where every duration is given')
         launch = stops.keys.launch

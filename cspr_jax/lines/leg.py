@@ -20,9 +20,7 @@ class TimedLines(Leg):
     def __init__(self, stops: Waypoints) -> None:
         """Refuse numbers of arcs, which a line does not have."""
         super().__init__(stops)
-        for i, pose in enumerate(stops.poses[1:], start=1):
-            if pose.arcs is not None:
-                raise ConfigError(stops.path, f'{stops.name(i)}.arcs: must be absent with family = "{stops.family}"')
+        self._refuse("arcs")
 
     def check(self, problem: Problem) -> None:
         """Refuse the rule of the text where spools are not in one plane; see `Leg.check`."""

@@ -7,6 +7,7 @@ from typing import ClassVar
 import jax
 import numpy as np
 
+from cspr_jax.errors import ConfigError
 from cspr_jax.motions.answers import Answers, joined
 from cspr_jax.motions.motion import Motion
 from cspr_jax.motions.outcome import LegOutcome
@@ -44,6 +45,14 @@ class Leg(abc.ABC):
     def __init__(self, stops: Waypoints) -> None:
         """Keep the poses; a family refuses what it cannot join."""
         self.stops = stops
+
+    def _refuse(self, *keys: str) -> None:
+        # Refuse keys of poses that other families take; at its first pose another leg may have taken them.
+        for i, pose in enumerate(self.stops.poses[1:], start=1):
+            for key in keys:
+                if getattr(pose, key) is not None:
+                    name = f"{self.stops.name(i)}.{key}"
+                    raise ConfigError(self.stops.path, f'{name}: must be absent with family = "{self.stops.family}"')
 
     def __len__(self) -> int:
         return len(self.stops)

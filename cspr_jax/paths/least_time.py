@@ -109,8 +109,8 @@ def least_time_motions(
     cases = zip(paths, jumping_motions(paths), settings, strict=True)
     answers = [_proved(problem, scene, *case) for case in cases]
     for finer in FINER:
-        # A motion that is not proved on its grid may be on a finer one.
-        rows = [k for k, (answer, is_met) in enumerate(answers) if answer.failure is None and not is_met]
+        # A motion that is not proved on its grid, or not found, may be on a finer one.
+        rows = [k for k, (_, is_met) in enumerate(answers) if not is_met]
         if not rows:
             break
         closer = [settings[k]._replace(grid=finer * settings[k].grid) for k in rows]

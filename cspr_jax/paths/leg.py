@@ -26,8 +26,6 @@ from cspr_jax.paths.least_time import LeastTime, least_time_motion
 from cspr_jax.paths.section import Section, SectionSettings
 from cspr_jax.robots.platform import PlatformRobot
 
-# Keys of poses that other families take, and a path does not.
-_OTHERS = ("arcs", "beta_hat")
 # Directions of a motion that runs on through a pose differ by no more.
 SAME_DIRECTION = 1e-6
 
@@ -67,10 +65,8 @@ class Paths(Leg):
         """Refuse keys of other families, and what a path and its poses say twice."""
         super().__init__(stops)
         self._notes: list[str] = []
+        self._refuse("arcs", "beta_hat")
         for i, pose in enumerate(stops.poses):
-            for key in _OTHERS if i else ():
-                if getattr(pose, key) is not None:
-                    raise ConfigError(stops.path, f'{stops.name(i)}.{key}: must be absent with family = "path"')
             if i and pose.path is not None and not stops.keys.is_one_path:
                 self._check_path(i, pose.path)
 

@@ -26,9 +26,6 @@ from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.store.motion_samples import read_motion
 
-# Keys of poses that other families take, and a spline does not.
-_OTHERS = ("arcs", "beta_hat")
-
 
 class Splines(Leg):
     """Poses at their times, and files of samples, joined by piecewise polynomials; see `Leg`."""
@@ -37,10 +34,8 @@ class Splines(Leg):
         """Refuse poses without times, and keys of other families."""
         super().__init__(stops)
         self._notes: list[str] = []
+        self._refuse("arcs", "beta_hat")
         for i, pose in enumerate(stops.poses):
-            for key in _OTHERS if i else ():
-                if getattr(pose, key) is not None:
-                    raise ConfigError(stops.path, f'{stops.name(i)}.{key}: must be absent with family = "spline"')
             if pose.motion is not None and i:
                 self._check_file(i)
         for first, last in self._runs:
