@@ -60,6 +60,7 @@ _MODULES = {
     "point_mass_robot": "api.robots",
     "replay": "api.replays",
     "report": "api.reports",
+    "retime": "api.retiming",
     "run": "api.sweeps",
     "sampled_margin": "api.motions",
     "sensitivity": "api.workspaces",

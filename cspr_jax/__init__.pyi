@@ -39,6 +39,7 @@ from cspr_jax.api.published import table as table
 from cspr_jax.api.replays import Replay as Replay
 from cspr_jax.api.replays import replay as replay
 from cspr_jax.api.reports import report as report
+from cspr_jax.api.retiming import retime as retime
 from cspr_jax.api.robots import load_robot as load_robot
 from cspr_jax.api.robots import parallel_pair_robot as parallel_pair_robot
 from cspr_jax.api.robots import platform as platform

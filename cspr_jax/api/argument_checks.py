@@ -15,7 +15,7 @@ import numpy as np
 from cspr_jax.api.argument_rules import Rule, choice, integer, kind_of, many, real, word
 from cspr_jax.errors import InputError
 from cspr_jax.schema.given_numbers import ANY
-from cspr_jax.schema.limits import LARGEST_MAX_ARCS, LIMITS, UNCERTAINTIES
+from cspr_jax.schema.limits import LARGEST_GRID, LARGEST_MAX_ARCS, LIMITS, UNCERTAINTIES
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -222,6 +222,7 @@ ARGUMENTS: dict[str, Rule] = {
         *("natural", "best", "fastest", "slowest"),
     ),
     "given": _FILE,
+    "grid": integer(2, LARGEST_GRID),
     "gravity": _POSITIVE,
     "inertia": real("three rows of three finite numbers, kg m^2", (3, 3), traced=True),
     "interpolation": word("cubic", "quintic", "hermite"),
@@ -261,6 +262,7 @@ ARGUMENTS: dict[str, Rule] = {
     "pulley_radius": real("a number >= 0, in m, or one a cable, or None", (), (ANY,), none=True),
     "pulses": _POSITIVE,
     "quantity": _TEXT_OR_NONE,
+    "ramp_time": real("a finite number >= 0, s", (), least=0.0),
     "rate": _NUMBER_OR_NONE,
     "reference": _PATH,
     "release_x": _RANGE,
@@ -329,12 +331,10 @@ OF_FUNCTIONS: dict[str, Rule] = {
     "least_time.start": _STARTS,
     "least_time_paths.blend_tolerance": _POSITIVE_OR_NONE,
     "least_time_paths.corner": word("stop", "blend"),
-    "least_time_paths.grid": integer(2, 100_000),
     "least_time_paths.kind": word("line", "polyline", "cubic", "quintic"),
     "least_time_paths.limits": _limits_or_keys,
     "least_time_paths.paths": kind_of("arrays (k, 3) of points, m", list, tuple, np.ndarray),
     "least_time_paths.quaternions": kind_of("arrays (k, 4), or None", list, tuple, np.ndarray, none=True),
-    "least_time_paths.ramp_time": real("a finite number >= 0, s", (), least=0.0),
     "least_time_paths.robot": _ROBOT_OR_NAME,
     "minimum_arcs.amplitude": choice(_AMPLITUDE, None),
     "minimum_arcs.start": _STARTS_OR_NONE,
@@ -348,6 +348,7 @@ OF_FUNCTIONS: dict[str, Rule] = {
     "replay.given": kind_of("a plan, its file, or a dictionary of that", str, os.PathLike, Mapping, has=_PLAN),
     "report.given": kind_of("a result, a plan, or the path of one", str, os.PathLike, has=("to_xarray",)),
     "report.output": _PATH,
+    "retime.plan": kind_of("a plan, or a check", has=("feasible", "to_table")),
     "status.directory": _PATH,
     "spline.ends": _ENDS,
     "spline.positions": _POINTS,

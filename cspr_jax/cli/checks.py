@@ -15,7 +15,7 @@ from cspr_jax.cli.command import (
     print_table,
     warn,
 )
-from cspr_jax.cli.plans import add_files, check_files, write_files
+from cspr_jax.cli.plans import add_files, add_retime, check_files, retime_settings, retimed, write_files
 from cspr_jax.errors import ConfigError, ExitCode
 from cspr_jax.runtime.progress import waiting
 
@@ -52,6 +52,7 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="find the least uniform stretching of time that is feasible, and check what it stretches",
     )
+    add_retime(parser, "run along its path in the least time that all limits allow, and check what comes of it")
     add_json(parser)
     add_files(parser, "400 rows", "write the motion even if it is not feasible")
     add_all_errors(parser)
@@ -83,6 +84,9 @@ def _check(options: argparse.Namespace) -> int:
     for option, path in (("-o", options.output), ("--mjcf", options.mjcf), ("--mjcf", control)):
         if path is not None and path.resolve() == options.motion.resolve():
             raise ConfigError(option, f"{path}: must be another name: the motion is there")
+    settings = retime_settings(options)
+    if options.retime and options.slower:
+        raise ConfigError("--retime", "must be absent with --slower")
     keys = _keys(options)
     with waiting():
         prepare_jax(options, quick=True)
@@ -93,22 +97,25 @@ def _check(options: argparse.Namespace) -> int:
             "--mjcf": options.mjcf,
             "--animate": options.animate,
             "--slower": options.slower,
+            "--retime": options.retime,
         }
         check = checks.check_file(options.motion, keys, outputs=[name for name, value in outputs.items() if value])
         slower = check.slower() if options.slower and not check.feasible else None
     for line in check.plan.warnings:
         warn(line)
-    shown = check if slower is None or slower.check is None else slower.check
+    faster = retimed(check, settings) if options.retime else None
+    shown = faster or check if slower is None or slower.check is None else slower.check
     try:
         write_files(shown.plan, options)
     finally:
-        _print(options, check, slower)
+        _print(options, check, slower, faster)
     return ExitCode.DONE if shown.feasible else ExitCode.NOT_FEASIBLE
 
 
-def _print(options: argparse.Namespace, check: Any, slower: Any) -> None:
+def _print(options: argparse.Namespace, check: Any, slower: Any, faster: Any) -> None:
     if options.json:
-        print_json(check.to_dict() if slower is None else check.to_dict() | {"slower": slower.to_dict()})
+        others = {"slower": slower, "retimed": faster}
+        print_json(check.to_dict() | {name: other.to_dict() for name, other in others.items() if other is not None})
         return
     for line in check.lines():
         print_line(line)
@@ -118,6 +125,10 @@ def _print(options: argparse.Namespace, check: Any, slower: Any) -> None:
             print_line(line)
         if slower.check is not None:
             print_table(slower.check.to_table())
+    if faster is not None:
+        for line in faster.lines():
+            print_line(line)
+        print_table(faster.to_table())
 
 
 COMMANDS = (

@@ -27,9 +27,53 @@ _STEP = "longest step of MuJoCo, s (default 0.0005)"
 def _add_plan(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("plan", type=Path, help="plan file (TOML)")
     add_json(parser)
+    add_retime(parser, "run along the paths of the plan in the least time that all limits allow")
     add_files(parser, "`samples` rows per segment", "write the best candidate's motion even if it is not feasible")
     add_all_errors(parser)
     add_device(parser, quick=True)
+
+
+def add_retime(parser: argparse.ArgumentParser, does: str) -> None:
+    """Add the options of motions that are run along again.
+
+    Args:
+        does: help of the option that asks for it.
+    """
+    parser.add_argument("--retime", action="store_true", help=does)
+    parser.add_argument(
+        "--ramp-time",
+        type=float,
+        metavar="S",
+        help="--retime: time in which accelerations rise and fall, s (default 0.1); 0: they jump",
+    )
+    parser.add_argument(
+        "--grid",
+        type=int,
+        metavar="N",
+        help="--retime: cells of each part of the path without a stop (default 500)",
+    )
+
+
+def retime_settings(options: argparse.Namespace) -> dict[str, Any]:
+    """Settings of a motion that is run along again.
+
+    Returns:
+        arguments of `api.retiming.retime`.
+
+    Raises:
+        ConfigError: a setting that is not allowed.
+    """
+    from cspr_jax.schema.limits import LARGEST_GRID
+
+    settings = {name: getattr(options, name) for name in ("ramp_time", "grid")}
+    settings = {name: value for name, value in settings.items() if value is not None}
+    for name in () if options.retime else settings:
+        raise ConfigError(f"--{name.replace('_', '-')}", "must be absent without --retime")
+    if not 0.0 <= settings.get("ramp_time", 0.0) < float("inf"):
+        raise ConfigError("--ramp-time", f"{options.ramp_time}: must be a number >= 0, in s")
+    if not 2 <= settings.get("grid", 2) <= LARGEST_GRID:
+        raise ConfigError("--grid", f"{options.grid}: must be a whole number from 2 to {LARGEST_GRID}")
+    return settings
 
 
 def add_files(parser: argparse.ArgumentParser, usual_rows: str, anyway: str) -> None:
@@ -106,13 +150,36 @@ def _planned(options: argparse.Namespace) -> Any:
 
 def _plan(options: argparse.Namespace) -> int:
     check_files(options)
+    settings = retime_settings(options)
     plan = _planned(options)
+    if options.retime:
+        plan = retimed(plan, settings)
     # Files are what took long: no table that cannot be printed stands before them.
     try:
         write_files(plan, options)
     finally:
         print_json(plan.to_dict()) if options.json else print_table(plan.to_table())
     return ExitCode.DONE if plan.feasible else ExitCode.NOT_FEASIBLE
+
+
+def retimed(plan: Any, settings: dict[str, Any]) -> Any:
+    """A plan, or a check, of motions that are run along again; its warnings are shown.
+
+    Args:
+        plan: `api.plans.Plan` or `api.checks.Check`.
+
+    Returns:
+        the same of the retimed motions.
+    """
+    from cspr_jax.api.retiming import retime
+
+    before = getattr(plan, "plan", plan).warnings
+    with waiting():
+        plan = retime(plan, **settings)
+    for line in getattr(plan, "plan", plan).warnings:
+        if line not in before:
+            warn(line)
+    return plan
 
 
 def write_files(plan: Any, options: argparse.Namespace) -> None:

@@ -11,6 +11,7 @@ from cspr_jax.config.reading import Table
 from cspr_jax.config.trajectory import Angle, Quaternion
 from cspr_jax.config.wording import either, fault
 from cspr_jax.errors import shown
+from cspr_jax.schema.limits import LARGEST_GRID
 
 # Keys of a shape, by the kinds that take them.
 _ALL = ("line", "polyline", "cubic", "quintic", "arc", "circle", "csv", "gcode")
@@ -34,7 +35,7 @@ SAME_PLACE = 1e-9
 # Number of cells of a grid in maps, where many paths are asked.
 MAP_GRID = 200
 MOST_POINTS = 100_000
-GridSize = Annotated[int, Field(ge=2, le=100_000)]
+GridSize = Annotated[int, Field(ge=2, le=LARGEST_GRID)]
 
 
 class PathTable(Table):

@@ -35,6 +35,10 @@ QUANTITIES = {
 }
 
 
+# Details of a motion that was run along again.
+RETIMED = ("planned_duration", "gain", "lower_bound", "gap", "retimed", "path_deviation")
+
+
 def check_object(plan: PlannedMotions) -> dict[str, Any]:
     """The object that `cspr check --json` prints.
 
@@ -72,7 +76,7 @@ def check_object(plan: PlannedMotions) -> dict[str, Any]:
         "ends": getattr(_motion(plan) or plan.keys, "ends", "") or None,
         "blocks": case.proof.blocks,
     }
-    return finite(fields)
+    return finite(fields | {name: plan.details(0)[name] for name in RETIMED if name in plan.details(0)})
 
 
 def shown_proof(plan: PlannedMotions) -> MotionProof:
@@ -129,6 +133,7 @@ def check_lines(plan: PlannedMotions) -> list[str]:
     answers, case = plan.answers, shown_proof(plan)
     duration = float(answers.duration[0])
     lines = [f"{plan.robot_file.name}: motion of {duration:.6g} s, {_taken_as(plan)}; z {plan.robot_file.z_axis}"]
+    lines += _retimed(plan)
     if plan.feasible:
         text = "feasible: every criterion is proved to hold at every instant"
         stands = float(answers.tolerated[0])
@@ -140,6 +145,15 @@ def check_lines(plan: PlannedMotions) -> list[str]:
     named = ", ".join(f"{start:.{digits}f} to {end:.{digits}f} s" for start, end in intervals[:MOST_INTERVALS])
     more = f", and {len(intervals) - MOST_INTERVALS} more" if len(intervals) > MOST_INTERVALS else ""
     return [*lines, f"it fails from {named}{more}"] if len(intervals) else lines
+
+
+def _retimed(plan: PlannedMotions) -> list[str]:
+    details = plan.details(0)
+    if not details.get("retimed"):
+        return []
+    bound = "" if math.isnan(details["gap"]) else f"; none takes less than {details['lower_bound']:.6g} s"
+    text = f"retimed: {details['planned_duration']:.6g} s before, {100.0 * details['gain']:.1f} % less{bound}"
+    return [f"{text}; {details['path_deviation']:.1g} m from its path"]
 
 
 def _motion(plan: PlannedMotions) -> Any:

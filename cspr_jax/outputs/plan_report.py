@@ -79,6 +79,10 @@ _OF_SOME = (
     "gap",
     "binding",
     "sections",
+    "planned_duration",
+    "gain",
+    "retimed",
+    "path_deviation",
 )
 
 
@@ -181,11 +185,14 @@ def _numbers(segments: list[dict[str, Any]]) -> dict[str, Column]:
     beziers = all(segment["control_points"] is not None for segment in segments)
     swings = all(segment["inclination"] is not None for segment in segments)
     proved = all(segment["margin_unit"] == "N" for segment in segments)
+    retimed = all(segment["planned_duration"] is not None for segment in segments)
     columns = _times() if lines else _durations() if beziers else _counts(swings)
     if proved:
         columns = _proved({} if not any(segment["tried_arcs"] for segment in segments) else columns)
     if any(segment["sections"] is not None for segment in segments):
         columns = _bounded(columns)
+    if retimed:
+        columns = _gained() | columns
     columns["tension (N)"] = lambda segment: " .. ".join(
         _number(segment[name], ".3f") for name in ("tension_min", "tension_max")
     )
@@ -239,6 +246,13 @@ def _bounded(columns: dict[str, Column]) -> dict[str, Column]:
 
     bounds = {"at least (s)": _of("lower_bound", ".4f"), "gap (%)": gap}
     return {"T (s)": columns["T (s)"]} | bounds | {name: columns[name] for name in columns if name != "T (s)"}
+
+
+def _gained() -> dict[str, Column]:
+    return {
+        "planned (s)": _of("planned_duration", ".4f"),
+        "gain (%)": lambda segment: f"{100.0 * segment['gain']:.1f}",
+    }
 
 
 def _counts(swings: bool) -> dict[str, Column]:

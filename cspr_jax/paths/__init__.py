@@ -29,6 +29,8 @@ Files, each importing only from those above it:
     least_time          the fastest motion along a section
     many                least times along many paths
     answers             what segments of plans tell of it
+    stops               motions of any kind, and their smooth parts between stops
+    retraced            their paths as sections
     leg                 poses joined along paths, as a leg of plans
     map                 maps of least durations along paths
 """

@@ -182,8 +182,11 @@ class PathAnswers(ProvedAnswers):
         """All sections; see `Answers.every_section`."""
         return [section for i, through in enumerate(self.sections) for section in through if section.ends[0] == i]
 
-    def notes(self) -> list[str]:
-        """Say in one line where ramps are shorter than the plan says.
+    def notes(self, key: str = "path.ramp_time") -> list[str]:
+        """Say in one line where ramps are shorter than they are to be.
+
+        Args:
+            key: name of their length.
 
         Returns:
             the line, if there is one to say.
@@ -197,8 +200,9 @@ class PathAnswers(ProvedAnswers):
         where = f" in {len(missing)} of {len(known)} sections" if len(known) > 1 else ""
         words = [f"shorter ones, of {_shown(shortest)} s or more, stand in for them"] if shortest else []
         words += ["accelerations jump" + (f" in {jumping}" if jumping < len(missing) else "")] if jumping else []
-        name = f"path.ramp_time = {_shown(missing[0].ramp_time)} s"
-        return [f"{name}: no ramps of that length were found{where}: {'; '.join(words)}"]
+        return [
+            f"{key} = {_shown(missing[0].ramp_time)} s: no ramps of that length were found{where}: {'; '.join(words)}"
+        ]
 
     def proved_causes(self, i: int, frame: Frame) -> tuple[Cause, ...]:
         """Places that no path speed passes, then what no other speed mends; see `Answers.proved_causes`."""

@@ -14,6 +14,31 @@ from cspr_jax.paths.timed import PathSpeeds, moving
 
 # Sections that are solved together, beside one alone; how often changes of u within cells are taken from the solution.
 TOGETHER, BENT = 32, 2
+# Width of a cell over that of all below which u changes within it as it is known to.
+NARROW = 0.5
+
+
+class PathPace(NamedTuple):
+    """PathPace of a feasible motion along a section, near which a faster one is sought where it is hard to find.
+
+    Fields:
+        coordinate: (k,) s, increasing, m.
+        acceleration: (k,) path acceleration, m/s^2.
+    """
+
+    coordinate: np.ndarray
+    acceleration: np.ndarray
+
+    def bend(self, nodes: np.ndarray) -> np.ndarray:
+        """Changes of the path acceleration within cells, over their widths.
+
+        Args:
+            nodes: (n_cells + 1,) m.
+
+        Returns:
+            (n_cells,) 1/s^2.
+        """
+        return np.diff(np.interp(nodes, *self)) / np.diff(nodes)
 
 
 class Jumping(NamedTuple):
@@ -70,30 +95,40 @@ def run_of(solution: GridSolution, path: Discrete, bend: np.ndarray) -> PathSpee
     Returns:
         them; None if there is no motion.
     """
-    if solution.empty >= 0 or not solution.is_start:
+    if not _is_passable(solution):
         return None
     half = 0.5 * bend * path.grid.width
     u = np.asarray(solution.u)
     return moving(PathSpeeds(np.asarray(solution.x), u - half, u + half), path.grid.width)
 
 
-def jumping_motions(paths: Sequence[Discrete]) -> list[Jumping]:
+def jumping_motions(paths: Sequence[Discrete], paces: Sequence[PathPace | None] = ()) -> list[Jumping]:
     """The fastest motions along sections.
 
     Within cells u changes as it does from cell to cell, where there is a motion that does.
+
+    Args:
+        paces: of a motion along each section; None, or empty: none is known.
 
     Returns:
         one a section.
     """
     bends = [np.zeros_like(path.grid.width) for path in paths]
     solutions = solved_together(paths, bends)
+    known = {
+        k: pace.bend(paths[k].grid.nodes)
+        for k, pace in enumerate(paces)
+        if pace is not None and not _is_passable(solutions[k])
+    }
+    for k, solution in zip(known, solved_together([paths[k] for k in known], list(known.values())), strict=True):
+        solutions[k], bends[k] = solution, known[k]
     motions = [
         Jumping(run_of(solution, path, bend), bend, solution)
         for solution, path, bend in zip(solutions, paths, bends, strict=True)
     ]
     going = [k for k, motion in enumerate(motions) if motion.run is not None]
     for _ in range(BENT):
-        changes = [smallest_of_slopes(np.asarray(solutions[k].u), paths[k].grid.width) for k in going]
+        changes = [_changes(solutions[k], paths[k].grid.width, known.get(k)) for k in going]
         following = solved_together([paths[k] for k in going], changes)
         better = [run_of(s, paths[k], change) for k, s, change in zip(going, following, changes, strict=True)]
         for k, solution, change, run in zip(going, following, changes, better, strict=True):
@@ -101,6 +136,16 @@ def jumping_motions(paths: Sequence[Discrete]) -> list[Jumping]:
                 solutions[k], motions[k] = solution, motions[k]._replace(run=run, bend=change)
         going = [k for k, run in zip(going, better, strict=True) if run is not None]
     return motions
+
+
+def _is_passable(solution: GridSolution) -> bool:
+    return bool(solution.empty < 0 and solution.is_start)
+
+
+def _changes(solution: GridSolution, width: np.ndarray, known: np.ndarray | None) -> np.ndarray:
+    # In cells that are narrow since the path all but turns back there, u changes as it is known to.
+    change = smallest_of_slopes(np.asarray(solution.u), width)
+    return change if known is None else np.where(width < NARROW * width.mean(), known, change)
 
 
 def again(paths: Sequence[Discrete], bends: Sequence[np.ndarray]) -> list[PathSpeeds | None]:

@@ -12,7 +12,7 @@ from cspr_jax.motions.problem import Problem
 from cspr_jax.paths.bound import path_bound
 from cspr_jax.paths.controllable import GridSolution
 from cspr_jax.paths.discrete import FASTER, Discrete, discretes
-from cspr_jax.paths.jumping import Jumping, again, jumping_motions
+from cspr_jax.paths.jumping import Jumping, PathPace, again, jumping_motions
 from cspr_jax.paths.refusals import NoMotion, refusal
 from cspr_jax.paths.section import Section, SectionSettings
 from cspr_jax.paths.smooth import SectionEnds, Smooth, below_ramps, smooth
@@ -82,31 +82,40 @@ class LeastTime:
     failure: NoMotion | None
 
 
-def least_time_motion(problem: Problem, scene: Scene | None, section: Section, settings: SectionSettings) -> LeastTime:
+def least_time_motion(
+    problem: Problem, scene: Scene | None, section: Section, settings: SectionSettings, pace: PathPace | None = None
+) -> LeastTime:
     """Find the fastest motion along a section.
 
     Args:
         scene: bodies that can meet; they are judged with the motion, and do not change it.
+        pace: of a feasible motion; None: none is known.
 
     Returns:
         the motion; where tightening ends before all is proved, the last one.
     """
-    return least_time_motions(problem, scene, [section], [settings])[0]
+    return least_time_motions(problem, scene, [section], [settings], [pace])[0]
 
 
 def least_time_motions(
-    problem: Problem, scene: Scene | None, sections: Sequence[Section], settings: Sequence[SectionSettings]
+    problem: Problem,
+    scene: Scene | None,
+    sections: Sequence[Section],
+    settings: Sequence[SectionSettings],
+    paces: Sequence[PathPace | None] = (),
 ) -> list[LeastTime]:
     """Find the fastest motions along sections.
 
     Args:
         scene: as for `least_time_motion`.
+        paces: of feasible motions along them; empty: none is known.
 
     Returns:
         the motions, as `least_time_motion` finds them.
     """
     paths = discretes(problem, sections, settings)
-    cases = zip(paths, jumping_motions(paths), settings, strict=True)
+    paces = paces or [None] * len(sections)
+    cases = zip(paths, jumping_motions(paths, paces), settings, strict=True)
     answers = [_proved(problem, scene, *case) for case in cases]
     for finer in FINER:
         # A motion that is not proved on its grid, or not found, may be on a finer one.
@@ -115,7 +124,8 @@ def least_time_motions(
             break
         closer = [settings[k]._replace(grid=finer * settings[k].grid) for k in rows]
         paths = discretes(problem, [sections[k] for k in rows], closer)
-        for k, path, start, each in zip(rows, paths, jumping_motions(paths), closer, strict=True):
+        starts = jumping_motions(paths, [paces[k] for k in rows])
+        for k, path, start, each in zip(rows, paths, starts, closer, strict=True):
             answers[k] = _proved(problem, scene, path, start, each)
     return [answer for answer, _ in answers]
 

@@ -79,9 +79,9 @@ class Paths(Leg):
         through[:] = [[] for _ in range(len(self))]
         for ride in self._rides(problem, z0):
             fastest = least_time_motion(problem, scene, ride.section, ride.settings)
-            for segment, motion in _cut(fastest, ride):
+            for segment, motion in cut(fastest, ride):
                 parts[segment].append(motion)
-            section = _answered(fastest, ride, stops.first)
+            section = section_answer(fastest, ride, stops.first)
             for segment in range(section.ends[0], section.ends[1] + 1):
                 through[segment].append(section)
         motions = [chained(splines) for splines in parts]
@@ -220,15 +220,26 @@ def _settled(run: CourseRun, sections: list[Section], segments: np.ndarray) -> l
     return rides
 
 
-def _answered(fastest: LeastTime, ride: Ride, before: int) -> SectionAnswer:
-    # A motion with the segments in which its cells lie, and how many segments the plan has before the leg.
+def section_answer(fastest: LeastTime, ride: Ride, before: int = 0) -> SectionAnswer:
+    """Motion of a ride, with the segments in which its cells lie.
+
+    Args:
+        before: number of segments of the plan before the leg.
+
+    Returns:
+        both.
+    """
     middles = 0.5 * (fastest.coordinate[1:] + fastest.coordinate[:-1])
     parts = np.clip(np.searchsorted(ride.section.marks, middles) - 1, 0, len(ride.segments) - 1)
     return SectionAnswer(fastest, ride.segments[parts], ride.settings.ramp_time, before)
 
 
-def _cut(fastest: LeastTime, ride: Ride) -> list[tuple[int, Spline]]:
-    # Parts of a motion between poses, with the numbers of their segments.
+def cut(fastest: LeastTime, ride: Ride) -> list[tuple[int, Spline]]:
+    """Parts of a motion between poses.
+
+    Returns:
+        numbers of their segments, and the parts.
+    """
     changes = np.flatnonzero(np.diff(ride.segments)) + 1
     marks = [0.0, *ride.section.marks[changes].tolist(), float(ride.section.marks[-1])]
     knots = [int(np.argmin(np.abs(fastest.coordinate - mark))) for mark in marks]

@@ -160,9 +160,7 @@ def plan_of(keys: PlanFile, path: Path) -> PlannedMotions:
     legs = tuple(JoinedLeg(leg.stops.family, *leg.join(problem, z0)) for leg in sequence.legs)
     _refuse_jumps(problem, sequence, legs)
     frame = sequence.stops.frame
-    why = [causes(problem, frame, leg.answers, leg.motions, _counts(leg, keys)) for leg in legs]
-    extremes = _demands(problem, legs, keys)
-    extremes = dataclasses.replace(extremes, lowest=frame.height(extremes.lowest))
+    why, extremes = _judged(problem, frame, legs, keys)
     lines = [line for leg in sequence.legs for line in leg.warnings(problem)]
     lines += nearly_resting(sequence.stops, z0)
     lines += _missed(keys, np.concatenate([leg.answers.feasible for leg in legs]), extremes)
@@ -176,9 +174,38 @@ def plan_of(keys: PlanFile, path: Path) -> PlannedMotions:
         legs=legs,
         demands=extremes,
         outcomes=_outcomes(problem, sequence, legs, extremes),
-        causes=tuple(itertools.chain.from_iterable(why)),
+        causes=why,
         warnings=tuple(dict.fromkeys(lines)),
     )
+
+
+def with_motions(plan: PlannedMotions, answers: Answers, motions: list[Motion], lines: list[str]) -> PlannedMotions:
+    """A plan with other motions between its poses.
+
+    Args:
+        plan: without outcomes.
+        answers: of the n motions.
+        motions: from the centroid of the spools, z down.
+        lines: warnings about them.
+
+    Returns:
+        the plan.
+    """
+    legs = (JoinedLeg(plan.keys.family, answers, motions),)
+    why, extremes = _judged(plan.problem, plan.frame, legs, plan.keys)
+    lines = [*plan.warnings, *lines, *_missed(plan.keys, answers.feasible, extremes)]
+    warnings = tuple(dict.fromkeys(lines))
+    return dataclasses.replace(plan, legs=legs, demands=extremes, causes=why, warnings=warnings)
+
+
+def _judged(
+    problem: Problem, frame: Frame, legs: tuple[JoinedLeg, ...], keys: PlanFile
+) -> tuple[tuple[tuple[Cause, ...], ...], Demands]:
+    # Causes of the segments, and demands with heights in the axes of the robot file.
+    why = [causes(problem, frame, leg.answers, leg.motions, _counts(leg, keys)) for leg in legs]
+    extremes = _demands(problem, legs, keys)
+    heights = dataclasses.replace(extremes, lowest=frame.height(extremes.lowest))
+    return tuple(itertools.chain.from_iterable(why)), heights
 
 
 def _points(sequence: PlanLegs, legs: tuple[JoinedLeg, ...], z0: float) -> np.ndarray:

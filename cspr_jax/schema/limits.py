@@ -6,7 +6,7 @@ from typing import Literal
 from cspr_jax.schema.verdicts import Verdict
 
 # Numbers of arcs that files and arguments may ask for.
-LARGEST_MAX_ARCS = 1000
+LARGEST_MAX_ARCS, LARGEST_GRID = 1000, 100_000
 # Multiples of an uncertainty are not followed further.
 LARGEST_MULTIPLE = 1000.0
 

@@ -129,6 +129,10 @@ SEGMENT = {
         "null: none), `share` of the time of the segment.",
     ),
     "sections": ("", "Paths: one object for each section, from stop to stop, that ends in the segment, below."),
+    "planned_duration": ("s", "Retimed plans: duration of the motion that was planned; null elsewhere."),
+    "gain": ("1", "Retimed plans: 1 - `duration` / `planned_duration`."),
+    "retimed": ("", "Retimed plans: whether the motion is the faster one; the planned one stays where none is proved."),
+    "path_deviation": ("m", "Retimed plans: largest distance of the motion from the planned path at samples."),
 }
 # Each section of a path, from stop to stop.
 SECTION = {
@@ -228,5 +232,10 @@ CHECK = {
         "",
         "With --slower: `factor` by which time is stretched (null: none is feasible), `static` (whether the robot can "
         "stand still at every place), `check` of the stretched motion.",
+    ),
+    "retimed": (
+        "",
+        "With --retime: this object again, of the motion that runs along its path in the least time, with "
+        "`planned_duration`, `gain`, `lower_bound`, `gap`, `retimed` and `path_deviation` of a retimed plan.",
     ),
 }

@@ -1,0 +1,42 @@
+"""Motions retimed, from Python: the same paths in the least time that all limits allow."""
+
+import dataclasses
+from typing import TypeVar
+
+from cspr_jax.api.argument_checks import checked
+from cspr_jax.api.checks import Check
+from cspr_jax.api.plans import NAME, Plan
+from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.config.path import GRID, RAMP_TIME
+from cspr_jax.plans.retiming import retimed
+
+Kind = TypeVar("Kind", Plan, Check)
+
+
+@checked
+def retime(plan: Kind, *, grid: int = GRID, ramp_time: float = RAMP_TIME) -> Kind:
+    """Run along the paths of a plan, or of a checked motion, in the least time that all limits allow.
+
+    Every place at which the motion stops is kept, and so are its speeds at ends at which it moves. Between them the
+    faster motion takes the place of the planned one where it is proved.
+
+    Args:
+        plan: a plan of any families but launches, or a check.
+        grid: number of cells of each part of the paths without a stop.
+        ramp_time: time in which accelerations, and so tensions, rise and fall, s; 0: they jump.
+
+    Returns:
+        the plan, or the check, of the retimed motions; segments have "planned_duration", "gain" and "lower_bound".
+
+    Raises:
+        ConfigError: a launch, a segment without a motion, or a motion whose velocity jumps.
+    """
+    if isinstance(plan, Check):
+        return Check(_retimed(plan.plan, grid, ramp_time))
+    return _retimed(plan, grid, ramp_time)
+
+
+def _retimed(plan: Plan, grid: int, ramp_time: float) -> Plan:
+    with double_precision():
+        planned = retimed(plan, grid, ramp_time, NAME)
+    return Plan(**{field.name: getattr(planned, field.name) for field in dataclasses.fields(planned)})

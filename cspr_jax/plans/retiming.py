@@ -1,0 +1,213 @@
+"""Plans retimed: the same paths, each run along in the least time that all limits allow."""
+
+import dataclasses
+import itertools
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax.build.scenes import scene_of
+from cspr_jax.curves.spline import Spline, chained
+from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.motions.answers import replaced
+from cspr_jax.motions.motion import Motion
+from cspr_jax.motions.proved_answers import ProvedAnswers, proved_answers
+from cspr_jax.paths.answers import PathAnswers
+from cspr_jax.paths.discrete import FASTER
+from cspr_jax.paths.least_time import LeastTime, least_time_motion
+from cspr_jax.paths.leg import Ride, cut, section_answer
+from cspr_jax.paths.retraced import Retraced, retraced
+from cspr_jax.paths.section import SectionSettings
+from cspr_jax.plans.planning import PlannedMotions, with_motions
+from cspr_jax.robots.clearance import Scene
+
+# Part of the planned duration by which a motion is shorter at least that takes its place.
+LEAST_GAIN = 1e-4
+# Share of the largest path speed that is sought, above which no limit bounds the time.
+UNBOUNDED = 0.5
+# Distance from the planned path above which the grid is doubled, m, and how often.
+AWAY, DOUBLINGS = 1e-6, 3
+# Accelerations at a pose may jump by this part of gravity.
+JUMPS = 1e-6
+
+
+@dataclasses.dataclass(frozen=True)
+class RetimedAnswers(PathAnswers):
+    """Answers of segments that were run along again.
+
+    Fields:
+        lower_bound: (n,) of the time along each path, s; NaN where none is known, or the motion passes a pose.
+        planned_duration: (n,) s.
+        deviation: (n,) largest distance from the planned path, at samples, m; 0 of a motion that stays as planned.
+        is_retimed: (n,) whether the motion is the faster one, and not that of the plan.
+    """
+
+    lower_bound: np.ndarray
+    planned_duration: np.ndarray
+    deviation: np.ndarray
+    is_retimed: np.ndarray
+
+    def details(self, i: int) -> dict[str, Any]:
+        """Durations before and after, the distance from the planned path, bounds; see `Answers.details`."""
+        duration, bound, planned = (float(x[i]) for x in (self.duration, self.lower_bound, self.planned_duration))
+        return super().details(i) | {
+            "lower_bound": bound,
+            "gap": 1.0 - bound / duration,
+            "planned_duration": planned,
+            "gain": 1.0 - duration / planned,
+            "retimed": bool(self.is_retimed[i]),
+            "path_deviation": float(self.deviation[i]),
+        }
+
+
+class _Faster(NamedTuple):
+    # The fastest motion along a path, and its largest distance from the planned one, m.
+    ride: Ride
+    fastest: LeastTime
+    deviation: float
+
+
+def retimed(plan: PlannedMotions, grid: int, ramp_time: float, path: Path) -> PlannedMotions:
+    """A plan whose motions run along their paths in the least time.
+
+    Between two poses at rest the faster motion takes the place of the planned one where it is proved, and faster, or
+    where the planned one is not feasible.
+
+    Args:
+        grid: as for `SectionSettings`.
+        ramp_time: s.
+        path: of the plan, named in errors.
+
+    Returns:
+        the plan; its answers are `RetimedAnswers`.
+
+    Raises:
+        ConfigError: motions that have no other speeds: launches, or none at all.
+    """
+    motions = [motion for leg in plan.legs for motion in leg.motions]
+    _check(plan, motions, path)
+    problem = plan.problem
+    scene = scene_of(problem.robot, plan.robot_file, plan.frame, plan.keys, path, trajectory=plan.keys)
+    try:
+        paths = retraced(problem.robot, motions, grid)
+    except InputError as error:
+        raise ConfigError(path, f"retime: {error}") from error
+    faster = [_fastest(plan, scene, one, grid, ramp_time) for one in paths]
+    parts: list[list[Spline]] = [[] for _ in motions]
+    for one in faster:
+        for segment, motion in cut(one.fastest, one.ride):
+            parts[segment].append(motion)
+    trial = [chained(splines) if splines else motion for splines, motion in zip(parts, motions, strict=True)]
+    proved = proved_answers(problem, trial, scene)
+    moves = np.array([len(splines) > 0 for splines in parts])
+    is_better = moves & _is_better(plan, proved, faster)
+    answers = _answers(plan, faster, _with_planned(plan, scene, proved, motions, np.flatnonzero(~is_better)), is_better)
+    chosen = [new if better else old for new, old, better in zip(trial, motions, is_better, strict=True)]
+    lines = _stays(moves & ~is_better) + _jumps(plan, faster, is_better) + _unbounded(plan, faster)
+    lines += answers.notes("retime: ramp_time")
+    return with_motions(plan, answers, chosen, lines)
+
+
+def _check(plan: PlannedMotions, motions: list[Motion], path: Path) -> None:
+    if plan.outcomes:
+        raise ConfigError(path, "retime: must be absent for a plan that launches an object, whose flight has its time")
+    if not motions:
+        raise ConfigError(path, "retime: must be absent for a motion that is too long to be held")
+    unknown = np.flatnonzero(~np.isfinite(plan.answers.duration))
+    if len(unknown):
+        raise ConfigError(path, f"retime: must be absent: segment {unknown[0] + 1} has no motion; see its verdict")
+
+
+def _fastest(plan: PlannedMotions, scene: Scene, one: Retraced, grid: int, ramp_time: float) -> _Faster:
+    # On a finer grid where the motion is too far from the path.
+    for doubling in range(DOUBLINGS):
+        settings = SectionSettings(grid * 2**doubling, ramp_time, *one.speeds)
+        fastest = least_time_motion(plan.problem, scene, one.section, settings, one.pace)
+        deviation = one.deviation + fastest.deviation
+        if deviation <= AWAY:
+            break
+    return _Faster(Ride(one.section, settings, one.segments), fastest, deviation)
+
+
+def _answers(
+    plan: PlannedMotions, faster: Sequence[_Faster], proved: ProvedAnswers, is_better: np.ndarray
+) -> RetimedAnswers:
+    # Sections are told of motions that are run along again, and bounds of all.
+    count = len(is_better)
+    bound, deviation = np.zeros(count), np.zeros(count)
+    sections = np.empty(count, object)
+    sections[:] = [[] for _ in range(count)]
+    for one in faster:
+        section = section_answer(one.fastest, one.ride)
+        first, last = section.ends
+        bound[first : last + 1] += one.fastest.lower_bound if first == last else np.nan
+        for segment in np.flatnonzero(is_better[first : last + 1]) + first:
+            sections[segment].append(section)
+            deviation[segment] = max(deviation[segment], one.deviation)
+    columns = {field.name: getattr(proved, field.name) for field in dataclasses.fields(proved)}
+    return RetimedAnswers(
+        **columns | {name: getattr(plan.answers, name) for name in ("arcs", "tried_arcs")},
+        sections=sections,
+        lower_bound=np.where(bound > 0.0, bound, np.nan),
+        planned_duration=np.array(plan.answers.duration),
+        deviation=deviation,
+        is_retimed=is_better,
+    )
+
+
+def _is_better(plan: PlannedMotions, answers: ProvedAnswers, faster: Sequence[_Faster]) -> np.ndarray:
+    # Motions (n,) that replace those of the plan: all of those between two poses at rest, or none.
+    before, after = np.array(plan.answers.duration), answers.duration
+    group = np.arange(len(before))
+    for segments in (one.ride.segments for one in faster):
+        group[np.isin(group, group[segments])] = group[segments].min()
+    better = np.zeros(len(before), bool)
+    for name in np.unique(group).tolist():
+        rows = group == name
+        is_faster = after[rows].sum() < (1.0 - LEAST_GAIN) * before[rows].sum() or not plan.is_feasible[rows].all()
+        better[rows] = answers.feasible[rows].all() and is_faster
+    return better
+
+
+def _with_planned(
+    plan: PlannedMotions, scene: Scene, answers: ProvedAnswers, motions: list[Motion], rows: np.ndarray
+) -> ProvedAnswers:
+    # Answers with those of motions that stay, whose family has proved what it says is feasible.
+    if not len(rows):
+        return answers
+    others = proved_answers(plan.problem, [motions[i] for i in rows], scene)
+    answers = replaced(answers, rows, others, np.arange(len(rows)))
+    answers.verdict[rows] = np.where(plan.is_feasible[rows], 0, answers.verdict[rows])
+    return answers
+
+
+def _stays(is_kept: np.ndarray) -> list[str]:
+    numbers = ", ".join(str(i + 1) for i in np.flatnonzero(is_kept).tolist())
+    return [f"retime: as planned, since no faster motion is proved: to {numbers}"] if numbers else []
+
+
+def _jumps(plan: PlannedMotions, faster: list[_Faster], is_better: np.ndarray) -> list[str]:
+    # Tensions jump where a motion turns back at a place at which the robot cannot stay.
+    largest, gravity = 0.0, float(plan.problem.robot.gravity)
+    for before, after in itertools.pairwise(faster):
+        if is_better[before.ride.segments[-1]] and is_better[after.ride.segments[0]]:
+            ends = before.fastest.motion.state(jnp.asarray(1.0)), after.fastest.motion.state(jnp.asarray(0.0))
+            largest = max(largest, float(np.linalg.norm(ends[1].acceleration - ends[0].acceleration)))
+    if not largest > JUMPS * gravity:
+        return []
+    return [f"retime: accelerations, and so tensions, jump by up to {largest:.3g} m/s^2 where the motion stops"]
+
+
+def _unbounded(plan: PlannedMotions, faster: list[_Faster]) -> list[str]:
+    numbers = list[int]()
+    for one in faster:
+        length = float(one.fastest.coordinate[-1])
+        most = FASTER * np.sqrt(float(plan.problem.robot.gravity) * length)
+        if np.nanmax(one.fastest.plane.speed, initial=0.0) > UNBOUNDED * most:
+            numbers += (one.ride.segments + 1).tolist()
+    names = ", ".join(map(str, dict.fromkeys(numbers)))
+    more = "give tension_max or a limit of speeds"
+    return [f"retime: no limit bounds the time of the motion to {names}: {more}"] if names else []
