@@ -145,10 +145,21 @@ def test_what_is_not_faster_stays():
     again = cspr_jax.retime(planned, ramp_time=0.3, grid=100)
     assert "retime: as planned, since no faster motion is proved: to 1" in again.warnings
     np.testing.assert_array_equal(again.answers.duration, planned.answers.duration)
+    np.testing.assert_array_equal(*(states(one.motions[0], 9).position for one in (planned, again)))
     segment = again.to_dict()["segments"][0]
     assert again.feasible
     assert (segment["gain"], segment["retimed"], segment["path_deviation"]) == (0.0, False, 0.0)
     assert segment["lower_bound"] == pytest.approx(planned.details(0)["lower_bound"], rel=2e-3)
+
+
+def test_what_no_speed_makes_feasible_stays():
+    """A straight line far outside of the footprint, from stop to stop."""
+    places = np.array([[0.9, 0.0, 1.0], [1.0, 0.1, 1.0]])
+    checked = cspr_jax.check("prototype", np.array([0.0, 9.0]), places, limits={"tension_max": 1.6})
+    retimed = cspr_jax.retime(checked, grid=50)
+    assert not retimed.feasible
+    assert retimed.duration == checked.duration == pytest.approx(9.0)
+    assert retimed.plan.details(0)["retimed"] is False
 
 
 def test_long_ramps_are_told(swing):
@@ -217,3 +228,26 @@ def test_table_2_1():
         assert segment["path_deviation"] < 1e-6
         assert distance(before, after) < 1e-6
     check_limits(retimed)
+
+
+@pytest.mark.thorough
+def test_platform_that_turns():
+    """Places and orientations of the retimed motion are those of the planned one."""
+    half = np.array([0.0, 0.06, -0.05, 0.0])
+    turns = np.stack([np.cos(half), 0.6 * np.sin(half), 0.0 * half, 0.8 * np.sin(half)], axis=1)
+    poses = [
+        {"position": [0.1 * k, 0.05 * k**2, 2.0 + 0.1 * k], "quaternion": turn.tolist(), "time": 2.0 * k}
+        for k, turn in enumerate(turns)
+    ]
+    keys = {"schema": 1, "robot": "laval-mssm", "family": "spline", "interpolation": "quintic"}
+    planned = cspr_jax.plan(keys | {"limits": {"tension_max": 200.0}, "pose": poses})
+    retimed = cspr_jax.retime(planned, grid=300)
+    assert retimed.feasible
+    assert (retimed.answers.duration < planned.answers.duration).all()
+    for before, after in zip(planned.motions, retimed.motions, strict=True):
+        line, places = (
+            np.concatenate([np.asarray(state.position), np.asarray(state.quaternion)], axis=1)
+            for state in (states(before, 100_001), states(after, 2_001))
+        )
+        line = np.concatenate([line, line * np.where(np.arange(7) < 3, 1.0, -1.0)])
+        assert cKDTree(line).query(places)[0].max() < 2e-5
