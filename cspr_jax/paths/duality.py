@@ -28,7 +28,7 @@ from jax import Array
 from cspr_jax.arithmetic.affine_bounds import ROUNDING, AffineBounds, cross, dot, norm_squared, squared, turned
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.paths.discrete import Discrete
-from cspr_jax.paths.nodes import places_on, state_at
+from cspr_jax.paths.nodes import Places, places_on, state_at
 from cspr_jax.paths.rows import still, unit_wrenches
 from cspr_jax.robots.cables import AnyRobot, cable_motion, wrench_units
 from cspr_jax.robots.limits import Limits
@@ -41,8 +41,8 @@ from cspr_jax.runtime import compile_options
 BATCH = 64
 # Part of the sums by which the bound is lowered: more than the rounding of what is summed here.
 SAFE = 1e-10
-# Times that multipliers are smoothed, and nodes on each side of a cell in which they are.
-REPAIRS, REACH = 12, 3
+# Times that multipliers are mended; cells on each side of one from which it takes what it lacks, and by how much more.
+REPAIRS, REACH, SPARE = 12, 20, 1.5
 # Axis of forces along gravity; by what more than is lacking weight is added.
 DOWN, MORE = 2, 1.01
 
@@ -102,7 +102,7 @@ def lower_bound(
     for _ in range(REPAIRS):
         start, end = (Multipliers(*(leaf[side] for leaf in multipliers)) for side in (slice(None, -1), slice(1, None)))
         cells = _Cell(start, end, rates, width, speed)
-        gains, losses, lacks = in_batches(partial(_kernel, robot, limits), (states, cells), size=BATCH)
+        gains, losses, lacks, short = in_batches(partial(_kernel, robot, limits), (states, cells), size=BATCH)
         if (lacks > 0.0).any():
             multipliers = _pulled_down(robot, multipliers, lacks)
             continue
@@ -110,7 +110,9 @@ def lower_bound(
         if np.isfinite(total):
             total += _boundary(robot, path, multipliers)
             return total - SAFE * float(np.sum(np.abs(gains)) + np.sum(np.abs(losses)))
-        multipliers = _smoothed(multipliers, ~np.isfinite(gains - losses))
+        if not np.isfinite(losses + short).all():
+            break
+        multipliers = _evened(robot, path, multipliers, width * short)
     return -np.inf
 
 
@@ -135,17 +137,25 @@ def _boundary(robot: AnyRobot, path: Discrete, multipliers: Multipliers) -> floa
     return total
 
 
-def _smoothed(multipliers: Multipliers, unknown: np.ndarray) -> Multipliers:
-    # Means of neighbours, where multipliers change so fast that the bound fails.
-    near = np.convolve(unknown, np.ones(2 * REACH), mode="full")[REACH - 1 : len(unknown) + REACH] > 0.0
-    near[[0, -1]] = False
+def _evened(robot: AnyRobot, path: Discrete, multipliers: Multipliers, short: np.ndarray) -> Multipliers:
+    # Where multipliers change so fast that y . a' - y' . a is negative, y falls more along a, and less in cells beside.
+    nodes = np.arange(len(short) + 1)
+    share = np.zeros(len(nodes))
+    for cell in np.flatnonzero(short > 0.0):
+        rise = np.clip(1.0 - (cell - nodes) / REACH, 0.0, 1.0) * (nodes <= cell)
+        fall = np.clip(1.0 - (nodes - cell - 1) / REACH, 0.0, 1.0) * (nodes > cell)
+        share += 0.5 * SPARE * short[cell] * (rise - fall)
+    momentum = in_batches(
+        partial(_momentum, robot), (places_on(path.section.curve, path.grid.nodes, ahead=True),), size=BATCH
+    )
+    square = np.sum(momentum**2, axis=1)
+    change = np.where(square > 0.0, share / np.where(square > 0.0, square, 1.0), 0.0)[:, None] * momentum
+    return multipliers._replace(wrench=multipliers.wrench + change)
 
-    def one(leaf: np.ndarray) -> np.ndarray:
-        means = leaf.copy()
-        means[1:-1] = 0.25 * (leaf[:-2] + leaf[2:]) + 0.5 * leaf[1:-1]
-        return np.where(near.reshape(-1, *[1] * (leaf.ndim - 1)), means, leaf)
 
-    return Multipliers(*map(one, multipliers))
+@partial(jax.jit, compiler_options=compile_options.least())
+def _momentum(robot: AnyRobot, nodes: tuple[Places]) -> Array:
+    return jax.vmap(lambda place: unit_wrenches(robot, state_at(place)).momentum)(*nodes)
 
 
 def _line(start: Array, end: Array) -> AffineBounds:
@@ -170,9 +180,10 @@ def _along(start: Array, end: Array, width: Array, momentum: AffineBounds, bend:
 
 
 @partial(jax.jit, compiler_options=compile_options.least())
-def _kernel(robot: AnyRobot, limits: Limits, blocks: tuple[StateBounds, _Cell]) -> tuple[Array, Array, Array]:
-    # Tell what each cell adds to the bound, what it takes from it, and how much weight its multipliers lack.
-    def one(state: StateBounds, cell: _Cell) -> tuple[Array, Array, Array]:
+def _kernel(robot: AnyRobot, limits: Limits, blocks: tuple[StateBounds, _Cell]) -> tuple[Array, Array, Array, Array]:
+    # Tell what each cell adds to the bound, what it takes from it, how much weight its multipliers lack, and by how
+    # much y . a' - y' . a is negative.
+    def one(state: StateBounds, cell: _Cell) -> tuple[Array, Array, Array, Array]:
         twice, lost, lack = _of_wrenches(robot, limits, state, cell)
         cables = cable_bounds(robot, state)
         if limits.cable_acceleration_max is not None:
@@ -192,7 +203,8 @@ def _kernel(robot: AnyRobot, limits: Limits, blocks: tuple[StateBounds, _Cell]) 
         # A concave function of a line is above the line between its values at both ends.
         low, high = _ends(twice, -1.0)
         values = [1.5 * jnp.where(side >= 0.0, jnp.cbrt(side), -jnp.inf) for side in (low, high)]
-        return cell.width * 0.5 * (values[0] + values[1]), cell.width * lost, lack
+        short = jnp.maximum(0.0, -jnp.minimum(low, high))
+        return cell.width * 0.5 * (values[0] + values[1]), cell.width * lost, lack, short
 
     return jax.vmap(one)(*blocks)
 

@@ -158,6 +158,14 @@ def test_random_paths(kind, seed, outside):
     check_case(least_time_cases.case(kind, seed, outside), SAMPLES["quick"], 60)
 
 
+@pytest.mark.parametrize("kind, seed", [("2T-4", 152), ("3T-4", 148)])
+def test_bounds_where_multipliers_change_fast(kind, seed):
+    """In one cell y . a' - y' . a is negative at first."""
+    case = least_time_cases.case(kind, seed, outside=True)
+    answer = solve(case.robot, case.path, case.limits)
+    assert (1.0 - SHORTER) * answer.time <= answer.lower <= answer.time
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("kind, seed, outside", THOROUGH)
 def test_more_random_paths(kind, seed, outside):
