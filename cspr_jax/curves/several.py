@@ -22,7 +22,7 @@ class SeveralSplines:
             ValueError: degrees differ, only some have orientations, or offsets of mass centres differ.
         """
         self._offset = splines[0].offset
-        if any(not np.array_equal(spline.offset, self._offset) for spline in splines):
+        if any(not np.array_equal(np.asarray(spline.offset), np.asarray(self._offset)) for spline in splines):
             raise ValueError("one offset of the mass centre")
         self._knots = np.concatenate([np.asarray(spline.knots) for spline in splines])
         self._of_knots = np.repeat(np.arange(len(splines)), [len(spline.knots) for spline in splines])
