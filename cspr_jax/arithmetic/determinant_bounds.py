@@ -3,7 +3,8 @@
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.arithmetic.affine_bounds import AffineBounds, reciprocal
+from cspr_jax.arithmetic.affine_bounds import AffineBounds
+from cspr_jax.arithmetic.function_bounds import reciprocal
 
 
 def determinant(matrix: AffineBounds) -> AffineBounds:

@@ -1,7 +1,8 @@
 """Affine bounds of piecewise polynomials over blocks of their variable, each within a piece or over many of them.
 
 Over a piece a polynomial lies within the hull of its Bernstein coefficients, so does what is left of it beside a
-straight line. A block that holds many pieces gets one line, and the widest band that any of them needs.
+straight line. A block that holds many pieces gets one line, and the widest band that any of them needs. Beside a
+parabola, which a block within one piece may get, less is left.
 """
 
 import math
@@ -62,21 +63,30 @@ def overlaps(
     return PieceParts(block, knot - of_blocks[block], of_piece, of_block, width[knot])
 
 
-def piecewise_bounds(table: np.ndarray, parts: PieceParts, orders: int = 3) -> list[AffineBounds]:
+def piecewise_bounds(
+    table: np.ndarray, parts: PieceParts, orders: int = 3, *, parabolas: bool = False
+) -> list[AffineBounds]:
     """Bounds of a piecewise polynomial and of its derivatives.
 
     Args:
         table: (m, degree + 1, n) Bernstein coefficients of the pieces.
         parts: of k blocks.
         orders: how many functions: the polynomial, and its derivatives below this order.
+        parabolas: whether bands are around parabolas.
 
     Returns:
         one for each order, leaves (k, n).
+
+    Raises:
+        ValueError: blocks with parabolas reach over several pieces.
     """
+    if parabolas and (np.diff(parts.block) != 1).any():
+        raise ValueError("parabolas are of blocks within one piece")
     coefficients, bands = table[parts.piece], []
     for order in range(orders):
         degree = coefficients.shape[1] - 1
-        bands.append(_band(_between(coefficients, *parts.of_piece), parts))
+        between = _between(coefficients, *parts.of_piece)
+        bands.append(_parabola_band(between) if parabolas else _band(between, parts))
         if order + 1 < orders:
             steps = degree / parts.width[:, None, None]
             coefficients = np.diff(coefficients, axis=1) * steps if degree else 0.0 * coefficients
@@ -99,6 +109,8 @@ def bernstein_of_powers(coefficients: np.ndarray) -> np.ndarray:
 
 def _between(coefficients: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     # Bernstein coefficients over [low, high] instead of [0, 1], by the steps of de Casteljau.
+    if not low.any() and (high == 1.0).all():
+        return coefficients
     after = _split(coefficients, high[:, None, None])
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(high > 0.0, low / high, 0.0)[:, None, None]
@@ -131,3 +143,20 @@ def _band(coefficients: np.ndarray, parts: PieceParts) -> AffineBounds:
     )
     size = np.maximum.reduceat(np.abs(coefficients).max(axis=1), starts)
     return AffineBounds(middle + 0.5 * (top + bottom), slope, 0.5 * (top - bottom) + 4.0 * ROUNDING * size)
+
+
+def _parabola_band(coefficients: np.ndarray) -> AffineBounds:
+    # The parabola has the mean second difference of the coefficients, which are those over the block.
+    # Sums along a first axis are fast.
+    rows, degree = np.ascontiguousarray(np.moveaxis(coefficients, 1, 0)), coefficients.shape[1] - 1
+    number, scale = np.arange(degree + 1)[:, None, None], max(degree * (degree - 1), 1)
+    # Coefficients of s and of s^2 over [-1, 1].
+    places = 2.0 * number / max(degree, 1) - 1.0
+    squares = 4.0 * number * (number - 1) / scale - 2.0 * places - 1.0
+    first, last = rows[0], rows[-1]
+    square = np.zeros_like(first) if degree < 2 else scale / 8.0 * np.diff(rows, 2, axis=0).mean(0)
+    middle, slope = 0.5 * (first + last) - square, 0.5 * (last - first)
+    rest = rows - middle - slope * places - square * squares
+    top, bottom = rest.max(axis=0), rest.min(axis=0)
+    size = np.abs(rows).max(axis=0) + np.abs(square)
+    return AffineBounds(middle + 0.5 * (top + bottom), slope, 0.5 * (top - bottom) + 4.0 * ROUNDING * size, square)

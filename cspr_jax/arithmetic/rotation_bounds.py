@@ -2,15 +2,8 @@
 
 from typing import NamedTuple
 
-from cspr_jax.arithmetic.affine_bounds import (
-    AffineBounds,
-    cross,
-    dot,
-    norm_squared,
-    reciprocal,
-    squared,
-    stacked,
-)
+from cspr_jax.arithmetic.affine_bounds import AffineBounds, cross, dot, norm_squared, squared, stacked
+from cspr_jax.arithmetic.function_bounds import reciprocal
 
 
 class RotationBounds(NamedTuple):

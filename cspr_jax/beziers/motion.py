@@ -14,8 +14,9 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic import elementary
-from cspr_jax.arithmetic.affine_bounds import AffineBounds, sincospi
+from cspr_jax.arithmetic.affine_bounds import AffineBounds
 from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.arithmetic.function_bounds import sincospi
 from cspr_jax.motions.amplitude_bounds import normalised
 from cspr_jax.robots.state import State
 from cspr_jax.robots.state_bounds import StateBounds

@@ -23,6 +23,7 @@ def spline_bounds(
     *,
     of_knots: np.ndarray | None = None,
     of_blocks: np.ndarray | None = None,
+    parabolas: bool = False,
 ) -> StateBounds:
     """Bounds of the states over blocks of time, of one motion or of several, whose tables follow each other.
 
@@ -34,16 +35,21 @@ def spline_bounds(
         end: (k,) s, later than `start`.
         of_knots: (m + n,) numbers of the motions, from 0 on; None: there is one.
         of_blocks: (k,) likewise.
+        parabolas: whether bands are around parabolas.
 
     Returns:
         the bounds, leaves (k, ...).
+
+    Raises:
+        ValueError: blocks with parabolas reach over several pieces.
     """
     motions = (of_knots, of_blocks) if of_knots is not None and of_blocks is not None else None
     parts = overlaps(knots, start, end, motions)
-    translation = piecewise_bounds(position, parts)
+    translation = piecewise_bounds(position, parts, parabolas=parabolas)
     if quaternion is None:
         return StateBounds(*translation)
-    return StateBounds(*translation, *in_batches(_rotations, piecewise_bounds(quaternion, parts), size=BATCH))
+    turning = piecewise_bounds(quaternion, parts, parabolas=parabolas)
+    return StateBounds(*translation, *in_batches(_rotations, turning, size=BATCH))
 
 
 @partial(jax.jit, compiler_options=compile_options.least())

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cspr_jax.curves.blocks import spline_bounds
-from cspr_jax.curves.spline import Spline
+from cspr_jax.curves.spline import Spline, moved
 from cspr_jax.robots.state_bounds import StateBounds
 
 
@@ -19,10 +19,11 @@ class SeveralSplines:
             splines: at least one.
 
         Raises:
-            ValueError: degrees differ, only some have orientations, or positions are not those of mass centres.
+            ValueError: degrees differ, only some have orientations, or offsets of mass centres differ.
         """
-        if any(spline.offset is not None for spline in splines):
-            raise ValueError("positions of mass centres alone")
+        self._offset = splines[0].offset
+        if any(not np.array_equal(np.asarray(spline.offset), np.asarray(self._offset)) for spline in splines):
+            raise ValueError("one offset of the mass centre")
         self._knots = np.concatenate([np.asarray(spline.knots) for spline in splines])
         self._of_knots = np.repeat(np.arange(len(splines)), [len(spline.knots) for spline in splines])
         turning = [spline.quaternion for spline in splines if spline.quaternion is not None]
@@ -33,18 +34,22 @@ class SeveralSplines:
         self.durations = np.array([float(spline.knots[-1]) for spline in splines])
         self.jumps = [spline.jumps() for spline in splines]
 
-    def bounds(self, motion: np.ndarray, start: np.ndarray, end: np.ndarray) -> StateBounds:
+    def bounds(self, motion: np.ndarray, start: np.ndarray, end: np.ndarray, *, parabolas: bool = False) -> StateBounds:
         """Bounds of the states over blocks; see `motions.motion.BoundedMotion.bounds`.
 
         Args:
             motion: (k,) numbers of the splines, from 0 on.
             start: (k,) s.
             end: (k,) s.
+            parabolas: whether bands are around parabolas.
 
         Returns:
             the bounds, leaves (k, ...).
+
+        Raises:
+            ValueError: blocks with parabolas reach over several pieces.
         """
-        return spline_bounds(
+        bounds = spline_bounds(
             self._knots,
             self._position,
             self._quaternion,
@@ -52,4 +57,6 @@ class SeveralSplines:
             end,
             of_knots=self._of_knots,
             of_blocks=motion,
+            parabolas=parabolas,
         )
+        return bounds if self._offset is None else moved(bounds, self._offset)

@@ -95,7 +95,7 @@ class Spline:
         """Bounds of the states; see `BoundedMotion.bounds`."""
         quaternion = None if self.quaternion is None else np.asarray(self.quaternion)
         bounds = spline_bounds(np.asarray(self.knots), np.asarray(self.position), quaternion, start, end)
-        return bounds if self.offset is None else _moved(bounds, self.offset)
+        return bounds if self.offset is None else moved(bounds, self.offset)
 
 
 jax.tree_util.register_dataclass(
@@ -104,8 +104,16 @@ jax.tree_util.register_dataclass(
 
 
 @jax.jit
-def _moved(bounds: StateBounds, offset: Array) -> StateBounds:
-    # Bounds of another point of the platform, over k blocks.
+def moved(bounds: StateBounds, offset: Array) -> StateBounds:
+    """Bounds of another point of a platform, over k blocks.
+
+    Args:
+        offset: (3,) platform axes, m.
+
+    Returns:
+        the bounds.
+    """
+
     def one(state: StateBounds) -> StateBounds:
         arm = turned(state.rotation, offset)
         swing = cross(state.angular_velocity, arm)

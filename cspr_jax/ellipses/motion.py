@@ -18,8 +18,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.arithmetic.affine_bounds import AffineBounds, sincospi
+from cspr_jax.arithmetic.affine_bounds import AffineBounds
 from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.arithmetic.function_bounds import sincospi
 from cspr_jax.ellipses.harmonics import Ellipse
 from cspr_jax.ellipses.rotation import Rotation, rotation_bounds, rotation_state
 from cspr_jax.motions.amplitude_bounds import TimeBounds, time_bounds

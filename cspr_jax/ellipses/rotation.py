@@ -14,8 +14,9 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic import rotations
-from cspr_jax.arithmetic.affine_bounds import AffineBounds, cross, dot, sincospi, turned
+from cspr_jax.arithmetic.affine_bounds import AffineBounds, cross, dot, turned
 from cspr_jax.arithmetic.elementary import leaf, length
+from cspr_jax.arithmetic.function_bounds import sincospi
 from cspr_jax.arithmetic.rotation_bounds import RotationBounds
 
 

@@ -9,8 +9,9 @@ import math
 import jax
 import numpy as np
 
-from cspr_jax.arithmetic.affine_bounds import AffineBounds, sincospi
+from cspr_jax.arithmetic.affine_bounds import AffineBounds
 from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.arithmetic.function_bounds import sincospi
 from cspr_jax.ellipses.harmonics import Ellipse
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import MotionProof, proofs_of

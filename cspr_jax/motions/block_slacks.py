@@ -31,7 +31,8 @@ from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.runtime import compile_options
 from cspr_jax.schema.verdicts import Verdict
 
-BATCH = 64
+# Blocks that are bounded together, with contacts and without.
+BATCH, RATES_BATCH = 64, 128
 # Length of a block and the one before it, together, at which what happens at an instant counts for the block, s.
 INSTANT = 1e-6
 # Upper bound of a slack that vanishes at an instant.
@@ -72,6 +73,11 @@ def _lines(below: Pair, above: Pair) -> Part:
     return jnp.minimum(*below), jnp.maximum(*above), below[1] - below[0], above[1] - above[0]
 
 
+def _part(slack: AffineBounds) -> Part:
+    # Bound the smallest value of a parabola.
+    return _lines(*_edges(slack)) if slack.square is None else (slack.low(), slack.low() + 2.0 * slack.radius)
+
+
 def _edges(slack: AffineBounds) -> tuple[Pair, Pair]:
     sides = slack.middle - slack.radius, slack.middle + slack.radius
     below, above = ((side - slack.slope, side + slack.slope) for side in sides)
@@ -89,10 +95,7 @@ def _kernel(
 ) -> tuple[Array, ...] | Array:
     # Bound the slacks, or tell which of them are proved to vanish at an instant.
     def one(state: StateBounds) -> tuple[Array, ...] | Array:
-        cables = cable_bounds(robot, state)
-        unit = 1.0 / wrench_units(robot)
-        matrix, wrench = balance_bounds(robot, state, cables)
-        matrix, wrench = matrix * unit[:, None], wrench * unit
+        cables, matrix, wrench = _balance(robot, state)
         if passes:
             return _passes(robot, bodies, matrix, state, cables)
         parts: list[Part] = []
@@ -103,11 +106,33 @@ def _kernel(
         if limits.floor is not None and bodies.body is not None:
             heights = -corner_depths(bodies.body, state) + limits.floor
             parts.append((jnp.min(heights.low(), keepdims=True), jnp.min(heights.high(), keepdims=True)))
-        # A part of two bounds has no lines.
-        level = [(*part, *[jnp.zeros_like(part[0])] * (4 - len(part))) for part in parts]
-        low, high, *rises = (jnp.concatenate(side) for side in zip(*level, strict=True))
-        low, high = jnp.where(jnp.isnan(low), -jnp.inf, low), jnp.where(jnp.isnan(high), jnp.inf, high)
-        return low, high, *(jnp.where(jnp.isfinite(rise), rise, 0.0) for rise in rises)
+        return _joined(parts)
+
+    return jax.vmap(one)(states)
+
+
+def _balance(robot: AnyRobot, state: StateBounds) -> tuple[CableBounds, AffineBounds, AffineBounds]:
+    cables, unit = cable_bounds(robot, state), 1.0 / wrench_units(robot)
+    matrix, wrench = balance_bounds(robot, state, cables)
+    return cables, matrix * unit[:, None], wrench * unit
+
+
+def _joined(parts: list[Part]) -> Part:
+    # A part of two bounds has no lines.
+    level = [(*part, *[jnp.zeros_like(part[0])] * (4 - len(part))) for part in parts]
+    low, high, *rises = (jnp.concatenate(side) for side in zip(*level, strict=True))
+    low, high = jnp.where(jnp.isnan(low), -jnp.inf, low), jnp.where(jnp.isnan(high), jnp.inf, high)
+    return low, high, *(jnp.where(jnp.isfinite(rise), rise, 0.0) for rise in rises)
+
+
+@partial(jax.jit, compiler_options=compile_options.least())
+def _rates_kernel(robot: AnyRobot, limits: Limits, states: StateBounds) -> tuple[Array, Array]:
+    # Bound the smallest slacks: the lower end of a line above a slack is above its smallest value.
+    def one(state: StateBounds) -> tuple[Array, Array]:
+        cables, matrix, wrench = _balance(robot, state)
+        parts = [*tension_slacks(robot, limits, matrix, wrench), *limit_slacks(limits, state, cables)]
+        low, high, _, rise = _joined(parts)
+        return low, high - jnp.abs(rise)
 
     return jax.vmap(one)(states)
 
@@ -120,7 +145,7 @@ def tension_slacks(robot: AnyRobot, limits: Limits, matrix: AffineBounds, wrench
         wrench: (dof,) what the cables must supply, likewise, N.
 
     Returns:
-        the bounds.
+        the bounds; from bounds around parabolas of the smallest slack in the block, without lines.
     """
     low, high = tension_range(robot, limits)
     tensions = witness_tensions(matrix, wrench, low, high)
@@ -128,7 +153,7 @@ def tension_slacks(robot: AnyRobot, limits: Limits, matrix: AffineBounds, wrench
         return [_lines(tensions.below[:, None], tensions.above[:, None])]
     slacks = [tensions.tension - low]
     slacks += [] if limits.tension_max is None else [high - tensions.tension]
-    return [_lines(*_edges(slack)) for slack in slacks]
+    return [_part(slack) for slack in slacks]
 
 
 def _of_pose(robot: AnyRobot, matrix: AffineBounds, state: StateBounds) -> list[Part]:
@@ -157,7 +182,7 @@ def limit_slacks(limits: Limits, state: StateBounds, cables: CableBounds) -> lis
         cables: of the same block.
 
     Returns:
-        the bounds.
+        the bounds, as `tension_slacks` gives them.
     """
     parts: list[Part] = []
     values = {"depth": state.position.each(lambda x: x[2:]), "length": cables.length}
@@ -166,9 +191,9 @@ def limit_slacks(limits: Limits, state: StateBounds, cables: CableBounds) -> lis
     for row in limits_set(limits):
         limit = jnp.asarray(getattr(limits, row.name))
         if row.quantity in values:
-            parts.append(_lines(*_edges(limit - values[row.quantity])))
+            parts.append(_part(limit - values[row.quantity]))
         elif row.quantity in sizes:
-            parts.append(_lines(*_edges(limit - norm(sizes[row.quantity].each(lambda x: x[None])))))
+            parts.append(_part(limit - norm(sizes[row.quantity].each(lambda x: x[None]))))
         elif row.quantity in rates:
             parts.append(_within(limit, rates[row.quantity]))
     return parts
@@ -177,6 +202,8 @@ def limit_slacks(limits: Limits, state: StateBounds, cables: CableBounds) -> lis
 def _within(limit: Array, value: AffineBounds) -> Part:
     # The smaller of two slacks is above the line between the smaller values at both ends, and below each of both.
     one, other = limit - value, value + limit
+    if value.square is not None:
+        return tuple(jnp.minimum(*sides) for sides in zip(_part(one), _part(other), strict=True))
     (below, above), (other_below, other_above) = _edges(one), _edges(other)
     is_nearer = one.high() <= other.high()
     start, end = (jnp.where(is_nearer, *ends) for ends in zip(above, other_above, strict=True))
@@ -227,3 +254,16 @@ def block_slacks(
         high[short] = np.where(vanishing, -SMALLEST, high[short])
         rises[1][short] = np.where(vanishing, 0.0, rises[1][short])
     return BlockSlacks(low, high, *rises)
+
+
+def rate_slacks(robot: AnyRobot, limits: Limits, states: StateBounds) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds of the smallest slacks of tensions and limits over blocks: of the first criteria alone.
+
+    Args:
+        robot: centred, z down.
+        states: over k blocks; of a robot without pulleys they may be around parabolas.
+
+    Returns:
+        (k, n) each: lower bounds, -inf where nothing is known, and upper ones, inf where nothing is known.
+    """
+    return in_batches(partial(_rates_kernel, robot, limits), states, size=RATES_BATCH)

@@ -5,7 +5,8 @@ from typing import Any
 
 from jax import Array
 
-from cspr_jax.arithmetic.affine_bounds import AffineBounds, sincospi, stacked, turned
+from cspr_jax.arithmetic.affine_bounds import AffineBounds, stacked, turned
+from cspr_jax.arithmetic.function_bounds import sincospi
 from cspr_jax.motions.amplitude_bounds import TimeBounds
 
 

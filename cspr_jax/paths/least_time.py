@@ -2,7 +2,7 @@
 
 import dataclasses
 import itertools
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,9 +16,8 @@ from cspr_jax.paths.jumping import Jumping, PathPace, again, jumping_motions
 from cspr_jax.paths.refusals import NoMotion, refusal
 from cspr_jax.paths.section import Section, SectionSettings
 from cspr_jax.paths.smooth import SectionEnds, Smooth, below_ramps, smooth
-from cspr_jax.paths.tightening import cell_slacks
+from cspr_jax.paths.tightening import CellSlacks, together
 from cspr_jax.paths.timed import PathSpeeds, cell_times, distance_from_path, moving, timed
-from cspr_jax.robots.clearance import Scene
 
 # Rounds of proof and tightening; how often ramps are shortened by half where none of their length exist.
 ROUNDS, SHORTER = 8, 4
@@ -83,23 +82,21 @@ class LeastTime:
 
 
 def least_time_motion(
-    problem: Problem, scene: Scene | None, section: Section, settings: SectionSettings, pace: PathPace | None = None
+    problem: Problem, section: Section, settings: SectionSettings, pace: PathPace | None = None
 ) -> LeastTime:
     """Find the fastest motion along a section.
 
     Args:
-        scene: bodies that can meet; they are judged with the motion, and do not change it.
         pace: of a feasible motion; None: none is known.
 
     Returns:
         the motion; where tightening ends before all is proved, the last one.
     """
-    return least_time_motions(problem, scene, [section], [settings], [pace])[0]
+    return least_time_motions(problem, [section], [settings], [pace])[0]
 
 
 def least_time_motions(
     problem: Problem,
-    scene: Scene | None,
     sections: Sequence[Section],
     settings: Sequence[SectionSettings],
     paces: Sequence[PathPace | None] = (),
@@ -107,7 +104,6 @@ def least_time_motions(
     """Find the fastest motions along sections.
 
     Args:
-        scene: as for `least_time_motion`.
         paces: of feasible motions along them; empty: none is known.
 
     Returns:
@@ -116,7 +112,7 @@ def least_time_motions(
     paths = discretes(problem, sections, settings)
     paces = paces or [None] * len(sections)
     cases = zip(paths, jumping_motions(paths, paces), settings, strict=True)
-    answers = [_proved(problem, scene, *case) for case in cases]
+    answers = together(problem, [_proved(problem, *case) for case in cases])
     for finer in FINER:
         # A motion that is not proved on its grid, or not found, may be on a finer one.
         rows = [k for k, (_, is_met) in enumerate(answers) if not is_met]
@@ -124,16 +120,17 @@ def least_time_motions(
             break
         closer = [settings[k]._replace(grid=finer * settings[k].grid) for k in rows]
         paths = discretes(problem, [sections[k] for k in rows], closer)
-        starts = jumping_motions(paths, [paces[k] for k in rows])
-        for k, path, start, each in zip(rows, paths, starts, closer, strict=True):
-            answers[k] = _proved(problem, scene, path, start, each)
+        cases = zip(paths, jumping_motions(paths, [paces[k] for k in rows]), closer, strict=True)
+        for k, answer in zip(rows, together(problem, [_proved(problem, *case) for case in cases]), strict=True):
+            answers[k] = answer
     return [answer for answer, _ in answers]
 
 
 def _proved(
-    problem: Problem, scene: Scene | None, path: Discrete, start: Jumping, settings: SectionSettings
-) -> tuple[LeastTime, bool]:
-    # Tighten the limits on the grid until the motion keeps them everywhere, and tell whether it does.
+    problem: Problem, path: Discrete, start: Jumping, settings: SectionSettings
+) -> Generator[Spline, CellSlacks, tuple[LeastTime, bool]]:
+    # Tighten the limits on the grid until the motion keeps them everywhere, and tell whether it does. It yields motions
+    # and receives the bounds of their slacks.
     jumping, bend, first = start
     if jumping is None:
         return _without_motion(problem, path, first), False
@@ -148,7 +145,7 @@ def _proved(
             break
         run = slower
         motion = timed(section, path.grid, run)
-        slacks = cell_slacks(problem, motion, scene)
+        slacks = yield motion
         margins = slacks.grown(margins, weight)
         slower = None if slacks.is_met else _slower(path.with_margins(margins), run, bend, jerk)
     times = np.diff(np.asarray(motion.knots))

@@ -78,7 +78,7 @@ class Paths(Leg):
         through = np.empty(len(self), object)
         through[:] = [[] for _ in range(len(self))]
         for ride in self._rides(problem, z0):
-            fastest = least_time_motion(problem, scene, ride.section, ride.settings)
+            fastest = least_time_motion(problem, ride.section, ride.settings)
             for segment, motion in cut(fastest, ride):
                 parts[segment].append(motion)
             section = section_answer(fastest, ride, stops.first)

@@ -55,7 +55,7 @@ def least_times(
     motions_along: list[LeastTime] = []
     for first in range(0, len(flat), PART):
         part = flat[first : first + PART]
-        motions_along += least_time_motions(problem, scene, part, [settings] * len(part))
+        motions_along += least_time_motions(problem, part, [settings] * len(part))
     ends = np.cumsum([len(path) for path in paths])
     sections = [motions_along[end - len(path) : end] for path, end in zip(paths, ends.tolist(), strict=True)]
     motions = [chained([section.motion for section in path]) for path in sections]

@@ -1,24 +1,29 @@
 """Limits that a motion along a path misses between the nodes, by proof, and those that bind it."""
 
-from typing import NamedTuple
+from collections.abc import Generator, Sequence
+from typing import NamedTuple, TypeVar
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
+from cspr_jax.curves.several import SeveralSplines
 from cspr_jax.curves.spline import Spline
-from cspr_jax.motions.block_slacks import block_slacks
+from cspr_jax.motions.block_slacks import rate_slacks
 from cspr_jax.motions.criteria import Criterion, criteria
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import TENSIONS
 from cspr_jax.paths.discrete import GridMargins
-from cspr_jax.robots.clearance import Scene
 
 # Slack, over its scale, that is left where a limit is met; by what more than is missed, and by how
 # much at least, margins grow; below which a criterion binds.
 LEFT, MORE, STEP, BINDING = 1e-7, 1.3, 1e-5, 0.01
+# Cells on each side in which margins grow with those of a cell, after the first time.
+SPREAD = 3
 # Times that a cell is halved, and by how much of what is missed its bounds may be apart.
 HALVINGS, LOOSE = 3, 0.5
 # Criteria that faster or slower motion changes, by their units.
 SPEEDS, ACCELERATIONS = "m/s", "m/s^2"
+Answer = TypeVar("Answer")
 
 
 class CellSlacks(NamedTuple):
@@ -27,7 +32,7 @@ class CellSlacks(NamedTuple):
     Fields:
         rows: criteria of tensions, speeds and accelerations.
         low: (n_cells, n_rows) lower bounds; of tensions over the weight, of others over what is allowed.
-        high: (n_cells, n_rows) upper bounds.
+        high: (n_cells, n_rows) upper bounds of the smallest slacks.
     """
 
     rows: list[Criterion]
@@ -49,10 +54,13 @@ class CellSlacks(NamedTuple):
         Returns:
             the margins.
         """
+        # A miss that is left when other cells became tighter moves on from cell to cell: margins grow around it, too.
+        reach = SPREAD if any(side.any() for side in margins) else 0
 
         def lacking(chosen: list[bool]) -> np.ndarray:
             missed = LEFT - self.low[:, chosen].min(1, initial=np.inf)
-            return np.where(missed > 0.0, MORE * missed + STEP, 0.0)
+            more = np.where(missed > 0.0, MORE * missed + STEP, 0.0)
+            return maximum_filter1d(more, 2 * reach + 1, mode="nearest")
 
         tension = weight * lacking([bool(row.flag & TENSIONS) for row in self.rows])
         others = (lacking([row.unit == unit for row in self.rows]) for unit in (ACCELERATIONS, SPEEDS))
@@ -73,32 +81,64 @@ class CellSlacks(NamedTuple):
         return np.where(self.high[np.arange(len(nearest)), nearest] < BINDING, nearest, -1)
 
 
-def cell_slacks(problem: Problem, motion: Spline, scene: Scene | None = None) -> CellSlacks:
-    """Bounds of the slacks that depend on how fast a motion is, over each of its pieces.
+def cell_slacks(problem: Problem, motions: Sequence[Spline]) -> list[CellSlacks]:
+    """Bounds of the slacks that depend on how fast motions are, over each of their pieces.
 
     Args:
-        scene: as for `motions.proved_answers.proved_answers`.
+        motions: at least one, of one degree.
 
     Returns:
-        the bounds.
+        the bounds, one set a motion.
     """
-    knots, rows = np.asarray(motion.knots), criteria(problem.robot, problem.limits, scene)
-    weight = float(problem.robot.mass * problem.robot.gravity)
+    robot, limits, several = problem.robot, problem.limits, SeveralSplines(motions)
+    rows = criteria(robot, limits)
+    weight = float(robot.mass * robot.gravity)
     chosen = [k for k, row in enumerate(rows) if row.flag & TENSIONS or row.unit in (SPEEDS, ACCELERATIONS)]
     scales = np.array([weight if rows[k].flag & TENSIONS else rows[k].allowed for k in chosen])
-    cell, start, end = np.arange(len(knots) - 1), knots[:-1], knots[1:]
+    knots = [np.asarray(motion.knots) for motion in motions]
+    counts = [len(each) - 1 for each in knots]
+    start, end = (np.concatenate([each[side] for each in knots]) for side in (slice(None, -1), slice(1, None)))
+    cell, motion = np.arange(len(start)), np.repeat(np.arange(len(motions)), counts)
     low = np.full((len(cell), len(chosen)), np.inf)
     high = low.copy()
     for level in range(HALVINGS + 1):
-        slacks = block_slacks(problem.robot, problem.limits, motion.bounds, start, end, scene)
-        below, above = slacks.low[:, chosen] / scales, slacks.high[:, chosen] / scales
+        states = several.bounds(motion[cell], start, end, parabolas=robot.pulleys is None)
+        below, above = (side[:, chosen] / scales for side in rate_slacks(robot, limits, states))
         np.minimum.at(high, cell, above)
         # A block says how much is missed where the lower bound is about as close as the upper one.
-        is_loose = ((below < 0.0) & (above - below > LOOSE * np.maximum(-above, LEFT))).any(1) & (level < HALVINGS)
+        is_loose = ((below < 0.0) & (above - below > LOOSE * np.maximum(-above, STEP))).any(1) & (level < HALVINGS)
         np.minimum.at(low, cell[~is_loose], below[~is_loose])
         if not is_loose.any():
             break
         cell, middle = np.repeat(cell[is_loose], 2), 0.5 * (start + end)[is_loose]
         start = np.stack([start[is_loose], middle], axis=1).ravel()
         end = np.stack([middle, end[is_loose]], axis=1).ravel()
-    return CellSlacks([rows[k] for k in chosen], low, high)
+    parts = (np.split(side, np.cumsum(counts)[:-1]) for side in (low, high))
+    return [CellSlacks([rows[k] for k in chosen], *sides) for sides in zip(*parts, strict=True)]
+
+
+def together(problem: Problem, searches: Sequence[Generator[Spline, CellSlacks, Answer]]) -> list[Answer]:
+    """Results of searches that go on with the bounds of the slacks of their motions, bounded together round by round.
+
+    Args:
+        searches: each yields motions, of one degree, and receives their bounds.
+
+    Returns:
+        what they return.
+    """
+    answers: dict[int, Answer] = {}
+    motions: dict[int, Spline] = {}
+
+    def resumed(k: int, slacks: CellSlacks | None) -> None:
+        try:
+            motions[k] = searches[k].send(slacks)  # type: ignore[arg-type]
+        except StopIteration as end:
+            answers[k] = end.value
+
+    for k in range(len(searches)):
+        resumed(k, None)
+    while motions:
+        going = list(motions)
+        for k, slacks in zip(going, cell_slacks(problem, [motions.pop(k) for k in going]), strict=True):
+            resumed(k, slacks)
+    return [answers[k] for k in range(len(searches))]

@@ -17,7 +17,7 @@ from cspr_jax.motions.motion import Motion
 from cspr_jax.motions.proved_answers import ProvedAnswers, proved_answers
 from cspr_jax.paths.answers import PathAnswers
 from cspr_jax.paths.discrete import FASTER
-from cspr_jax.paths.least_time import LeastTime, least_time_motion
+from cspr_jax.paths.least_time import LeastTime, least_time_motions
 from cspr_jax.paths.leg import Ride, cut, section_answer
 from cspr_jax.paths.retraced import Retraced, retraced
 from cspr_jax.paths.section import SectionSettings
@@ -95,7 +95,7 @@ def retimed(plan: PlannedMotions, grid: int, ramp_time: float, path: Path) -> Pl
         paths = retraced(problem.robot, motions, grid)
     except InputError as error:
         raise ConfigError(path, f"retime: {error}") from error
-    faster = [_fastest(plan, scene, one, grid, ramp_time) for one in paths]
+    faster = _fastest(plan, paths, grid, ramp_time)
     parts: list[list[Spline]] = [[] for _ in motions]
     for one in faster:
         for segment, motion in cut(one.fastest, one.ride):
@@ -121,15 +121,21 @@ def _check(plan: PlannedMotions, motions: list[Motion], path: Path) -> None:
         raise ConfigError(path, f"retime: must be absent: segment {unknown[0] + 1} has no motion; see its verdict")
 
 
-def _fastest(plan: PlannedMotions, scene: Scene, one: Retraced, grid: int, ramp_time: float) -> _Faster:
-    # On a finer grid where the motion is too far from the path.
+def _fastest(plan: PlannedMotions, paths: Sequence[Retraced], grid: int, ramp_time: float) -> list[_Faster]:
+    # On finer grids where motions are too far from their paths.
+    answers, rows = dict[int, _Faster](), list(range(len(paths)))
     for doubling in range(DOUBLINGS):
-        settings = SectionSettings(grid * 2**doubling, ramp_time, *one.speeds)
-        fastest = least_time_motion(plan.problem, scene, one.section, settings, one.pace)
-        deviation = one.deviation + fastest.deviation
-        if deviation <= AWAY:
+        chosen = [paths[k] for k in rows]
+        settings = [SectionSettings(grid * 2**doubling, ramp_time, *one.speeds) for one in chosen]
+        along = least_time_motions(
+            plan.problem, [one.section for one in chosen], settings, [one.pace for one in chosen]
+        )
+        for k, one, each, fastest in zip(rows, chosen, settings, along, strict=True):
+            answers[k] = _Faster(Ride(one.section, each, one.segments), fastest, one.deviation + fastest.deviation)
+        rows = [k for k in rows if answers[k].deviation > AWAY]
+        if not rows:
             break
-    return _Faster(Ride(one.section, settings, one.segments), fastest, deviation)
+    return [answers[k] for k in range(len(paths))]
 
 
 def _answers(

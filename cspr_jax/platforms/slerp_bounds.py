@@ -5,7 +5,8 @@ import math
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.arithmetic.affine_bounds import AffineBounds, bent, dot, joined, norm_squared, sincospi, squared
+from cspr_jax.arithmetic.affine_bounds import AffineBounds, dot, joined, norm_squared, squared
+from cspr_jax.arithmetic.function_bounds import bent, sincospi
 from cspr_jax.platforms.oscillating_slerp import Slerp, angle_ratio, sinc
 
 # Rounding of the derivatives that recurrences give, in parts of their size or of 1, is less.

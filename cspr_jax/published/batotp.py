@@ -59,7 +59,7 @@ def least_time(cells: int = CELLS) -> dict[Key, float | None]:
     powers = np.moveaxis(CubicSpline(segments, keys["points"]).c[::-1], 0, 1)
     curve = Spline(leaf(segments), leaf(frame.inward(bernstein_of_powers(powers))), None)
     section = Section(curve, np.full(len(powers), np.inf), segments)
-    least = least_time_motion(problem, None, section, SectionSettings(cells, 0.0))
+    least = least_time_motion(problem, section, SectionSettings(cells, 0.0))
     is_proved = proved_answers(problem, [least.motion], None).verdict[0] == 0
     values = dict.fromkeys(PUBLISHED, least.duration if is_proved else None)
     bound = least.lower_bound if np.isfinite(least.lower_bound) else None

@@ -17,7 +17,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.arithmetic.affine_bounds import AffineBounds, constant, cross, dot, norm_squared, turned
+from cspr_jax.arithmetic.affine_bounds import AffineBounds, constant, cross, dot, norm_squared, stacked, turned
 from cspr_jax.arithmetic.determinant_bounds import changes_sign
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.contact_bodies import Bodies, Shape
@@ -108,7 +108,7 @@ def _ends(state: StateBounds, cables: CableBounds) -> AffineBounds:
     # Points at which the cables leave, and those at which they are attached, (n_cables, 2, 3).
     attached = state.position.each(lambda x: jnp.broadcast_to(x, cables.exit.middle.shape))
     attached = attached if cables.arm is None else attached + cables.arm
-    return AffineBounds(*(jnp.stack(pair, axis=1) for pair in zip(cables.exit, attached, strict=True)))
+    return stacked([cables.exit, attached], axis=1)
 
 
 def _seen(state: StateBounds, ends: AffineBounds) -> AffineBounds:
@@ -169,7 +169,7 @@ def _of_platform(bodies: Bodies, body: Shape, state: StateBounds, cables: CableB
     shape = Solid(constant(body.corners), body.edges, body.faces)
 
     def one(start: AffineBounds, spool: AffineBounds) -> Range:
-        cable = Solid(AffineBounds(*(jnp.stack(pair) for pair in zip(start, spool, strict=True))), *SEGMENT)
+        cable = Solid(stacked([start, spool], axis=0), *SEGMENT)
         return _signed(bodies, cable, shape, depth_bound(cable, body.planes))
 
     low, high = jax.vmap(one)(starts, spools)

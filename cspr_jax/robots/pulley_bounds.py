@@ -9,18 +9,8 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 
-from cspr_jax.arithmetic.affine_bounds import (
-    ROUNDING,
-    AffineBounds,
-    arc_sine,
-    constant,
-    cross,
-    dot,
-    norm_squared,
-    reciprocal,
-    reciprocal_root,
-    squared,
-)
+from cspr_jax.arithmetic.affine_bounds import ROUNDING, AffineBounds, constant, cross, dot, norm_squared, squared
+from cspr_jax.arithmetic.function_bounds import arc_sine, reciprocal, reciprocal_root
 from cspr_jax.robots.pulleys import Pulleys
 
 

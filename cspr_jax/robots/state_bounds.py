@@ -15,11 +15,11 @@ from cspr_jax.arithmetic.affine_bounds import (
     dot,
     joined,
     norm_squared,
-    reciprocal_root,
     selected,
     squared,
     turned,
 )
+from cspr_jax.arithmetic.function_bounds import reciprocal_root
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot, across_line

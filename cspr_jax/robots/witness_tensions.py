@@ -1,9 +1,10 @@
 """Witness tensions: tensions that balance a motion throughout a block of time, and bounds of how central they can be.
 
 A line f + s f' of tensions, whose middle and slope are corrected by the balance and its derivative, leaves a residual
-r(s) of second order. For any B with A(s) B = 1 + E(s), the correction B (1 + E)^-1 r balances exactly, and where the
-rows of |E| sum to less than 1 it is bounded. Where the bounds keep the limits, there are tensions within them at every
-instant: a proof. On as many cables as components these are the only ones, and A is nowhere singular.
+r(s) of second order; a parabola, beside bounds of the balance around parabolas, leaves one of third order. For any B
+with A(s) B = 1 + E(s), the correction B (1 + E)^-1 r balances exactly, and where the rows of |E| sum to less than 1 it
+is bounded. Where the bounds keep the limits, there are tensions within them at every instant: a proof. On as many
+cables as components these are the only ones, and A is nowhere singular.
 
 For more cables, the line joins the most central tensions at both ends of the block: between them tensions are at least
 about as far from their limits, also where another face becomes the nearest one. A face of the set of wrenches refutes.
@@ -18,7 +19,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.arithmetic.affine_bounds import AffineBounds, constant, dot, turned
+from cspr_jax.arithmetic.affine_bounds import AffineBounds, constant, dot, squares, turned
 from cspr_jax.arithmetic.elementary import solved
 from cspr_jax.robots.nearest_face import NearestFace, nearest_face
 from cspr_jax.robots.wrench_sets import FLAT
@@ -72,17 +73,37 @@ def witness_tensions(matrix: AffineBounds, wrench: AffineBounds, low: Array, hig
         smallest = jnp.min(jnp.minimum(tension.high() - low, high - tension.low()))
         above = jnp.broadcast_to(jnp.where(is_regular, smallest, jnp.inf), (2,))
     else:
-        matrices, wrenches = (jnp.stack([x.middle - x.slope, x.middle + x.slope]) for x in (matrix, wrench))
+        matrices, wrenches = (
+            jnp.stack([x.middle + squares(x) - x.slope, x.middle + squares(x) + x.slope]) for x in (matrix, wrench)
+        )
         faces = jax.vmap(nearest_face, (0, 0, None, None))(matrices, wrenches, low, high)
         before, after = faces.tensions
-        tension, is_regular = _solution(matrix, inverse, wrench, 0.5 * (before + after), 0.5 * (after - before))
         nearer = jnp.argmin(jnp.min(jnp.minimum(faces.tensions - low[None], high[None] - faces.tensions), axis=1))
-        above = _face_margin(matrix, inverse, wrench, (low, high), jax.tree.map(lambda leaf: leaf[nearer], faces))
+        face = jax.tree.map(lambda leaf: leaf[nearer], faces)
+        back = inverse if matrix.square is None else _central_inverse(matrix.middle, face, inverse)
+        tension, is_regular = _solution(matrix, back, wrench, 0.5 * (before + after), 0.5 * (after - before))
+        above = _face_margin(matrix, inverse, wrench, (low, high), face)
+    if tension.square is not None:
+        least = jnp.min(jnp.minimum(tension.low() - low, high - tension.high()))
+        below = jnp.broadcast_to(jnp.where(is_regular, least, -jnp.inf), (2,))
+        return WitnessTensions(tension, below, above, is_regular, inverse)
     # The smallest of functions above lines is above the line between the smallest values at both ends.
     lines = tension.middle - tension.slope, tension.middle + tension.slope
     slacks = [jnp.minimum(line - low, high - line) - tension.radius for line in lines]
     below = jnp.stack([jnp.min(slack) for slack in slacks])
     return WitnessTensions(tension, jnp.where(is_regular, below, -jnp.inf), above, is_regular, inverse)
+
+
+def _central_inverse(matrix: Array, face: NearestFace, other: Array) -> Array:
+    # Right inverse with which tensions stay the most central ones near one face: all cables that do not span it move
+    # away from their limits by the same. Another one where the cables of the face depend on each other.
+    dof, count = matrix.shape
+    ways = jnp.sign(face.along)
+    system = jnp.concatenate([matrix[:, face.columns], (matrix @ ways)[:, None]], axis=1)
+    rows = solved(system, jnp.eye(dof))[0]
+    is_spanning = (jnp.arange(count)[:, None] == face.columns[None]).astype(matrix.dtype)
+    central = is_spanning @ rows[:-1] + ways[:, None] * rows[-1][None]
+    return jnp.where(jnp.isfinite(central).all(), central, other)
 
 
 def right_inverse(matrix: Array) -> Array:
@@ -108,9 +129,12 @@ def _solution(
     middle = start + inverse @ (right.middle - matrix.middle @ start)
     slope = rise + inverse @ (right.slope - matrix.slope @ middle - matrix.middle @ rise)
     line = AffineBounds(middle, slope, jnp.zeros(n))
-    residual = (right - turned(matrix, line)).size()
     # Sums of rows of |M B - 1|; that of the middle is rounding.
     rows = jnp.abs(matrix.middle @ inverse - jnp.eye(m)) + jnp.abs(matrix.slope @ inverse)
+    if matrix.square is not None:
+        line = line._replace(square=inverse @ (squares(right) - matrix.square @ middle - matrix.slope @ slope))
+        rows += jnp.abs(matrix.square @ inverse)
+    residual = (right - turned(matrix, line)).size()
     rows = jnp.sum(rows + matrix.radius @ jnp.abs(inverse), axis=1)
     share = jnp.max(rows)
     radius = jnp.abs(inverse) @ (residual + rows * jnp.max(residual) / (1.0 - share))
@@ -136,7 +160,7 @@ def _face_margin(
     over = jnp.where(is_inward, -along.low(), along.high())
     other = jnp.where(over > FLAT * jnp.abs(along.middle), over * (high - low), 0.0)
     slack = dot(normal, wrench) - dot(along, jnp.where(is_bounded, limit, 0.0))
-    top = slack.middle + slack.radius + jnp.sum(other)
+    top = slack.middle + slack.radius + jnp.maximum(squares(slack), 0.0) + jnp.sum(other)
     ends = jnp.stack([top - slack.slope, top + slack.slope])
     # The quotient is a convex function of the slack: it is below the line between its values at both ends.
     smallest = jnp.maximum(along.size() - 2.0 * along.reach(), 0.0)

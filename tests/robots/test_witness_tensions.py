@@ -10,6 +10,7 @@ from support.splines import random_spline
 
 import cspr_jax
 from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.curves.several import SeveralSplines
 from cspr_jax.robots import cables
 from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.state_bounds import balance_bounds, cable_bounds
@@ -57,16 +58,21 @@ def BOUNDS(robot, limits, states):
     return jax.vmap(one)(states)
 
 
-def judged(name: str, seed: int, count: int, low: float, high: float):
+def judged(name: str, seed: int, count: int, low: float, high: float, *, parabolas: bool = False):
     """Exact balances at instants of random blocks, and the bounds of these blocks."""
     robot = centred(cspr_jax.load_robot(name))[0]
     middle, size, tilt = ROBOTS[name]
     spline, table = random_spline(seed, middle=middle, size=size, tilt=tilt)
     edges = np.linspace(0.0, table.x[-1], count + 1)
+    if parabolas:  # of blocks within one piece
+        parts = np.linspace(table.x[:-1], table.x[1:], count // (len(table.x) - 1), endpoint=False)
+        edges = np.append(parts.T.ravel(), table.x[-1])
     times = 0.5 * (edges[:-1] + edges[1:])[:, None] + 0.5 * np.diff(edges)[:, None] * S
     limits = np.full(robot.n_cables, low), np.full(robot.n_cables, high)
     instants = in_batches(partial(EXACT, robot, spline), times / table.x[-1], size=10)
-    return instants, in_batches(partial(BOUNDS, robot, limits), spline.bounds(edges[:-1], edges[1:]), size=10)
+    several = SeveralSplines([spline])
+    states = several.bounds(np.zeros(count, int), edges[:-1], edges[1:], parabolas=parabolas)
+    return instants, in_batches(partial(BOUNDS, robot, limits), states, size=10)
 
 
 def largest_distance(matrix, wrench, low: float, high: float) -> float:
@@ -94,25 +100,28 @@ EACH = [
 ]
 
 
+@pytest.mark.parametrize("parabolas", [False, True])
 @pytest.mark.parametrize("name", EACH)
-def test_bounds_of_cables_and_balances(name):
+def test_bounds_of_cables_and_balances(name, parabolas):
     for seed in range(3):
-        for count in (10, 80):
-            instants, found = judged(name, seed, count, 0.0, np.inf)
+        for count in (12, 78):
+            instants, found = judged(name, seed, count, 0.0, np.inf, parabolas=parabolas)
             for values, band in zip(instants, found[:5], strict=True):
                 s = S.reshape(1, -1, *(1,) * (values.ndim - 2))
-                over = np.abs(values - band.middle[:, None] - band.slope[:, None] * s) - band.radius[:, None]
+                curve = band.square[:, None] * s**2 if parabolas else 0.0
+                over = np.abs(values - band.middle[:, None] - band.slope[:, None] * s - curve) - band.radius[:, None]
                 assert np.nanmax(over) < 1e-11 * np.abs(values).max()
 
 
+@pytest.mark.parametrize("parabolas", [False, True])
 @pytest.mark.parametrize("name", EACH)
 @pytest.mark.parametrize("high", [np.inf, 60.0])
-def test_margins_of_tensions_against_highs(name, high):
+def test_margins_of_tensions_against_highs(name, high, parabolas):
     scale = 30.0 if name == "cogiro" else 1.0
     proved = 0
     for seed in range(2):
         low, top = 1.0 * scale, high * scale
-        instants, found = judged(name, seed, 40, low, top)
+        instants, found = judged(name, seed, 42 if parabolas else 40, low, top, parabolas=parabolas)
         matrices, wrenches, tensions = *instants[3:], found[5]
         for i in range(0, 40, 3):
             exact = [largest_distance(matrices[i, j], wrenches[i, j], low, top) for j in (0, 4, 8)]
@@ -124,13 +133,25 @@ def test_margins_of_tensions_against_highs(name, high):
     assert proved >= 14
 
 
+@pytest.mark.parametrize("parabolas", [False, True])
 @pytest.mark.parametrize("name", ["prototype", "laval-mssm"])
-def test_the_only_tensions(name):
+def test_the_only_tensions(name, parabolas):
     """On as many cables as components the bounds hold the tensions themselves."""
-    instants, found = judged(name, 4, 80, 0.0, np.inf)
+    instants, found = judged(name, 4, 78, 0.0, np.inf, parabolas=parabolas)
     matrices, wrenches, tensions = *instants[3:], found[5]
     exact = np.linalg.solve(matrices, wrenches[..., None])[..., 0]
-    over = np.abs(exact - tensions.tension.middle[:, None] - tensions.tension.slope[:, None] * S[:, None])
+    over = exact - tensions.tension.middle[:, None] - tensions.tension.slope[:, None] * S[:, None]
+    over = np.abs(over - (tensions.tension.square[:, None] * S[:, None] ** 2 if parabolas else 0.0))
     known = tensions.is_regular
     assert known.mean() > 0.9
     assert (over <= tensions.tension.radius[:, None] + 1e-9 * np.abs(exact).max())[known].all()
+
+
+@pytest.mark.parametrize(("parabolas", "least", "most"), [(False, 3.0, 5.0), (True, 6.0, 10.0)])
+def test_how_fast_bounds_of_tensions_shrink(parabolas, least, most):
+    """With the square of the length of a block around lines, with the third power around parabolas."""
+    radii = [
+        np.nanmedian(judged("prototype", 4, count, 0.0, np.inf, parabolas=parabolas)[1][5].tension.radius)
+        for count in (120, 240)
+    ]
+    assert least < radii[0] / radii[1] < most

@@ -55,7 +55,7 @@ def solve(robot, path, limits, grid=500, ramp_time=0.0):
         sizes = {name: np.ones(prepared.n_cables) for name in limits if name not in ("speed_max", "acceleration_max")}
         problem = Problem(prepared, Limits(**{k: leaf(v * sizes.get(k, 1.0)) for k, v in limits.items()}), named("A1"))
         section = section_of(path, frame)
-        least = least_time_motion(problem, None, section, SectionSettings(grid, ramp_time))
+        least = least_time_motion(problem, section, SectionSettings(grid, ramp_time))
         # The reference knows no bodies.
         flags = Verdict(int(proved_answers(problem, [least.motion], None).verdict[0]))
         verdict = flags & ~(Verdict.CABLE_CABLE | Verdict.CABLE_PLATFORM)
