@@ -76,7 +76,8 @@ def check_object(plan: PlannedMotions) -> dict[str, Any]:
         "ends": getattr(_motion(plan) or plan.keys, "ends", "") or None,
         "blocks": case.proof.blocks,
     }
-    return finite(fields | {name: plan.details(0)[name] for name in RETIMED if name in plan.details(0)})
+    details = answers.details(0)
+    return finite(fields | {name: details[name] for name in RETIMED if name in details})
 
 
 def shown_proof(plan: PlannedMotions) -> MotionProof:
@@ -148,7 +149,7 @@ def check_lines(plan: PlannedMotions) -> list[str]:
 
 
 def _retimed(plan: PlannedMotions) -> list[str]:
-    details = plan.details(0)
+    details = plan.answers.details(0)
     if not details.get("retimed"):
         return []
     bound = "" if math.isnan(details["gap"]) else f"; none takes less than {details['lower_bound']:.6g} s"

@@ -138,7 +138,7 @@ def _boundary(robot: AnyRobot, path: Discrete, multipliers: Multipliers) -> floa
 
 
 def _evened(robot: AnyRobot, path: Discrete, multipliers: Multipliers, short: np.ndarray) -> Multipliers:
-    # Where multipliers change so fast that y . a' - y' . a is negative, y falls more along a, and less in cells beside.
+    # Let y fall more along a where it changes so fast that y . a' - y' . a is negative, and less in cells beside.
     nodes = np.arange(len(short) + 1)
     share = np.zeros(len(nodes))
     for cell in np.flatnonzero(short > 0.0):

@@ -17,8 +17,8 @@ from cspr_jax.paths.discrete import GridMargins
 # Slack, over its scale, that is left where a limit is met; by what more than is missed, and by how
 # much at least, margins grow; below which a criterion binds.
 LEFT, MORE, STEP, BINDING = 1e-7, 1.3, 1e-5, 0.01
-# Cells on each side in which margins grow with those of a cell, after the first time.
-SPREAD = 3
+# Cells on each side in which margins grow with those of a cell, after the first time: one for so many of the grid.
+SPREAD = 150
 # Times that a cell is halved, and by how much of what is missed its bounds may be apart.
 HALVINGS, LOOSE = 3, 0.5
 # Criteria that faster or slower motion changes, by their units.
@@ -55,7 +55,7 @@ class CellSlacks(NamedTuple):
             the margins.
         """
         # A miss that is left when other cells became tighter moves on from cell to cell: margins grow around it, too.
-        reach = SPREAD if any(side.any() for side in margins) else 0
+        reach = len(self.low) // SPREAD if any(side.any() for side in margins) else 0
 
         def lacking(chosen: list[bool]) -> np.ndarray:
             missed = LEFT - self.low[:, chosen].min(1, initial=np.inf)

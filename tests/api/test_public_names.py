@@ -56,6 +56,7 @@ def test_every_command_has_its_function():
         functions = [getattr(cspr_jax, function) for function in FUNCTIONS[name]]
         files = [plans.Plan.save, plans.Plan.save_mjcf, plans.Plan.animate]
         functions += files if name in ("plan", "check") else []
+        functions += [cspr_jax.retime] if name in ("plan", "check") else []
         functions += [cspr_jax.Replay.plot] if name == "replay" else []
         functions += [cspr_jax.ImportedRobot.save] if name == "import" else []
         known = {parameter for function in functions for parameter in inspect.signature(function).parameters}
@@ -71,6 +72,7 @@ def test_every_command_has_its_function():
         own |= {"plan": "plan"} if name in ("plot", "report") else {}
         own |= {"file": "path", "set": "cable_set", "output": "path"} if name == "import" else {}
         known |= {"slower"} if name == "check" else set()  # a method of what is checked
+        known |= {"retime"} if name in ("plan", "check") else set()  # a function of what is planned or checked
         options = {action.dest for action in parser._actions} - PRINTING
         assert {own.get(option, option) for option in options} <= known, name
 

@@ -220,7 +220,7 @@ def test_bounds_of_pulleys_of_no_size_are_those_of_points():
     middles = np.linspace(0.1, float(table.x[-1]) - 0.1, 60)
     robots = centred(wheels(radius=[0.0, 0.1, 0.0]))[0], centred(made("3T", 3))[0]
     for one, other in zip(*(bands_of(robot, spline, middles, 0.1) for robot in robots), strict=True):
-        for leaf, wanted in zip(one, other, strict=True):
+        for leaf, wanted in zip(jax.tree.leaves(one), jax.tree.leaves(other), strict=True):
             np.testing.assert_allclose(leaf[..., [0, 2]], wanted[..., [0, 2]], rtol=1e-11, atol=1e-15)
 
 
