@@ -100,6 +100,19 @@ class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys):
         description="path: [path] with points, a file or an arc, in place of the poses; without, it says how the poses "
         "are joined",
     )
+    objective: Literal["time"] | None = Field(
+        None, description='free: what is sought the least of: "time", the default'
+    )
+    end_accelerations: Literal["free", "swing"] | list[Point] | None = Field(
+        None,
+        description='free: accelerations at the poses: "free" (the default), "swing", those of swings about P0, so '
+        "that hypocycloids can precede and follow, or one [x, y, z] for each pose, m/s^2; 0 where rest = true",
+    )
+    together: bool | None = Field(
+        None,
+        description="free: whether all poses that the family joins are passed in the least time together (true, the "
+        "default), or one segment after the other is",
+    )
     launch: LaunchTable | None = Field(None, description="bezier, ellipse: [launch] of an object that is released")
     stretch: Annotated[float, Field(ge=1e-6, le=1e9)] | None = Field(
         None, description="spline: factor by which all durations grow (default 1)"

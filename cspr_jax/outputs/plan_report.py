@@ -79,6 +79,7 @@ _OF_SOME = (
     "gap",
     "binding",
     "sections",
+    "objective",
     "planned_duration",
     "gain",
     "retimed",
@@ -189,7 +190,7 @@ def _numbers(segments: list[dict[str, Any]]) -> dict[str, Column]:
     columns = _times() if lines else _durations() if beziers else _counts(swings)
     if proved:
         columns = _proved({} if not any(segment["tried_arcs"] for segment in segments) else columns)
-    if any(segment["sections"] is not None for segment in segments):
+    if any(segment["sections"] is not None or segment["objective"] is not None for segment in segments):
         columns = _bounded(columns)
     if retimed:
         columns = _gained() | columns

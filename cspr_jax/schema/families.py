@@ -165,6 +165,20 @@ _ROWS = (
         keys=("path",),
         pose_keys=("path",),
     ),
+    Family(
+        "free",
+        "the fastest motions between poses that a search finds, at zero velocity in every pose",
+        dict.fromkeys(ANY_PATTERN, "cspr_jax.free.leg:FreeMotions"),
+        rests_anywhere=True,
+        takes_amplitude=False,
+        any_cables=ANY_PATTERN,
+        knows_uncertainty=True,
+        uncertain_redundancy=True,
+        knows_obstacles=True,
+        knows_pulleys=True,
+        knows_mass_centre=True,
+        keys=("objective", "end_accelerations", "together"),
+    ),
 )
 FAMILIES: dict[str, Family] = {row.name: row for row in _ROWS}
 

@@ -22,7 +22,7 @@ FLOORS = (
     ("build",),
     ("maps", "curves"),
     ("workspaces",),
-    ("swings", "lines", "beziers", "platforms", "splines", "ellipses", "paths"),
+    ("swings", "lines", "beziers", "platforms", "splines", "ellipses", "paths", "free"),
     ("plans", "sweep", "bench"),
     ("outputs",),
     ("published", "outputs.plots"),
@@ -32,7 +32,7 @@ FLOORS = (
 )
 ROOMS = [room for floor in FLOORS for room in floor]
 # Families import nothing of each other: what two of them need lies below. Poses at rest are asked about by platforms.
-FAMILIES = ("swings", "lines", "beziers", "platforms", "splines", "ellipses", "paths")
+FAMILIES = ("swings", "lines", "beziers", "platforms", "splines", "ellipses", "paths", "free")
 KERNELS = ("errors", "arithmetic", "schema", "robots", "motions", "curves", "workspaces", *FAMILIES)
 # What a room is about, what it rests on, and its files in the order in which they are read, stand in its guide.
 GUIDES = ("motions", "curves", "workspaces", *FAMILIES)
@@ -125,7 +125,7 @@ def test_tests_lie_in_folders_like_those_of_the_package():
 def test_the_house_stays_small():
     loose = {path.stem for path in PACKAGE.glob("*.py")}
     assert loose <= {"__init__", "__main__", "cli", "api", "errors"}
-    assert len(ROOMS) <= 28
+    assert len(ROOMS) <= 29
     assert len(FLOORS) <= 14
     assert {FLOOR_OF[room] for room in FAMILIES} == {FLOOR_OF[FAMILIES[0]]}
 

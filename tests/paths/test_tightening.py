@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 from oracles import any_motion_cases, least_time_bounds, path_rows
-from support.least_time import _states, robot_of, section_of
+from support.least_time import robot_of, sampled_states, section_of
 
 from cspr_jax.arithmetic.elementary import double_precision, leaf
 from cspr_jax.motions.amplitudes import named
@@ -59,7 +59,7 @@ def test_bounds_over_cells_hold_the_smallest_slacks(kind):
         knots = np.asarray(motion.knots)
         times = knots[:-1, None] + np.diff(knots)[:, None] * SHARES
         sampled = least_time_bounds.slacks(
-            robot, values, Called(partial(_states, Placed(motion, frame))), times.ravel()
+            robot, values, Called(partial(sampled_states, Placed(motion, frame))), times.ravel()
         )
         units = {"N": ("tension", weight), "m/s": ("cable_speed_max", 0.6 * pace)}
         units["m/s^2"] = ("cable_acceleration_max", 0.5 * 9.81)

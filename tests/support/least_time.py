@@ -61,7 +61,7 @@ def solve(robot, path, limits, grid=500, ramp_time=0.0):
         verdict = flags & ~(Verdict.CABLE_CABLE | Verdict.CABLE_PLATFORM)
     if least.failure is not None:
         return Answer(verdict.text, np.inf, np.inf, None)
-    motion = partial(_states, Placed(least.motion, frame))
+    motion = partial(sampled_states, Placed(least.motion, frame))
     return Answer(verdict.text if verdict else "feasible", least.duration, least.lower_bound, motion)
 
 
@@ -81,7 +81,7 @@ def section_of(path, frame):
     return Section(curve, np.full(len(knots) - 1, np.inf), knots)
 
 
-def _states(motion, times):
+def sampled_states(motion, times):
     # Compiled for one number of instants at a time; the last instant belongs to the motion.
     with double_precision():
         tau = np.clip(np.asarray(times) / float(motion.duration()), 0.0, 1.0)

@@ -1,0 +1,22 @@
+"""Free motions: the fastest motion between poses, along whatever path.
+
+Between poses a motion is a quintic B-spline of normalised time, with four continuous derivatives, so that tensions and
+their rates are continuous. Its control points, its duration and the accelerations at the poses are found by an
+interior-point method on the limits at many instants, from several starts. The proof of any motion then says where
+limits are missed between instants; there they are tightened, and the search goes on. The orientation is a Rodrigues
+vector from an orientation half-way, so that the motion is a spline of quaternions as all others are.
+
+Files, each importing only from those above it:
+
+    basis           quintic B-splines, and the instants at which motions are looked at
+    instants        equations and bounds of a motion at an instant
+    tasks           motions that are sought together, and their unknowns
+    elimination     tensions and multipliers, eliminated from Newton's equations of each instant
+    newton          steps of Newton's method, with banded matrices
+    search          the interior-point method
+    starts          lines, bent lines and swings, from which searches begin
+    poses           tasks from poses, and motions from what is found
+    free_motion     the fastest motion through poses, tightened until it is proved
+    time_bounds     lower bounds of the time of all motions between two poses
+    leg             poses joined by free motions, as a leg of plans
+"""

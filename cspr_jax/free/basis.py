@@ -1,0 +1,99 @@
+"""Quintic B-splines on equal intervals of normalised time, clamped, and the instants at which motions are looked at."""
+
+from functools import lru_cache
+from math import comb
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+DEGREE = 5
+# Control points that count in one interval.
+LOCAL = DEGREE + 1
+
+
+class Basis(NamedTuple):
+    """Basis functions of splines with K control points on m intervals.
+
+    Fields:
+        knots: (K + 6,) of normalised time.
+        tau: (m, n) instants of normalised time, equidistant, from start to end.
+        rows: (m, n, 3, 6) values, first and second derivatives there of the functions of an interval's control points.
+        averages: (K,) instants where control points count most.
+        fit: (K, K) control points from values at these instants.
+        pieces: (m, 6, 6) Bernstein coefficients of each interval from its control points.
+    """
+
+    knots: np.ndarray
+    tau: np.ndarray
+    rows: np.ndarray
+    averages: np.ndarray
+    fit: np.ndarray
+    pieces: np.ndarray
+
+    @property
+    def controls(self) -> int:
+        """Number K of control points."""
+        return len(self.averages)
+
+    @property
+    def end_slope(self) -> float:
+        """Step between the first two control points, over the first derivative at the start."""
+        return 1.0 / (DEGREE * len(self.tau))
+
+    @property
+    def end_bend(self) -> float:
+        """Step to the third control point that a second derivative at the start needs, over that derivative."""
+        return 2.0 / (DEGREE * (DEGREE - 1) * len(self.tau) ** 2)
+
+    def in_intervals(self, controls: np.ndarray) -> np.ndarray:
+        """Control points that count in each interval.
+
+        Args:
+            controls: (..., K, d).
+
+        Returns:
+            (..., m, 6, d).
+        """
+        return np.stack([controls[..., m : m + LOCAL, :] for m in range(len(self.tau))], axis=-3)
+
+    def places(self, controls: np.ndarray) -> np.ndarray:
+        """Values and two derivatives at all instants.
+
+        Args:
+            controls: (..., K, d).
+
+        Returns:
+            (..., m, n, 3, d).
+        """
+        return np.einsum("mnrk,...mkd->...mnrd", self.rows, self.in_intervals(controls), optimize=True)
+
+
+@lru_cache(maxsize=8)
+def basis(intervals: int, instants: int) -> Basis:
+    """Basis functions.
+
+    Args:
+        intervals: their number m.
+        instants: number n of instants an interval.
+
+    Returns:
+        the basis.
+    """
+    borders = np.linspace(0.0, 1.0, intervals + 1)
+    knots = np.concatenate([np.zeros(DEGREE), borders, np.ones(DEGREE)])
+    count = intervals + DEGREE
+    functions = BSpline(knots, np.eye(count), DEGREE)
+    tau = np.linspace(0.0, 1.0, intervals * instants).reshape(intervals, instants)
+    derivatives = [functions.derivative(order)(tau) for order in range(3)]
+    rows = [[table[m, :, m : m + LOCAL] for table in derivatives] for m in range(intervals)]
+    averages = np.array([knots[k + 1 : k + 1 + DEGREE].mean() for k in range(count)])
+    # Bernstein coefficients from values at six places of each interval.
+    share = np.linspace(0.0, 1.0, LOCAL)[:, None]
+    power = np.arange(LOCAL)
+    bernstein = np.array([comb(DEGREE, k) for k in power]) * share**power * (1.0 - share) ** power[::-1]
+    values = functions(borders[:-1, None] + share.T / intervals)
+    pieces = [np.linalg.solve(bernstein, values[m, :, m : m + LOCAL]) for m in range(intervals)]
+    return Basis(
+        knots, tau, np.swapaxes(np.array(rows), 1, 2), averages, np.linalg.inv(functions(averages)), np.array(pieces)
+    )

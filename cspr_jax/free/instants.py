@@ -1,0 +1,236 @@
+"""Equations and bounds of a motion at an instant, for a search.
+
+Values are the tensions over the weight, and whatever else limits bound, over the limit. Tensions are unknowns of their
+own: equations say that they balance the motion, and that all other values are those of its state. So redundant cables
+need no rule, and no matrix is inverted, which may be singular on the way.
+"""
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.arithmetic import rotations
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.curves.spline import turning_of
+from cspr_jax.motions.criteria import Criterion, judged_poses
+from cspr_jax.motions.limits import limits_set
+from cspr_jax.robots.cables import AnyRobot, cable_motion, wrench_units
+from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.robots.point_mass import plane_normal, spool_radius
+from cspr_jax.robots.state import State
+from cspr_jax.robots.wrench_sets import tension_range
+from cspr_jax.schema.limits import Limit
+from cspr_jax.schema.verdicts import Verdict
+
+BATCH = 512
+# Depth below the spools, over the size of the robot, that a search keeps at least.
+BELOW = 0.02
+
+
+class InstantValues(NamedTuple):
+    """Equations of instants, whose residuals are those of the tensions and less other values, and their derivatives.
+
+    Derivatives are by x: the coordinates, their first and second derivatives in normalised time, and the duration.
+
+    Fields:
+        residual: (..., n_equations) without the other values: what tensions miss of the wrench, over the weight; then
+            less the other values of the state.
+        slope: (..., n_equations, n_x).
+        matrix: (..., dof, n_cables) wrenches of unit tensions.
+        bend: (..., n_x, n_x) second derivatives of the residuals times multipliers.
+        mixed: (..., n_cables, n_x) of the same, by a tension and x.
+    """
+
+    residual: Any
+    slope: Any
+    matrix: Any
+    bend: Any
+    mixed: Any
+
+
+def coordinates(pattern: str) -> tuple[np.ndarray, np.ndarray]:
+    """Coordinates of an effector.
+
+    Args:
+        pattern: name of a row of `robots.patterns`.
+
+    Returns:
+        axes along which it moves, and axes of the components of a Rodrigues vector, from 0 to 2.
+    """
+    row = PATTERNS[pattern]
+    return np.array(row.forces, int), np.array(row.moments, int)
+
+
+def state_of(robot: AnyRobot, reference: Array, place: Array, duration: Array) -> State:
+    """State of a motion at one instant.
+
+    Args:
+        reference: (4,) orientation from which the Rodrigues vector counts.
+        place: (3, d) coordinates, and their first two derivatives in normalised time.
+        duration: () s.
+
+    Returns:
+        the state.
+    """
+    along, about = coordinates(robot.pattern)
+    rate = 1.0 / duration
+    rates = place * jnp.stack([jnp.ones_like(rate), rate, rate * rate])[:, None]
+    position = jnp.zeros((3, 3)).at[:, along].set(rates[:, : len(along)])
+    if not len(about):
+        return State(position[0], position[1], position[2])
+    vector = jnp.zeros((3, 3)).at[:, about].set(rates[:, len(along) :])
+    quaternions = jnp.concatenate([jnp.asarray([[1.0], [0.0], [0.0]]), vector], axis=1)
+    rotation, spin, spin_rate, _ = turning_of(*(rotations.product(one, reference) for one in quaternions))
+    return State(position[0], position[1], position[2], rotation, spin, spin_rate)
+
+
+def other_rows(limits: Limits) -> list[Limit]:
+    """Rows of the limits that are set, but those of tensions.
+
+    Returns:
+        the rows.
+    """
+    return [row for row in limits_set(limits) if row.quantity != "tension"]
+
+
+def _other_values(robot: AnyRobot, limits: Limits, state: State) -> Array:
+    # Values beside the tensions: over their limits, of the mass centre squared; depths over the size of the robot.
+    length, rate, bend = cable_motion(robot, state)
+    size = spool_radius(robot)
+    values = {
+        "depth": state.position[2:],
+        "length": length,
+        "speed": rate,
+        "acceleration": bend,
+        "mass_centre_speed": jnp.sum(state.velocity**2, keepdims=True),
+        "mass_centre_acceleration": jnp.sum(state.acceleration**2, keepdims=True),
+    }
+    parts = []
+    for row in other_rows(limits):
+        limit = jnp.atleast_1d(jnp.asarray(getattr(limits, row.name)))
+        scale = size if row.is_height else limit**2 if row.of_mass_centre else limit
+        parts.append(values[row.quantity] / scale)
+    if judged_poses(robot)[1]:
+        parts.append(jnp.dot(plane_normal(robot), state.position)[None] / size)
+    return jnp.concatenate(parts) if parts else jnp.zeros(0)
+
+
+@jax.jit
+def _kernel(robot: AnyRobot, limits: Limits, instants: tuple[Array, ...]) -> InstantValues:
+    def one(reference: Array, place: Array, duration: Array, tensions: Array, multipliers: Array) -> InstantValues:
+        unit, weight = wrench_units(robot), robot.mass * robot.gravity
+
+        def state(x: Array) -> State:
+            return state_of(robot, reference, x[:-1].reshape(place.shape), x[-1])
+
+        def matrix(x: Array) -> Array:
+            return robot.wrench_matrix(state(x)) / unit[:, None]
+
+        def residual(x: Array) -> Array:
+            missing = matrix(x) @ tensions - robot.inertial_wrench(state(x)) / unit / weight
+            return jnp.concatenate([missing, -_other_values(robot, limits, state(x))])
+
+        x = jnp.concatenate([place.ravel(), duration[None]])
+        return InstantValues(
+            residual(x),
+            jax.jacfwd(residual)(x),
+            matrix(x),
+            jax.jacfwd(jax.grad(lambda x: jnp.dot(residual(x), multipliers)))(x),
+            jax.jacfwd(lambda x: multipliers[: robot.dof] @ matrix(x))(x),
+        )
+
+    return jax.vmap(one)(*instants)
+
+
+def instant_values(robot: AnyRobot, limits: Limits, *instants: np.ndarray) -> InstantValues:
+    """Equations at many instants.
+
+    Args:
+        robot: centred, z down.
+        instants: references (..., 4), places (..., 3, d), durations (...), tensions (..., n_cables) over the weight,
+            and multipliers (..., n_equations), as of `state_of` and `InstantValues`.
+
+    Returns:
+        the equations, leaves (..., ...).
+    """
+    shape = instants[2].shape
+    flat = tuple(np.ascontiguousarray(part.reshape(-1, *part.shape[len(shape) :])) for part in instants)
+    values = in_batches(partial(_kernel, robot, limits), flat, size=BATCH)
+    return InstantValues(*(leaf.reshape(*shape, *leaf.shape[1:]) for leaf in values))
+
+
+class ValueBounds(NamedTuple):
+    """Bounds of the values at an instant, and how criteria tighten them.
+
+    Fields:
+        low: (n_values,) -inf for none.
+        high: (n_values,) inf for none.
+        rises: (n_criteria, n_values) by how much a lower bound rises so that the slack of a criterion grows by 1.
+        falls: (n_criteria, n_values) by how much an upper bound falls.
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+    rises: np.ndarray
+    falls: np.ndarray
+
+
+class _Value(NamedTuple):
+    # A value: bounds, the criteria that they stand for, its cable or -1, and its change with that of the slack.
+    low: float
+    high: float
+    least: Verdict
+    most: Verdict
+    cable: int
+    change: float
+
+
+def bounds(robot: AnyRobot, limits: Limits, rows: Sequence[Criterion]) -> ValueBounds:
+    """Bounds of the values.
+
+    Args:
+        robot: centred, z down.
+        rows: its criteria.
+
+    Returns:
+        the bounds.
+    """
+    weight, size = float(robot.mass * robot.gravity), float(spool_radius(robot))
+    together, numbers = Verdict.WRENCH_INFEASIBLE, range(robot.n_cables)
+    low, high = (np.asarray(side) / weight for side in tension_range(robot, limits))
+    slack, over = Verdict.SLACK_CABLE | together, Verdict.OVER_TENSION | together
+    values = [_Value(low[k], high[k], slack, over, k, 1.0 / weight) for k in numbers]
+    for row in other_rows(limits):
+        limit = np.broadcast_to(getattr(limits, row.name), robot.n_cables if row.per_cable else 1)
+        for k, most in enumerate(limit):
+            # Squares change twice as much.
+            change = 1.0 / size if row.is_height else (2.0 if row.of_mass_centre else 1.0) / most
+            top = most / size if row.is_height else 1.0
+            bottom = -1.0 if row.quantity in ("speed", "acceleration") else -np.inf
+            values.append(_Value(bottom, top, row.flag, row.flag, k if row.per_cable else -1, change))
+    if judged_poses(robot)[1]:
+        values.append(_Value(BELOW, np.inf, Verdict.ABOVE_SPOOLS, Verdict.FEASIBLE, -1, 1.0 / size))
+
+    def changes(side: str, bound: str) -> np.ndarray:
+        return np.array(
+            [
+                [
+                    value.change
+                    if getattr(value, side) & row.flag
+                    and value.cable in (*(row.cables or numbers), -1)
+                    and np.isfinite(getattr(value, bound))
+                    else 0.0
+                    for value in values
+                ]
+                for row in rows
+            ]
+        )
+
+    low, high = (np.array([getattr(value, side) for value in values]) for side in ("low", "high"))
+    return ValueBounds(low, high, changes("least", "low"), changes("most", "high"))

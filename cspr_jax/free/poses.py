@@ -1,0 +1,166 @@
+"""Poses between which free motions are sought, as tasks of the search, and motions from what it finds."""
+
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.arithmetic.rotations import products
+from cspr_jax.curves.spline import Spline
+from cspr_jax.errors import InputError
+from cspr_jax.free.basis import Basis
+from cspr_jax.free.instants import ValueBounds, coordinates
+from cspr_jax.free.tasks import Tasks, Unknowns
+from cspr_jax.motions.problem import Problem
+from cspr_jax.robots.patterns import PATTERNS
+
+BACK = np.array([1.0, -1.0, -1.0, -1.0])
+
+
+class FreePoses(NamedTuple):
+    """Poses, at which a motion is at rest but for its acceleration; in the axes of the kernels.
+
+    Fields:
+        positions: (k, 3) of the mass centre, m.
+        quaternions: (k, 4) orientations, unit, scalar first; None for a point mass.
+        accelerations: (k, 3) m/s^2, of platforms (k, 6) with angular accelerations behind them, rad/s^2; a row with a
+            NaN: free.
+        z0: depth of P0, about which the motions swing from which searches begin, m.
+    """
+
+    positions: np.ndarray
+    quaternions: np.ndarray | None
+    accelerations: np.ndarray
+    z0: float
+
+
+class _Joined(NamedTuple):
+    # Segments in coordinates: places (s, 2, d), references (s, 4), turns (s, 2, d, d), accelerations (s + 1, d).
+    places: np.ndarray
+    references: np.ndarray
+    turns: np.ndarray
+    accelerations: np.ndarray
+
+
+def check_searched(problem: Problem) -> None:
+    """Refuse a problem for which no free motion is sought.
+
+    Raises:
+        InputError: a pattern that is not moved, or a cable without a largest tension.
+    """
+    robot, most = problem.robot, problem.limits.tension_max
+    row = PATTERNS[robot.pattern]
+    if row.is_jointed or row.along_line:
+        raise InputError("pattern", robot.pattern, '"1T", "2T", "3T", "1R2T" or "3R3T" for free motions')
+    if most is None or not np.isfinite(np.asarray(most)).all():
+        raise InputError("tension_max", None, "a number, N: without it the least time is that of impulses")
+
+
+def _joined(problem: Problem, poses: FreePoses) -> _Joined:
+    along, about = coordinates(problem.robot.pattern)
+    count, d = len(poses.positions) - 1, len(along) + len(about)
+    places = np.zeros((count, 2, d))
+    places[..., : len(along)] = np.stack([poses.positions[:-1], poses.positions[1:]], axis=1)[..., along]
+    turns, references = np.tile(np.eye(d), (count, 2, 1, 1)), np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
+    linear = poses.accelerations[:, along]
+    if poses.quaternions is None:
+        return _Joined(places, references, turns, linear)
+    start, end = poses.quaternions[:-1], poses.quaternions[1:]
+    end = np.where(np.sum(start * end, axis=1, keepdims=True) < 0.0, -end, end)
+    # From half-way between, a Rodrigues vector is no longer than 1.
+    references = (start + end) / np.linalg.norm(start + end, axis=1, keepdims=True)
+    for side, quaternions in enumerate((start, end)):
+        turning = products(quaternions, references * BACK)
+        vector = turning[:, 1:] / turning[:, :1]
+        places[:, side, len(along) :] = vector[:, about]
+        for i, v in enumerate(vector):
+            across = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+            spin = 2.0 / (1.0 + v @ v) * (np.eye(3) + across)
+            turns[i, side, len(along) :, len(along) :] = np.linalg.inv(spin[np.ix_(about, about)])
+    return _Joined(places, references, turns, np.concatenate([linear, poses.accelerations[:, 3 + about]], axis=1))
+
+
+def tasks_of(problem: Problem, basis: Basis, bounds: ValueBounds, poses: FreePoses) -> Tasks:
+    """The task of moving through all poses.
+
+    Args:
+        bounds: of the values at each instant.
+
+    Returns:
+        one task.
+    """
+    places, references, turns, accelerations = _joined(problem, poses)
+    is_free = np.isnan(accelerations).any(1)
+    shape = 1, len(places), *basis.tau.shape, len(bounds.low)
+    return Tasks(
+        robot=problem.robot,
+        limits=problem.limits,
+        basis=basis,
+        places=places[None],
+        velocities=np.zeros_like(places)[None],
+        references=references[None],
+        turns=turns[None],
+        accelerations=np.where(is_free[:, None], 0.0, accelerations)[None],
+        is_free=is_free[None],
+        low=np.broadcast_to(bounds.low, shape).copy(),
+        high=np.broadcast_to(bounds.high, shape).copy(),
+        scale=np.full(1, np.pi * np.sqrt(poses.z0 / float(problem.robot.gravity))),
+    )
+
+
+def segments_of(tasks: Tasks) -> Tasks:
+    """Segments of tasks as tasks of their own, one behind another.
+
+    Returns:
+        l s tasks of one segment.
+    """
+
+    def one(part: np.ndarray) -> np.ndarray:
+        return part.reshape(-1, 1, *part.shape[2:])
+
+    def ends(part: np.ndarray) -> np.ndarray:
+        pairs = np.stack([part[:, :-1], part[:, 1:]], axis=2)
+        return pairs.reshape(-1, *pairs.shape[2:])
+
+    count = tasks.places.shape[1]
+    return dataclasses.replace(
+        tasks,
+        places=one(tasks.places),
+        velocities=one(tasks.velocities),
+        references=one(tasks.references),
+        turns=one(tasks.turns),
+        accelerations=ends(tasks.accelerations),
+        is_free=ends(tasks.is_free),
+        low=one(tasks.low),
+        high=one(tasks.high),
+        scale=np.repeat(tasks.scale, count),
+    )
+
+
+def motions_of(tasks: Tasks, unknowns: Unknowns, z0: float) -> list[Spline]:
+    """Motions along all segments of a task.
+
+    Args:
+        unknowns: of one task.
+        z0: depth of P0, m.
+
+    Returns:
+        the motions, one a segment.
+    """
+    along, about = coordinates(tasks.robot.pattern)
+    controls = tasks.basis.in_intervals(tasks.controls(unknowns)[0])
+    tables = np.einsum("mbk,smkd->smbd", tasks.basis.pieces, controls)
+    motions = []
+    for table, reference, duration in zip(tables, tasks.references[0], unknowns.duration[0].tolist(), strict=True):
+        position = np.zeros((*table.shape[:2], 3))
+        position[..., along] = table[..., : len(along)]
+        quaternion = None
+        if len(about):
+            turning = np.zeros((*table.shape[:2], 4))
+            turning[..., 0] = 1.0
+            turning[..., 1 + about] = table[..., len(along) :]
+            quaternion = leaf(products(turning.reshape(-1, 4), reference[None]).reshape(turning.shape))
+        knots = np.linspace(0.0, duration, len(table) + 1)
+        motions.append(Spline(leaf(knots), leaf(position), quaternion, leaf(z0)))
+    return motions

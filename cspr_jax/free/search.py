@@ -1,0 +1,307 @@
+"""Search for the fastest motions: a primal-dual interior-point method for many motions at once.
+
+Bounds are kept by barriers. Equations may be missed at a price, whose multipliers are those of the last optimum
+(an augmented Lagrangian), so that every start has a way down to a motion that meets them; barriers and what may be
+missed fall together. Steps are Newton's, no longer than the merit falls.
+"""
+
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.free.elimination import Softness, times, transposed
+from cspr_jax.free.instants import InstantValues
+from cspr_jax.free.newton import Step, gathered, newton_step
+from cspr_jax.free.tasks import OUTER, Tasks, Unknowns
+
+# Weight of the barriers and softness of the equations: at the start, at the end, and by what they fall.
+BARRIERS, BARRIER_FALL, BARRIER_POWER = (1e-1, 3e-8), 0.2, 1.5
+SOFTNESS, SOFTNESS_FALL = (1.0, 1e-6), 0.2
+# Errors of Newton's equations, over the weight of the barriers, with which these fall; by how much equations are missed
+# in the end.
+CLOSE, MISSED = 10.0, 1e-6
+# Steps, all and for one weight of the barriers; halvings of one; part of the way to a bound that one goes; part of the
+# slope by which the merit falls at least.
+STEPS, PATIENCE, HALVINGS, SHARE, DESCENT = 150, 40, 8, 0.99, 1e-4
+# Multipliers of equations beyond which their mean counts as the unit of errors.
+LARGE = 100.0
+# Part of the range by which values are inside their bounds at the start, at least, and at most.
+INSIDE, AWAY = 0.1, 1e-2
+# Keeps the metric of the tensions regular; by how much multipliers of bounds and barriers over gaps may differ.
+REGULAR, APART = 1e-6, 1e10
+
+
+class Levels(NamedTuple):
+    """Weight of the barriers, (l,), and how far equations may be missed."""
+
+    barrier: np.ndarray
+    soft: Softness
+
+
+class Optima(NamedTuple):
+    """Results.
+
+    Fields:
+        unknowns: of all motions.
+        is_optimal: (l,) whether the search has converged.
+        steps: (l,) number of steps.
+    """
+
+    unknowns: Unknowns
+    is_optimal: np.ndarray
+    steps: np.ndarray
+
+
+@dataclasses.dataclass(frozen=True)
+class _Points:
+    # Motions with their equations.
+    tasks: Tasks
+    unknowns: Unknowns
+    equations: InstantValues
+    residual: np.ndarray
+
+    @classmethod
+    def of(cls, tasks: Tasks, unknowns: Unknowns) -> "_Points":
+        return cls(tasks, unknowns, *tasks.equations(unknowns))
+
+    def taken(self, rows: np.ndarray) -> "_Points":
+        equations = InstantValues(*(leaf[rows] for leaf in self.equations))
+        return _Points(self.tasks.taken(rows), self.unknowns.taken(rows), equations, self.residual[rows])
+
+    def put(self, rows: np.ndarray, others: "_Points") -> None:
+        # Replaces some of the motions, in place.
+        for leaf, values in zip(self._leaves, others._leaves, strict=True):
+            leaf[rows] = values
+
+    @property
+    def _leaves(self) -> tuple[np.ndarray, ...]:
+        return *self.unknowns, *self.equations, self.residual
+
+    def metric(self) -> np.ndarray:
+        # A force that is missed counts as the tensions that it would take.
+        matrix = self.equations.matrix
+        return matrix @ transposed(matrix) + REGULAR * np.eye(matrix.shape[-2])
+
+    def missed(self) -> np.ndarray:
+        return np.abs(self.residual).reshape(len(self.residual), -1).max(1)
+
+    def merit(self, levels: Levels) -> np.ndarray:
+        tasks, values, soft = self.tasks, self.unknowns.values, levels.soft
+        barrier = np.zeros(values.shape)
+        for bound, gap in ((tasks.low, values - tasks.low), (tasks.high, tasks.high - values)):
+            barrier -= np.where(np.isfinite(bound), np.log(np.where(np.isfinite(bound), gap, 1.0)), 0.0)
+        price = (soft.level + 0.5 * soft.paid(self.residual)) * self.residual
+        each = price, levels.barrier[:, None, None, None, None] * barrier
+        return self.unknowns.duration.sum(1) / tasks.scale + sum(part.reshape(len(values), -1).sum(1) for part in each)
+
+    def errors(self, levels: Levels) -> np.ndarray:
+        # Largest error of Newton's equations.
+        tasks, unknowns, soft = self.tasks, self.unknowns, levels.soft
+        count, dof, d = len(unknowns.values), tasks.robot.dof, tasks.places.shape[-1]
+        slope = gathered(tasks.basis, times(transposed(self.equations.slope), unknowns.multipliers))
+        slope[..., -1] += 1.0 / tasks.scale[:, None]
+        along = times(transposed(tasks.border_slopes(unknowns)), slope[..., tasks.border])
+        segments, accelerations = unknowns.duration.shape[1], np.zeros_like(unknowns.acceleration)
+        for side in (0, 1):
+            accelerations[:, side : segments + side] += along[..., 1 + side * d : 1 + (1 + side) * d]
+        balance = times(transposed(self.equations.matrix), unknowns.multipliers[..., :dof])
+        values = np.concatenate([balance, unknowns.multipliers[..., dof:]], axis=-1)
+        values = values - unknowns.low_push + unknowns.high_push
+        parts = [slope[..., OUTER * d : -1 - OUTER * d], slope[..., -1] + along[..., 0], values]
+        parts.append(np.where(tasks.is_free[..., None], accelerations, 0.0))
+        pushes, weight = (unknowns.low_push, unknowns.high_push), levels.barrier[:, None, None, None, None]
+        gaps = unknowns.values - tasks.low, tasks.high - unknowns.values
+        for push, gap in zip(pushes, gaps, strict=True):
+            parts.append(np.where(np.isfinite(gap), np.where(np.isfinite(gap), gap, 0.0) * push - weight, 0.0))
+        unit = np.maximum(LARGE, (pushes[0] + pushes[1]).reshape(count, -1).mean(1)) / LARGE
+        largest = np.max([np.abs(part).reshape(count, -1).max(1, initial=0.0) for part in parts], axis=0)
+        price = self.residual - soft.missed(unknowns.multipliers - soft.level)
+        return np.maximum(largest / unit, np.abs(price).reshape(count, -1).max(1))
+
+
+def _moved(unknowns: Unknowns, change: Unknowns, primal: np.ndarray, dual: np.ndarray) -> Unknowns:
+    sizes = [primal] * 5 + [dual] * 2
+    return Unknowns(
+        *(
+            leaf + size.reshape(-1, *[1] * (leaf.ndim - 1)) * step
+            for leaf, size, step in zip(unknowns, sizes, change, strict=True)
+        )
+    )
+
+
+def _length(*pairs: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    # Longest steps, up to 1, by which no value loses more than a share of itself, (l,).
+    lengths = np.ones(len(pairs[0][0]))
+    for value, change in pairs:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            longest = np.where(change < 0.0, -SHARE * value / change, np.inf)
+        lengths = np.minimum(lengths, longest.reshape(len(lengths), -1).min(1))
+    return lengths
+
+
+def _lengths(points: _Points, step: Step) -> tuple[np.ndarray, np.ndarray]:
+    # Longest steps of the unknowns, and of the multipliers of bounds.
+    tasks, unknowns, change = points.tasks, points.unknowns, step.change
+    low, high = np.isfinite(tasks.low), np.isfinite(tasks.high)
+    return _length(
+        (unknowns.values - tasks.low, np.where(low, change.values, 0.0)),
+        (tasks.high - unknowns.values, np.where(high, -change.values, 0.0)),
+        (0.5 * unknowns.duration, change.duration),
+    ), _length((unknowns.low_push, change.low_push), (unknowns.high_push, change.high_push))
+
+
+def _descended(points: _Points, step: Step, levels: Levels) -> _Points:
+    # The motions after a step, halved until the merit falls.
+    primal, dual = _lengths(points, step)
+    before, after = points.merit(levels), points
+    rows = np.arange(len(primal))
+    for halving in range(HALVINGS + 1):
+        part = points.taken(rows)
+        trial = _Points.of(part.tasks, _moved(part.unknowns, step.change.taken(rows), primal[rows], dual[rows]))
+        merit = trial.merit(_taken(levels, rows))
+        least = before[rows] + DESCENT * primal[rows] * step.fall[rows] + 1e-12 * np.abs(before[rows])
+        falls = (merit <= least) | (halving == HALVINGS)
+        if halving == 0 and falls.all():
+            return trial
+        after = after if halving else points.taken(rows)
+        after.put(rows[falls], trial.taken(falls))
+        rows = rows[~falls]
+        if not len(rows):
+            break
+        primal[rows] *= 0.5
+    return after
+
+
+def _taken(levels: Levels, rows: np.ndarray) -> Levels:
+    return Levels(levels.barrier[rows], Softness(*(leaf[rows] for leaf in levels.soft)))
+
+
+def _sharpened(points: _Points, levels: Levels) -> tuple[Levels, np.ndarray]:
+    # Weights and softness, smaller where their optimum is reached; errors.
+    barrier, (size, metric, level) = levels
+    while True:
+        levels = Levels(barrier, Softness(size, metric, level))
+        errors = points.errors(levels)
+        is_close = errors < CLOSE * barrier
+        level = np.where(_wide(is_close, level), points.unknowns.multipliers, level)
+        size = np.where(is_close, np.maximum(SOFTNESS[1], SOFTNESS_FALL * size), size)
+        metric = np.where(_wide(is_close, metric), points.metric(), metric)
+        is_close &= barrier > BARRIERS[1]
+        if not is_close.any():
+            return Levels(barrier, Softness(size, metric, level)), errors
+        smaller = np.minimum(BARRIER_FALL * barrier, barrier**BARRIER_POWER)
+        barrier = np.where(is_close, np.maximum(BARRIERS[1], smaller), barrier)
+
+
+def _wide(flags: np.ndarray, leaf: np.ndarray) -> np.ndarray:
+    return flags.reshape(-1, *[1] * (leaf.ndim - 1))
+
+
+def optima(tasks: Tasks, start: Unknowns, barrier: float = BARRIERS[0], softness: float = SOFTNESS[0]) -> Optima:
+    """Search for the fastest motions.
+
+    Args:
+        start: from which the search begins.
+        barrier: weight of the barriers at the start.
+        softness: of the equations at the start.
+
+    Returns:
+        the motions; those that have not converged as they were last.
+    """
+    count = len(start.duration)
+    points = _Points.of(tasks, start)
+    sizes = np.full(count, softness)
+    levels = Levels(np.full(count, barrier), Softness(sizes, points.metric(), start.multipliers.copy()))
+    result = Optima(Unknowns(*(leaf.copy() for leaf in start)), np.zeros(count, bool), np.zeros(count, int))
+    rows, curved, waited = np.arange(count), np.zeros(count), np.zeros(count)
+    for number in range(STEPS + 1):
+        before = levels.barrier
+        levels, errors = _sharpened(points, levels)
+        waited = np.where(levels.barrier < before, 0, waited + 1)
+        is_optimal = (levels.barrier <= BARRIERS[1]) & (errors < CLOSE * BARRIERS[1]) & (points.missed() < MISSED)
+        is_over = is_optimal | (number == STEPS) | (waited > PATIENCE)
+        for leaf, values in zip(result.unknowns, points.unknowns.taken(is_over), strict=True):
+            leaf[rows[is_over]] = values
+        result.is_optimal[rows[is_over]], result.steps[rows[is_over]] = is_optimal[is_over], number
+        if is_over.all():
+            break
+        if is_over.any():
+            rows, curved, waited = rows[~is_over], curved[~is_over], waited[~is_over]
+            points, levels = points.taken(~is_over), _taken(levels, ~is_over)
+        step = newton_step(
+            points.tasks, points.unknowns, points.equations, points.residual, levels.barrier, levels.soft, curved
+        )
+        curved = np.where(step.curved > 0.0, step.curved, curved)
+        points = _safeguarded(_descended(points, step, levels), levels.barrier)
+    return result
+
+
+def _safeguarded(points: _Points, barrier: np.ndarray) -> _Points:
+    # Multipliers of bounds not too far from barriers over gaps.
+    tasks, unknowns, weight = points.tasks, points.unknowns, barrier[:, None, None, None, None]
+    pushes = []
+    for push, gap in (
+        (unknowns.low_push, unknowns.values - tasks.low),
+        (unknowns.high_push, tasks.high - unknowns.values),
+    ):
+        near = weight / gap
+        pushes.append(np.where(np.isfinite(gap), np.clip(push, near / APART, near * APART), 0.0))
+    return dataclasses.replace(points, unknowns=unknowns._replace(low_push=pushes[0], high_push=pushes[1]))
+
+
+def again(tasks: Tasks, unknowns: Unknowns, barrier: float) -> Unknowns:
+    """Unknowns of motions found before, from which a search within other bounds begins.
+
+    Args:
+        barrier: weight of the barriers.
+
+    Returns:
+        the unknowns: values inside their bounds.
+    """
+    inside = np.minimum(np.sqrt(barrier), INSIDE * (tasks.high - tasks.low))
+    values = np.clip(unknowns.values, tasks.low + inside, tasks.high - inside)
+    return unknowns._replace(values=values, **_pushes(tasks, values, barrier))
+
+
+def _pushes(tasks: Tasks, values: np.ndarray, barrier: float) -> dict[str, np.ndarray]:
+    gaps = {"low_push": values - tasks.low, "high_push": tasks.high - values}
+    return {name: np.where(np.isfinite(gap), barrier / gap, 0.0) for name, gap in gaps.items()}
+
+
+def started(tasks: Tasks, controls: np.ndarray, duration: np.ndarray, barrier: float = BARRIERS[0]) -> Unknowns:
+    """Unknowns of motions from which a search begins.
+
+    Args:
+        controls: (l, s, K, d) control points, of which the outer ones only say the accelerations that are free.
+        duration: (l, s) s.
+        barrier: weight of the barriers.
+
+    Returns:
+        the unknowns: values inside their bounds.
+    """
+    count, cables, dof = duration.shape[1], tasks.robot.n_cables, tasks.robot.dof
+    acceleration = tasks.accelerations.copy()
+    for side, index, sign in ((0, OUTER - 1, 3.0), (1, -OUTER, -3.0)):
+        step = controls[:, :, index] - tasks.places[:, :, side]
+        step = step - sign * tasks.basis.end_slope * duration[..., None] * tasks.velocities[:, :, side]
+        second = step / (tasks.basis.end_bend * duration[..., None] ** 2)
+        near = np.linalg.solve(tasks.turns[:, :, side], second[..., None])[..., 0]
+        is_free = tasks.is_free[:, side : count + side, None]
+        acceleration[:, side : count + side] = np.where(is_free, near, acceleration[:, side : count + side])
+    shape = tasks.low.shape
+    values, empty = np.zeros(shape), np.zeros((*shape[:-1], shape[-1] - cables + dof))
+    unknowns = Unknowns(controls[:, :, OUTER:-OUTER], duration, acceleration, values, empty, values, values)
+    equations, residual = tasks.equations(unknowns)
+    # Tensions nearest to the middle of their range that balance the motion.
+    middle = 0.5 * (tasks.low + tasks.high)[..., :cables]
+    matrix = equations.matrix
+    lacking = -residual[..., :dof] - times(matrix, middle)
+    metric = matrix @ transposed(matrix) + REGULAR * np.eye(dof)
+    tensions = middle + times(transposed(matrix), np.linalg.solve(metric, lacking[..., None])[..., 0])
+    values = np.concatenate([tensions, -residual[..., dof:]], axis=-1)
+    inside = np.minimum(AWAY, INSIDE * (tasks.high - tasks.low))
+    values = np.clip(values, tasks.low + inside, tasks.high - inside)
+    pushes = _pushes(tasks, values, barrier)
+    inner = controls[:, :, OUTER:-OUTER].copy()
+    return Unknowns(inner, duration.copy(), acceleration, values, empty, **pushes)

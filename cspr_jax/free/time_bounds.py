@@ -1,0 +1,86 @@
+"""Lower bounds of the time of any motion between two poses at zero velocity, whatever its path.
+
+A length that changes by D from rest to rest, with accelerations up to a that speed it up and up to b that slow it
+down, and a speed up to v, takes no less than sqrt(2 D (1/a + 1/b)), or D / v + v (1/a + 1/b) / 2 if it comes to v. That
+holds for the length of each cable, and for the way of the mass centre in every direction e: tensions give it no more
+than e . g + s sum(t_max) / m, where s is the largest e . u of a cable's direction u. Below the spools u points up.
+"""
+
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax.curves.spline import Spline
+from cspr_jax.motions.criteria import judged_poses
+from cspr_jax.motions.problem import Problem
+from cspr_jax.robots.cables import cable_motion
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.wrench_sets import tension_range
+
+# Directions in the vertical plane through both places; what bounds are lowered by, more than their rounding.
+Numbers = np.ndarray | float
+ANGLES, SAFE = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 181), 1e-9
+
+
+def least_time(way: np.ndarray, speeding: Numbers, slowing: Numbers, speed: Numbers) -> np.ndarray:
+    """Least time of a way from rest to rest.
+
+    Args:
+        way: (...) m, not negative.
+        speeding: (...) largest acceleration on the way, m/s^2; inf for none.
+        slowing: (...) largest acceleration against it, likewise.
+        speed: (...) largest speed, m/s; inf for none.
+
+    Returns:
+        (...) s.
+    """
+    slowness = 1.0 / np.asarray(speeding) + 1.0 / np.asarray(slowing)
+    with np.errstate(invalid="ignore", divide="ignore"):  # of no cap, no largest acceleration, no way
+        is_capped = np.sqrt(2.0 * way / slowness) > speed
+        capped = way / speed + 0.5 * speed * slowness
+        return np.where(way > 0.0, np.where(is_capped, capped, np.sqrt(2.0 * way * slowness)), 0.0)
+
+
+def time_bounds(problem: Problem, motions: list[Spline]) -> np.ndarray:
+    """Lower bounds of the time of all motions with the same ends.
+
+    Args:
+        motions: n of them, at zero velocity where they begin and end.
+
+    Returns:
+        (n,) s.
+    """
+    return np.array([(1.0 - SAFE) * _time_bound(problem, motion) for motion in motions])
+
+
+def _time_bound(problem: Problem, motion: Spline) -> float:
+    robot, limits = problem.robot, problem.limits
+    start, end = (motion.state(jnp.asarray(tau)) for tau in (0.0, 1.0))
+    way = np.asarray(end.position) - np.asarray(start.position)
+    bounds = [_of_mass_centre(problem, way)]
+    speed, rise = (
+        np.inf if most is None else np.asarray(most) for most in (limits.cable_speed_max, limits.cable_acceleration_max)
+    )
+    paid = np.abs(np.asarray(cable_motion(robot, end)[0]) - np.asarray(cable_motion(robot, start)[0]))
+    bounds.append(float(np.max(least_time(paid, rise, rise, speed))))
+    return max(bounds)
+
+
+def _of_mass_centre(problem: Problem, way: np.ndarray) -> float:
+    robot, limits = problem.robot, problem.limits
+    level = np.linalg.norm(way[:2])
+    # Components along the way's level direction and downwards, of directions in which it goes.
+    directions = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
+    along = directions @ np.array([level, way[2]])
+    directions = directions * np.where(along < 0.0, -1.0, 1.0)[:, None]
+    pull = float(np.sum(np.asarray(tension_range(robot, limits)[1]))) / float(robot.mass)
+    most = np.inf if limits.acceleration_max is None else float(limits.acceleration_max)
+    pulls_up = judged_poses(robot)[1] and not isinstance(robot, PlatformRobot)
+
+    def largest(down: np.ndarray) -> np.ndarray:
+        share = np.sqrt(np.clip(1.0 - np.maximum(down, 0.0) ** 2, 0.0, 1.0)) if pulls_up else np.ones_like(down)
+        pulled = np.where(share > 0.0, share * pull, 0.0) if np.isfinite(pull) else np.where(share > 0.0, np.inf, 0.0)
+        return np.clip(pulled + float(robot.gravity) * down, 0.0, most)
+
+    speed = np.inf if limits.speed_max is None else float(limits.speed_max)
+    with np.errstate(divide="ignore"):  # where nothing moves
+        return float(np.max(least_time(np.abs(along), largest(directions[:, 1]), largest(-directions[:, 1]), speed)))

@@ -1,0 +1,150 @@
+"""Parts of the search for free motions against finite differences and dense matrices."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from oracles import least_time_forms
+from support.free_motions import problem_of
+
+from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.free.basis import basis
+from cspr_jax.free.elimination import Softness, eliminated, times, transposed
+from cspr_jax.free.instants import bounds
+from cspr_jax.free.newton import gathered
+from cspr_jax.free.poses import FreePoses, tasks_of
+from cspr_jax.free.search import started
+from cspr_jax.free.starts import starts
+from cspr_jax.motions.criteria import criteria
+
+RING = least_time_forms.ring_robot(3, 1.0, 2.0)
+LIMITS = {"tension_min": np.full(3, 0.4), "tension_max": np.full(3, 16.0)}
+STEP = 1e-5
+
+
+@pytest.fixture(scope="module")
+def searched():
+    """A task of two segments with velocities at its ends, and unknowns with random multipliers."""
+    rng = np.random.default_rng(0)
+    with double_precision():
+        problem = problem_of(RING, LIMITS)[0]
+        limits = bounds(problem.robot, problem.limits, criteria(problem.robot, problem.limits))
+        places = np.array([[0.3, 0.1, 1.0], [-0.2, 0.3, 1.4], [0.1, -0.3, 1.2]])
+        poses = FreePoses(places, None, np.full((3, 3), np.nan), 1.2)
+        tasks = tasks_of(problem, basis(6, 3), limits, poses)
+        tasks = dataclasses.replace(tasks, velocities=rng.normal(size=tasks.velocities.shape))
+        line = np.linspace(places[:-1], places[1:], tasks.basis.controls, axis=1)[None]
+        unknowns = started(tasks, line + 0.02 * rng.normal(size=line.shape), np.array([[0.7, 0.9]]))
+    return tasks, unknowns._replace(multipliers=rng.normal(size=unknowns.multipliers.shape))
+
+
+def moved(unknowns, step, size):
+    """Unknowns with durations and accelerations a step further."""
+    duration, acceleration = step
+    return unknowns._replace(
+        duration=unknowns.duration + size * duration, acceleration=unknowns.acceleration + size * acceleration
+    )
+
+
+def test_splines_have_the_derivatives_and_the_pieces_of_their_control_points():
+    table, rng = basis(5, 4), np.random.default_rng(1)
+    controls = rng.normal(size=(table.controls, 2))
+    places = table.places(controls)
+    assert table.tau[0, 0] == 0.0
+    assert table.tau[-1, -1] == 1.0
+    pieces = np.einsum("mbk,mkd->mbd", table.pieces, table.in_intervals(controls))
+    np.testing.assert_allclose(pieces[1:, 0], pieces[:-1, -1], atol=1e-12)
+    np.testing.assert_allclose(pieces[[0, -1], [0, -1]], controls[[0, -1]], atol=1e-12)
+    np.testing.assert_allclose(places[0, 0, 1], (controls[1] - controls[0]) / table.end_slope, atol=1e-9)
+    still = controls.copy()
+    still[1] = still[0]
+    np.testing.assert_allclose(table.places(still)[0, 0, 2], (still[2] - still[0]) / table.end_bend, atol=1e-9)
+    fitted = table.fit @ np.sin(table.averages)
+    np.testing.assert_allclose(table.places(fitted[:, None])[..., 0, 0], np.sin(table.tau), atol=1e-6)
+    np.testing.assert_allclose(table.places(fitted[:, None])[..., 1, 0], np.cos(table.tau), atol=1e-4)
+
+
+def test_outer_control_points_have_their_derivatives(searched):
+    tasks, unknowns = searched
+    rng = np.random.default_rng(2)
+    step = rng.normal(size=(1, 2)), rng.normal(size=(1, 3, 3))
+    by = np.concatenate([step[0][..., None], step[1][:, :-1], step[1][:, 1:]], axis=-1)
+    push = rng.normal(size=(1, 2, 12))
+    sides = [moved(unknowns, step, size) for size in (-STEP, STEP)]
+    before, after = (tasks.controls(one).reshape(1, 2, -1)[..., tasks.border] for one in sides)
+    np.testing.assert_allclose(times(tasks.border_slopes(unknowns), by), (after - before) / (2 * STEP), atol=1e-7)
+    before, after = (times(transposed(tasks.border_slopes(one)), push) for one in sides)
+    bends = times(tasks.border_bends(unknowns, push), by)
+    np.testing.assert_allclose(bends, (after - before) / (2 * STEP), atol=1e-7)
+
+
+def test_equations_have_their_derivatives(searched):
+    """Gathered gradients of the residuals times multipliers, and second derivatives at instants."""
+    tasks, unknowns = searched
+    rng = np.random.default_rng(3)
+    inner, step = rng.normal(size=unknowns.inner.shape), (rng.normal(size=(1, 2)), np.zeros((1, 3, 3)))
+
+    def at(size):
+        with double_precision():
+            there = moved(unknowns, step, size)._replace(inner=unknowns.inner + size * inner)
+            return tasks.controls(there), *tasks.equations(there)
+
+    (first, before, less), (last, after, more) = at(-STEP), at(STEP)
+    with double_precision():
+        equations, _ = tasks.equations(unknowns)
+    lagrangian = times(transposed(equations.slope), unknowns.multipliers)
+    change = ((last - first) / (2 * STEP)).reshape(1, 2, -1)
+    slope = gathered(tasks.basis, lagrangian)
+    along = np.sum(slope[..., :-1] * change, axis=-1) + slope[..., -1] * step[0]
+    values = (np.sum(residual * unknowns.multipliers, axis=(2, 3, 4)) for residual in (less, more))
+    low, high = values
+    np.testing.assert_allclose(along, (high - low) / (2 * STEP), rtol=1e-6)
+    places = tasks.basis.places((last - first) / (2 * STEP)).reshape(1, 2, 6, 3, -1)
+    state = np.concatenate([places, np.broadcast_to(step[0][:, :, None, None, None], (1, 2, 6, 3, 1))], axis=-1)
+    slopes = (times(transposed(one.slope), unknowns.multipliers) for one in (before, after))
+    low, high = slopes
+    np.testing.assert_allclose(times(equations.bend, state), (high - low) / (2 * STEP), rtol=1e-4, atol=1e-4)
+    balances = (times(transposed(one.matrix), unknowns.multipliers[..., :3]) for one in (before, after))
+    low, high = balances
+    np.testing.assert_allclose(times(equations.mixed, state), (high - low) / (2 * STEP), rtol=1e-4, atol=1e-5)
+
+
+def test_what_is_eliminated_is_that_of_the_whole_matrix(searched):
+    tasks, unknowns = searched
+    rng = np.random.default_rng(4)
+    with double_precision():
+        equations, residual = tasks.equations(unknowns)
+    shape, values = residual.shape[:-1], unknowns.values.shape[-1]
+    weights, push = rng.uniform(0.1, 2.0, (*shape, values)), rng.normal(size=(*shape, values))
+    factor = rng.normal(size=(*shape, 3, 3))
+    soft = Softness(np.array([0.3]), np.eye(3) + factor @ transposed(factor), unknowns.multipliers)
+    np.testing.assert_allclose(soft.paid(soft.missed(residual)), residual, atol=1e-12)
+    local = eliminated(equations, weights, push, residual, soft)
+    step = rng.normal(size=(*shape, 10))
+    change, multipliers = local.changes(step, 3, 3)
+    # The wrenches of tensions, and the identity of other values.
+    by_values = np.zeros((*shape, residual.shape[-1], values))
+    by_values[..., :3, :3] = equations.matrix
+    by_values[..., range(3, values), range(3, values)] = 1.0
+    mixed = np.zeros((*shape, values, 10))
+    mixed[..., :3, :] = equations.mixed
+    first = weights * change + times(mixed, step) + times(transposed(by_values), multipliers)
+    np.testing.assert_allclose(first, push, atol=1e-9)
+    second = times(by_values, change) + times(equations.slope, step) - soft.missed(multipliers)
+    np.testing.assert_allclose(second, residual, atol=1e-9)
+    whole = times(equations.bend, step) + times(transposed(mixed), change)
+    whole = whole + times(transposed(equations.slope), multipliers)
+    np.testing.assert_allclose(times(local.bend, step) + local.slope, whole, atol=1e-8)
+
+
+def test_starts_are_the_same_for_each_task_and_join_its_poses(searched):
+    tasks, _ = searched
+    single = dataclasses.replace(
+        tasks,
+        places=np.moveaxis(tasks.places, 1, 0),
+        references=np.moveaxis(tasks.references, 1, 0),
+    )
+    begun = starts(single, 1.2)
+    assert (np.bincount(begun.task) == len(begun.task) // 2).all()
+    for side, end in ((0, 0), (1, -1)):
+        np.testing.assert_allclose(begun.controls[:, 0, end], single.places[begun.task, 0, side], atol=1e-9)

@@ -1,0 +1,60 @@
+"""How tests ask the package for free motions: one function, which knows the package's names and axes."""
+
+from math import comb
+
+import numpy as np
+from oracles.sampled_motion import State
+from scipy.interpolate import PPoly
+
+from cspr_jax.arithmetic.elementary import double_precision, leaf
+from cspr_jax.free.free_motion import FreeSettings, free_motion
+from cspr_jax.free.poses import FreePoses
+from cspr_jax.motions.amplitudes import named
+from cspr_jax.motions.problem import Problem
+from cspr_jax.robots.kernel_axes import centred
+from cspr_jax.robots.limits import Limits
+from support.least_time import robot_of
+
+# Quick tests look at few intervals.
+QUICK = FreeSettings(12, 3)
+
+
+class Judged:
+    """A motion as the judge takes it, in the axes of the robot."""
+
+    def __init__(self, motion, frame):
+        self.motion, self.frame, self.times = motion, frame, (0.0, float(motion.knots[-1]))
+
+    def state(self, times):
+        """States at times (k,), s, by powers of the pieces."""
+        curve = PPoly(*self._powers())
+        position, velocity, acceleration = (curve(times, order) for order in range(3))
+        count = len(times)
+        turning = np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3)), np.zeros((count, 3))
+        turned = self.frame.turned
+        return State(self.frame.outward(position), turned(velocity), turned(acceleration), *turning)
+
+    def _powers(self):
+        # Coefficients of the pieces, highest power first, from those of Bernstein.
+        knots, table = np.asarray(self.motion.knots), np.asarray(self.motion.position)
+        degree = table.shape[1] - 1
+        rows = []
+        for k in range(degree, -1, -1):
+            signs = [(-1) ** (k - i) * comb(degree, k) * comb(k, i) for i in range(k + 1)]
+            rows.append(np.einsum("i,mid->md", signs, table[:, : k + 1]) / np.diff(knots)[:, None] ** k)
+        return np.array(rows), knots
+
+
+def problem_of(robot, limits):
+    """The problem of a robot of the reference, with its limits (a floor from the spools), and the frame of its axes."""
+    prepared, frame = centred(robot_of(robot))
+    return Problem(prepared, Limits(**{name: leaf(value) for name, value in limits.items()}), named("A1")), frame
+
+
+def solve(robot, limits, positions, accelerations=None, settings=QUICK):
+    """The free motion of a point mass through positions (k, 3), m, with accelerations (k, 3), m/s^2, NaN where free."""
+    with double_precision():
+        problem, frame = problem_of(robot, limits)
+        places = np.asarray(frame.inward(np.asarray(positions, float)))
+        free = np.full(places.shape, np.nan) if accelerations is None else frame.turned(np.asarray(accelerations))
+        return free_motion(problem, None, FreePoses(places, None, free, float(places[:, 2].mean())), settings), frame
