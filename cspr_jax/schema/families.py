@@ -168,10 +168,10 @@ _ROWS = (
     Family(
         "free",
         "the fastest motions between poses that a search finds, at zero velocity in every pose",
-        dict.fromkeys(ANY_PATTERN, "cspr_jax.free.leg:FreeMotions"),
+        dict.fromkeys(("1T", "2T", "3T", "1R2T", "3R3T"), "cspr_jax.free.leg:FreeMotions"),
         rests_anywhere=True,
         takes_amplitude=False,
-        any_cables=ANY_PATTERN,
+        any_cables=("1T", "2T", "3T", "1R2T", "3R3T"),
         knows_uncertainty=True,
         uncertain_redundancy=True,
         knows_obstacles=True,

@@ -145,7 +145,9 @@ def test_a_platform_is_the_same_whatever_wrote_it(tmp_path, kind, capsys):
     plan += "[[pose]]\nrest = true\n[[pose]]\nposition = [0, 0, 1]\n"
     (tmp_path / "plan.toml").write_text(plan)
     assert main(["plan", str(tmp_path / "plan.toml")]) == 2
-    wanted = 'must be "hypocycloid-standard" or "hypocycloid" or "spline" or "ellipse" or "path" for a platform'
+    wanted = (
+        'must be "hypocycloid-standard" or "hypocycloid" or "spline" or "ellipse" or "path" or "free" for a platform'
+    )
     assert f'{wanted} ("{found.keys["name"]}")' in capsys.readouterr().err
 
 

@@ -175,9 +175,9 @@ def test_the_row_is_gone_behind_the_block(tmp_path):
 
 def test_rows_of_the_package():
     lines = ["s-curve", "quintic", "cubic", "bezier"]
-    assert moving("2T") == ["transition", *lines, "spline", "ellipse", "path"]
-    assert moving("3T") == ["hypocycloid-standard", "transition", *lines, "spline", "ellipse", "path"]
-    assert moving("3R3T") == ["hypocycloid-standard", "hypocycloid", "spline", "ellipse", "path"]
+    assert moving("2T") == ["transition", *lines, "spline", "ellipse", "path", "free"]
+    assert moving("3T") == ["hypocycloid-standard", "transition", *lines, "spline", "ellipse", "path", "free"]
+    assert moving("3R3T") == ["hypocycloid-standard", "hypocycloid", "spline", "ellipse", "path", "free"]
     assert moving("2R3T") == ["spline", "path"]
     assert all(row.leg(pattern) for row in FAMILIES.values() for pattern in row.legs)
 

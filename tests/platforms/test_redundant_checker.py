@@ -223,7 +223,7 @@ def test_beta_hat_of_the_largest_margin(low):
         ({"tensions": "closed-form", "tension_max": [np.inf] * 8}, "without tension_max of every cable"),
         ({"tension_max": [np.inf] * 7}, "tension_max"),
         ({"robot": "fast", "tensions": "centred"}, 'tensions = "centred": must be absent: on 6 cables'),
-        ({"robot": "kntu-planar"}, 'must be "spline" or "path" for a planar platform'),
+        ({"robot": "kntu-planar"}, 'must be "spline" or "path" or "free" for a planar platform'),
         ({"family": "s-curve"}, 'family = "s-curve": must be'),
     ],
 )

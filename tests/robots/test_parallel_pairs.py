@@ -188,7 +188,8 @@ def test_the_key_is_checked_when_the_file_is_read(tmp_path):
     assert "robot.translation_only = true: must be absent: cables 3 and 4 are not parallel" in err and "0.001 m" in err
     code, _, err = plan(tmp_path, PLAN.format(robot='"laval-mssm"', family="transition", limits=""))
     assert code == 2 and len(err.splitlines()) == 1
-    names = " or ".join(f'"{name}"' for name in ("hypocycloid-standard", "hypocycloid", "spline", "ellipse", "path"))
+    families = ("hypocycloid-standard", "hypocycloid", "spline", "ellipse", "path", "free")
+    names = " or ".join(f'"{name}"' for name in families)
     assert f'must be {names} for a platform ("laval-mssm")' in err
     assert "nor do three parallel pairs of cables keep it from turning: cables" in err
     (tmp_path / "sweep.toml").write_text(SWEEP.format(kind="feasible-acceleration", robot='"laval-mssm"'))

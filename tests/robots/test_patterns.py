@@ -197,7 +197,7 @@ def test_what_only_rigid_platforms_have_is_refused_in_one_line(tmp_path, capsys)
     for robot, wanted in (
         (
             f'{flat}\npattern = "1R2T"\n{bodies}',
-            ('must be "spline" or "path" for a planar platform', 'pattern = "1R2T": must be "2T"'),
+            ('must be "spline" or "path" or "free" for a planar platform', 'pattern = "1R2T": must be "2T"'),
         ),
         (
             f'{three}\npattern = "3R"\n{bodies}',
