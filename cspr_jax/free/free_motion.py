@@ -53,19 +53,14 @@ class FreeMotion:
     Fields:
         motions: one a segment; of a search that found none, the last one it looked at.
         answers: of them: proved, refuted or undecided.
-        is_found: whether the search met all limits at the instants that it looks at.
+        is_optimal: whether the search met all limits at the instants that it looks at.
         searched: duration of all segments before bounds were tightened, s; NaN without a motion.
-        durations: (n_starts, n_segments) s of the motions of single segments that searches ended at, NaN where one
-            found none.
-        rounds: number of proofs.
     """
 
     motions: list[Spline]
     answers: ProvedAnswers
-    is_found: bool
+    is_optimal: bool
     searched: float
-    durations: np.ndarray
-    rounds: int
 
     @property
     def duration(self) -> float:
@@ -88,17 +83,17 @@ def free_motion(problem: Problem, scene: Scene | None, poses: FreePoses, setting
     check_searched(problem)
     limits = bounds(problem.robot, problem.limits, criteria(problem.robot, problem.limits, scene))
     tasks = tasks_of(problem, basis(settings.intervals, settings.instants), limits, poses)
-    best, durations = _searched(problem, limits, poses, settings)
+    best = _searched(problem, limits, poses, settings)
     optimum = None
-    if not np.isnan(durations).all(0).any():
+    if all(one.is_optimal for one in best):
         optimum = _first_optimum(tasks, ((_together(tasks, best, each[0]), *each) for each in FINE))
-    unknowns, is_found = optimum or _together(tasks, best, FINE[0][0]), optimum is not None
-    searched = float(unknowns.duration.sum()) if is_found else np.nan
+    unknowns, is_optimal = optimum or _together(tasks, best, FINE[0][0]), optimum is not None
+    searched = float(unknowns.duration.sum()) if is_optimal else np.nan
     for number in range(1, ROUNDS + 1):
         motions = motions_of(tasks, unknowns, poses.z0)
         answers = proved_answers(problem, motions, scene)
         tighter = None
-        if is_found and number < ROUNDS and not answers.feasible.all():
+        if is_optimal and number < ROUNDS and not answers.feasible.all():
             tighter = _tightened(problem, scene, tasks, motions, limits)
         if tighter is None:
             break
@@ -106,7 +101,7 @@ def free_motion(problem: Problem, scene: Scene | None, poses: FreePoses, setting
         if further is None:
             break
         tasks, unknowns = tighter, further
-    return FreeMotion(motions, answers, is_found, searched, durations, number)
+    return FreeMotion(motions, answers, is_optimal, searched)
 
 
 def _first_optimum(tasks: Tasks, begun: Iterable[tuple[Unknowns, float, float]]) -> Unknowns | None:
@@ -119,20 +114,21 @@ def _first_optimum(tasks: Tasks, begun: Iterable[tuple[Unknowns, float, float]])
 
 
 class _Best(NamedTuple):
-    # The best motion along one segment: control points, (K, d), duration, s, and the basis.
+    # The best motion along one segment: control points, (K, d), duration, s, and the basis; whether a search has
+    # converged to it, and whether two starts or more have.
     controls: np.ndarray
     duration: float
     basis: Basis
+    is_optimal: bool
+    is_shared: bool
 
 
-def _searched(
-    problem: Problem, limits: ValueBounds, poses: FreePoses, settings: FreeSettings
-) -> tuple[list[_Best], np.ndarray]:
+def _searched(problem: Problem, limits: ValueBounds, poses: FreePoses, settings: FreeSettings) -> list[_Best]:
     # The best motion along each segment by itself, from all starts; where starts disagree, by all searches.
     count = len(poses.positions) - 1
-    best, durations = dict[int, _Best](), dict[int, np.ndarray]()
+    best = dict[int, _Best]()
     for share, softness in SEARCHES:
-        rows = np.array([k for k in range(count) if k not in durations or not _agree(durations[k])], int)
+        rows = np.array([k for k in range(count) if k not in best or not best[k].is_shared], int)
         if not len(rows):
             break
         single = segments_of(tasks_of(problem, basis(settings.intervals // share, FEWEST), limits, poses))
@@ -144,16 +140,12 @@ def _searched(
         for i, k in enumerate(rows.tolist()):
             lanes_of = np.flatnonzero(begun.task == i)
             nearest = lanes_of[times[lanes_of].argmin()]
-            if k in best and not times[nearest] < np.nanmin(durations[k], initial=np.inf):
+            duration, is_optimal = float(result.unknowns.duration[nearest, 0]), bool(result.is_optimal[nearest])
+            if k in best and not (is_optimal and (duration < best[k].duration or not best[k].is_optimal)):
                 continue
-            best[k] = _Best(controls[nearest], float(result.unknowns.duration[nearest, 0]), single.basis)
-            durations[k] = np.where(np.isfinite(times[lanes_of]), times[lanes_of], np.nan)
-    return [best[k] for k in range(count)], np.array([durations[k] for k in range(count)]).T
-
-
-def _agree(durations: np.ndarray) -> bool:
-    # Tell whether two starts or more end at the shortest motion.
-    return bool(np.sum(durations <= (1.0 + SAME) * np.nanmin(durations, initial=np.inf)) > 1)
+            is_shared = is_optimal and bool(np.sum(times[lanes_of] <= (1.0 + SAME) * duration) > 1)
+            best[k] = _Best(controls[nearest], duration, single.basis, is_optimal, is_shared)
+    return [best[k] for k in range(count)]
 
 
 def _together(tasks: Tasks, best: list[_Best], barrier: float) -> Unknowns:

@@ -74,7 +74,7 @@ class FreeMotions(Leg):
             parts = (self._separate if is_separate else self._together)(problem, scene, poses)
         except InputError as error:
             raise ConfigError(stops.path, str(error)) from error
-        if not all(part.is_found for part in parts):
+        if not all(part.is_optimal for part in parts):
             self._notes = [f'family = "free": {MISSED}']
         answers = joined([part.answers for part in parts])
         columns = {field.name: getattr(answers, field.name) for field in dataclasses.fields(answers)}

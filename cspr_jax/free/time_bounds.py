@@ -3,7 +3,7 @@
 A length that changes by D from rest to rest, with accelerations up to a that speed it up and up to b that slow it
 down, and a speed up to v, takes no less than sqrt(2 D (1/a + 1/b)), or D / v + v (1/a + 1/b) / 2 if it comes to v. That
 holds for the length of each cable, and for the way of the mass centre in every direction e: tensions give it no more
-than e . g + s sum(t_max) / m, where s is the largest e . u of a cable's direction u. Below the spools u points up.
+than e . g + s sum(t_max) / m, where s is the largest e . u of a cable's direction u. Below level spools u points up.
 """
 
 import jax.numpy as jnp
@@ -14,11 +14,14 @@ from cspr_jax.motions.criteria import judged_poses
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.cables import cable_motion
 from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.point_mass import spool_radius
 from cspr_jax.robots.wrench_sets import tension_range
 
 # Directions in the vertical plane through both places; what bounds are lowered by, more than their rounding.
-Numbers = np.ndarray | float
 ANGLES, SAFE = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 181), 1e-9
+# Heights of spools over the robot's size that count as equal, and what that may add to a share.
+LEVEL, SLANTED = 1e-12, 1e-5
+Numbers = np.ndarray | float
 
 
 def least_time(way: np.ndarray, speeding: Numbers, slowing: Numbers, speed: Numbers) -> np.ndarray:
@@ -74,12 +77,13 @@ def _of_mass_centre(problem: Problem, way: np.ndarray) -> float:
     directions = directions * np.where(along < 0.0, -1.0, 1.0)[:, None]
     pull = float(np.sum(np.asarray(tension_range(robot, limits)[1]))) / float(robot.mass)
     most = np.inf if limits.acceleration_max is None else float(limits.acceleration_max)
-    pulls_up = judged_poses(robot)[1] and not isinstance(robot, PlatformRobot)
+    heights, is_point = np.asarray(robot.base_points)[:, 2], not isinstance(robot, PlatformRobot)
+    is_level = float(np.ptp(heights)) <= LEVEL * float(spool_radius(robot)) and robot.pulleys is None
+    pulls_up = is_point and is_level and judged_poses(robot)[1]
 
     def largest(down: np.ndarray) -> np.ndarray:
         share = np.sqrt(np.clip(1.0 - np.maximum(down, 0.0) ** 2, 0.0, 1.0)) if pulls_up else np.ones_like(down)
-        pulled = np.where(share > 0.0, share * pull, 0.0) if np.isfinite(pull) else np.where(share > 0.0, np.inf, 0.0)
-        return np.clip(pulled + float(robot.gravity) * down, 0.0, most)
+        return np.clip(np.minimum(share + SLANTED, 1.0) * pull + float(robot.gravity) * down, 0.0, most)
 
     speed = np.inf if limits.speed_max is None else float(limits.speed_max)
     with np.errstate(divide="ignore"):  # where nothing moves

@@ -1,5 +1,6 @@
-"""Slacks of any motion over each of its pieces, so that a search can be tightened where they are too small."""
+"""Slacks of motions over their pieces, so that a search can be tightened where they are too small."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -10,12 +11,14 @@ from cspr_jax.motions.motion import BoundedMotion
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.clearance import Scene
 
-# Times that a piece is halved, and by how much of what is missed, or of the least, its bounds may be apart.
-HALVINGS, LOOSE, LEAST = 5, 0.5, 1e-7
+# By how much of what is missed the bounds of a piece may be apart. Of slacks in their units: by how much at least, and
+# times that a piece is halved.
+LOOSE, LEAST, HALVINGS = 0.5, 1e-7, 5
+Sides = tuple[np.ndarray, np.ndarray]
 
 
 class PieceSlacks(NamedTuple):
-    """Bounds of the slacks of criteria over pieces of a motion.
+    """Bounds of the smallest slacks of criteria over pieces of a motion.
 
     Fields:
         rows: the criteria.
@@ -38,18 +41,41 @@ def piece_slacks(problem: Problem, motion: BoundedMotion, knots: np.ndarray, sce
     Returns:
         the bounds.
     """
-    rows = criteria(problem.robot, problem.limits, scene)
-    piece, start, end = np.arange(len(knots) - 1), knots[:-1], knots[1:]
-    low, high = np.full((2, len(piece), len(rows)), np.inf)
-    for level in range(HALVINGS + 1):
+
+    def bounded(_: np.ndarray, start: np.ndarray, end: np.ndarray) -> Sides:
         slacks = block_slacks(problem.robot, problem.limits, motion.bounds, start, end, scene)
-        np.minimum.at(high, piece, slacks.high)
-        apart = slacks.high - slacks.low > LOOSE * np.maximum(-slacks.high, LEAST)
-        is_loose = ((slacks.low < 0.0) & apart).any(1) & (level < HALVINGS)
-        np.minimum.at(low, piece[~is_loose], slacks.low[~is_loose])
+        return slacks.low, slacks.high
+
+    rows = criteria(problem.robot, problem.limits, scene)
+    return PieceSlacks(rows, *close_bounds(bounded, (knots[:-1], knots[1:]), LEAST, HALVINGS))
+
+
+def close_bounds(
+    bounded: Callable[[np.ndarray, np.ndarray, np.ndarray], Sides], ends: Sides, least: float, halvings: int
+) -> Sides:
+    """Bounds of the smallest slacks over pieces, which are halved where a negative lower bound is not close.
+
+    Args:
+        bounded: lower and upper bounds (k, n) over blocks, from the numbers of their pieces, their starts and ends.
+        ends: (n_pieces,) starts and ends of the pieces, s.
+        least: by how much bounds may be apart in any case.
+        halvings: most halvings of a piece.
+
+    Returns:
+        (n_pieces, n) each, lower and upper bounds.
+    """
+    start, end = ends
+    piece, bounds = np.arange(len(start)), None
+    for level in range(halvings + 1):
+        below, above = bounded(piece, start, end)
+        low, high = bounds = bounds or (np.full(below.shape, np.inf), np.full(below.shape, np.inf))
+        np.minimum.at(high, piece, above)
+        # A block says how much is missed where the lower bound is about as close as the upper one.
+        is_loose = ((below < 0.0) & (above - below > LOOSE * np.maximum(-above, least))).any(1) & (level < halvings)
+        np.minimum.at(low, piece[~is_loose], below[~is_loose])
         if not is_loose.any():
             break
         piece, middle = np.repeat(piece[is_loose], 2), 0.5 * (start + end)[is_loose]
         start = np.stack([start[is_loose], middle], axis=1).ravel()
         end = np.stack([middle, end[is_loose]], axis=1).ravel()
-    return PieceSlacks(rows, low, high)
+    return low, high

@@ -1,6 +1,7 @@
 """Limits that a motion along a path misses between the nodes, by proof, and those that bind it."""
 
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
+from functools import partial
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -10,6 +11,7 @@ from cspr_jax.curves.several import SeveralSplines
 from cspr_jax.curves.spline import Spline
 from cspr_jax.motions.block_slacks import rate_slacks
 from cspr_jax.motions.criteria import Criterion, criteria
+from cspr_jax.motions.piece_slacks import Sides, close_bounds
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import TENSIONS
 from cspr_jax.paths.discrete import GridMargins
@@ -19,8 +21,8 @@ from cspr_jax.paths.discrete import GridMargins
 LEFT, MORE, STEP, BINDING = 1e-7, 1.3, 1e-5, 0.01
 # Cells on each side in which margins grow with those of a cell, after the first time: one for so many of the grid.
 SPREAD = 150
-# Times that a cell is halved, and by how much of what is missed its bounds may be apart.
-HALVINGS, LOOSE = 3, 0.5
+# Times that a cell is halved.
+HALVINGS = 3
 # Criteria that faster or slower motion changes, by their units.
 SPEEDS, ACCELERATIONS = "m/s", "m/s^2"
 Answer = TypeVar("Answer")
@@ -98,21 +100,14 @@ def cell_slacks(problem: Problem, motions: Sequence[Spline]) -> list[CellSlacks]
     knots = [np.asarray(motion.knots) for motion in motions]
     counts = [len(each) - 1 for each in knots]
     start, end = (np.concatenate([each[side] for each in knots]) for side in (slice(None, -1), slice(1, None)))
-    cell, motion = np.arange(len(start)), np.repeat(np.arange(len(motions)), counts)
-    low = np.full((len(cell), len(chosen)), np.inf)
-    high = low.copy()
-    for level in range(HALVINGS + 1):
+    motion = np.repeat(np.arange(len(motions)), counts)
+
+    def bounded(cell: np.ndarray, start: np.ndarray, end: np.ndarray) -> Sides:
         states = several.bounds(motion[cell], start, end, parabolas=robot.pulleys is None)
-        below, above = (side[:, chosen] / scales for side in rate_slacks(robot, limits, states))
-        np.minimum.at(high, cell, above)
-        # A block says how much is missed where the lower bound is about as close as the upper one.
-        is_loose = ((below < 0.0) & (above - below > LOOSE * np.maximum(-above, STEP))).any(1) & (level < HALVINGS)
-        np.minimum.at(low, cell[~is_loose], below[~is_loose])
-        if not is_loose.any():
-            break
-        cell, middle = np.repeat(cell[is_loose], 2), 0.5 * (start + end)[is_loose]
-        start = np.stack([start[is_loose], middle], axis=1).ravel()
-        end = np.stack([middle, end[is_loose]], axis=1).ravel()
+        below, above = rate_slacks(robot, limits, states)
+        return below[:, chosen] / scales, above[:, chosen] / scales
+
+    low, high = close_bounds(bounded, (start, end), STEP, HALVINGS)
     parts = (np.split(side, np.cumsum(counts)[:-1]) for side in (low, high))
     return [CellSlacks([rows[k] for k in chosen], *sides) for sides in zip(*parts, strict=True)]
 
@@ -129,16 +124,16 @@ def together(problem: Problem, searches: Sequence[Generator[Spline, CellSlacks, 
     answers: dict[int, Answer] = {}
     motions: dict[int, Spline] = {}
 
-    def resumed(k: int, slacks: CellSlacks | None) -> None:
+    def resumed(k: int, following: Callable[[], Spline]) -> None:
         try:
-            motions[k] = searches[k].send(slacks)  # type: ignore[arg-type]
+            motions[k] = following()
         except StopIteration as end:
             answers[k] = end.value
 
-    for k in range(len(searches)):
-        resumed(k, None)
+    for k, search in enumerate(searches):
+        resumed(k, partial(next, search))
     while motions:
         going = list(motions)
         for k, slacks in zip(going, cell_slacks(problem, [motions.pop(k) for k in going]), strict=True):
-            resumed(k, slacks)
+            resumed(k, partial(searches[k].send, slacks))
     return [answers[k] for k in range(len(searches))]

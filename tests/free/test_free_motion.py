@@ -35,7 +35,7 @@ LEAST = (1.3205, 1.7040, 1.1545, 2.0059, 1.9807, 1.7390)
 
 def check_proved(robot, limits, free, frame, samples=501):
     """Each segment is proved, and the judge, who shares no code with the package, finds no limit broken."""
-    assert free.is_found
+    assert free.is_optimal
     assert free.answers.feasible.all()
     for motion in free.motions:
         instants = np.linspace(0.0, float(motion.knots[-1]), samples)
@@ -119,7 +119,7 @@ def test_segments_together_share_their_acceleration_and_lose_no_time(aside):
 def test_no_motion_is_found_above_what_cables_carry():
     limits = LIMITS | {"tension_max": np.full(3, 0.2 * WEIGHT)}
     free, _ = solve(RING, limits, ASIDE, np.zeros((2, 3)))
-    assert not free.is_found
+    assert not free.is_optimal
     assert not free.answers.feasible.any()
 
 

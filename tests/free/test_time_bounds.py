@@ -7,8 +7,13 @@ from hypothesis import strategies as st
 from oracles import least_time_forms
 
 import cspr_jax
-from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.arithmetic.elementary import double_precision, leaf
+from cspr_jax.curves.spline import Spline
 from cspr_jax.free.time_bounds import least_time, time_bounds
+from cspr_jax.motions.amplitudes import named
+from cspr_jax.motions.problem import Problem
+from cspr_jax.robots.kernel_axes import centred
+from cspr_jax.robots.limits import Limits
 
 SIZES = st.floats(0.01, 100.0)
 
@@ -40,6 +45,18 @@ def test_vertical_line():
     plan = cspr_jax.plan({"schema": 1, "robot": mass, "family": "path", "path": line, "tension_max": 1.2 * weight})
     (bound,) = bound_of(plan)
     assert 0.5 * exact < bound <= exact <= plan.answers.duration[0]
+
+
+def test_spools_that_pull_down():
+    """Below the plane of spools of several heights a cable can pull down: a fall may be faster than a free one."""
+    points = [[1.0, 0.0, 0.0], [-0.5, 0.8, 0.0], [-0.5, -0.8, 3.0]]
+    with double_precision():
+        robot, _ = centred(cspr_jax.point_mass(points, mass=1.0, name="slanted"))
+        problem = Problem(robot, Limits(tension_max=leaf(np.full(3, 100.0))), named("A1"))
+        places = np.array([[0.0, 0.0, 2.0 + 0.2 * k] for k in range(6)])
+        fall = Spline(leaf(np.array([0.0, 1.0])), leaf(places[[[0, 0, 0, 5, 5, 5]]]), None)
+        (bound,) = time_bounds(problem, [fall])
+    assert bound <= float(least_time(np.array(1.0), 300.0 + 9.81, 300.0 - 9.81, np.inf))
 
 
 def test_speeds_of_cables():

@@ -39,7 +39,7 @@ def test_times_are_those_of_collocation(name):
         poses = FreePoses(positions, quaternions, np.full((2, size), np.nan), float(positions[:, 2].mean()))
         free = free_motion(problem, None, poses)
         (bound,) = time_bounds(problem, free.motions)
-    assert free.is_found
+    assert free.is_optimal
     assert (free.answers.verdict | CONTACTS == CONTACTS).all()
     assert max(bound, reference.below, (1.0 - BELOW) * reference.infimum) <= free.duration
     assert free.duration <= (1.0 + ABOVE) * reference.time
