@@ -169,6 +169,8 @@ def solved(matrix: Array, right: Array) -> tuple[Array, Array]:
         (n, m), not finite where the matrix is singular; () determinant.
     """
     count = matrix.shape[0]
+    if not count:
+        return right, jnp.ones((), matrix.dtype)
     index = jnp.arange(count)
 
     def eliminate(carry, k):

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, PrivateAttr, Tag, model_validator
 
 from cspr_jax.config.ellipse import WHOLE, EllipseTable
+from cspr_jax.config.free_motions import FreeMotionKeys
 from cspr_jax.config.kinds import refuse_other_kinds
 from cspr_jax.config.launch import LaunchTable
 from cspr_jax.config.limits import LimitTable, Point, Positive
@@ -34,7 +35,7 @@ Depth = Annotated[
 ]
 
 
-class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys):
+class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys, FreeMotionKeys):
     """A plan."""
 
     format_version: Literal[1] = Field(alias="schema", description="version of this format: 1")
@@ -99,19 +100,6 @@ class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys):
         None,
         description="path: [path] with points, a file or an arc, in place of the poses; without, it says how the poses "
         "are joined",
-    )
-    objective: Literal["time"] | None = Field(
-        None, description='free: what is sought the least of: "time", the default'
-    )
-    end_accelerations: Literal["free", "swing"] | list[Point] | None = Field(
-        None,
-        description='free: accelerations at the poses: "free" (the default), "swing", those of swings about P0, so '
-        "that hypocycloids can precede and follow, or one [x, y, z] for each pose, m/s^2; 0 where rest = true",
-    )
-    together: bool | None = Field(
-        None,
-        description="free: whether all poses that the family joins are passed in the least time together (true, the "
-        "default), or one segment after the other is",
     )
     launch: LaunchTable | None = Field(None, description="bezier, ellipse: [launch] of an object that is released")
     stretch: Annotated[float, Field(ge=1e-6, le=1e9)] | None = Field(

@@ -57,8 +57,8 @@ class Pose(Table):
     )
     velocity: Vector | None = Field(
         None,
-        description='spline: velocity at this pose, m/s; of inner poses with interpolation = "hermite" alone; absent: '
-        "as `ends` says",
+        description="spline, free: velocity at this pose, m/s; of inner poses of splines with interpolation = "
+        '"hermite" alone; absent: as `ends` says, and of free motions 0',
     )
     acceleration: Vector | None = Field(None, description="spline: acceleration at this pose, m/s^2, likewise")
     motion: str | None = Field(

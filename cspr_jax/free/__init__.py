@@ -1,4 +1,4 @@
-"""Free motions: the fastest motion between poses, along whatever path.
+"""Free motions: the fastest, or otherwise best, motion between poses, along whatever path.
 
 Between poses a motion is a quintic B-spline of normalised time, with four continuous derivatives, so that tensions and
 their rates are continuous. Its control points, its duration and the accelerations at the poses are found by an
@@ -10,6 +10,7 @@ Files, each importing only from those above it:
 
     basis           quintic B-splines, and the instants at which motions are looked at
     instants        equations and bounds of a motion at an instant
+    objectives      what a motion is the best in
     tasks           motions that are sought together, and their unknowns
     elimination     tensions and multipliers, eliminated from Newton's equations of each instant
     newton          steps of Newton's method, with banded matrices

@@ -10,6 +10,8 @@ from scipy.interpolate import BSpline
 DEGREE = 5
 # Control points that count in one interval.
 LOCAL = DEGREE + 1
+# Weights of the first instants in an integral, over their distance.
+GREGORY = (3.0 / 8.0, 7.0 / 6.0, 23.0 / 24.0)
 
 
 class Basis(NamedTuple):
@@ -45,6 +47,13 @@ class Basis(NamedTuple):
     def end_bend(self) -> float:
         """Step to the third control point that a second derivative at the start needs, over that derivative."""
         return 2.0 / (DEGREE * (DEGREE - 1) * len(self.tau) ** 2)
+
+    @property
+    def shares(self) -> np.ndarray:
+        """Shares of the duration for which the instants stand in an integral, (m, n): Gregory's rule of order 4."""
+        shares = np.ones(self.tau.size)
+        shares[:3], shares[-3:] = GREGORY, GREGORY[::-1]
+        return shares.reshape(self.tau.shape) / (self.tau.size - 1)
 
     def in_intervals(self, controls: np.ndarray) -> np.ndarray:
         """Control points that count in each interval.

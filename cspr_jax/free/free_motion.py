@@ -1,6 +1,7 @@
 """The fastest motion between poses: searched from many starts, and tightened until it is proved."""
 
 import dataclasses
+import time
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -10,8 +11,9 @@ from scipy.interpolate import BSpline
 from cspr_jax.curves.spline import Spline, chained
 from cspr_jax.free.basis import DEGREE, Basis, basis
 from cspr_jax.free.instants import ValueBounds, bounds
+from cspr_jax.free.objectives import OBJECTIVES, Objective
 from cspr_jax.free.poses import FreePoses, check_searched, motions_of, segments_of, tasks_of
-from cspr_jax.free.search import again, optima, started
+from cspr_jax.free.search import Optima, again, optima, started
 from cspr_jax.free.starts import starts
 from cspr_jax.free.tasks import Tasks, Unknowns
 from cspr_jax.motions.criteria import criteria
@@ -19,6 +21,7 @@ from cspr_jax.motions.piece_slacks import piece_slacks
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import ProvedAnswers, proved_answers
 from cspr_jax.robots.clearance import Scene
+from cspr_jax.runtime.stages import stage
 
 # Rounds of proof and tightening; slack that is left, in the units of values; by what more than is missed, and by how
 # much at least and at most, bounds tighten; by what share of it those of the next pieces do.
@@ -35,10 +38,18 @@ class FreeSettings(NamedTuple):
     """Settings of a search.
 
     Fields:
+        objective: row of `objectives.OBJECTIVES`.
+        longest: duration of a segment, s; None for any.
+        starts: number of motions from which the search of a segment begins; None for those of `starts.starts`.
+        search_time: after which no more searches begin, s; None for none.
         intervals: of the spline of a segment, even.
         instants: of each interval, at which the search looks.
     """
 
+    objective: str = "time"
+    longest: float | None = None
+    starts: int | None = None
+    search_time: float | None = None
     intervals: int = 48
     instants: int = 4
 
@@ -48,18 +59,24 @@ USUAL = FreeSettings()
 
 @dataclasses.dataclass(frozen=True)
 class FreeMotion:
-    """The fastest motion that was found.
+    """The best motion that the search has come to.
 
     Fields:
-        motions: one a segment; of a search that found none, the last one it looked at.
+        motions: one a segment; of a search that came to none, the last one it looked at.
         answers: of them: proved, refuted or undecided.
+        energy: (n,) integral of the sum of the squares of the tensions, N^2 s, of the segments.
+        level: (n,) of the objective, as `objectives` has it.
         is_optimal: whether the search met all limits at the instants that it looks at.
+        is_stopped: whether Ctrl-C, or `search_time`, has ended it before its end.
         searched: duration of all segments before bounds were tightened, s; NaN without a motion.
     """
 
     motions: list[Spline]
     answers: ProvedAnswers
+    energy: np.ndarray
+    level: np.ndarray
     is_optimal: bool
+    is_stopped: bool
     searched: float
 
     @property
@@ -81,71 +98,116 @@ def free_motion(problem: Problem, scene: Scene | None, poses: FreePoses, setting
         InputError: a robot for which no free motion is sought, or a cable without a largest tension.
     """
     check_searched(problem)
-    limits = bounds(problem.robot, problem.limits, criteria(problem.robot, problem.limits, scene))
-    tasks = tasks_of(problem, basis(settings.intervals, settings.instants), limits, poses)
-    best = _searched(problem, limits, poses, settings)
-    optimum = None
+    question = _Question.of(problem, scene, poses, settings)
+    best, is_stopped = _searched(question)
+    tasks, optimum = question.tasks(settings.intervals, settings.instants), None
     if all(one.is_optimal for one in best):
         optimum = _first_optimum(tasks, ((_together(tasks, best, each[0]), *each) for each in FINE))
     unknowns, is_optimal = optimum or _together(tasks, best, FINE[0][0]), optimum is not None
     searched = float(unknowns.duration.sum()) if is_optimal else np.nan
     for number in range(1, ROUNDS + 1):
+        stage(f"free motion: proof {number}")
         motions = motions_of(tasks, unknowns, poses.z0)
         answers = proved_answers(problem, motions, scene)
         tighter = None
         if is_optimal and number < ROUNDS and not answers.feasible.all():
-            tighter = _tightened(problem, scene, tasks, motions, limits)
+            tighter = _tightened(question, tasks, motions)
         if tighter is None:
             break
         further = _first_optimum(tighter, ((again(tighter, unknowns, each[0]), *each) for each in ON))
         if further is None:
             break
         tasks, unknowns = tighter, further
-    return FreeMotion(motions, answers, is_optimal, searched)
+    energy, level = tasks.energies(unknowns)[0], unknowns.level[0]
+    return FreeMotion(motions, answers, energy, level, is_optimal, is_stopped, searched)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Question:
+    # The best motion through poses within limits is sought.
+    problem: Problem
+    scene: Scene | None
+    poses: FreePoses
+    settings: FreeSettings
+    limits: ValueBounds
+    objective: Objective
+
+    @classmethod
+    def of(cls, problem: Problem, scene: Scene | None, poses: FreePoses, settings: FreeSettings) -> "_Question":
+        robot = problem.robot
+        limits = bounds(robot, problem.limits, criteria(robot, problem.limits, scene), settings.longest is not None)
+        objective, limits = OBJECTIVES[settings.objective](limits, robot.n_cables)
+        return cls(problem, scene, poses, settings, limits, objective)
+
+    def tasks(self, intervals: int, instants: int) -> Tasks:
+        numbers = basis(intervals, instants)
+        return tasks_of(self.problem, numbers, self.limits, self.objective, self.poses, self.settings.longest)
 
 
 def _first_optimum(tasks: Tasks, begun: Iterable[tuple[Unknowns, float, float]]) -> Unknowns | None:
     # The optimum of the first search that converges, of one task, with its start, barrier and softness.
     for start in begun:
         result = optima(tasks, *start)
-        if result.is_optimal[0]:
+        if result.is_optimal[0] and tasks.objective.keeps_limits(result.unknowns.level)[0]:
             return result.unknowns
     return None
 
 
 class _Best(NamedTuple):
-    # The best motion along one segment: control points, (K, d), duration, s, and the basis; whether a search has
-    # converged to it, and whether two starts or more have.
+    # The best motion along one segment: control points, (K, d), duration, s, the objective, and the basis; whether a
+    # search has converged to it, and whether two starts or more have.
     controls: np.ndarray
     duration: float
+    cost: float
     basis: Basis
     is_optimal: bool
     is_shared: bool
 
 
-def _searched(problem: Problem, limits: ValueBounds, poses: FreePoses, settings: FreeSettings) -> list[_Best]:
-    # The best motion along each segment by itself, from all starts; where starts disagree, by all searches.
-    count = len(poses.positions) - 1
-    best = dict[int, _Best]()
-    for share, softness in SEARCHES:
+def _searched(question: _Question) -> tuple[list[_Best], bool]:
+    # The best motion along each segment by itself, from all starts; where starts disagree, by all searches. Whether the
+    # search has been stopped: by Ctrl-C only where there is something to keep.
+    settings, poses = question.settings, question.poses
+    count, best = len(poses.positions) - 1, dict[int, _Best]()
+    until = np.inf if settings.search_time is None else time.monotonic() + settings.search_time
+    for number, (share, softness) in enumerate(SEARCHES, 1):
         rows = np.array([k for k in range(count) if k not in best or not best[k].is_shared], int)
-        if not len(rows):
-            break
-        single = segments_of(tasks_of(problem, basis(settings.intervals // share, FEWEST), limits, poses))
-        begun = starts(single.taken(rows), poses.z0)
+        if not len(rows) or (best and time.monotonic() > until):
+            return list(best.values()), bool(len(rows))
+        stage(f"free motion: search {number}{_said(best, settings.objective)}")
+        single = segments_of(question.tasks(settings.intervals // share, FEWEST))
+        begun = starts(single.taken(rows), poses.z0, settings.starts)
         lanes = single.taken(rows[begun.task])
-        result = optima(lanes, started(lanes, begun.controls, begun.duration), softness=softness)
-        controls = lanes.controls(result.unknowns)[:, 0]
-        times = np.where(result.is_optimal, result.unknowns.duration[:, 0], np.inf)
-        for i, k in enumerate(rows.tolist()):
-            lanes_of = np.flatnonzero(begun.task == i)
-            nearest = lanes_of[times[lanes_of].argmin()]
-            duration, is_optimal = float(result.unknowns.duration[nearest, 0]), bool(result.is_optimal[nearest])
-            if k in best and not (is_optimal and (duration < best[k].duration or not best[k].is_optimal)):
-                continue
-            is_shared = is_optimal and bool(np.sum(times[lanes_of] <= (1.0 + SAME) * duration) > 1)
-            best[k] = _Best(controls[nearest], duration, single.basis, is_optimal, is_shared)
-    return [best[k] for k in range(count)]
+        result = optima(lanes, started(lanes, begun.controls, begun.duration), softness=softness, until=until)
+        _keep(best, rows, begun.task, lanes, result)
+        if result.is_stopped:
+            if not all(one.is_optimal for one in best.values()) and time.monotonic() < until:
+                raise KeyboardInterrupt
+            return list(best.values()), True
+    return list(best.values()), False
+
+
+def _said(best: dict[int, _Best], objective: str) -> str:
+    # The best so far, for people who wait.
+    if not best or not all(one.is_optimal for one in best.values()):
+        return ""
+    return f", so far {sum(one.duration for one in best.values()):.4g} s" if objective == "time" else ", one is there"
+
+
+def _keep(best: dict[int, _Best], rows: np.ndarray, of_task: np.ndarray, lanes: Tasks, result: Optima) -> None:
+    # Keeps what is better than before.
+    controls, costs = lanes.controls(result.unknowns)[:, 0], lanes.cost(result.unknowns)
+    is_optimal = result.is_optimal & lanes.objective.keeps_limits(result.unknowns.level)
+    costs = np.where(is_optimal, costs, np.inf)
+    for i, k in enumerate(rows.tolist()):
+        lanes_of = np.flatnonzero(of_task == i)
+        nearest = lanes_of[costs[lanes_of].argmin()]
+        if k in best and not (is_optimal[nearest] and (costs[nearest] < best[k].cost or not best[k].is_optimal)):
+            continue
+        room = costs[nearest] + SAME * abs(costs[nearest])
+        is_shared = bool(is_optimal[nearest]) and bool(np.sum(costs[lanes_of] <= room) > 1)
+        duration = float(result.unknowns.duration[nearest, 0])
+        best[k] = _Best(controls[nearest], duration, costs[nearest], lanes.basis, bool(is_optimal[nearest]), is_shared)
 
 
 def _together(tasks: Tasks, best: list[_Best], barrier: float) -> Unknowns:
@@ -155,12 +217,10 @@ def _together(tasks: Tasks, best: list[_Best], barrier: float) -> Unknowns:
     return started(tasks, np.einsum("kj,sjd->skd", tasks.basis.fit, np.array(values))[None], duration, barrier)
 
 
-def _tightened(
-    problem: Problem, scene: Scene | None, tasks: Tasks, motions: list[Spline], limits: ValueBounds
-) -> Tasks | None:
+def _tightened(question: _Question, tasks: Tasks, motions: list[Spline]) -> Tasks | None:
     # Tighter bounds where the proof finds less slack than is needed; None where it finds enough, or no more helps.
-    whole = chained(motions)
-    slacks = piece_slacks(problem, whole, np.asarray(whole.knots), scene)
+    whole, limits = chained(motions), question.limits
+    slacks = piece_slacks(question.problem, whole, np.asarray(whole.knots), question.scene)
     changes = np.abs(limits.rises) + np.abs(limits.falls)
     unit = changes.max(1)
     missed = np.where(unit > 0.0, LEFT - slacks.low * unit, 0.0)

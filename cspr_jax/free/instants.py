@@ -29,6 +29,8 @@ from cspr_jax.schema.limits import Limit
 from cspr_jax.schema.verdicts import Verdict
 
 BATCH = 512
+# Entries of x behind the coordinates.
+SCALARS = 2
 # Depth below the spools, over the size of the robot, that a search keeps at least.
 BELOW = 0.02
 
@@ -36,7 +38,8 @@ BELOW = 0.02
 class InstantValues(NamedTuple):
     """Equations of instants, whose residuals are those of the tensions and less other values, and their derivatives.
 
-    Derivatives are by x: the coordinates, their first and second derivatives in normalised time, and the duration.
+    Derivatives are by x: the coordinates, their first and second derivatives in normalised time, the duration, and the
+    level of the objective, on which the equations do not depend.
 
     Fields:
         residual: (..., n_equations) without the other values: what tensions miss of the wrench, over the weight; then
@@ -99,7 +102,7 @@ def other_rows(limits: Limits) -> list[Limit]:
     return [row for row in limits_set(limits) if row.quantity != "tension"]
 
 
-def _other_values(robot: AnyRobot, limits: Limits, state: State) -> Array:
+def _other_values(robot: AnyRobot, limits: Limits, longest: Array | None, state: State, duration: Array) -> Array:
     # Values beside the tensions: over their limits, of the mass centre squared; depths over the size of the robot.
     length, rate, bend = cable_motion(robot, state)
     size = spool_radius(robot)
@@ -118,11 +121,13 @@ def _other_values(robot: AnyRobot, limits: Limits, state: State) -> Array:
         parts.append(values[row.quantity] / scale)
     if judged_poses(robot)[1]:
         parts.append(jnp.dot(plane_normal(robot), state.position)[None] / size)
+    if longest is not None:
+        parts.append(duration[None] / longest)
     return jnp.concatenate(parts) if parts else jnp.zeros(0)
 
 
 @jax.jit
-def _kernel(robot: AnyRobot, limits: Limits, instants: tuple[Array, ...]) -> InstantValues:
+def _kernel(robot: AnyRobot, limits: Limits, longest: Array | None, instants: tuple[Array, ...]) -> InstantValues:
     def one(reference: Array, place: Array, duration: Array, tensions: Array, multipliers: Array) -> InstantValues:
         unit, weight = wrench_units(robot), robot.mass * robot.gravity
 
@@ -134,25 +139,29 @@ def _kernel(robot: AnyRobot, limits: Limits, instants: tuple[Array, ...]) -> Ins
 
         def residual(x: Array) -> Array:
             missing = matrix(x) @ tensions - robot.inertial_wrench(state(x)) / unit / weight
-            return jnp.concatenate([missing, -_other_values(robot, limits, state(x))])
+            return jnp.concatenate([missing, -_other_values(robot, limits, longest, state(x), x[-1])])
+
+        def widened(derivatives: Array, axes: int = 1) -> Array:
+            return jnp.pad(derivatives, [(0, 0)] * (2 - axes) + [(0, SCALARS - 1)] * axes)
 
         x = jnp.concatenate([place.ravel(), duration[None]])
         return InstantValues(
             residual(x),
-            jax.jacfwd(residual)(x),
+            widened(jax.jacfwd(residual)(x)),
             matrix(x),
-            jax.jacfwd(jax.grad(lambda x: jnp.dot(residual(x), multipliers)))(x),
-            jax.jacfwd(lambda x: multipliers[: robot.dof] @ matrix(x))(x),
+            widened(jax.jacfwd(jax.grad(lambda x: jnp.dot(residual(x), multipliers)))(x), 2),
+            widened(jax.jacfwd(lambda x: multipliers[: robot.dof] @ matrix(x))(x)),
         )
 
     return jax.vmap(one)(*instants)
 
 
-def instant_values(robot: AnyRobot, limits: Limits, *instants: np.ndarray) -> InstantValues:
+def instant_values(robot: AnyRobot, limits: Limits, longest: np.ndarray | None, *instants: np.ndarray) -> InstantValues:
     """Equations at many instants.
 
     Args:
         robot: centred, z down.
+        longest: () longest duration, s; None for any.
         instants: references (..., 4), places (..., 3, d), durations (...), tensions (..., n_cables) over the weight,
             and multipliers (..., n_equations), as of `state_of` and `InstantValues`.
 
@@ -161,7 +170,7 @@ def instant_values(robot: AnyRobot, limits: Limits, *instants: np.ndarray) -> In
     """
     shape = instants[2].shape
     flat = tuple(np.ascontiguousarray(part.reshape(-1, *part.shape[len(shape) :])) for part in instants)
-    values = in_batches(partial(_kernel, robot, limits), flat, size=BATCH)
+    values = in_batches(partial(_kernel, robot, limits, longest), flat, size=BATCH)
     return InstantValues(*(leaf.reshape(*shape, *leaf.shape[1:]) for leaf in values))
 
 
@@ -191,12 +200,13 @@ class _Value(NamedTuple):
     change: float
 
 
-def bounds(robot: AnyRobot, limits: Limits, rows: Sequence[Criterion]) -> ValueBounds:
+def bounds(robot: AnyRobot, limits: Limits, rows: Sequence[Criterion], is_timed: bool = False) -> ValueBounds:
     """Bounds of the values.
 
     Args:
         robot: centred, z down.
         rows: its criteria.
+        is_timed: whether a longest duration is a limit, too.
 
     Returns:
         the bounds.
@@ -216,6 +226,8 @@ def bounds(robot: AnyRobot, limits: Limits, rows: Sequence[Criterion]) -> ValueB
             values.append(_Value(bottom, top, row.flag, row.flag, k if row.per_cable else -1, change))
     if judged_poses(robot)[1]:
         values.append(_Value(BELOW, np.inf, Verdict.ABOVE_SPOOLS, Verdict.FEASIBLE, -1, 1.0 / size))
+    if is_timed:
+        values.append(_Value(-np.inf, 1.0, Verdict.FEASIBLE, Verdict.FEASIBLE, -1, 0.0))
 
     def changes(side: str, bound: str) -> np.ndarray:
         return np.array(

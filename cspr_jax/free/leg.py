@@ -9,7 +9,7 @@ import numpy as np
 from cspr_jax.build.orientations import pose_quaternions
 from cspr_jax.build.scenes import scene_of
 from cspr_jax.errors import ConfigError, InputError, shown
-from cspr_jax.free.free_motion import FreeMotion, free_motion
+from cspr_jax.free.free_motion import FreeMotion, FreeSettings, free_motion
 from cspr_jax.free.poses import FreePoses
 from cspr_jax.free.time_bounds import time_bounds
 from cspr_jax.motions.answers import Answers, joined
@@ -22,6 +22,8 @@ from cspr_jax.robots.clearance import Scene
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import rest_point
 
+LEVELS = ("tension", "margin")
+STOPPED = "the search was stopped before its end: more starts might have led to a better motion"
 MISSED = "the search found no motion that keeps all limits; the numbers are those of the last one that it looked at"
 
 
@@ -30,19 +32,23 @@ class FreeAnswers(ProvedAnswers):
     """Answers of free motions.
 
     Fields:
-        lower_bound: (n,) of the time of all motions between both poses, s.
+        objective: row of `objectives.OBJECTIVES`.
+        energy: (n,) integral of the sum of the squares of the tensions, N^2 s.
+        lower_bound: (n,) of the time of all motions between both poses, s; NaN for none.
     """
 
+    objective: str
+    energy: np.ndarray
     lower_bound: np.ndarray
 
     def details(self, i: int) -> dict[str, Any]:
         """The quantity that was sought, and a time that no motion undercuts; see `Answers.details`."""
+        details = super().details(i) | {"objective": self.objective, "energy": float(self.energy[i])}
         bound = float(self.lower_bound[i])
-        return super().details(i) | {
-            "objective": "time",
-            "lower_bound": bound,
-            "gap": 1.0 - bound / float(self.duration[i]),
-        }
+        if np.isnan(bound):
+            return details
+        gap = {"gap": 1.0 - bound / float(self.duration[i])} if self.objective == "time" else {}
+        return details | {"lower_bound": bound} | gap
 
 
 class FreeMotions(Leg):
@@ -62,6 +68,9 @@ class FreeMotions(Leg):
             )
         if accelerations == "swing" and stops.keys.z0 is None:
             raise ConfigError(stops.path, 'z0 is missing: depth of P0, m, about which end_accelerations = "swing" are')
+        if stops.keys.objective in LEVELS and stops.keys.duration_max is None:
+            why = f'which objective = "{stops.keys.objective}" needs: the slower a motion, the better it is'
+            raise ConfigError(stops.path, f"duration_max is missing: longest duration of a segment, s, {why}")
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the poses; see `Leg.join`."""
@@ -74,27 +83,38 @@ class FreeMotions(Leg):
             parts = (self._separate if is_separate else self._together)(problem, scene, poses)
         except InputError as error:
             raise ConfigError(stops.path, str(error)) from error
+        if any(part.is_stopped for part in parts):
+            self._notes.append(f'family = "free": {STOPPED}')
         if not all(part.is_optimal for part in parts):
-            self._notes = [f'family = "free": {MISSED}']
+            self._notes.append(f'family = "free": {MISSED}')
         answers = joined([part.answers for part in parts])
         columns = {field.name: getattr(answers, field.name) for field in dataclasses.fields(answers)}
         motions = [motion for part in parts for motion in part.motions]
-        return FreeAnswers(**columns, lower_bound=time_bounds(problem, motions)), list(motions)
+        is_still = np.array([not (poses.velocities[i : i + 2]).any() for i in range(len(self))])
+        bounds = np.where(is_still, time_bounds(problem, motions), np.nan)
+        energy = np.concatenate([part.energy for part in parts])
+        columns |= {"objective": self._settings.objective, "energy": energy, "lower_bound": bounds}
+        return FreeAnswers(**columns), list(motions)
+
+    @property
+    def _settings(self) -> FreeSettings:
+        keys = self.stops.keys
+        return FreeSettings(keys.objective or "time", keys.duration_max, keys.starts, keys.search_time)
 
     def warnings(self, problem: Problem) -> list[str]:
-        """A search that has found nothing; see `Leg.warnings`."""
+        """A search that came to nothing, or was stopped; see `Leg.warnings`."""
         return self._notes
 
     def _together(self, problem: Problem, scene: Scene, poses: FreePoses) -> list[FreeMotion]:
-        return [free_motion(problem, scene, poses)]
+        return [free_motion(problem, scene, poses, self._settings)]
 
     def _separate(self, problem: Problem, scene: Scene, poses: FreePoses) -> list[FreeMotion]:
         # Each segment begins with the acceleration with which the one before ends.
         parts, accelerations = list[FreeMotion](), poses.accelerations.copy()
         for i in range(len(self)):
             quaternions = None if poses.quaternions is None else poses.quaternions[i : i + 2]
-            pair = FreePoses(poses.positions[i : i + 2], quaternions, accelerations[i : i + 2], poses.z0)
-            parts.append(free_motion(problem, scene, pair))
+            ends = poses.positions[i : i + 2], quaternions, poses.velocities[i : i + 2], accelerations[i : i + 2]
+            parts.append(free_motion(problem, scene, FreePoses(*ends, poses.z0), self._settings))
             end = parts[-1].motions[0].state(jnp.asarray(1.0))
             turning = [] if quaternions is None else [np.asarray(end.angular_acceleration)]
             accelerations[i + 1] = np.concatenate([np.asarray(end.acceleration), *turning])
@@ -115,6 +135,6 @@ class FreeMotions(Leg):
             accelerations[:] = 0.0
             accelerations[:, :3] = stops.frame.turned(np.array(known[stops.first : stops.last + 1], float))
         accelerations[[pose.rest for pose in stops.poses]] = 0.0
-        return FreePoses(
-            positions, quaternions, accelerations, z0 if np.isfinite(z0) else float(positions[:, 2].mean())
-        )
+        rates = np.array([pose.velocity or (0.0, 0.0, 0.0) for pose in stops.poses])
+        middle = z0 if np.isfinite(z0) else float(positions[:, 2].mean())
+        return FreePoses(positions, quaternions, stops.frame.turned(rates), accelerations, middle)

@@ -11,6 +11,7 @@ from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import InputError
 from cspr_jax.free.basis import Basis
 from cspr_jax.free.instants import ValueBounds, coordinates
+from cspr_jax.free.objectives import Objective
 from cspr_jax.free.tasks import Tasks, Unknowns
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.patterns import PATTERNS
@@ -19,11 +20,12 @@ BACK = np.array([1.0, -1.0, -1.0, -1.0])
 
 
 class FreePoses(NamedTuple):
-    """Poses, at which a motion is at rest but for its acceleration; in the axes of the kernels.
+    """Poses through which a motion goes, in the axes of the kernels.
 
     Fields:
         positions: (k, 3) of the mass centre, m.
         quaternions: (k, 4) orientations, unit, scalar first; None for a point mass.
+        velocities: (k, 3) m/s; platforms do not turn.
         accelerations: (k, 3) m/s^2, of platforms (k, 6) with angular accelerations behind them, rad/s^2; a row with a
             NaN: free.
         z0: depth of P0, about which the motions swing from which searches begin, m.
@@ -31,13 +33,16 @@ class FreePoses(NamedTuple):
 
     positions: np.ndarray
     quaternions: np.ndarray | None
+    velocities: np.ndarray
     accelerations: np.ndarray
     z0: float
 
 
 class _Joined(NamedTuple):
-    # Segments in coordinates: places (s, 2, d), references (s, 4), turns (s, 2, d, d), accelerations (s + 1, d).
+    # Segments in coordinates: places and velocities (s, 2, d), references (s, 4), turns (s, 2, d, d), accelerations
+    # (s + 1, d).
     places: np.ndarray
+    velocities: np.ndarray
     references: np.ndarray
     turns: np.ndarray
     accelerations: np.ndarray
@@ -63,9 +68,10 @@ def _joined(problem: Problem, poses: FreePoses) -> _Joined:
     places = np.zeros((count, 2, d))
     places[..., : len(along)] = np.stack([poses.positions[:-1], poses.positions[1:]], axis=1)[..., along]
     turns, references = np.tile(np.eye(d), (count, 2, 1, 1)), np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
-    linear = poses.accelerations[:, along]
+    velocities, linear = np.zeros_like(places), poses.accelerations[:, along]
+    velocities[..., : len(along)] = np.stack([poses.velocities[:-1], poses.velocities[1:]], axis=1)[..., along]
     if poses.quaternions is None:
-        return _Joined(places, references, turns, linear)
+        return _Joined(places, velocities, references, turns, linear)
     start, end = poses.quaternions[:-1], poses.quaternions[1:]
     end = np.where(np.sum(start * end, axis=1, keepdims=True) < 0.0, -end, end)
     # From half-way between, a Rodrigues vector is no longer than 1.
@@ -78,19 +84,23 @@ def _joined(problem: Problem, poses: FreePoses) -> _Joined:
             across = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
             spin = 2.0 / (1.0 + v @ v) * (np.eye(3) + across)
             turns[i, side, len(along) :, len(along) :] = np.linalg.inv(spin[np.ix_(about, about)])
-    return _Joined(places, references, turns, np.concatenate([linear, poses.accelerations[:, 3 + about]], axis=1))
+    accelerations = np.concatenate([linear, poses.accelerations[:, 3 + about]], axis=1)
+    return _Joined(places, velocities, references, turns, accelerations)
 
 
-def tasks_of(problem: Problem, basis: Basis, bounds: ValueBounds, poses: FreePoses) -> Tasks:
+def tasks_of(
+    problem: Problem, basis: Basis, bounds: ValueBounds, objective: Objective, poses: FreePoses, longest: float | None
+) -> Tasks:
     """The task of moving through all poses.
 
     Args:
         bounds: of the values at each instant.
+        longest: duration of a segment, s; None for any.
 
     Returns:
         one task.
     """
-    places, references, turns, accelerations = _joined(problem, poses)
+    places, velocities, references, turns, accelerations = _joined(problem, poses)
     is_free = np.isnan(accelerations).any(1)
     shape = 1, len(places), *basis.tau.shape, len(bounds.low)
     return Tasks(
@@ -98,7 +108,7 @@ def tasks_of(problem: Problem, basis: Basis, bounds: ValueBounds, poses: FreePos
         limits=problem.limits,
         basis=basis,
         places=places[None],
-        velocities=np.zeros_like(places)[None],
+        velocities=velocities[None],
         references=references[None],
         turns=turns[None],
         accelerations=np.where(is_free[:, None], 0.0, accelerations)[None],
@@ -106,6 +116,8 @@ def tasks_of(problem: Problem, basis: Basis, bounds: ValueBounds, poses: FreePos
         low=np.broadcast_to(bounds.low, shape).copy(),
         high=np.broadcast_to(bounds.high, shape).copy(),
         scale=np.full(1, np.pi * np.sqrt(poses.z0 / float(problem.robot.gravity))),
+        objective=objective,
+        longest=None if longest is None else np.asarray(longest, float),
     )
 
 

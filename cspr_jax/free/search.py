@@ -1,4 +1,4 @@
-"""Search for the fastest motions: a primal-dual interior-point method for many motions at once.
+"""Search for the best motions: a primal-dual interior-point method for many motions at once.
 
 Bounds are kept by barriers. Equations may be missed at a price, whose multipliers are those of the last optimum
 (an augmented Lagrangian), so that every start has a way down to a motion that meets them; barriers and what may be
@@ -6,14 +6,15 @@ missed fall together. Steps are Newton's, no longer than the merit falls.
 """
 
 import dataclasses
+import time
 from typing import NamedTuple
 
 import numpy as np
 
 from cspr_jax.free.elimination import Softness, times, transposed
-from cspr_jax.free.instants import InstantValues
+from cspr_jax.free.instants import SCALARS, InstantValues
 from cspr_jax.free.newton import Step, gathered, newton_step
-from cspr_jax.free.tasks import OUTER, Tasks, Unknowns
+from cspr_jax.free.tasks import OUTER, Tasks, Unknowns, wide
 
 # Weight of the barriers and softness of the equations: at the start, at the end, and by what they fall.
 BARRIERS, BARRIER_FALL, BARRIER_POWER = (1e-1, 3e-8), 0.2, 1.5
@@ -46,11 +47,13 @@ class Optima(NamedTuple):
         unknowns: of all motions.
         is_optimal: (l,) whether the search has converged.
         steps: (l,) number of steps.
+        is_stopped: whether Ctrl-C, or the time, has ended it.
     """
 
     unknowns: Unknowns
     is_optimal: np.ndarray
     steps: np.ndarray
+    is_stopped: bool = False
 
 
 @dataclasses.dataclass(frozen=True)
@@ -87,20 +90,20 @@ class _Points:
         return np.abs(self.residual).reshape(len(self.residual), -1).max(1)
 
     def merit(self, levels: Levels) -> np.ndarray:
-        tasks, values, soft = self.tasks, self.unknowns.values, levels.soft
-        barrier = np.zeros(values.shape)
-        for bound, gap in ((tasks.low, values - tasks.low), (tasks.high, tasks.high - values)):
-            barrier -= np.where(np.isfinite(bound), np.log(np.where(np.isfinite(bound), gap, 1.0)), 0.0)
+        soft, barrier = levels.soft, np.zeros(self.unknowns.values.shape)
+        for gap in self.tasks.gaps(self.unknowns):
+            barrier -= np.log(np.where(np.isfinite(gap), gap, 1.0))
         price = (soft.level + 0.5 * soft.paid(self.residual)) * self.residual
-        each = price, levels.barrier[:, None, None, None, None] * barrier
-        return self.unknowns.duration.sum(1) / tasks.scale + sum(part.reshape(len(values), -1).sum(1) for part in each)
+        each = price, wide(levels.barrier) * barrier
+        return self.tasks.cost(self.unknowns) + sum(part.reshape(len(part), -1).sum(1) for part in each)
 
     def errors(self, levels: Levels) -> np.ndarray:
         # Largest error of Newton's equations.
         tasks, unknowns, soft = self.tasks, self.unknowns, levels.soft
-        count, dof, d = len(unknowns.values), tasks.robot.dof, tasks.places.shape[-1]
+        count, dof, d, cables = len(unknowns.values), tasks.robot.dof, tasks.places.shape[-1], tasks.robot.n_cables
         slope = gathered(tasks.basis, times(transposed(self.equations.slope), unknowns.multipliers))
-        slope[..., -1] += 1.0 / tasks.scale[:, None]
+        tensions, shares = unknowns.values[..., :cables], tasks.energy_shares
+        slope[..., -2] += tasks.objective.time / tasks.scale[:, None] + np.sum(shares * tensions**2, axis=(2, 3, 4))
         along = times(transposed(tasks.border_slopes(unknowns)), slope[..., tasks.border])
         segments, accelerations = unknowns.duration.shape[1], np.zeros_like(unknowns.acceleration)
         for side in (0, 1):
@@ -108,12 +111,17 @@ class _Points:
         balance = times(transposed(self.equations.matrix), unknowns.multipliers[..., :dof])
         values = np.concatenate([balance, unknowns.multipliers[..., dof:]], axis=-1)
         values = values - unknowns.low_push + unknowns.high_push
-        parts = [slope[..., OUTER * d : -1 - OUTER * d], slope[..., -1] + along[..., 0], values]
+        values[..., :cables] += 2.0 * shares * wide(unknowns.duration) * tensions
+        parts = [slope[..., OUTER * d : -SCALARS - OUTER * d], slope[..., -2] + along[..., 0], values]
         parts.append(np.where(tasks.is_free[..., None], accelerations, 0.0))
-        pushes, weight = (unknowns.low_push, unknowns.high_push), levels.barrier[:, None, None, None, None]
-        gaps = unknowns.values - tasks.low, tasks.high - unknowns.values
-        for push, gap in zip(pushes, gaps, strict=True):
-            parts.append(np.where(np.isfinite(gap), np.where(np.isfinite(gap), gap, 0.0) * push - weight, 0.0))
+        pushes = unknowns.low_push, unknowns.high_push
+        if tasks.objective.level > 0.0:
+            lifts = tasks.objective.low_lift, -tasks.objective.high_lift
+            by_level = sum(push * lift for push, lift in zip(pushes, lifts, strict=True))
+            parts.append(tasks.objective.level + by_level.sum((2, 3, 4)))
+        for push, gap in zip(pushes, tasks.gaps(unknowns), strict=True):
+            is_bound = np.isfinite(gap)
+            parts.append(np.where(is_bound, np.where(is_bound, gap, 0.0) * push - wide(levels.barrier), 0.0))
         unit = np.maximum(LARGE, (pushes[0] + pushes[1]).reshape(count, -1).mean(1)) / LARGE
         largest = np.max([np.abs(part).reshape(count, -1).max(1, initial=0.0) for part in parts], axis=0)
         price = self.residual - soft.missed(unknowns.multipliers - soft.level)
@@ -121,7 +129,7 @@ class _Points:
 
 
 def _moved(unknowns: Unknowns, change: Unknowns, primal: np.ndarray, dual: np.ndarray) -> Unknowns:
-    sizes = [primal] * 5 + [dual] * 2
+    sizes = [primal] * 6 + [dual] * 2
     return Unknowns(
         *(
             leaf + size.reshape(-1, *[1] * (leaf.ndim - 1)) * step
@@ -143,12 +151,9 @@ def _length(*pairs: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
 def _lengths(points: _Points, step: Step) -> tuple[np.ndarray, np.ndarray]:
     # Longest steps of the unknowns, and of the multipliers of bounds.
     tasks, unknowns, change = points.tasks, points.unknowns, step.change
-    low, high = np.isfinite(tasks.low), np.isfinite(tasks.high)
-    return _length(
-        (unknowns.values - tasks.low, np.where(low, change.values, 0.0)),
-        (tasks.high - unknowns.values, np.where(high, -change.values, 0.0)),
-        (0.5 * unknowns.duration, change.duration),
-    ), _length((unknowns.low_push, change.low_push), (unknowns.high_push, change.high_push))
+    gaps = zip(tasks.gaps(unknowns), tasks.gap_changes(change), strict=True)
+    duals = (unknowns.low_push, change.low_push), (unknowns.high_push, change.high_push)
+    return _length(*gaps, (0.5 * unknowns.duration, change.duration)), _length(*duals)
 
 
 def _descended(points: _Points, step: Step, levels: Levels) -> _Points:
@@ -198,34 +203,50 @@ def _wide(flags: np.ndarray, leaf: np.ndarray) -> np.ndarray:
     return flags.reshape(-1, *[1] * (leaf.ndim - 1))
 
 
-def optima(tasks: Tasks, start: Unknowns, barrier: float = BARRIERS[0], softness: float = SOFTNESS[0]) -> Optima:
-    """Search for the fastest motions.
+def optima(
+    tasks: Tasks,
+    start: Unknowns,
+    barrier: float = BARRIERS[0],
+    softness: float = SOFTNESS[0],
+    until: float = np.inf,
+) -> Optima:
+    """Search for the best motions.
 
     Args:
         start: from which the search begins.
         barrier: weight of the barriers at the start.
         softness: of the equations at the start.
+        until: time of `time.monotonic` at which the search ends, s.
 
     Returns:
-        the motions; those that have not converged as they were last.
+        the motions; those that have not converged as they were last. Ctrl-C ends the search: what has converged stays.
     """
-    count = len(start.duration)
-    points = _Points.of(tasks, start)
-    sizes = np.full(count, softness)
-    levels = Levels(np.full(count, barrier), Softness(sizes, points.metric(), start.multipliers.copy()))
+    count, points = len(start.duration), _Points.of(tasks, start)
+    soft = Softness(np.full(count, softness), points.metric(), start.multipliers.copy())
     result = Optima(Unknowns(*(leaf.copy() for leaf in start)), np.zeros(count, bool), np.zeros(count, int))
-    rows, curved, waited = np.arange(count), np.zeros(count), np.zeros(count)
+    try:
+        is_stopped = not _sought(points, Levels(np.full(count, barrier), soft), result, until)
+    except KeyboardInterrupt:
+        is_stopped = True
+    return result._replace(is_stopped=is_stopped)
+
+
+def _sought(points: _Points, levels: Levels, result: Optima, until: float) -> bool:
+    # Puts motions into the result as their searches end; whether all have ended in time.
+    rows = np.arange(len(result.steps))
+    curved, waited = np.zeros(len(rows)), np.zeros(len(rows))
     for number in range(STEPS + 1):
         before = levels.barrier
         levels, errors = _sharpened(points, levels)
         waited = np.where(levels.barrier < before, 0, waited + 1)
         is_optimal = (levels.barrier <= BARRIERS[1]) & (errors < CLOSE * BARRIERS[1]) & (points.missed() < MISSED)
-        is_over = is_optimal | (number == STEPS) | (waited > PATIENCE)
+        is_late = time.monotonic() > until
+        is_over = is_optimal | (number == STEPS) | (waited > PATIENCE) | is_late
         for leaf, values in zip(result.unknowns, points.unknowns.taken(is_over), strict=True):
             leaf[rows[is_over]] = values
         result.is_optimal[rows[is_over]], result.steps[rows[is_over]] = is_optimal[is_over], number
         if is_over.all():
-            break
+            return not is_late
         if is_over.any():
             rows, curved, waited = rows[~is_over], curved[~is_over], waited[~is_over]
             points, levels = points.taken(~is_over), _taken(levels, ~is_over)
@@ -234,18 +255,14 @@ def optima(tasks: Tasks, start: Unknowns, barrier: float = BARRIERS[0], softness
         )
         curved = np.where(step.curved > 0.0, step.curved, curved)
         points = _safeguarded(_descended(points, step, levels), levels.barrier)
-    return result
+    return True
 
 
 def _safeguarded(points: _Points, barrier: np.ndarray) -> _Points:
     # Multipliers of bounds not too far from barriers over gaps.
-    tasks, unknowns, weight = points.tasks, points.unknowns, barrier[:, None, None, None, None]
-    pushes = []
-    for push, gap in (
-        (unknowns.low_push, unknowns.values - tasks.low),
-        (unknowns.high_push, tasks.high - unknowns.values),
-    ):
-        near = weight / gap
+    unknowns, pushes = points.unknowns, []
+    for push, gap in zip((unknowns.low_push, unknowns.high_push), points.tasks.gaps(unknowns), strict=True):
+        near = wide(barrier) / gap
         pushes.append(np.where(np.isfinite(gap), np.clip(push, near / APART, near * APART), 0.0))
     return dataclasses.replace(points, unknowns=unknowns._replace(low_push=pushes[0], high_push=pushes[1]))
 
@@ -259,14 +276,14 @@ def again(tasks: Tasks, unknowns: Unknowns, barrier: float) -> Unknowns:
     Returns:
         the unknowns: values inside their bounds.
     """
-    inside = np.minimum(np.sqrt(barrier), INSIDE * (tasks.high - tasks.low))
-    values = np.clip(unknowns.values, tasks.low + inside, tasks.high - inside)
-    return unknowns._replace(values=values, **_pushes(tasks, values, barrier))
+    low, high = tasks.bounds(unknowns.level)
+    inside = np.minimum(np.sqrt(barrier), INSIDE * (high - low))
+    return _pushed(tasks, unknowns._replace(values=np.clip(unknowns.values, low + inside, high - inside)), barrier)
 
 
-def _pushes(tasks: Tasks, values: np.ndarray, barrier: float) -> dict[str, np.ndarray]:
-    gaps = {"low_push": values - tasks.low, "high_push": tasks.high - values}
-    return {name: np.where(np.isfinite(gap), barrier / gap, 0.0) for name, gap in gaps.items()}
+def _pushed(tasks: Tasks, unknowns: Unknowns, barrier: float) -> Unknowns:
+    low, high = (np.where(np.isfinite(gap), barrier / gap, 0.0) for gap in tasks.gaps(unknowns))
+    return unknowns._replace(low_push=low, high_push=high)
 
 
 def started(tasks: Tasks, controls: np.ndarray, duration: np.ndarray, barrier: float = BARRIERS[0]) -> Unknowns:
@@ -291,17 +308,16 @@ def started(tasks: Tasks, controls: np.ndarray, duration: np.ndarray, barrier: f
         acceleration[:, side : count + side] = np.where(is_free, near, acceleration[:, side : count + side])
     shape = tasks.low.shape
     values, empty = np.zeros(shape), np.zeros((*shape[:-1], shape[-1] - cables + dof))
-    unknowns = Unknowns(controls[:, :, OUTER:-OUTER], duration, acceleration, values, empty, values, values)
+    level, inner = np.full(duration.shape, tasks.objective.start), controls[:, :, OUTER:-OUTER].copy()
+    unknowns = Unknowns(inner, duration.copy(), acceleration, level, values, empty, values, values)
     equations, residual = tasks.equations(unknowns)
     # Tensions nearest to the middle of their range that balance the motion.
-    middle = 0.5 * (tasks.low + tasks.high)[..., :cables]
+    low, high = tasks.bounds(level)
+    middle = 0.5 * (low + high)[..., :cables]
     matrix = equations.matrix
     lacking = -residual[..., :dof] - times(matrix, middle)
     metric = matrix @ transposed(matrix) + REGULAR * np.eye(dof)
     tensions = middle + times(transposed(matrix), np.linalg.solve(metric, lacking[..., None])[..., 0])
     values = np.concatenate([tensions, -residual[..., dof:]], axis=-1)
-    inside = np.minimum(AWAY, INSIDE * (tasks.high - tasks.low))
-    values = np.clip(values, tasks.low + inside, tasks.high - inside)
-    pushes = _pushes(tasks, values, barrier)
-    inner = controls[:, :, OUTER:-OUTER].copy()
-    return Unknowns(inner, duration.copy(), acceleration, values, empty, **pushes)
+    inside = np.minimum(AWAY, INSIDE * (high - low))
+    return _pushed(tasks, unknowns._replace(values=np.clip(values, low + inside, high - inside)), barrier)

@@ -1,5 +1,6 @@
 """Motions from which searches begin: lines, lines bent to all sides, and swings about P0."""
 
+from itertools import zip_longest
 from typing import NamedTuple
 
 import numpy as np
@@ -8,8 +9,8 @@ from cspr_jax.free.instants import coordinates
 from cspr_jax.free.tasks import Tasks
 from cspr_jax.robots.point_mass import rest_point, spool_radius
 
-# Numbers of arcs of swings; by how much of their length lines are bent.
-ARCS, BENT = (1, 2, 3), 0.35
+# Largest number of arcs of swings; by how much of their length lines are bent.
+ARCS, BENT = 3, 0.35
 # Durations of lines over those of motions with the acceleration of gravity.
 SLOWER = 1.3
 
@@ -28,40 +29,62 @@ class Starts(NamedTuple):
     duration: np.ndarray
 
 
-def starts(tasks: Tasks, z0: float) -> Starts:
+def starts(tasks: Tasks, z0: float, most: int | None = None) -> Starts:
     """Starts of searches, in the same order for each task.
 
     Args:
         tasks: of one segment each.
         z0: depth of P0, m.
+        most: number of starts of each task; None for the usual ones. More of them are swings of more arcs.
 
     Returns:
         the starts of the first task, then of the second one, ...
     """
-    tau, robot = tasks.basis.averages, tasks.robot
-    # At rest only at the ends, where accelerations do not vanish.
-    share = (3.0 * tau**2 - 2.0 * tau**3)[:, None]
-    bulge, grown = 16.0 * (tau * (1.0 - tau))[:, None] ** 2, (tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2))[:, None]
-    along = coordinates(robot.pattern)[0]
-    gravity, size = float(robot.gravity), float(spool_radius(robot))
-    curves, durations = list[np.ndarray](), list[float]()
+    begun = list[_Start]()
     for start, end in tasks.places[:, 0]:
-        line = start + (end - start) * share
-        chord = (end - start)[: len(along)]
-        length = float(np.linalg.norm(chord)) + size * float(np.linalg.norm((end - start)[len(along) :]))
-        curves += [line + BENT * length * bulge * way for way in _ways(chord, along, len(start))]
-        durations += [SLOWER * 2.0 * np.sqrt(2.0 * max(length, 0.1 * size) / gravity)] * (len(curves) - len(durations))
-        hub = np.array(start)
-        hub[: len(along)] = rest_point(z0)[along]
-        for arcs in ARCS:
-            first, last = np.cos(arcs * np.pi * tau)[:, None], np.cos(arcs * np.pi * (1.0 - tau))[:, None]
-            swing = hub + (start - hub) * (1.0 - grown) * first + (end - hub) * grown * last
-            swing[:, len(along) :] = line[:, len(along) :]
-            curves.append(swing)
-            durations.append(arcs * np.pi * np.sqrt(z0 / gravity))
-    each = len(curves) // len(tasks.places)
-    controls = np.einsum("kj,njd->nkd", tasks.basis.fit, np.array(curves))
-    return Starts(np.repeat(np.arange(len(tasks.places)), each), controls[:, None], np.array(durations)[:, None])
+        lines = _lines(tasks, start, end)
+        swings = _swings(tasks, start, end, z0, ARCS if most is None else max(1, most - len(lines)))
+        # Few starts are of both kinds.
+        begun += [one for pair in zip_longest(lines, swings) for one in pair if one is not None][:most]
+    task = np.repeat(np.arange(len(tasks.places)), len(begun) // len(tasks.places))
+    controls = np.einsum("kj,njd->nkd", tasks.basis.fit, np.array([one.places for one in begun]))
+    return Starts(task, controls[:, None], np.array([[one.duration] for one in begun]))
+
+
+class _Start(NamedTuple):
+    # Places (K, d) at the instants where control points count most, and the duration, s.
+    places: np.ndarray
+    duration: float
+
+
+def _line(tasks: Tasks, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    # At rest only at the ends, where accelerations do not vanish.
+    tau = tasks.basis.averages[:, None]
+    return start + (end - start) * (3.0 * tau**2 - 2.0 * tau**3)
+
+
+def _lines(tasks: Tasks, start: np.ndarray, end: np.ndarray) -> list[_Start]:
+    # The line, and lines that are bent to all sides.
+    tau, along = tasks.basis.averages[:, None], coordinates(tasks.robot.pattern)[0]
+    gravity, size = float(tasks.robot.gravity), float(spool_radius(tasks.robot))
+    chord, bulge = (end - start)[: len(along)], 16.0 * (tau * (1.0 - tau)) ** 2
+    length = float(np.linalg.norm(chord)) + size * float(np.linalg.norm((end - start)[len(along) :]))
+    line, duration = _line(tasks, start, end), SLOWER * 2.0 * np.sqrt(2.0 * max(length, 0.1 * size) / gravity)
+    return [_Start(line + BENT * length * bulge * way, duration) for way in _ways(chord, along, len(start))]
+
+
+def _swings(tasks: Tasks, start: np.ndarray, end: np.ndarray, z0: float, most: int) -> list[_Start]:
+    # Swings about P0 of one arc, two arcs, ...
+    tau, along = tasks.basis.averages[:, None], coordinates(tasks.robot.pattern)[0]
+    line, grown, hub = _line(tasks, start, end), tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2), start.copy()
+    hub[: len(along)] = rest_point(z0)[along]
+    half, swings = np.pi * np.sqrt(z0 / float(tasks.robot.gravity)), list[_Start]()
+    for arcs in range(1, most + 1):
+        first, last = np.cos(arcs * np.pi * tau), np.cos(arcs * np.pi * (1.0 - tau))
+        swing = hub + (start - hub) * (1.0 - grown) * first + (end - hub) * grown * last
+        places = np.concatenate([swing[:, : len(along)], line[:, len(along) :]], axis=1)
+        swings.append(_Start(places, arcs * half))
+    return swings
 
 
 def _ways(chord: np.ndarray, along: np.ndarray, d: int) -> list[np.ndarray]:

@@ -1,4 +1,4 @@
-"""Motions that are sought together, and their unknowns: control points, durations, accelerations at poses.
+"""Motions that are sought together, and their unknowns: control points, durations, accelerations at poses, levels.
 
 A motion is at a pose at each end of its segments, with a given velocity there, and an acceleration that the segments at
 both sides share. So the outer three control points at each end follow from the duration and the acceleration.
@@ -11,11 +11,24 @@ import numpy as np
 
 from cspr_jax.free.basis import Basis
 from cspr_jax.free.instants import InstantValues, instant_values
+from cspr_jax.free.objectives import Objective
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
 
 # Control points at each end that follow from the others.
 OUTER = 3
+
+
+def wide(numbers: np.ndarray) -> np.ndarray:
+    """Numbers of motions, or of their segments, beside their values at instants.
+
+    Args:
+        numbers: (l,) or (l, s).
+
+    Returns:
+        (l, 1, 1, 1, 1) or (l, s, 1, 1, 1).
+    """
+    return numbers.reshape(*numbers.shape, *[1] * (5 - numbers.ndim))
 
 
 class Unknowns(NamedTuple):
@@ -25,6 +38,7 @@ class Unknowns(NamedTuple):
         inner: (l, s, K - 6, d) control points between the outer ones.
         duration: (l, s) s.
         acceleration: (l, s + 1, d) at the poses, m/s^2, rad/s^2.
+        level: (l, s) of the objective, by which bounds of tensions move.
         values: (l, s, m, n, n_values) as of `instants`.
         multipliers: (l, s, m, n, n_equations).
         low_push: (l, s, m, n, n_values) multipliers of lower bounds, at least 0.
@@ -34,6 +48,7 @@ class Unknowns(NamedTuple):
     inner: np.ndarray
     duration: np.ndarray
     acceleration: np.ndarray
+    level: np.ndarray
     values: np.ndarray
     multipliers: np.ndarray
     low_push: np.ndarray
@@ -65,9 +80,11 @@ class Tasks:
         turns: (l, s, 2, d, d) second derivatives of the coordinates from accelerations.
         accelerations: (l, s + 1, d) at the poses, m/s^2, rad/s^2, where they are given.
         is_free: (l, s + 1) whether they are not.
-        low: (l, s, m, n, n_values) lower bounds, -inf for none.
-        high: (l, s, m, n, n_values) upper bounds, inf for none.
+        low: (l, s, m, n, n_values) lower bounds at level 0, -inf for none.
+        high: (l, s, m, n, n_values) upper bounds at level 0, inf for none.
         scale: (l,) half a swing, s, over which durations count.
+        objective: what is to be least.
+        longest: () longest duration of a segment, s; None for any.
     """
 
     robot: AnyRobot
@@ -82,6 +99,8 @@ class Tasks:
     low: np.ndarray
     high: np.ndarray
     scale: np.ndarray
+    objective: Objective
+    longest: np.ndarray | None = None
 
     def taken(self, rows: np.ndarray) -> "Tasks":
         """Some of the motions.
@@ -94,6 +113,77 @@ class Tasks:
         """
         names = ("places", "velocities", "references", "turns", "accelerations", "is_free", "low", "high", "scale")
         return dataclasses.replace(self, **{name: getattr(self, name)[rows] for name in names})
+
+    def bounds(self, level: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Bounds of the values.
+
+        Args:
+            level: (l, s).
+
+        Returns:
+            lower and upper ones, (l, s, m, n, n_values).
+        """
+        level = wide(level)
+        return self.low + level * self.objective.low_lift, self.high + level * self.objective.high_lift
+
+    def gaps(self, unknowns: Unknowns) -> tuple[np.ndarray, np.ndarray]:
+        """Distances of the values from their bounds.
+
+        Returns:
+            from lower and upper ones, (l, s, m, n, n_values); inf for none.
+        """
+        low, high = self.bounds(unknowns.level)
+        return unknowns.values - low, high - unknowns.values
+
+    def gap_changes(self, change: Unknowns) -> tuple[np.ndarray, np.ndarray]:
+        """Changes of the distances of the values from their bounds.
+
+        Returns:
+            from lower and upper ones, (l, s, m, n, n_values).
+        """
+        level = wide(change.level)
+        low, high = level * self.objective.low_lift, level * self.objective.high_lift
+        return change.values - low, high - change.values
+
+    @property
+    def energy_shares(self) -> np.ndarray:
+        """Shares of the instants in the objective, of the squares of tensions times the duration, (l, 1, m, n, 1)."""
+        return self.objective.energy / wide(self.scale) * self.basis.shares[..., None]
+
+    def cost(self, unknowns: Unknowns) -> np.ndarray:
+        """The objective.
+
+        Returns:
+            (l,).
+        """
+        time = self.objective.time * unknowns.duration.sum(1) / self.scale
+        squares = unknowns.values[..., : self.robot.n_cables] ** 2 * wide(unknowns.duration)
+        energy = np.sum(self.energy_shares * squares, axis=(1, 2, 3, 4))
+        return time + energy + self.objective.level * unknowns.level.sum(1)
+
+    def energies(self, unknowns: Unknowns) -> np.ndarray:
+        """Integrals of the sum of the squares of the tensions.
+
+        Returns:
+            (l, s) N^2 s.
+        """
+        squares = np.sum(unknowns.values[..., : self.robot.n_cables] ** 2, axis=-1)
+        weight = float(self.robot.mass * self.robot.gravity)
+        return weight**2 * unknowns.duration * np.sum(self.basis.shares * squares, axis=(2, 3))
+
+    def cost_change(self, unknowns: Unknowns, change: Unknowns) -> np.ndarray:
+        """Slope of the objective along a change.
+
+        Returns:
+            (l,).
+        """
+        cables = self.robot.n_cables
+        tensions, duration = unknowns.values[..., :cables], wide(unknowns.duration)
+        squares = wide(change.duration) * tensions**2
+        squares = squares + 2.0 * duration * tensions * change.values[..., :cables]
+        energy = np.sum(self.energy_shares * squares, axis=(1, 2, 3, 4))
+        time = self.objective.time * change.duration.sum(1) / self.scale
+        return time + energy + self.objective.level * change.level.sum(1)
 
     @property
     def border(self) -> np.ndarray:
@@ -172,6 +262,7 @@ class Tasks:
         equations = instant_values(
             self.robot,
             self.limits,
+            self.longest,
             np.broadcast_to(self.references[:, :, None, None], (*shape, 4)),
             self.basis.places(self.controls(unknowns)),
             np.broadcast_to(unknowns.duration[:, :, None, None], shape),

@@ -80,6 +80,7 @@ _OF_SOME = (
     "binding",
     "sections",
     "objective",
+    "energy",
     "planned_duration",
     "gain",
     "retimed",

@@ -136,8 +136,8 @@ def _solution(
         rows += jnp.abs(matrix.square @ inverse)
     residual = (right - turned(matrix, line)).size()
     rows = jnp.sum(rows + matrix.radius @ jnp.abs(inverse), axis=1)
-    share = jnp.max(rows)
-    radius = jnp.abs(inverse) @ (residual + rows * jnp.max(residual) / (1.0 - share))
+    share = jnp.max(rows, initial=0.0)
+    radius = jnp.abs(inverse) @ (residual + rows * jnp.max(residual, initial=0.0) / (1.0 - share))
     is_known = (share < 1.0) & jnp.isfinite(middle).all() & jnp.isfinite(slope).all() & jnp.isfinite(radius).all()
     return line._replace(radius=jnp.where(is_known, radius, jnp.nan)), is_known
 

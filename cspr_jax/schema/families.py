@@ -167,7 +167,7 @@ _ROWS = (
     ),
     Family(
         "free",
-        "the fastest motions between poses that a search finds, at zero velocity in every pose",
+        "the fastest, or otherwise best, motions between poses that a search finds",
         dict.fromkeys(("1T", "2T", "3T", "1R2T", "3R3T"), "cspr_jax.free.leg:FreeMotions"),
         rests_anywhere=True,
         takes_amplitude=False,
@@ -177,7 +177,8 @@ _ROWS = (
         knows_obstacles=True,
         knows_pulleys=True,
         knows_mass_centre=True,
-        keys=("objective", "end_accelerations", "together"),
+        keys=("objective", "duration_max", "end_accelerations", "together", "starts", "search_time"),
+        end_keys=("velocity",),
     ),
 )
 FAMILIES: dict[str, Family] = {row.name: row for row in _ROWS}

@@ -123,14 +123,18 @@ SEGMENT = {
         "a section without a stop runs on through a pose, or has no motion. Free motions: of the time of any motion "
         "between both poses.",
     ),
-    "gap": ("1", "Paths, free motions: 1 - `lower_bound` / `duration`."),
+    "gap": ("1", "Paths, free motions of least time: 1 - `lower_bound` / `duration`."),
     "binding": (
         "",
         "Paths: limits that bind, those that do so longest first: `criterion` (name of a flag), `cable` (from 0 on; "
         "null: none), `share` of the time of the segment.",
     ),
     "sections": ("", "Paths: one object for each section, from stop to stop, that ends in the segment, below."),
-    "objective": ("", 'Free motions: what was sought the least of, "time"; null elsewhere.'),
+    "objective": (
+        "",
+        'Free motions: what the motion is the best in, "time", "energy", "tension" or "margin"; null elsewhere.',
+    ),
+    "energy": ("N^2 s", "Free motions: integral of the sum of the squares of the tensions; null elsewhere."),
     "planned_duration": ("s", "Retimed plans: duration of the motion that was planned; null elsewhere."),
     "gain": ("1", "Retimed plans: 1 - `duration` / `planned_duration`."),
     "retimed": ("", "Retimed plans: whether the motion is the faster one; the planned one stays where none is proved."),

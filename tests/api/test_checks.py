@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import cspr_jax
 from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.robots.point_mass import guided_robot
 from cspr_jax.schema.verdicts import Verdict
 
 TIMES = np.linspace(0.0, 6.0, 7)
@@ -106,6 +107,16 @@ def test_slower():
     assert not cspr_jax.check("prototype", TIMES * slower.factor * 0.9999, PLACES, limits=FAST).feasible
     beyond = cspr_jax.check("prototype", TIMES, PLACES, limits={"cable_length_max": 0.9}).slower()
     assert np.isnan(beyond.factor) and beyond.check is None and not beyond.is_static
+
+
+def test_a_guided_weight_on_two_cables():
+    """At rest the upper cable carries 10 N more than the lower one: 5.5 and 15.5 N are as far as can be from limits."""
+    robot = guided_robot([[0.0, 0.0, 0.0], [0.0, 0.0, 2.0]], mass=1.0, gravity=10.0)
+    answer = cspr_jax.check(
+        robot, [0.0, 1.0], [[0.0, 0.0, 0.9], [0.0, 0.0, 0.9]], limits={"tension_min": 1.0, "tension_max": 20.0}
+    )
+    assert answer.feasible
+    assert answer.margin == pytest.approx(4.5, abs=1e-9)
 
 
 def test_functions_are_sampled():

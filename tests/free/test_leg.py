@@ -66,6 +66,23 @@ def test_accelerations_of_a_file():
     np.testing.assert_allclose(ends(planned.motions[0]).acceleration, [[0.0] * 3, [0.0, 0.1, -0.2]], atol=1e-6)
 
 
+def test_energy_between_velocities():
+    """In the axes of a file with z up; no bound of the time is told where a motion does not begin at rest."""
+    chosen = [{"position": [0.0, 0.0, 1.5], "velocity": [0.3, 0.0, 0.1]}, {"position": [0.1, 0.0, 1.4], "rest": True}]
+    keys = {"objective": "energy", "duration_max": 1.0, "limits": {"tension_max": 3.0}}
+    planned = cspr_jax.plan(KEYS | keys | {"pose": chosen})
+    (segment,) = planned.to_dict()["segments"]
+    assert planned.feasible
+    assert segment["duration"] <= 1.0
+    assert (segment["objective"], segment["lower_bound"], segment["gap"]) == ("energy", None, None)
+    state = ends(planned.motions[0])
+    np.testing.assert_allclose(state.velocity, [[0.3, 0.0, 0.1], [0.0, 0.0, 0.0]], atol=1e-9)
+    np.testing.assert_allclose(state.acceleration[1], 0.0, atol=1e-6)
+    rows = planned.rows(rate=2000.0)
+    squares = np.sum(rows["tension"] ** 2, axis=1)
+    assert segment["energy"] == pytest.approx(np.trapezoid(squares, rows["t"]), rel=1e-3)
+
+
 @pytest.mark.thorough
 def test_nothing_is_found():
     """Below 3 m/s no motion stays taut between these poses."""
@@ -80,6 +97,12 @@ def test_nothing_is_found():
         ('end_accelerations = "swing"', 'z0 is missing: depth of P0, m, about which end_accelerations = "swing" are'),
         ("end_accelerations = [[0.0, 0.0, 1.0]]", "must be one [x, y, z] for each of the 2 poses"),
         ('objective = "beauty"', 'objective = "beauty"'),
+        (
+            'objective = "margin"',
+            'duration_max is missing: longest duration of a segment, s, which objective = "margin"',
+        ),
+        ("starts = 0", "starts = 0"),
+        ("search_time = -1.0", "search_time = -1.0"),
         ("tension_min = 0.1", "tension_max = (missing): must be a number"),
     ],
 )

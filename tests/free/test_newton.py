@@ -10,11 +10,13 @@ from support.free_motions import problem_of
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.free.basis import basis
 from cspr_jax.free.elimination import Softness, eliminated, times, transposed
-from cspr_jax.free.instants import bounds
-from cspr_jax.free.newton import gathered
+from cspr_jax.free.instants import ValueBounds, bounds
+from cspr_jax.free.newton import gathered, newton_step
+from cspr_jax.free.objectives import OBJECTIVES
 from cspr_jax.free.poses import FreePoses, tasks_of
 from cspr_jax.free.search import started
 from cspr_jax.free.starts import starts
+from cspr_jax.free.tasks import Unknowns
 from cspr_jax.motions.criteria import criteria
 
 RING = least_time_forms.ring_robot(3, 1.0, 2.0)
@@ -30,9 +32,8 @@ def searched():
         problem = problem_of(RING, LIMITS)[0]
         limits = bounds(problem.robot, problem.limits, criteria(problem.robot, problem.limits))
         places = np.array([[0.3, 0.1, 1.0], [-0.2, 0.3, 1.4], [0.1, -0.3, 1.2]])
-        poses = FreePoses(places, None, np.full((3, 3), np.nan), 1.2)
-        tasks = tasks_of(problem, basis(6, 3), limits, poses)
-        tasks = dataclasses.replace(tasks, velocities=rng.normal(size=tasks.velocities.shape))
+        poses = FreePoses(places, None, rng.normal(size=(3, 3)), np.full((3, 3), np.nan), 1.2)
+        tasks = tasks_of(problem, basis(6, 3), limits, OBJECTIVES["time"](limits, 3)[0], poses, None)
         line = np.linspace(places[:-1], places[1:], tasks.basis.controls, axis=1)[None]
         unknowns = started(tasks, line + 0.02 * rng.normal(size=line.shape), np.array([[0.7, 0.9]]))
     return tasks, unknowns._replace(multipliers=rng.normal(size=unknowns.multipliers.shape))
@@ -59,6 +60,8 @@ def test_splines_have_the_derivatives_and_the_pieces_of_their_control_points():
     still = controls.copy()
     still[1] = still[0]
     np.testing.assert_allclose(table.places(still)[0, 0, 2], (still[2] - still[0]) / table.end_bend, atol=1e-9)
+    # Cubics are integrated exactly.
+    assert np.sum(table.shares * (5.0 * table.tau**3 - table.tau)) == pytest.approx(0.75, abs=1e-12)
     fitted = table.fit @ np.sin(table.averages)
     np.testing.assert_allclose(table.places(fitted[:, None])[..., 0, 0], np.sin(table.tau), atol=1e-6)
     np.testing.assert_allclose(table.places(fitted[:, None])[..., 1, 0], np.cos(table.tau), atol=1e-4)
@@ -95,12 +98,13 @@ def test_equations_have_their_derivatives(searched):
     lagrangian = times(transposed(equations.slope), unknowns.multipliers)
     change = ((last - first) / (2 * STEP)).reshape(1, 2, -1)
     slope = gathered(tasks.basis, lagrangian)
-    along = np.sum(slope[..., :-1] * change, axis=-1) + slope[..., -1] * step[0]
+    along = np.sum(slope[..., :-2] * change, axis=-1) + slope[..., -2] * step[0]
     values = (np.sum(residual * unknowns.multipliers, axis=(2, 3, 4)) for residual in (less, more))
     low, high = values
     np.testing.assert_allclose(along, (high - low) / (2 * STEP), rtol=1e-6)
     places = tasks.basis.places((last - first) / (2 * STEP)).reshape(1, 2, 6, 3, -1)
-    state = np.concatenate([places, np.broadcast_to(step[0][:, :, None, None, None], (1, 2, 6, 3, 1))], axis=-1)
+    scalars = (step[0][:, :, None, None, None], np.full((1, 2, 1, 1, 1), 7.0))
+    state = np.concatenate([places, *(np.broadcast_to(one, (1, 2, 6, 3, 1)) for one in scalars)], axis=-1)
     slopes = (times(transposed(one.slope), unknowns.multipliers) for one in (before, after))
     low, high = slopes
     np.testing.assert_allclose(times(equations.bend, state), (high - low) / (2 * STEP), rtol=1e-4, atol=1e-4)
@@ -120,13 +124,13 @@ def test_what_is_eliminated_is_that_of_the_whole_matrix(searched):
     soft = Softness(np.array([0.3]), np.eye(3) + factor @ transposed(factor), unknowns.multipliers)
     np.testing.assert_allclose(soft.paid(soft.missed(residual)), residual, atol=1e-12)
     local = eliminated(equations, weights, push, residual, soft)
-    step = rng.normal(size=(*shape, 10))
+    step = rng.normal(size=(*shape, 11))
     change, multipliers = local.changes(step, 3, 3)
     # The wrenches of tensions, and the identity of other values.
     by_values = np.zeros((*shape, residual.shape[-1], values))
     by_values[..., :3, :3] = equations.matrix
     by_values[..., range(3, values), range(3, values)] = 1.0
-    mixed = np.zeros((*shape, values, 10))
+    mixed = np.zeros((*shape, values, 11))
     mixed[..., :3, :] = equations.mixed
     first = weights * change + times(mixed, step) + times(transposed(by_values), multipliers)
     np.testing.assert_allclose(first, push, atol=1e-9)
@@ -137,6 +141,58 @@ def test_what_is_eliminated_is_that_of_the_whole_matrix(searched):
     np.testing.assert_allclose(times(local.bend, step) + local.slope, whole, atol=1e-8)
 
 
+def merit(tasks, name, unknowns, barrier, soft):
+    """Time, energy, largest tension over its limit (16 N), or margin, with barriers, and equations that are missed."""
+    _, residual = tasks.equations(unknowns)
+    tensions, time, level = unknowns.values, unknowns.duration / tasks.scale[0], unknowns.level
+    weight = RING["mass"] * RING["gravity"]
+    low, high = np.full(2, 0.4 / weight), np.full(2, 16.0 / weight)
+    shares = np.array([9, 28, 23, *[24] * 12, 23, 28, 9]) / 24.0 / 17.0
+    squares = np.sum(tensions[..., :3] ** 2, axis=-1).reshape(2, 18)
+    costs = {
+        "time": time.sum(),
+        "energy": np.sum(time[0] * np.sum(shares * squares, axis=1)),
+        "tension": 1e-4 * time.sum() + level.sum(),
+        "margin": 1e-4 * time.sum() + level.sum(),
+    }
+    if name == "tension":
+        high = high * level[0]
+    if name == "margin":
+        low, high = low - level[0], high + level[0]
+    low, high = (one.reshape(1, 2, 1, 1, 1) for one in (low, high))
+    # Depths keep a distance from the spools, too.
+    sides = [tensions[..., :3] - low, high - tensions[..., :3], tensions[..., 3:] - 0.02]
+    price = np.sum((soft.level + 0.5 * soft.paid(residual)) * residual)
+    return costs[name] + price - barrier * sum(np.sum(np.log(side)) for side in sides)
+
+
+@pytest.mark.parametrize("name", OBJECTIVES)
+def test_steps_go_down_the_merit_of_each_objective(searched, name):
+    """The slope that a step tells is that of the merit, written out here; without multipliers errors are no less."""
+    tasks, unknowns = searched
+    limits = ValueBounds(tasks.low[0, 0, 0, 0], tasks.high[0, 0, 0, 0], np.zeros(0), np.zeros(0))
+    objective, moved_limits = OBJECTIVES[name](limits, 3)
+    with double_precision():
+        tasks = dataclasses.replace(
+            tasks, objective=objective, high=np.broadcast_to(moved_limits.high, tasks.high.shape)
+        )
+        line = tasks.controls(unknowns)
+        unknowns = started(tasks, line, unknowns.duration)._replace(multipliers=unknowns.multipliers)
+        unknowns = unknowns._replace(level=unknowns.level + np.array([0.1, 0.2]))
+        equations, residual = tasks.equations(unknowns)
+        soft = Softness(np.array([0.3]), np.tile(np.eye(3), (*residual.shape[:-1], 1, 1)), unknowns.multipliers)
+        step = newton_step(tasks, unknowns, equations, residual, np.array([0.05]), soft, np.zeros(1))
+        sizes = [
+            merit(
+                tasks, name, Unknowns(*(x + size * dx for x, dx in zip(unknowns, step.change, strict=True))), 0.05, soft
+            )
+            for size in (-STEP, STEP)
+        ]
+    assert step.fall[0] < 0.0
+    assert (step.change.level != 0.0).all() == (name in ("tension", "margin"))
+    assert step.fall[0] == pytest.approx((sizes[1] - sizes[0]) / (2 * STEP), rel=1e-5)
+
+
 def test_starts_are_the_same_for_each_task_and_join_its_poses(searched):
     tasks, _ = searched
     single = dataclasses.replace(
@@ -145,6 +201,7 @@ def test_starts_are_the_same_for_each_task_and_join_its_poses(searched):
         references=np.moveaxis(tasks.references, 1, 0),
     )
     begun = starts(single, 1.2)
+    assert [len(starts(single, 1.2, most).task) for most in (1, 5, 12)] == [2, 10, 24]
     assert (np.bincount(begun.task) == len(begun.task) // 2).all()
     for side, end in ((0, 0), (1, -1)):
         np.testing.assert_allclose(begun.controls[:, 0, end], single.places[begun.task, 0, side], atol=1e-9)

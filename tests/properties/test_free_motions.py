@@ -36,7 +36,8 @@ def test_times_are_those_of_collocation(name):
         quaternions, size = None, 3
         if isinstance(problem.robot, PlatformRobot):
             quaternions, size = np.asarray(frame.turned_quaternions(np.array([pose.quaternion for pose in ends]))), 6
-        poses = FreePoses(positions, quaternions, np.full((2, size), np.nan), float(positions[:, 2].mean()))
+        still, free = np.zeros((2, 3)), np.full((2, size), np.nan)
+        poses = FreePoses(positions, quaternions, still, free, float(positions[:, 2].mean()))
         free = free_motion(problem, None, poses)
         (bound,) = time_bounds(problem, free.motions)
     assert free.is_optimal

@@ -16,7 +16,7 @@ from cspr_jax.robots.limits import Limits
 from support.least_time import robot_of
 
 # Quick tests look at few intervals.
-QUICK = FreeSettings(12, 3)
+QUICK = FreeSettings(intervals=12, instants=3)
 
 
 class Judged:
@@ -57,4 +57,6 @@ def solve(robot, limits, positions, accelerations=None, settings=QUICK):
         problem, frame = problem_of(robot, limits)
         places = np.asarray(frame.inward(np.asarray(positions, float)))
         free = np.full(places.shape, np.nan) if accelerations is None else frame.turned(np.asarray(accelerations))
-        return free_motion(problem, None, FreePoses(places, None, free, float(places[:, 2].mean())), settings), frame
+        return free_motion(
+            problem, None, FreePoses(places, None, np.zeros(places.shape), free, float(places[:, 2].mean())), settings
+        ), frame
