@@ -172,6 +172,13 @@ def test_more_random_paths(kind, seed, outside):
     check_case(least_time_cases.case(kind, seed, outside), SAMPLES["thorough"], 300)
 
 
+def with_all_limits(case):
+    """Limits of a case; absent ones are so far away that they bind nowhere: all cases of a robot compile alike."""
+    size, gravity = np.ptp(np.asarray(case.robot["base_points"]), axis=0).max(), case.robot["gravity"]
+    speeds = dict.fromkeys(("cable_speed_max", "speed_max"), 1e4 * math.sqrt(gravity * size))
+    return speeds | dict.fromkeys(("cable_acceleration_max", "acceleration_max"), 1e4 * gravity) | case.limits
+
+
 @pytest.mark.soak
 @pytest.mark.parametrize("kind", least_time_cases.KINDS)
 def test_samples_never_break_a_proof(kind):
@@ -179,7 +186,7 @@ def test_samples_never_break_a_proof(kind):
     broken, proved = {}, 0
     for seed in range(100, 1_100):
         case = least_time_cases.case(kind, seed, seed % 4 == 0)
-        answer = solve(case.robot, case.path, case.limits)
+        answer = solve(case.robot, case.path, with_all_limits(case))
         if answer.verdict == "feasible":
             proved += 1
             found = breaches(case.robot, case.limits, answer, SAMPLES["soak"])
@@ -192,14 +199,17 @@ def test_samples_never_break_a_proof(kind):
 @pytest.mark.soak
 @pytest.mark.parametrize("kind", least_time_cases.KINDS)
 def test_verdicts_are_those_of_linear_programs(kind):
-    """The problem on a grid by HiGHS, tensions its unknowns, 100 paths a robot; what one decides the other may not."""
+    """The problem on a grid by HiGHS, tensions its unknowns, 100 paths a robot: the same verdicts.
+
+    The package is proved, and no slower; it may be faster: the reference's motion keeps one acceleration along a cell.
+    """
     differ = {}
     for seed in range(2_000, 2_100):
         case = least_time_cases.case(kind, seed, seed % 2 == 0)
-        answer = solve(case.robot, case.path, case.limits, grid=200)
+        answer = solve(case.robot, case.path, with_all_limits(case), grid=200)
         theirs = least_time.ByTensions(case.robot, case.limits, case.path, 200).solve()
         is_other = (answer.verdict == "feasible") != (theirs.verdict == "feasible")
-        if is_other or (answer.verdict == "feasible" and abs(answer.time / theirs.time - 1.0) > 0.006):
+        if is_other or (answer.verdict == "feasible" and answer.time > 1.001 * theirs.time):
             differ[seed] = answer.verdict, answer.time, theirs.verdict, theirs.time
     assert differ == {}
 
