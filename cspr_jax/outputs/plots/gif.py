@@ -6,6 +6,8 @@ import numpy as np
 from matplotlib.animation import AbstractMovieWriter
 from PIL import Image
 
+from cspr_jax.outputs.plots.moving_figure import MovingFigure
+
 # Pictures from which the colours come, and how many of these are exact: white, grey and the like cover most of them.
 SAMPLES, EXACT, COLOURS = 8, 32, 256
 
@@ -16,11 +18,12 @@ class GifWriter(AbstractMovieWriter):
     def setup(self, fig: Any, outfile: Any, dpi: float | None = None) -> None:
         """Begin a film of a `moving_figure.MovingFigure`."""
         super().setup(fig, outfile, dpi=dpi)
+        self._moving: MovingFigure = fig
         self._pictures = list[np.ndarray]()
 
     def grab_frame(self, **savefig_kwargs: Any) -> None:
         """Take the figure's picture."""
-        self._pictures.append(self.fig.picture())
+        self._pictures.append(self._moving.picture())
 
     def finish(self) -> None:
         """Write the file."""
