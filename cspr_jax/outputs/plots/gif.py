@@ -16,7 +16,12 @@ class GifWriter(AbstractMovieWriter):
     """A writer of films for matplotlib."""
 
     def setup(self, fig: Any, outfile: Any, dpi: float | None = None) -> None:
-        """Begin a film of a `moving_figure.MovingFigure`."""
+        """Begin a film.
+
+        Args:
+            fig: a `moving_figure.MovingFigure`, which is settled.
+            dpi: pixels per inch.
+        """
         super().setup(fig, outfile, dpi=dpi)
         self._moving: MovingFigure = fig
         self._pictures = list[np.ndarray]()
