@@ -13,6 +13,7 @@ from cspr_jax.api.plans import NAME, Plan, plan
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import ConfigError
 from cspr_jax.outputs import replay as replays
+from cspr_jax.outputs.mujoco_module import need_mujoco
 from cspr_jax.outputs.mujoco_motion import STEP
 from cspr_jax.outputs.plots.replay import replay_figure
 from cspr_jax.outputs.plots.style import style_of
@@ -71,7 +72,7 @@ def replay(given: str | Path | Mapping[str, Any] | Plan, *, step: float = STEP, 
         ConfigError: MuJoCo is not installed, the plan has a mistake, is not feasible or has no finite motion, or the
             step is no number > 0 or gives too many rows.
     """
-    replays.need_mujoco()
+    need_mujoco()
     planned = given if isinstance(given, Plan) else plan(given)
     if not (planned.feasible or anyway):
         raise ConfigError(NAME, "not played, since a segment is not proved feasible (anyway=True plays it)")

@@ -223,8 +223,8 @@ def _replay(options: argparse.Namespace) -> int:
         raise ConfigError("-o", f"{options.output}: must end in .png, .pdf, .svg or another picture format")
     _check_step(options)
     check_place(options.output)
+    from cspr_jax.outputs.mujoco_module import need_mujoco
     from cspr_jax.outputs.plots.style import style_of
-    from cspr_jax.outputs.replay import need_mujoco
 
     look = {name: getattr(options, name) for name in ("size", "dpi", "font_size", "preset", "title")}
     style_of(**look)  # before what takes long

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cspr_jax.errors import ConfigError
 from cspr_jax.outputs.mjcf import model_xml
+from cspr_jax.outputs.mujoco_module import need_mujoco
 from cspr_jax.outputs.mujoco_motion import STEP, Played, Suspended, coordinates, played, suspended, upward
 from cspr_jax.outputs.table_layout import two_digits
 from cspr_jax.plans.planning import PlannedMotions
@@ -114,22 +114,6 @@ class PlayedPlan:
 
 def _place(deviation: dict[str, Any]) -> str:
     return f"at {deviation['t']:.2f} s in segment {deviation['segment']}"
-
-
-def need_mujoco() -> Any:
-    """MuJoCo, an optional dependency.
-
-    Returns:
-        the module.
-
-    Raises:
-        ConfigError: it is not installed.
-    """
-    try:
-        import mujoco
-    except ImportError as error:
-        raise ConfigError("mujoco", "is not installed: pip install 'cspr_jax[sim]'") from error
-    return mujoco
 
 
 def replay(plan: PlannedMotions, step: float = STEP) -> PlayedPlan:

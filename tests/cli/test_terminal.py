@@ -243,3 +243,20 @@ def test_a_wrong_sweep_is_refused_before_dask_is_imported(tmp_path):
     words = ["run", str(tmp_path / "wrong.toml"), "--scheduler", "tcp://127.0.0.1:1"]
     done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, timeout=60)
     assert done.stdout == "2 False\n" and len(done.stderr.splitlines()) == 1
+
+
+def test_commands_set_jax_up_before_they_import_it():
+    """Later jax keeps no compiled code."""
+    code = """
+import sys
+from cspr_jax.cli import main
+from cspr_jax.errors import ConfigError
+from cspr_jax.runtime import xla
+def prepare(*words, **options):
+    raise ConfigError("jax", "imported" if "jax" in sys.modules else "not yet")
+xla.prepare, sys.modules["mujoco"] = prepare, sys
+for words in ("plan", "replay", "report", "check --robot prototype"):
+    main([*words.split(), "no.toml"])
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.stderr == 4 * "cspr: jax: not yet\n"

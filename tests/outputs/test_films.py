@@ -4,6 +4,7 @@ import io
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
 import cspr_jax
@@ -78,6 +79,38 @@ def test_an_object_flies_where_free_fall_takes_it(plan):
     for place, instant in zip(places[1:], (1.0, 1.2, 1.5), strict=True):
         wanted = [np.interp(instant, time[:, 0], values) for values in flight.T]
         assert place[0] == pytest.approx(wanted, abs=0.02)
+
+
+def test_pictures_are_those_of_the_whole_figure(plan):
+    """Pixel for pixel, though only what moves is drawn again: spools and clock lie over the cables and the mark."""
+    columns = plan.rows(200.0) | {"flight_t": np.array([1.0, 1.5]), "flight_position": np.array([[0.3, 0.1, 1.2]] * 2)}
+    rows = np.searchsorted(columns["t"], [0.0, 1.2, 1.9])
+    with in_style(Style()):
+        picture = films._Picture("film", columns, plan.robot_file, plan.keys, rows)
+        moved = picture.figure.findobj(lambda artist: artist.get_animated())
+        for number in range(len(rows)):
+            picture.show(number)
+            quick = picture.figure.picture()
+            for artist in moved:
+                artist.set_animated(False)
+            canvas = FigureCanvasAgg(picture.figure)
+            canvas.draw()
+            assert np.array_equal(quick, np.asarray(canvas.buffer_rgba()))
+            for artist in moved:
+                artist.set_animated(True)
+
+
+def test_a_gif_keeps_what_covers_most_of_its_pictures(plan):
+    """White, the greys of the panes and black exactly; lines nearly."""
+    columns = plan.rows(200.0)
+    rows = np.arange(len(columns["t"]))[:: len(columns["t"]) // 5]
+    with in_style(Style()):
+        picture = films._Picture("film", columns, plan.robot_file, plan.keys, rows)
+        true = picture.figure.picture()[..., :3].astype(int)
+        data = films.film(".gif", "film", columns, plan.robot_file, plan.keys, speed=32.0)
+    with Image.open(io.BytesIO(data)) as shown:
+        differences = np.abs(np.asarray(shown.convert("RGB")) - true).max(axis=2)
+    assert (differences > 0).mean() < 0.06 and (differences > 24).mean() < 0.002
 
 
 @pytest.mark.thorough

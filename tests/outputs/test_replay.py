@@ -12,8 +12,9 @@ import cspr_jax
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.config.reading import read_toml
 from cspr_jax.errors import ConfigError
+from cspr_jax.outputs.mujoco_module import need_mujoco
 from cspr_jax.outputs.mujoco_motion import played, suspended
-from cspr_jax.outputs.replay import need_mujoco, tension_deviation, way_of
+from cspr_jax.outputs.replay import tension_deviation, way_of
 from outputs.test_outputs import cspr, strict_json
 
 mujoco = pytest.importorskip("mujoco")

@@ -9,11 +9,9 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, HTMLWriter, PillowWriter
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, HTMLWriter
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from cspr_jax.config.plan import PlanFile
@@ -21,8 +19,10 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.bodies_in_space import draw_bodies
 from cspr_jax.outputs.plots.fitting import fit, legend_above
+from cspr_jax.outputs.plots.gif import GifWriter
 from cspr_jax.outputs.plots.labels import COLOURS, cable_names, line_look
 from cspr_jax.outputs.plots.motion import draw_limits, shade_failing
+from cspr_jax.outputs.plots.moving_figure import MovingFigure
 from cspr_jax.outputs.plots.obstacles import AREA, points_of
 from cspr_jax.outputs.plots.robot_along import Moving, limits_of, moving
 from cspr_jax.outputs.plots.scene import colours_of_tension, fill_places, set_space
@@ -116,7 +116,7 @@ def _encoder() -> str:
 
 def _writer(ending: str, rate: int) -> AbstractMovieWriter:
     if ending == ".gif":
-        return PillowWriter(fps=rate)
+        return GifWriter(fps=rate)
     if ending == ".html":
         return HTMLWriter(fps=rate, embed_frames=True, default_mode="loop")
     _encoder()
@@ -141,17 +141,18 @@ class _Picture:
         self._largest = float(finite.max(initial=0.0)) or 1.0
         self._norm = Normalize(0.0, self._largest)
         self._colours = colours_of_tension()
-        self.figure = Figure(figsize=SIZE, layout="constrained")
-        FigureCanvasAgg(self.figure)
+        self.figure = MovingFigure(figsize=SIZE, layout="constrained")
         grid = self.figure.add_gridspec(1, 2, width_ratios=[1.0, 1.05])
         self._space: Any = self.figure.add_subplot(grid[0], projection="3d", computed_zorder=False)
         self._draw_space(is_down=robot_file.z_axis == "down")
         self._draw_tensions(self.figure.add_subplot(grid[1]), limits_of(robot_file, keys))
         self.figure.suptitle(title)
-        # Lay the figure out once: places of axes do not change, and with any layout it is drawn twice for each picture.
+        # Lay the figure out once: places of axes do not change.
         self.show(0)
         fit(self.figure)
         fill_places(self.figure)
+        of_cables = [*self.cables, *self._edges, self._mass]
+        self.figure.settle([self._flown, self.object, self._behind, *of_cables, self._mark, self._clock], DPI)
 
     def _draw_space(self, *, is_down: bool) -> None:
         space, robot = self._space, self.robot

@@ -141,11 +141,21 @@ def _fill(figure: Figure, panel: Any, place: Bbox) -> None:
     for _ in range(STEPS):
         panel.set_position(Bbox([middle - half, middle + half]))
         panel.set_box_aspect(sizes, zoom=zoom)
-        figure.draw_without_rendering()
+        _place_words(figure, panel)
         drawn = Bbox.union([*words_in_space(panel), box_in_space(panel)])
         zoom *= float(min(room.width / drawn.width, room.height / drawn.height))
         shift = np.array([room.x0 + room.x1 - drawn.x0 - drawn.x1, room.y0 + room.y1 - drawn.y0 - drawn.y1])
         middle = middle + 0.5 * shift / np.array([figure.bbox.width, figure.bbox.height])
+
+
+def _place_words(figure: Figure, panel: Any) -> None:
+    # Ticks and labels of a panel in space are where it was drawn last; nothing else in the figure has changed.
+    others = [artist for artist in figure.get_children() if artist is not panel and not artist.get_animated()]
+    for artist in others:
+        artist.set_animated(True)
+    figure.draw_without_rendering()
+    for artist in others:
+        artist.set_animated(False)
 
 
 def _axes(panel: Any) -> tuple[Any, ...]:

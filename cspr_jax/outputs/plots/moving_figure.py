@@ -1,0 +1,67 @@
+"""A figure of which few artists move from picture to picture, so that the others are drawn once."""
+
+from collections.abc import Collection
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.legend import Legend
+from PIL import Image
+
+
+class MovingFigure(Figure):
+    """Pictures of the same axes; writers of films get them by `savefig`."""
+
+    def settle(self, moving: Collection[Artist], dpi: float) -> None:
+        """Draw what lies behind the artists that move.
+
+        Args:
+            moving: these artists; all others, and the layout, are final.
+            dpi: pixels per inch of the pictures.
+        """
+        self.set_dpi(dpi)
+        self._agg = FigureCanvasAgg(self)
+        self._front = [artist for panel in self.axes for artist in _in_front(panel, moving)]
+        for artist in self._front:
+            artist.set_animated(True)
+        self._agg.draw()
+        self._background = self._agg.copy_from_bbox(self.bbox)
+
+    def picture(self) -> np.ndarray:
+        """The figure as it is now.
+
+        Returns:
+            (height, width, 4) its pixels, 8 bits of red, green, blue and opacity.
+        """
+        self._agg.restore_region(self._background)
+        renderer = self._agg.get_renderer()
+        for artist in self._front:
+            artist.draw(renderer)
+        return np.array(self._agg.buffer_rgba())
+
+    def savefig(self, fname: Any, *, transparent: bool | None = None, **settings: Any) -> None:
+        """Write the picture, as writers of films ask for it.
+
+        Args:
+            fname: stream.
+            transparent: without effect.
+            settings: "format", "png" or raw "rgba"; the others are those of `settle`.
+        """
+        if settings["format"] == "png":
+            Image.fromarray(self.picture()).save(fname, "png")
+        else:
+            fname.write(self.picture().tobytes())
+
+
+def _in_front(panel: Any, moving: Collection[Artist]) -> list[Artist]:
+    # Return what the panel draws from its first moving artist on, which would else lie behind it. A legend beside the
+    # panel's area meets nothing that moves, and takes as long to draw as all of that.
+    drawn = sorted((artist for artist in panel.get_children() if artist is not panel.patch), key=Artist.get_zorder)
+    first = next((place for place, artist in enumerate(drawn) if artist in moving), len(drawn))
+    return [
+        artist
+        for artist in drawn[first:]
+        if not isinstance(artist, Legend) or artist.get_window_extent().overlaps(panel.bbox)
+    ]
