@@ -94,7 +94,7 @@ def free_motion(problem: Problem, scene: Scene | None, poses: FreePoses, setting
         answers = proved_answers(problem, motions, scene)
         tighter = None
         if is_optimal and number < ROUNDS and not answers.feasible.all():
-            tighter = _tightened(problem, scene, tasks, motions, limits)
+            tighter = tightened(problem, scene, tasks, motions, limits)
         if tighter is None:
             break
         further = _first_optimum(tighter, ((again(tighter, unknowns, each[0]), *each) for each in ON))
@@ -155,10 +155,20 @@ def _together(tasks: Tasks, best: list[_Best], barrier: float) -> Unknowns:
     return started(tasks, np.einsum("kj,sjd->skd", tasks.basis.fit, np.array(values))[None], duration, barrier)
 
 
-def _tightened(
+def tightened(
     problem: Problem, scene: Scene | None, tasks: Tasks, motions: list[Spline], limits: ValueBounds
 ) -> Tasks | None:
-    # Tighter bounds where the proof finds less slack than is needed; None where it finds enough, or no more helps.
+    """Tighter bounds where the proof finds less slack than is needed.
+
+    Args:
+        scene: as for `free_motion`.
+        tasks: l of s segments each.
+        motions: l s of them, along all segments.
+        limits: of the values.
+
+    Returns:
+        the tasks; None where the proof finds enough everywhere, or no more helps.
+    """
     whole = chained(motions)
     slacks = piece_slacks(problem, whole, np.asarray(whole.knots), scene)
     changes = np.abs(limits.rises) + np.abs(limits.falls)
@@ -168,9 +178,10 @@ def _tightened(
         return None
     steps = np.where(missed > 0.0, np.minimum(MORE * missed + STEP, MOST), 0.0) / np.where(unit > 0.0, unit, 1.0)
     # A slack that is smallest beside a border depends on the bounds of the next piece as much.
+    steps = steps.reshape(len(tasks.low), -1, len(unit))
     near = steps.copy()
-    near[1:] = np.maximum(near[1:], BESIDE * steps[:-1])
-    near[:-1] = np.maximum(near[:-1], BESIDE * steps[1:])
-    shape = 1, len(motions), len(tasks.basis.tau), 1, -1
-    rise, fall = ((near[:, :, None] * side).max(1).reshape(shape) for side in (limits.rises, limits.falls))
+    near[:, 1:] = np.maximum(near[:, 1:], BESIDE * steps[:, :-1])
+    near[:, :-1] = np.maximum(near[:, :-1], BESIDE * steps[:, 1:])
+    shape = *tasks.low.shape[:3], 1, -1
+    rise, fall = ((near[..., None] * side).max(2).reshape(shape) for side in (limits.rises, limits.falls))
     return dataclasses.replace(tasks, low=tasks.low + rise, high=tasks.high - fall)
