@@ -8,50 +8,26 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import BSpline
 
-from cspr_jax.curves.spline import Spline, chained
-from cspr_jax.free.basis import DEGREE, Basis, basis
-from cspr_jax.free.instants import ValueBounds, bounds
-from cspr_jax.free.objectives import OBJECTIVES, Objective
-from cspr_jax.free.poses import FreePoses, check_searched, motions_of, segments_of, tasks_of
+from cspr_jax.curves.spline import Spline
+from cspr_jax.free.basis import DEGREE, Basis
+from cspr_jax.free.poses import FreePoses, motions_of, segments_of
+from cspr_jax.free.question import FreeQuestion, FreeSettings, tightened
 from cspr_jax.free.search import Optima, again, optima, started
 from cspr_jax.free.starts import starts
 from cspr_jax.free.tasks import Tasks, Unknowns
-from cspr_jax.motions.criteria import criteria
-from cspr_jax.motions.piece_slacks import piece_slacks
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import ProvedAnswers, proved_answers
 from cspr_jax.robots.clearance import Scene
 from cspr_jax.runtime.stages import stage
 
-# Rounds of proof and tightening; slack that is left, in the units of values; by what more than is missed, and by how
-# much at least and at most, bounds tighten; by what share of it those of the next pieces do.
-ROUNDS, LEFT, MORE, STEP, MOST, BESIDE = 10, 1e-7, 1.5, 1e-6, 0.03, 0.5
+# Rounds of proof and tightening.
+ROUNDS = 10
 # Weights of barriers, and softness, with which searches go on from a motion within tighter bounds, or a coarser one.
 ON = ((1e-5, 1e-2), (1e-3, 1e-1), (1e-2, 1.0), (1e-2, 10.0))
 FINE = ((1e-4, 1e-1), (1e-2, 1.0), (1e-2, 10.0))
 # Searches of single segments, each for those for which the ones before have no two starts with the same best motion, by
 # this part of its duration: by what the intervals are divided, and the softness; instants of each interval.
 SEARCHES, FEWEST, SAME = ((2, 10.0), (2, 1.0), (1, 1.0)), 3, 1e-3
-
-
-class FreeSettings(NamedTuple):
-    """Settings of a search.
-
-    Fields:
-        objective: row of `objectives.OBJECTIVES`.
-        longest: duration of a segment, s; None for any.
-        starts: number of motions from which the search of a segment begins; None for those of `starts.starts`.
-        search_time: after which no more searches begin, s; None for none.
-        intervals: of the spline of a segment, even.
-        instants: of each interval, at which the search looks.
-    """
-
-    objective: str = "time"
-    longest: float | None = None
-    starts: int | None = None
-    search_time: float | None = None
-    intervals: int = 48
-    instants: int = 4
 
 
 USUAL = FreeSettings()
@@ -97,8 +73,7 @@ def free_motion(problem: Problem, scene: Scene | None, poses: FreePoses, setting
     Raises:
         InputError: a robot for which no free motion is sought, or a cable without a largest tension.
     """
-    check_searched(problem)
-    question = _Question.of(problem, scene, poses, settings)
+    question = FreeQuestion.of(problem, scene, poses, settings)
     best, is_stopped = _searched(question)
     tasks, optimum = question.tasks(settings.intervals, settings.instants), None
     if all(one.is_optimal for one in best):
@@ -111,7 +86,7 @@ def free_motion(problem: Problem, scene: Scene | None, poses: FreePoses, setting
         answers = proved_answers(problem, motions, scene)
         tighter = None
         if is_optimal and number < ROUNDS and not answers.feasible.all():
-            tighter = _tightened(question, tasks, motions)
+            tighter = tightened(question, tasks, motions)
         if tighter is None:
             break
         further = _first_optimum(tighter, ((again(tighter, unknowns, each[0]), *each) for each in ON))
@@ -120,28 +95,6 @@ def free_motion(problem: Problem, scene: Scene | None, poses: FreePoses, setting
         tasks, unknowns = tighter, further
     energy, level = tasks.energies(unknowns)[0], unknowns.level[0]
     return FreeMotion(motions, answers, energy, level, is_optimal, is_stopped, searched)
-
-
-@dataclasses.dataclass(frozen=True)
-class _Question:
-    # The best motion through poses within limits is sought.
-    problem: Problem
-    scene: Scene | None
-    poses: FreePoses
-    settings: FreeSettings
-    limits: ValueBounds
-    objective: Objective
-
-    @classmethod
-    def of(cls, problem: Problem, scene: Scene | None, poses: FreePoses, settings: FreeSettings) -> "_Question":
-        robot = problem.robot
-        limits = bounds(robot, problem.limits, criteria(robot, problem.limits, scene), settings.longest is not None)
-        objective, limits = OBJECTIVES[settings.objective](limits, robot.n_cables)
-        return cls(problem, scene, poses, settings, limits, objective)
-
-    def tasks(self, intervals: int, instants: int) -> Tasks:
-        numbers = basis(intervals, instants)
-        return tasks_of(self.problem, numbers, self.limits, self.objective, self.poses, self.settings.longest)
 
 
 def _first_optimum(tasks: Tasks, begun: Iterable[tuple[Unknowns, float, float]]) -> Unknowns | None:
@@ -164,7 +117,7 @@ class _Best(NamedTuple):
     is_shared: bool
 
 
-def _searched(question: _Question) -> tuple[list[_Best], bool]:
+def _searched(question: FreeQuestion) -> tuple[list[_Best], bool]:
     # The best motion along each segment by itself, from all starts; where starts disagree, by all searches. Whether the
     # search has been stopped: by Ctrl-C only where there is something to keep.
     settings, poses = question.settings, question.poses
@@ -215,22 +168,3 @@ def _together(tasks: Tasks, best: list[_Best], barrier: float) -> Unknowns:
     averages, duration = tasks.basis.averages, np.array([[one.duration for one in best]])
     values = [BSpline(one.basis.knots, one.controls, DEGREE)(averages) for one in best]
     return started(tasks, np.einsum("kj,sjd->skd", tasks.basis.fit, np.array(values))[None], duration, barrier)
-
-
-def _tightened(question: _Question, tasks: Tasks, motions: list[Spline]) -> Tasks | None:
-    # Tighter bounds where the proof finds less slack than is needed; None where it finds enough, or no more helps.
-    whole, limits = chained(motions), question.limits
-    slacks = piece_slacks(question.problem, whole, np.asarray(whole.knots), question.scene)
-    changes = np.abs(limits.rises) + np.abs(limits.falls)
-    unit = changes.max(1)
-    missed = np.where(unit > 0.0, LEFT - slacks.low * unit, 0.0)
-    if not (missed > 0.0).any():
-        return None
-    steps = np.where(missed > 0.0, np.minimum(MORE * missed + STEP, MOST), 0.0) / np.where(unit > 0.0, unit, 1.0)
-    # A slack that is smallest beside a border depends on the bounds of the next piece as much.
-    near = steps.copy()
-    near[1:] = np.maximum(near[1:], BESIDE * steps[:-1])
-    near[:-1] = np.maximum(near[:-1], BESIDE * steps[1:])
-    shape = 1, len(motions), len(tasks.basis.tau), 1, -1
-    rise, fall = ((near[:, :, None] * side).max(1).reshape(shape) for side in (limits.rises, limits.falls))
-    return dataclasses.replace(tasks, low=tasks.low + rise, high=tasks.high - fall)

@@ -9,8 +9,9 @@ import numpy as np
 from cspr_jax.build.orientations import pose_quaternions
 from cspr_jax.build.scenes import scene_of
 from cspr_jax.errors import ConfigError, InputError, shown
-from cspr_jax.free.free_motion import FreeMotion, FreeSettings, free_motion
+from cspr_jax.free.free_motion import FreeMotion, free_motion
 from cspr_jax.free.poses import FreePoses
+from cspr_jax.free.question import FreeSettings
 from cspr_jax.free.time_bounds import time_bounds
 from cspr_jax.motions.answers import Answers, joined
 from cspr_jax.motions.leg import Leg

@@ -6,11 +6,12 @@ from cspr_jax.errors import ConfigError
 from cspr_jax.maps.grid_map import PointMassMap
 
 
-def check_place(robot_file: RobotFile, keys: SweepFile, file: object) -> None:
+def check_place(robot_file: RobotFile, keys: SweepFile, file: object, *, rests: bool = False) -> None:
     """Refuse a start that is no place of a robot.
 
     Args:
         file: named in errors.
+        rests: whether the start may be at rest in P0.
 
     Raises:
         ConfigError: such a start.
@@ -18,7 +19,7 @@ def check_place(robot_file: RobotFile, keys: SweepFile, file: object) -> None:
     start = keys.trajectory.start
     if robot_file.is_planar and start is not None and start.position is not None and start.position[1] != 0.0:
         raise ConfigError(file, "trajectory.from.position: must have y = 0: a planar robot")
-    if start is not None and start.rest:
+    if start is not None and start.rest and not rests:
         raise ConfigError(file, "trajectory.from: must be { position = [x, y, z] } in this map, or axes from_x, ...")
 
 

@@ -1,5 +1,6 @@
 """Plans of single cells of a map: the motion whose verdict, duration and margins the cell holds."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -8,7 +9,7 @@ import numpy as np
 from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.config.ellipse import SweepEllipse, cell_axes
 from cspr_jax.config.obstacles import SurroundingsKeys
-from cspr_jax.config.path import TargetPath
+from cspr_jax.config.path import SAME_PLACE, TargetPath
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.schema.map_kinds import MAP_KINDS
@@ -47,6 +48,8 @@ def cell_plan(
     if "ellipse" in kind.takes:
         return _turn(settings, place, values, {"samples": samples, **trajectory_keys})
     depth = {name: place[name] for name in ("z0", "inclination") if name in place}
+    if trajectory.get("family") == "free":
+        return _free(settings, place, {"samples": samples, **trajectory_keys, **depth})
     used = float(values.get("used_inclination", np.nan))
     if trajectory_keys.get("inclination") == "best" and np.isfinite(used):
         depth["inclination"] = used
@@ -96,6 +99,16 @@ def _path(settings: Mapping[str, Any], place: Mapping[str, float], keys: Mapping
     target = {**start, "position": end, "path": path.model_dump(mode="json", exclude_none=True)}
     surroundings = {name: settings[name] for name in SurroundingsKeys.model_fields if name in settings}
     return {"schema": 1, "robot": robot, **keys, "pose": [start, target], **surroundings}
+
+
+def _free(settings: Mapping[str, Any], place: Mapping[str, float], keys: Mapping[str, Any]) -> dict[str, Any] | None:
+    # The free motion to the target of a cell, which keeps the orientation.
+    start, end = _start(settings, place), _target(settings, place)
+    if "position" in start and math.dist(start["position"], end) <= SAME_PLACE:
+        return None
+    target = {name: value for name, value in start.items() if name != "rest"} | {"position": end}
+    surroundings = {name: settings[name] for name in SurroundingsKeys.model_fields if name in settings}
+    return {"schema": 1, "robot": settings["robot"], **keys, "pose": [start, target], **surroundings}
 
 
 def _start(settings: Mapping[str, Any], place: Mapping[str, float]) -> dict[str, Any]:

@@ -380,7 +380,7 @@ OF_PATHS = (
         "N",
         "smallest distance of a tension from its limits",
         "Smallest along the motion, of redundant cables that of the tensions that keep it largest; negative where they "
-        "break a limit; along a slow motion where none is feasible.",
+        "break a limit; along a slow motion where none is feasible, NaN where no free motion is found.",
         signed=True,
     ),
     Quantity(
@@ -788,8 +788,8 @@ QUANTITIES = {
             "lower_bound",
             "s",
             "lower bound of the least time",
-            "Proved: no motion along the path, with the same stops, takes less time within the limits; NaN where no "
-            "bound is known.",
+            "Proved: no motion along the path, with the same stops, takes less time within the limits; of free motions "
+            "none at all. NaN where no bound is known.",
         ),
         Quantity("duration_ratio", "1", "duration over the least one", "Duration of the law over `least_duration`."),
         Quantity(

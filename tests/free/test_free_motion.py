@@ -6,7 +6,7 @@ from oracles import any_motion, least_time_forms
 from support.free_motions import Judged, solve
 
 from cspr_jax.errors import InputError
-from cspr_jax.free.free_motion import FreeSettings
+from cspr_jax.free.question import FreeSettings
 
 RING = least_time_forms.ring_robot(3, 1.0, 2.0)
 WEIGHT = 2.0 * 9.81

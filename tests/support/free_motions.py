@@ -7,8 +7,9 @@ from oracles.sampled_motion import State
 from scipy.interpolate import PPoly
 
 from cspr_jax.arithmetic.elementary import double_precision, leaf
-from cspr_jax.free.free_motion import FreeSettings, free_motion
+from cspr_jax.free.free_motion import free_motion
 from cspr_jax.free.poses import FreePoses
+from cspr_jax.free.question import FreeSettings
 from cspr_jax.motions.amplitudes import named
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.kernel_axes import centred

@@ -1,0 +1,111 @@
+"""The question of a search: poses, limits, and what the motion is to be the best in; bounds tighten after a proof."""
+
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.curves.spline import Spline, chained
+from cspr_jax.free.basis import basis
+from cspr_jax.free.instants import ValueBounds, bounds
+from cspr_jax.free.objectives import OBJECTIVES, Objective
+from cspr_jax.free.poses import FreePoses, check_searched, tasks_of
+from cspr_jax.free.tasks import Tasks
+from cspr_jax.motions.criteria import criteria
+from cspr_jax.motions.piece_slacks import piece_slacks
+from cspr_jax.motions.problem import Problem
+from cspr_jax.robots.clearance import Scene
+
+# Slack that is left after tightening, in the units of values; by what more than is missed, and by how much at least and
+# at most, bounds tighten; by what share of it those of the next pieces do.
+LEFT, MORE, STEP, MOST, BESIDE = 1e-7, 1.5, 1e-6, 0.03, 0.5
+
+
+class FreeSettings(NamedTuple):
+    """Settings of a search.
+
+    Fields:
+        objective: row of `objectives.OBJECTIVES`.
+        longest: duration of a segment, s; None for any.
+        starts: number of motions from which the search of a segment begins; None for those of `starts.starts`.
+        search_time: after which no more searches begin, s; None for none.
+        intervals: of the spline of a segment, even.
+        instants: of each interval, at which the search looks.
+    """
+
+    objective: str = "time"
+    longest: float | None = None
+    starts: int | None = None
+    search_time: float | None = None
+    intervals: int = 48
+    instants: int = 4
+
+
+@dataclasses.dataclass(frozen=True)
+class FreeQuestion:
+    """The best motion through poses within limits is sought.
+
+    Fields:
+        limits: bounds of the values at each instant.
+    """
+
+    problem: Problem
+    scene: Scene | None
+    poses: FreePoses
+    limits: ValueBounds
+    objective: Objective
+    settings: FreeSettings
+
+    @classmethod
+    def of(cls, problem: Problem, scene: Scene | None, poses: FreePoses, settings: FreeSettings) -> "FreeQuestion":
+        """Take limits from the robot, and the objective from the settings.
+
+        Raises:
+            InputError: a robot for which no free motion is sought, or a cable without a largest tension.
+        """
+        check_searched(problem)
+        robot = problem.robot
+        limits = bounds(robot, problem.limits, criteria(robot, problem.limits, scene), settings.longest is not None)
+        objective, limits = OBJECTIVES[settings.objective](limits, robot.n_cables)
+        return cls(problem, scene, poses, limits, objective, settings)
+
+    def tasks(self, intervals: int, instants: int) -> Tasks:
+        """The question on some intervals.
+
+        Args:
+            instants: of each interval.
+
+        Returns:
+            one task.
+        """
+        numbers = basis(intervals, instants)
+        return tasks_of(self.problem, numbers, self.limits, self.objective, self.poses, self.settings.longest)
+
+
+def tightened(question: FreeQuestion, tasks: Tasks, motions: list[Spline]) -> Tasks | None:
+    """Tighter bounds where the proof finds less slack than is needed.
+
+    Args:
+        question: with the same limits as the tasks.
+        tasks: l of s segments each.
+        motions: l s of them, along all segments.
+
+    Returns:
+        the tasks; None where the proof finds enough everywhere, or no more helps.
+    """
+    whole, limits = chained(motions), question.limits
+    slacks = piece_slacks(question.problem, whole, np.asarray(whole.knots), question.scene)
+    changes = np.abs(limits.rises) + np.abs(limits.falls)
+    unit = changes.max(1)
+    missed = np.where(unit > 0.0, LEFT - slacks.low * unit, 0.0)
+    if not (missed > 0.0).any():
+        return None
+    steps = np.where(missed > 0.0, np.minimum(MORE * missed + STEP, MOST), 0.0) / np.where(unit > 0.0, unit, 1.0)
+    # A slack that is smallest beside a border depends on the bounds of the next piece as much.
+    steps = steps.reshape(len(tasks.low), -1, len(unit))
+    near = steps.copy()
+    near[:, 1:] = np.maximum(near[:, 1:], BESIDE * steps[:, :-1])
+    near[:, :-1] = np.maximum(near[:, :-1], BESIDE * steps[:, 1:])
+    shape = *tasks.low.shape[:3], 1, -1
+    rise, fall = ((near[..., None] * side).max(2).reshape(shape) for side in (limits.rises, limits.falls))
+    return dataclasses.replace(tasks, low=tasks.low + rise, high=tasks.high - fall)

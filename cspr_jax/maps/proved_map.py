@@ -1,0 +1,108 @@
+"""Base of maps of proved motions of any robot from given places, with one orientation."""
+
+import functools
+import operator
+from typing import ClassVar
+
+import numpy as np
+
+from cspr_jax.build.orientations import given_quaternion
+from cspr_jax.build.scenes import scene_of
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.config.sweep import SweepFile
+from cspr_jax.errors import ConfigError
+from cspr_jax.maps.from_places import check_place
+from cspr_jax.maps.grid_map import ROUNDING, GridMap, exceeds
+from cspr_jax.motions.criteria import FLAGS, judged_poses
+from cspr_jax.motions.proved_answers import ProvedAnswers
+from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.schema.tiles import Grid
+from cspr_jax.schema.verdicts import Verdict
+
+CONTACTS = functools.reduce(operator.or_, FLAGS.values())
+# What can be said of a motion beside its contacts.
+_BESIDE = CONTACTS | Verdict.UNDECIDED | Verdict.UNCERTAINTY | Verdict.BELOW_FLOOR
+_COLUMNS = {"tension_margin": "margin", "tension_margin_bound": "margin_bound"}
+
+
+class ProvedMap(GridMap):
+    """The map of proved motions from one place to each target; see `GridMap`.
+
+    Fields:
+        from_rest: whether the start may be at rest in P0.
+    """
+
+    proves = True
+    any_cables = True
+    from_rest: ClassVar[bool] = False
+
+    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
+        """Refuse robots that go along no path, and starts without a place."""
+        super().__init__(robot_file, keys, file)
+        check_place(robot_file, keys, file, rests=self.from_rest)
+        if robot_file.own_pattern == "1T" or PATTERNS[robot_file.own_pattern].is_jointed:
+            allowed = "must be one that moves in space or in a plane in this map"
+            raise ConfigError(file, f'robot "{robot_file.name}" is {robot_file.kind}: {allowed}')
+        start, axes = keys.trajectory.start, [getattr(keys.axes, f"from_{name}") for name in "xyz"]
+        if start is None and None in axes:
+            allowed = "{ position = [x, y, z] }, or axes from_x, from_y, from_z"
+            raise ConfigError(file, f"trajectory.from is missing: {allowed}")
+        for key in ("tilt_torsion", "beta_hat", *(() if robot_file.is_platform else ("quaternion",))):
+            if start is not None and getattr(start, key) is not None:
+                absent = f'must be absent with family = "{keys.trajectory.family}"'
+                raise ConfigError(file, f"trajectory.from.{key}: {absent}")
+        self._unit = None
+        if isinstance(self._problem.robot, PlatformRobot):
+            quaternion = None if start is None else start.quaternion
+            self._unit = given_quaternion(quaternion, "trajectory.from.quaternion", file)
+        self._scene = scene_of(self._problem.robot, robot_file, self._frame, keys, file, trajectory=keys.trajectory)
+
+    def refuse_hopeless(self, grid: Grid) -> None:
+        """Refuse targets that are all out of reach; see `GridMap.refuse_hopeless`."""
+        self._refuse_out_of_plane(grid)
+        if judged_poses(self._problem.robot)[1]:
+            super().refuse_hopeless(grid)
+
+    def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
+        feasible, duration, margin = answers["verdict"] == 0, answers["duration"], answers["tension_margin"]
+        return {
+            "a feasible cell without a duration": feasible & ~(duration >= 0.0),
+            "an infeasible cell with a duration": ~feasible & np.isfinite(duration),
+            "a duration below its proved bound": feasible & exceeds(answers["lower_bound"], duration),
+            "a feasible cell with a margin below zero": feasible & ~(margin > -ROUNDING),
+            "a margin below its proved bound": exceeds(answers["tension_margin_bound"], margin),
+            "a feasible cell that touches an obstacle": feasible & (answers["clearance"] <= -ROUNDING),
+        }
+
+
+def proved_columns(answers: ProvedAnswers) -> dict[str, np.ndarray]:
+    """Columns of a map of proved motions.
+
+    Args:
+        answers: of n motions.
+
+    Returns:
+        (n,) for each quantity but those of time.
+    """
+    columns = {name: getattr(answers, name) for name in ("verdict", "tolerated", "not_tolerated")}
+    columns |= {name: getattr(answers, source) for name, source in _COLUMNS.items()}
+    clear = np.array([proof.least(proof.proof.high, CONTACTS) for proof in answers.proof])
+    return columns | {"clearance": np.where(answers.verdict & ~np.uint32(_BESIDE.value), np.nan, clear)}
+
+
+def joined_columns(parts: list[tuple[np.ndarray, dict[str, np.ndarray]]]) -> dict[str, np.ndarray]:
+    """Columns of all cells from those of some.
+
+    Args:
+        parts: (n,) masks of cells, and their columns; together they are all.
+
+    Returns:
+        (n,) for each quantity.
+    """
+    joined = {name: np.empty(len(parts[0][0]), column.dtype) for name, column in parts[0][1].items()}
+    for rows, columns in parts:
+        for name, column in columns.items():
+            joined[name][rows] = column
+    return joined
