@@ -1,7 +1,7 @@
 """A second sieve, of limits: a few instants refute most numbers of arcs that break a limit by far.
 
-It looks at candidates only as the search comes to them, as many at a time as a batch holds. A sample that breaks a limit
-by more than rounding is a refutation; nothing is accepted here.
+It looks at candidates only as the search comes to them, as many at a time as a batch holds. A sample that breaks a
+limit by more than rounding is a refutation; nothing is accepted here.
 """
 
 from functools import partial
@@ -19,7 +19,7 @@ from cspr_jax.swings.hypocycloid import Segment
 from cspr_jax.swings.parities import pick
 from cspr_jax.swings.proof import BATCH, tolerance
 
-SAMPLES = 8
+SAMPLES = 32
 # Tolerances by which a sample must lie below zero: twice as far as where `swings.proof` refutes a limit.
 FAR = 4.0
 

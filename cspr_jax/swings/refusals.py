@@ -11,7 +11,7 @@ from cspr_jax.swings.criteria import BASIC, flags
 from cspr_jax.swings.hypocycloid import Segment
 from cspr_jax.swings.limit_sieve import upcoming
 from cspr_jax.swings.parities import pick
-from cspr_jax.swings.proof import SMALLEST_MARGIN, is_met_at_samples, prove
+from cspr_jax.swings.proof import SMALLEST_MARGIN, first_look, is_met_at_samples, prove
 
 
 def refusals(problem: Problem, parities: dict[int, Segment], upper: np.ndarray, known: np.ndarray) -> Refused:
@@ -46,7 +46,7 @@ def refusals(problem: Problem, parities: dict[int, Segment], upper: np.ndarray, 
             now = turn & ~fewest.is_best[rows]
             now[now] = fewest.may_change(rows[now], known[rows[now], arcs[now] - 1])
             if now.any():
-                is_clear, broken = _limits_of(problem, pick(parities, rows[now], arcs[now]), arcs[now])
+                is_clear, broken = _limits_of(problem, parities, rows[now], arcs[now], fewest)
                 fewest.take(rows[now][is_clear], arcs[now][is_clear], broken[is_clear])
 
 
@@ -55,17 +55,22 @@ def _turns(rows: np.ndarray) -> np.ndarray:
     return np.arange(len(rows)) - np.searchsorted(rows, rows)
 
 
-def _limits_of(problem: Problem, segments: Segment, arcs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _limits_of(
+    problem: Problem, parities: dict[int, Segment], rows: np.ndarray, arcs: np.ndarray, fewest: FewestLimits
+) -> tuple[np.ndarray, np.ndarray]:
     # Return which of some candidates with taut cables break limits that are certain, and these (n, n_criteria).
+    # Candidates that change nothing by the limits that they are seen to break are not looked at more closely.
+    segments = pick(parities, rows, arcs)
+    look = first_look(problem, segments, arcs.astype(float))
     is_limit = np.arange(BASIC + len(limits_set(problem.limits))) >= BASIC
-    proof = prove(problem, segments, arcs, ignored=np.ones((len(arcs), len(is_limit)), bool))
+    proof = prove(problem, segments, arcs, ignored=np.ones((len(arcs), len(is_limit)), bool), look=look)
     is_proved, broken = np.ones(len(arcs), bool), proof.broken & is_limit
-    unclear = np.flatnonzero((is_limit & ~broken & ~proof.met).any(1))
+    unclear = np.flatnonzero((is_limit & ~broken & ~proof.met).any(1) & fewest.may_change(rows, broken))
     for _ in range(int(is_limit.sum()) + 1):
         if not len(unclear):
             break
-        part = jax.tree.map(lambda leaf, rows=unclear: leaf[rows], segments)
-        again = prove(problem, part, arcs[unclear], ignored=broken[unclear] | ~is_limit)
+        part, seen = jax.tree.map(lambda leaf, rows=unclear: leaf[rows], (segments, look))
+        again = prove(problem, part, arcs[unclear], ignored=broken[unclear] | ~is_limit, look=seen)
         is_proved[unclear] = again.feasible
         broken[unclear] |= again.broken & is_limit
         unclear = unclear[again.infeasible]
