@@ -106,19 +106,18 @@ def test_many_limits_are_met_by_the_arcs_of_a_full_search(record_property):
 
 def test_candidates_left_out_change_nothing():
     """Limits named from all candidates, and from those alone that may change them by what is known beforehand."""
-    rng = np.random.default_rng(11)
+    rng, left_out = np.random.default_rng(11), 0
     for _ in range(300):
         every, some = (FewestLimits(1, (Verdict.SLACK_CABLE, Verdict.ABOVE_SPOOLS, *FLAGS)) for _ in range(2))
-        row, left_out = np.array([0]), 0
         for p in range(1, 8):
             broken = np.append([False] * 2, rng.random(4) < 0.7)[None]
             known = broken & (rng.random(6) < 0.8)
             if not broken.any():
                 continue
             if not every.is_best[0]:
-                every.take(row, np.array([p]), broken)
-            if not some.is_best[0] and some.may_change(row, known)[0]:
-                some.take(row, np.array([p]), broken)
+                every.take(np.array([0]), np.array([p]), broken)
+            if not some.is_best[0] and some.may_change(np.array([0]), known)[0]:
+                some.take(np.array([0]), np.array([p]), broken)
             else:
                 left_out += 1
         for one, other in zip(every.refused(), some.refused(), strict=True):
