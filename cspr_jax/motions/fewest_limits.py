@@ -69,6 +69,18 @@ class FewestLimits:
         self._least[rows[better]] = ranks[better]
         self._common[rows] &= broken
 
+    def may_change(self, rows: np.ndarray, broken: np.ndarray) -> np.ndarray:
+        """Tell which candidates can change what is known, since fewer limits may refuse them, or others.
+
+        Args:
+            rows: (m,) numbers of their motions.
+            broken: (m, n_criteria) limits that each is known to break; it may break more.
+
+        Returns:
+            (m,) false where taking in the candidate would change nothing.
+        """
+        return (rank(self._flags, broken) < self._least[rows]) | (self._common[rows] & ~broken).any(1)
+
     @property
     def is_best(self) -> np.ndarray:
         """Tell for each motion whether its candidate breaks one limit at most, so that none can be better, (n,)."""

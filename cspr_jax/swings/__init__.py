@@ -28,6 +28,7 @@ Files, each importing only from those above it:
     transition_margins      smallest slacks of transitions, from two functions of time
     sieve                   upper bounds of the margins of all numbers of arcs at once
     parities                segments for even and for odd numbers of arcs
+    limit_sieve             candidates that a few instants refute by a limit
     refusals                limits that refuse every number of arcs
     redundant_arcs          smallest numbers of arcs on more cables than degrees of freedom
     redundant_inclinations  inclinations that need the fewest oscillations there

@@ -16,6 +16,9 @@ from cspr_jax.swings.hypocycloid import Segment
 from cspr_jax.swings.limit_slacks import count, limit_curvatures, limit_slacks
 from cspr_jax.swings.slacks import instant, row_bounds, stretch, taut_bounds
 
+# Criteria that are no limits: taut cables, and the depth below the spools.
+BASIC = 2
+
 
 def flags(limits: Limits) -> tuple[Verdict, ...]:
     """The flag that says that a criterion is broken, for each criterion.

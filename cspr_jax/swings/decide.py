@@ -18,14 +18,17 @@ from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.tolerances import Tolerated
+from cspr_jax.robots.limits import NO_LIMITS
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.swings import criteria, hypocycloid
+from cspr_jax.swings.criteria import BASIC
 from cspr_jax.swings.enclosures import tolerated_by_point_masses
 from cspr_jax.swings.hypocycloid import Segment
+from cspr_jax.swings.limit_sieve import LimitSieve
 from cspr_jax.swings.margins import margins
 from cspr_jax.swings.parities import pick, rows_of
 from cspr_jax.swings.proof import SMALLEST_MARGIN, prove
-from cspr_jax.swings.refusals import BASIC, refusals, unavoidable
+from cspr_jax.swings.refusals import refusals, unavoidable
 
 # Segments computed at a time where little is computed for each.
 BATCH = 4096
@@ -87,7 +90,9 @@ def decided(
     none = np.flatnonzero(smallest == 0)
     is_feasible = smallest > 0
     if len(none):
-        proof = prove(problem, pick(parities, none, tried[none]), tried[none])
+        # Limits count only where it matters whether one of these is feasible.
+        shown = problem if problem.limits.uncertainty is not None else problem._replace(limits=NO_LIMITS)
+        proof = prove(shown, pick(parities, none, tried[none]), tried[none])
         bound[none], is_feasible[none] = proof.bound[:, :BASIC].min(1), proof.feasible
     multiples = _tolerated(problem, chosen, tried, np.flatnonzero(is_feasible))
     answers = Answers(
@@ -144,23 +149,25 @@ def only(upper: np.ndarray, arcs) -> np.ndarray:
 
 
 class _Search(NamedTuple):
-    # The smallest number of arcs proved feasible, whether a smaller one stayed undecided, the proved margin, and
-    # whether some number of arcs is feasible as it is planned, if not for every robot within the uncertainty.
+    # The smallest number of arcs proved feasible, whether a smaller one stayed undecided, the proved margin,
+    # whether some number of arcs is feasible as it is planned, if not for every robot within the uncertainty, and the
+    # limits that candidates are known to break, (n, max_arcs, n_criteria).
     smallest: np.ndarray
     doubtful: np.ndarray
     bound: np.ndarray
     is_planned: np.ndarray
+    broken: np.ndarray
 
 
 def _search(problem: Problem, parities: dict[int, Segment], upper: np.ndarray, known: Known) -> _Search:
     smallest, doubtful, bound = np.zeros(len(upper), int), np.zeros(len(upper), bool), np.full(len(upper), -np.inf)
     is_planned = np.zeros(len(upper), bool)
-    alive = upper >= -SMALLEST_MARGIN
+    sieve = LimitSieve(problem, parities, upper >= -SMALLEST_MARGIN)
     while True:
-        rows = np.flatnonzero((smallest == 0) & alive.any(1))
+        rows = sieve.look(np.flatnonzero(smallest == 0))
         if not len(rows):
-            return _Search(smallest, doubtful, bound, is_planned)
-        arcs = np.argmax(alive[rows], axis=1) + 1
+            return _Search(smallest, doubtful, bound, is_planned, sieve.broken)
+        arcs = np.argmax(sieve.alive[rows], axis=1) + 1
         is_known = arcs == known.arcs[rows]
         smallest[rows[is_known]], bound[rows[is_known]] = arcs[is_known], known.bound[rows[is_known]]
         rows, arcs = rows[~is_known], arcs[~is_known]
@@ -178,7 +185,7 @@ def _search(problem: Problem, parities: dict[int, Segment], upper: np.ndarray, k
         smallest[rows[is_feasible]] = arcs[is_feasible]
         bound[rows] = proof.bound[:, :2].min(1)
         doubtful[rows[~is_feasible & ~is_refuted]] = True
-        alive[rows, arcs - 1] = False
+        sieve.alive[rows, arcs - 1] = False
 
 
 class _Shown(NamedTuple):
@@ -202,7 +209,7 @@ def _shown(
     # Without limits, or with an undecided candidate, the largest margin says enough.
     is_refused = (fixed == 0) & ~search.doubtful & ~search.is_planned
     refused = np.flatnonzero(is_refused & bool(limits_set(problem.limits)))
-    why = refusals(problem, rows_of(parities, refused), basic[refused])
+    why = refusals(problem, rows_of(parities, refused), basic[refused], search.broken[refused])
     fixed[refused], by_cables[refused] = why.arcs, why.arcs == 0
     upper = np.where(by_cables[:, None], basic, with_limits)
     tried, slack = _best(problem, parities, upper, fixed, by_cables, measure)

@@ -212,7 +212,10 @@ def _length(robot: PointMassRobot, segment: Segment, over: Stretch, pace: Bounds
     at_middle = jnp.linalg.norm((segment.hub + segment.plane @ over.place)[None] - robot.base_points, axis=1)
     change = over.radius * pace.slope
     depth = (1.0 + segment.tilt @ over.place - over.radius * eta.slope) * segment.hub[2]
-    nearest = jnp.maximum(jnp.maximum(at_middle - change, depth / jnp.linalg.norm(plane_normal(robot))), 0.0)
+    # In a block in which the mass goes far, its greatest distance from P0 and its least depth say more than its rate.
+    depth = jnp.maximum(depth, (1.0 - eta.value) * segment.hub[2]) / jnp.linalg.norm(plane_normal(robot))
+    from_hub = jnp.linalg.norm(segment.hub[None] - robot.base_points, axis=1) - pace.value
+    nearest = jnp.maximum(jnp.maximum(jnp.maximum(at_middle - change, from_hub), depth), 0.0)
     slope = jnp.broadcast_to(pace.slope, nearest.shape)
     return Bounds(at_middle + change, slope, slope**2 / nearest + pace.curvature)
 

@@ -113,20 +113,28 @@ def _closer_look(problem: Problem, arguments) -> tuple[Array, Array]:
     return sampled.T, proved.T
 
 
-def prove(problem: Problem, segments: Segment, arcs: np.ndarray, *, ignored: np.ndarray | None = None) -> Proof:
+def prove(
+    problem: Problem,
+    segments: Segment,
+    arcs: np.ndarray,
+    *,
+    ignored: np.ndarray | None = None,
+    look: tuple[np.ndarray, ...] | None = None,
+) -> Proof:
     """Decide segments, each with a given number of arcs.
 
     Args:
         segments: leaves (n, ...), of the parity of `arcs`; float64.
         arcs: (n,) number of arcs, 1 or more.
         ignored: (n, n_criteria) criteria that do not count; None: all do.
+        look: result of `first_look` for these segments; None: it is taken here.
 
     Returns:
         the proofs.
     """
     arcs = np.asarray(arcs, float)
     table = blocks(problem.amplitude, int(arcs.max()))
-    sampled, bound, near = _looked_at(problem, segments, arcs, table)
+    sampled, bound, near = first_look(problem, segments, arcs) if look is None else look
     allowed = _allowance(sampled.shape[1], near)
     counted = ~(np.zeros(sampled.shape, bool) if ignored is None else ignored)
     met, broken = bound + allowed > near[:, None], ~(sampled + allowed >= -near[:, None])
@@ -151,12 +159,21 @@ def is_met_at_samples(problem: Problem, segments: Segment, arcs: np.ndarray) -> 
         (n, n_criteria): False is a proof that the criterion is broken, True is none that it is met.
     """
     arcs = np.asarray(arcs, float)
-    sampled, _, near = _looked_at(problem, segments, arcs, blocks(problem.amplitude, int(arcs.max())))
+    sampled, _, near = first_look(problem, segments, arcs)
     return sampled + _allowance(sampled.shape[1], near) >= -near[:, None]
 
 
-def _looked_at(problem: Problem, segments: Segment, arcs: np.ndarray, table) -> tuple[np.ndarray, ...]:
-    # Return the smallest samples and the proved bounds (n, n_criteria), and the tolerances (n,).
+def first_look(problem: Problem, segments: Segment, arcs: np.ndarray) -> tuple[np.ndarray, ...]:
+    """A first look at segments: smallest samples and proved bounds of all criteria.
+
+    Args:
+        segments: leaves (n, ...), of the parity of `arcs`; float64.
+        arcs: (n,) number of arcs, 1 or more; floats.
+
+    Returns:
+        the samples and the bounds, (n, n_criteria) each, and the tolerances (n,).
+    """
+    table = blocks(problem.amplitude, int(arcs.max()))
     order = np.argsort(arcs, kind="stable")
     back = np.argsort(order, kind="stable")
     arguments = jax.tree.map(lambda x: x[order], (segments, arcs))

@@ -6,49 +6,71 @@ import numpy as np
 from cspr_jax.motions.fewest_limits import FewestLimits, Refused
 from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
-from cspr_jax.swings.criteria import flags
+from cspr_jax.robots.limits import NO_LIMITS
+from cspr_jax.swings.criteria import BASIC, flags
 from cspr_jax.swings.hypocycloid import Segment
+from cspr_jax.swings.limit_sieve import upcoming
 from cspr_jax.swings.parities import pick
-from cspr_jax.swings.proof import SMALLEST_MARGIN, is_met_at_samples, prove
-
-# Criteria that are no limits: taut cables, and the depth below the spools.
-BASIC = 2
+from cspr_jax.swings.proof import SMALLEST_MARGIN, first_look, is_met_at_samples, prove
 
 
-def refusals(problem: Problem, parities: dict[int, Segment], upper: np.ndarray) -> Refused:
+def refusals(problem: Problem, parities: dict[int, Segment], upper: np.ndarray, known: np.ndarray) -> Refused:
     """Limits that refuse segments whose cables some number of arcs keeps taut.
 
     Args:
         parities: the segments for even (key 0) and odd (key 1) numbers of arcs, leaves (n, ...); none is feasible.
         upper: (n, max_arcs) upper bounds of the slack of the cables and of the depth; -inf where out of the question.
+        known: (n, max_arcs, n_criteria) limits that each candidate is known to break, by more than rounding.
 
     Returns:
         the refusals.
     """
-    is_limit = np.arange(BASIC + len(limits_set(problem.limits))) >= BASIC
     fewest, alive = FewestLimits(len(upper), flags(problem.limits)), upper >= -SMALLEST_MARGIN
     while True:
         rows = np.flatnonzero(~fewest.is_best & alive.any(1))
         if not len(rows):
             return fewest.refused()
-        arcs = np.argmax(alive[rows], axis=1) + 1
+        rows, arcs = upcoming(alive, rows)
         alive[rows, arcs - 1] = False
-        is_taut, broken = _limits_of(problem, pick(parities, rows, arcs), arcs, is_limit)
-        fewest.take(rows[is_taut], arcs[is_taut], broken[is_taut])
+        tells = fewest.may_change(rows, known[rows, arcs - 1])
+        rows, arcs = rows[tells], arcs[tells]
+        if not len(rows):
+            continue
+        taut = prove(problem._replace(limits=NO_LIMITS), pick(parities, rows, arcs), arcs).feasible
+        rows, arcs = rows[taut], arcs[taut]
+        for rank in range(int(alive.shape[1])):
+            # One candidate of each segment after the other, since one may make the next ones superfluous.
+            turn = _turns(rows) == rank
+            if not turn.any():
+                break
+            now = turn & ~fewest.is_best[rows]
+            now[now] = fewest.may_change(rows[now], known[rows[now], arcs[now] - 1])
+            if now.any():
+                is_clear, broken = _limits_of(problem, parities, rows[now], arcs[now], fewest)
+                fewest.take(rows[now][is_clear], arcs[now][is_clear], broken[is_clear])
+
+
+def _turns(rows: np.ndarray) -> np.ndarray:
+    # Count for each entry the equal ones before it; equal ones stand together.
+    return np.arange(len(rows)) - np.searchsorted(rows, rows)
 
 
 def _limits_of(
-    problem: Problem, segments: Segment, arcs: np.ndarray, is_limit: np.ndarray
+    problem: Problem, parities: dict[int, Segment], rows: np.ndarray, arcs: np.ndarray, fewest: FewestLimits
 ) -> tuple[np.ndarray, np.ndarray]:
-    # Return which candidates are proved but for the limits that they break, and these limits (n, n_criteria).
-    proof = prove(problem, segments, arcs, ignored=np.tile(is_limit, (len(arcs), 1)))
-    is_proved, broken = proof.feasible.copy(), proof.broken & is_limit
-    unclear = np.flatnonzero(is_proved & (~broken & ~proof.met).any(1))
+    # Return which of some candidates with taut cables break limits that are certain, and these (n, n_criteria).
+    # Candidates that change nothing by the limits that they are seen to break are not looked at more closely.
+    segments = pick(parities, rows, arcs)
+    look = first_look(problem, segments, arcs.astype(float))
+    is_limit = np.arange(BASIC + len(limits_set(problem.limits))) >= BASIC
+    proof = prove(problem, segments, arcs, ignored=np.ones((len(arcs), len(is_limit)), bool), look=look)
+    is_proved, broken = np.ones(len(arcs), bool), proof.broken & is_limit
+    unclear = np.flatnonzero((is_limit & ~broken & ~proof.met).any(1) & fewest.may_change(rows, broken))
     for _ in range(int(is_limit.sum()) + 1):
         if not len(unclear):
             break
-        part = jax.tree.map(lambda leaf, rows=unclear: leaf[rows], segments)
-        again = prove(problem, part, arcs[unclear], ignored=broken[unclear])
+        part, seen = jax.tree.map(lambda leaf, rows=unclear: leaf[rows], (segments, look))
+        again = prove(problem, part, arcs[unclear], ignored=broken[unclear] | ~is_limit, look=seen)
         is_proved[unclear] = again.feasible
         broken[unclear] |= again.broken & is_limit
         unclear = unclear[again.infeasible]
