@@ -13,8 +13,8 @@ from cspr_jax.free.search import BARRIERS, optima, started
 from cspr_jax.free.starts import starts
 from cspr_jax.free.tasks import Tasks
 
-# Numbers of the starts from which searches begin: a line, one bent downwards, and a swing.
-FIRST = (0, 2, 5)
+# Numbers of the starts from which searches begin: a line, and swings of one arc and of two.
+FIRST = (0, -3, -2)
 # Weight of the barriers, and softness, of a search from a start, and from a neighbour's motion.
 FROM_START, FROM_NEIGHBOUR = (BARRIERS[0], 10.0), (1e-2, 1.0)
 # Neighbours of a pair; how many of them can help; part of its time by which one must be faster, besides the distance
@@ -64,7 +64,8 @@ class Neighbours:
 
     def _from_starts(self, rows: np.ndarray, *, others: bool) -> None:
         parts = [starts(self._tasks.taken(rows[i : i + 1]), self._depths[k]) for i, k in enumerate(rows.tolist())]
-        chosen = np.flatnonzero(np.isin(np.arange(len(parts[0].task)), FIRST, invert=others))
+        count = len(parts[0].task)
+        chosen = np.flatnonzero(np.isin(np.arange(count), np.mod(FIRST, count), invert=others))
         controls, duration = (np.concatenate([part[i][chosen, 0] for part in parts]) for i in (1, 2))
         self._improve(np.repeat(rows, len(chosen)), controls, duration, FROM_START)
 
