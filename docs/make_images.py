@@ -110,6 +110,12 @@ IMAGES = {
         "--quantity tolerated",
     ),
     "least_time": Image("Least duration of the S-model from one place to each target.", 10),
+    "least_time_ratio": Image(
+        "Least duration by free motions over that by hypocycloids: 1 where a closed form is as fast as any motion.",
+        150,
+        "--ratio --quantity duration",
+        ("least_time_free", "least_time_arcs"),
+    ),
     "active_bounds": Image(
         "What holds back the acceleration on the way to each target: cables, or max_acceleration.",
         10,

@@ -264,6 +264,7 @@ ARGUMENTS: dict[str, Rule] = {
     "quantity": _TEXT_OR_NONE,
     "ramp_time": real("a finite number >= 0, s", (), least=0.0),
     "rate": _NUMBER_OR_NONE,
+    "ratio": _FLAG,
     "reference": _PATH,
     "release_x": _RANGE,
     "release_y": _RANGE,

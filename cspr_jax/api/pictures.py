@@ -27,6 +27,7 @@ def plot(  # noqa: PLR0913
     lines: str | None = None,
     envelope: bool = False,
     solid: bool = False,
+    ratio: bool = False,
     size: str | tuple[float, float] | None = None,
     dpi: float | None = None,
     font_size: float | None = None,
@@ -49,6 +50,7 @@ def plot(  # noqa: PLR0913
         lines: axis whose points become lines; None: sections, or one line.
         envelope: whether to draw all orientations of one place, in three dimensions.
         solid: whether to draw the boundary of a workspace over x, y and z, with its robot, in three dimensions.
+        ratio: whether to draw the quantity of the first of two maps over that of the second, over the same cells.
         size: width and height, cm, as (16, 10) or "16x10"; None: the usual size of the picture.
         dpi: pixels per inch of a file; None: 160.
         font_size: size of the font, points; None: 10.
@@ -79,7 +81,9 @@ def plot(  # noqa: PLR0913
     def draw() -> Figure:
         given_at = None if at is None else dict(at)
         shown = [one.best(*names_of(best)) for one in loaded] if best else loaded
-        return drawn(shown, names, quantity=quantity, at=given_at, lines=lines, envelope=envelope, solid=solid)
+        return drawn(
+            shown, names, quantity=quantity, at=given_at, lines=lines, envelope=envelope, solid=solid, ratio=ratio
+        )
 
     return finished(draw, names[0], style, output)
 

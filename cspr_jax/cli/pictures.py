@@ -20,7 +20,20 @@ def _plot(options: argparse.Namespace) -> int:
     output = options.output or results[0].with_suffix(".png")
     if not output.suffix:
         raise ConfigError("-o", f"{output}: must end in .png, .pdf, .svg or another picture format")
-    names = ("quantity", "best", "lines", "envelope", "solid", "size", "dpi", "font_size", "preset", "title", "plan")
+    names = (
+        "quantity",
+        "best",
+        "lines",
+        "envelope",
+        "solid",
+        "ratio",
+        "size",
+        "dpi",
+        "font_size",
+        "preset",
+        "title",
+        "plan",
+    )
     with waiting():
         plot(results, at=at, output=output, **{name: getattr(options, name) for name in names})
     print_path(output)

@@ -13,8 +13,8 @@ from cspr_jax.free.search import BARRIERS, optima, started
 from cspr_jax.free.starts import starts
 from cspr_jax.free.tasks import Tasks
 
-# Numbers of the starts from which searches begin: a line, a swing, and a line bent downwards.
-FIRST = (0, 1, 4)
+# Numbers of the starts from which searches begin: a line, and swings of one arc and of two.
+FIRST = (0, 1, 3)
 # Weight of the barriers, and softness, of a search from a start, and from a neighbour's motion.
 FROM_START, FROM_NEIGHBOUR = (BARRIERS[0], 10.0), (1e-2, 1.0)
 # Neighbours of a pair; how many of them can help; part of its time by which one must be faster, besides the distance

@@ -925,7 +925,9 @@ QUANTITIES = {
         ),
     )
 }
-EVERY = ChainMap(AXES, QUANTITIES, BEST, TRAJECTORY, SEGMENTS, FLIGHT, FAILURES, PATHS)
+# What a picture of two maps shows.
+RATIO = Quantity("ratio", "1", "ratio", "A quantity of one map over that of another, as `cspr plot --ratio` shows it.")
+EVERY = ChainMap(AXES, QUANTITIES, BEST, {RATIO.name: RATIO}, TRAJECTORY, SEGMENTS, FLIGHT, FAILURES, PATHS)
 _OWN = frozenset(QUANTITIES)
 
 

@@ -17,10 +17,11 @@ from cspr_jax.outputs.plots.lines import PlottedLine, line_figure, lines_of, nam
 from cspr_jax.outputs.plots.motion_comparison import motion_comparison_figure
 from cspr_jax.outputs.plots.motion_pictures import motion_picture
 from cspr_jax.outputs.plots.planes import in_order
+from cspr_jax.outputs.plots.ratio import ratio_of
 from cspr_jax.outputs.plots.sections import POLAR, PlaneSection, section_figure, tells
 from cspr_jax.outputs.plots.selection import nearest
 from cspr_jax.outputs.plots.solid import SPACE, solid_figure
-from cspr_jax.schema.quantities import TILT_TORSION
+from cspr_jax.schema.quantities import RATIO, TILT_TORSION
 from cspr_jax.store.result import Result
 
 
@@ -53,6 +54,7 @@ def drawn(
     lines: str | None = None,
     envelope: bool = False,
     solid: bool = False,
+    ratio: bool = False,
 ) -> Figure:
     """The picture of one result, or of several maps as lines or outlines; made inside `style.in_style`.
 
@@ -64,6 +66,7 @@ def drawn(
         lines: axis whose points become lines; None: sections, or one line.
         envelope: whether to draw all orientations of one place, in three dimensions.
         solid: whether to draw the boundary of a workspace with its robot, in three dimensions.
+        ratio: whether to draw the ratio of the quantity of two maps over the same cells.
 
     Returns:
         the figure.
@@ -71,6 +74,9 @@ def drawn(
     Raises:
         InputError: no such quantity or axis, or nothing to draw.
     """
+    if ratio:
+        _refuse("--ratio", {"--solid": solid, "--envelope": envelope})
+        return _map_figure(ratio_of(results, names, quantity), RATIO.name, at or {}, lines)
     if solid:
         _refuse("--solid", {"--envelope": envelope, "--quantity": quantity, "--lines": lines})
         return _solid(results, at or {})

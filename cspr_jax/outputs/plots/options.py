@@ -31,6 +31,9 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
         help='draw the boundary of a map = "workspace" over x, y and z, with the robot in it',
     )
     parser.add_argument(
+        "--ratio", action="store_true", help="draw the quantity of one map over that of another over the same cells"
+    )
+    parser.add_argument(
         "--at",
         action="append",
         default=[],
