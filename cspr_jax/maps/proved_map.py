@@ -21,7 +21,7 @@ from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import Verdict
 
 CONTACTS = functools.reduce(operator.or_, FLAGS.values())
-# What can be said of a motion beside its contacts.
+# Flags that say something of a motion beside its contacts.
 _BESIDE = CONTACTS | Verdict.UNDECIDED | Verdict.UNCERTAINTY | Verdict.BELOW_FLOOR
 _COLUMNS = {"tension_margin": "margin", "tension_margin_bound": "margin_bound"}
 
