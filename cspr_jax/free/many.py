@@ -1,7 +1,7 @@
 """The fastest motions of many pairs of poses: searched on few intervals, then on many, proved and tightened."""
 
 import dataclasses
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,19 +11,19 @@ from cspr_jax.curves.several import SeveralSplines
 from cspr_jax.curves.spline import Spline
 from cspr_jax.free.basis import DEGREE, Basis
 from cspr_jax.free.free_motion import FEWEST, FINE, ON, ROUNDS
-from cspr_jax.free.neighbours import FROM_NEIGHBOUR, Neighbours
+from cspr_jax.free.neighbours import Neighbours
 from cspr_jax.free.poses import FreePoses, motions_of
 from cspr_jax.free.question import FreeQuestion, FreeSettings, tightened
 from cspr_jax.free.search import again, optima, started
 from cspr_jax.free.tasks import Tasks, Unknowns
 from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.proved_answers import ProvedAnswers, answers_of, judge_all_robots, proofs_of
+from cspr_jax.motions.proved_answers import MotionProof, ProvedAnswers, answers_of, judge_all_robots, proofs_of
 from cspr_jax.robots.clearance import Scene
 
-# Intervals of the first searches; of those where their motions lead to none on all intervals.
-COARSE, MIDDLE = 12, 24
-# Splines of maps are coarser than those of plans, and some parts in a thousand slower.
-MAP = FreeSettings(intervals=32)
+# Intervals of the first searches, and of the motions in the end, each for pairs for which the ones before led to no
+# proved motion: a search that gets stuck on some intervals does not on others. Splines of plans have more intervals,
+# and are some parts in a thousand faster. Instants of each interval.
+MESHES, INSTANTS = ((12, 32), (16, 28), (24, 36)), 4
 
 
 class ManyFreeMotions(NamedTuple):
@@ -41,13 +41,14 @@ class ManyFreeMotions(NamedTuple):
 
 
 def free_motions(
-    problem: Problem, scene: Scene | None, pairs: Sequence[FreePoses], settings: FreeSettings = MAP
+    problem: Problem, scene: Scene | None, pairs: Sequence[FreePoses], meshes: Sequence[tuple[int, int]] = MESHES
 ) -> ManyFreeMotions:
     """Search for the fastest motions of many pairs of poses, and prove them.
 
     Args:
         scene: bodies that can meet; they are judged with the motions, and do not change them.
         pairs: two poses each, at least one pair.
+        meshes: intervals of the first searches, and of the motions in the end, even.
 
     Returns:
         the motions.
@@ -55,30 +56,35 @@ def free_motions(
     Raises:
         InputError: a robot for which no free motion is sought, or a cable without a largest tension.
     """
-    questions = [FreeQuestion.of(problem, scene, pair, settings) for pair in pairs]
+    questions = [FreeQuestion.of(problem, scene, pair, FreeSettings()) for pair in pairs]
+    best = dict[int, tuple[Spline, MotionProof]]()
+    for mesh in meshes:
+        left = [k for k in range(len(pairs)) if k not in best or best[k][1].verdict]
+        for i, motion, proof in _on_mesh([questions[k] for k in left], mesh) if left else ():
+            if left[i] not in best or not proof.verdict:
+                best[left[i]] = motion, proof
+    rows = sorted(best)
+    motions = [best[k][0] for k in rows]
+    answers = answers_of([best[k][1] for k in rows], np.array([float(one.knots[-1]) for one in motions]))
+    judge_all_robots(problem, answers, motions, scene)
+    return ManyFreeMotions(np.array(rows, int), motions, answers)
 
-    def on(intervals: int, instants: int) -> Tasks:
-        return _stacked([question.tasks(intervals, instants) for question in questions])
 
-    coarse, fine = on(COARSE, FEWEST), on(settings.intervals, settings.instants)
-    search = Neighbours(coarse, [pair.z0 for pair in pairs])
+def _on_mesh(questions: Sequence[FreeQuestion], mesh: tuple[int, int]) -> Iterator[tuple[int, Spline, MotionProof]]:
+    # Numbers of pairs, and their motions with proofs.
+    coarse, fine = (
+        _stacked([question.tasks(intervals, instants) for question in questions])
+        for intervals, instants in zip(mesh, (FEWEST, INSTANTS), strict=True)
+    )
+    search = Neighbours(coarse, [question.poses.z0 for question in questions])
     search.search()
     rows = np.flatnonzero(np.isfinite(search.duration))
     if not len(rows):
-        return ManyFreeMotions(rows, [], answers_of([], np.empty(0)))
+        return
     begun = _refined(coarse.basis, fine.taken(rows), search.controls[rows], search.duration[rows], FINE[0][0])
     unknowns, is_optimal = _first_optima(fine.taken(rows), begun, FINE)
-    lost = rows[~is_optimal]
-    if len(lost):
-        middle = on(MIDDLE, FEWEST).taken(lost)
-        begun = _refined(coarse.basis, middle, search.controls[lost], search.duration[lost], FROM_NEIGHBOUR[0])
-        between = optima(middle, begun, *FROM_NEIGHBOUR).unknowns
-        controls, duration = middle.controls(between)[:, 0], between.duration[:, 0]
-        begun = _refined(middle.basis, fine.taken(lost), controls, duration, FINE[0][0])
-        _put(unknowns, *_first_optima(fine.taken(lost), begun, FINE), ~is_optimal, is_optimal)
-    tasks, unknowns = fine.taken(rows[is_optimal]), unknowns.taken(is_optimal)
     rows = rows[is_optimal]
-    return _proved(questions[0], rows, tasks, unknowns, [pairs[k].z0 for k in rows.tolist()])
+    yield from zip(rows.tolist(), *_proved(questions, rows, fine.taken(rows), unknowns.taken(is_optimal)), strict=True)
 
 
 def _stacked(tasks: Sequence[Tasks]) -> Tasks:
@@ -118,10 +124,10 @@ def _put(
 
 
 def _proved(
-    question: FreeQuestion, rows: np.ndarray, tasks: Tasks, unknowns: Unknowns, depths: list[float]
-) -> ManyFreeMotions:
+    questions: Sequence[FreeQuestion], rows: np.ndarray, tasks: Tasks, unknowns: Unknowns
+) -> tuple[list[Spline], list[MotionProof]]:
     # Motions, tightened and searched again until all are proved, or no more helps.
-    problem, scene = question.problem, question.scene
+    problem, scene, depths = questions[0].problem, questions[0].scene, [questions[k].poses.z0 for k in rows.tolist()]
 
     def motion(k: int) -> Spline:
         one = np.array([k])
@@ -137,7 +143,7 @@ def _proved(
         left = np.array([k for k in left.tolist() if proofs[k].verdict], int)
         tighter = None
         if len(left) and number < ROUNDS:
-            tighter = tightened(question, tasks.taken(left), [motions[k] for k in left.tolist()])
+            tighter = tightened(questions[0], tasks.taken(left), [motions[k] for k in left.tolist()])
         if tighter is None:
             break
         further, is_optimal = _first_optima(tighter, unknowns.taken(left), ON)
@@ -147,6 +153,4 @@ def _proved(
             leaf[left] = values[is_optimal]
         for k in left.tolist():
             motions[k] = motion(k)
-    answers = answers_of(proofs.tolist(), unknowns.duration[:, 0])
-    judge_all_robots(problem, answers, motions, scene)
-    return ManyFreeMotions(rows, motions, answers)
+    return motions, proofs.tolist()
