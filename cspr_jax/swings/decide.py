@@ -18,7 +18,6 @@ from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.tolerances import Tolerated
-from cspr_jax.robots.limits import NO_LIMITS
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.swings import criteria, hypocycloid
 from cspr_jax.swings.criteria import BASIC
@@ -27,7 +26,7 @@ from cspr_jax.swings.hypocycloid import Segment
 from cspr_jax.swings.limit_sieve import LimitSieve
 from cspr_jax.swings.margins import margins
 from cspr_jax.swings.parities import pick, rows_of
-from cspr_jax.swings.proof import SMALLEST_MARGIN, prove
+from cspr_jax.swings.proof import SMALLEST_MARGIN, first_look, prove
 from cspr_jax.swings.refusals import refusals, unavoidable
 
 # Segments computed at a time where little is computed for each.
@@ -90,10 +89,11 @@ def decided(
     none = np.flatnonzero(smallest == 0)
     is_feasible = smallest > 0
     if len(none):
-        # Limits count only where it matters whether one of these is feasible.
-        shown = problem if problem.limits.uncertainty is not None else problem._replace(limits=NO_LIMITS)
-        proof = prove(shown, pick(parities, none, tried[none]), tried[none])
-        bound[none], is_feasible[none] = proof.bound[:, :BASIC].min(1), proof.feasible
+        shown = pick(parities, none, tried[none])
+        look = first_look(problem, shown, tried[none].astype(float))
+        bound[none] = look[1][:, :BASIC].min(1)
+        if problem.limits.uncertainty is not None:
+            is_feasible[none] = prove(problem, shown, tried[none], look=look).feasible
     multiples = _tolerated(problem, chosen, tried, np.flatnonzero(is_feasible))
     answers = Answers(
         smallest,

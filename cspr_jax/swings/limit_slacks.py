@@ -207,17 +207,36 @@ def pace_bounds(segment: Segment, arcs: Array, over: Stretch) -> tuple[Bounds, B
 
 
 def _length(robot: PointMassRobot, segment: Segment, over: Stretch, pace: Bounds, eta: Bounds) -> Bounds:
-    # |rho'| <= |p'|, and rho'' = (|p'|^2 - rho'^2 + ray . p'') / rho; leaves (n_cables,). No cable is shorter than
-    # the distance from the spool plane.
-    at_middle = jnp.linalg.norm((segment.hub + segment.plane @ over.place)[None] - robot.base_points, axis=1)
-    change = over.radius * pace.slope
-    depth = (1.0 + segment.tilt @ over.place - over.radius * eta.slope) * segment.hub[2]
-    # In a block in which the mass goes far, its greatest distance from P0 and its least depth say more than its rate.
-    depth = jnp.maximum(depth, (1.0 - eta.value) * segment.hub[2]) / jnp.linalg.norm(plane_normal(robot))
-    from_hub = jnp.linalg.norm(segment.hub[None] - robot.base_points, axis=1) - pace.value
-    nearest = jnp.maximum(jnp.maximum(jnp.maximum(at_middle - change, from_hub), depth), 0.0)
+    # |rho'| <= |p'|, and rho'' = (|p'|^2 - rho'^2 + ray . p'') / rho; leaves (n_cables,).
+    nearest = least_lengths(robot, segment, over, pace, eta)
     slope = jnp.broadcast_to(pace.slope, nearest.shape)
-    return Bounds(at_middle + change, slope, slope**2 / nearest + pace.curvature)
+    farthest = _at_middle(robot, segment, over) + over.radius * pace.slope
+    return Bounds(farthest, slope, slope**2 / nearest + pace.curvature)
+
+
+def _at_middle(robot: PointMassRobot, segment: Segment, over: Stretch) -> Array:
+    return jnp.linalg.norm((segment.hub + segment.plane @ over.place)[None] - robot.base_points, axis=1)
+
+
+def least_lengths(robot: PointMassRobot, segment: Segment, over: Stretch, pace: Bounds, eta: Bounds) -> Array:
+    """Lower bounds of the lengths of the cables over an interval.
+
+    No cable is shorter than the distance from the spool plane. Where the mass goes far within the interval, its
+    greatest distance from P0 and its least depth say more than its length and depth in the middle.
+
+    Args:
+        robot: a point mass on three cables.
+        pace: bounds of the position from P0, () each, as `pace_bounds` gives them.
+        eta: bounds of the depth over z0, less 1, () each.
+
+    Returns:
+        (n_cables,) m, not negative.
+    """
+    in_middle = _at_middle(robot, segment, over) - over.radius * pace.slope
+    from_hub = jnp.linalg.norm(segment.hub[None] - robot.base_points, axis=1) - pace.value
+    lowest = jnp.maximum(segment.tilt @ over.place - over.radius * eta.slope, -eta.value)
+    depth = (1.0 + lowest) * segment.hub[2] / jnp.linalg.norm(plane_normal(robot))
+    return jnp.maximum(jnp.maximum(in_middle, from_hub), jnp.maximum(depth, 0.0))
 
 
 def _rate(length: Bounds, pace: Bounds, pull: Bounds) -> Bounds:

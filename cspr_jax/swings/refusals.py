@@ -43,11 +43,11 @@ def refusals(problem: Problem, parities: dict[int, Segment], upper: np.ndarray, 
             turn = _turns(rows) == rank
             if not turn.any():
                 break
-            now = turn & ~fewest.is_best[rows]
-            now[now] = fewest.may_change(rows[now], known[rows[now], arcs[now] - 1])
-            if now.any():
-                is_clear, broken = _limits_of(problem, parities, rows[now], arcs[now], fewest)
-                fewest.take(rows[now][is_clear], arcs[now][is_clear], broken[is_clear])
+            due = turn & ~fewest.is_best[rows]
+            due[due] = fewest.may_change(rows[due], known[rows[due], arcs[due] - 1])
+            if due.any():
+                is_clear, broken = _limits_of(problem, parities, rows[due], arcs[due], fewest)
+                fewest.take(rows[due][is_clear], arcs[due][is_clear], broken[is_clear])
 
 
 def _turns(rows: np.ndarray) -> np.ndarray:

@@ -17,6 +17,7 @@ from cspr_jax.motions.problem import Problem
 from cspr_jax.robots import point_mass
 from cspr_jax.robots.limits import Limits
 from cspr_jax.swings import criteria, hypocycloid
+from cspr_jax.swings.limit_slacks import least_lengths, pace_bounds
 from cspr_jax.swings.proof import SMALLEST_MARGIN, prove, tolerance
 from cspr_jax.swings.slacks import instant, row_bounds, stretch, taut_bounds
 
@@ -147,6 +148,39 @@ def test_curvature_bounds_of_limits_hold(name):
         clear = error[:, 0] < 1e-3 * bounds
         sharpest = np.maximum(sharpest, np.where(clear, bend.max(1) / bounds, 0.0)[below].max(0))
     assert (sharpest > [0.97, 0.97, 0.8, 0.8, 0.97, 0.6, 0.45, 0.45]).all()
+
+
+LEAST_LENGTHS = jax.jit(
+    jax.vmap(
+        lambda robot, segment, amplitude, arcs, start, stop: least_lengths(
+            robot,
+            segment,
+            (over := stretch(segment, amplitude, arcs, start, stop)),
+            pace_bounds(segment, arcs, over)[0],
+            row_bounds(segment, arcs, over, segment.tilt),
+        ),
+        (None, 0, None, 0, 0, 0),
+    )
+)
+POSITIONS = instants(lambda _, __, amplitude, segment, p, t: hypocycloid.motion(segment, amplitude, p, t)[0])
+
+
+@pytest.mark.parametrize("name", BASES)
+def test_no_cable_is_shorter_than_its_bound(name):
+    """Over whole arcs and short intervals: a bound that is too large makes curvatures too small."""
+    rng, n, robot, same = np.random.default_rng(28), 2000, ROBOTS[name], of_one_shape(QUINTIC)
+    starts, ends, arcs = random_points(rng, name, n)
+    segments, p = segments_of(name, starts, ends, arcs), arcs.astype(float)
+    width = 10.0 ** rng.uniform(-3.0, 0.0, n)
+    start = (1.0 - width) * rng.uniform(size=n)
+    tau = start[:, None] + width[:, None] * np.linspace(0.0, 1.0, 129)
+    places = np.asarray(POSITIONS(None, None, same, segments, p, tau))
+    lengths = np.linalg.norm(places[:, :, None] - np.asarray(robot.base_points), axis=-1).min(1)
+    bounds = np.asarray(LEAST_LENGTHS(robot, segments, same, p, start, start + width))
+    moves = np.isfinite(lengths).all(1)
+    assert (bounds <= lengths * (1.0 + 1e-12))[moves].all()
+    is_wide = moves & (width > 0.3)
+    assert (bounds[is_wide] > 0.2 * lengths[is_wide]).mean() > 0.4
 
 
 def dense_margin(name, start, end, arcs, printed):
