@@ -75,7 +75,8 @@ PAGES = {
         "How fast can a point mass get to each target in a straight line, by the S-model with its best parameters, and "
         "by any motion along the line? `active_up` and `active_down` name what holds it back. With "
         '`family = "path"`: how fast does any robot get there, a platform too, by the fastest motion along a straight '
-        "or a lifted path, and how much faster could any motion be, at most?",
+        "or a lifted path, and how much faster could any motion be, at most? With "
+        '`family = "free"`: how fast does it get there along any path, by the fastest motion that a search finds?',
     ),
     "launch-range": MapPage(
         "launch_range",

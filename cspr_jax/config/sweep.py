@@ -112,7 +112,7 @@ class From(Table):
     rest: bool = Field(False, description="true: at rest in P0")
     tilt_torsion: TiltTorsion | None = Field(None, description="poses: orientation at the start, as in a plan")
     quaternion: Quaternion | None = Field(
-        None, description="poses: orientation at the start, in place of tilt_torsion; path: of the whole path"
+        None, description="poses: orientation at the start, in place of tilt_torsion; path, free: at the targets, too"
     )
     beta_hat: BetaHat | None = Field(None, description="poses: beta-hat at the start; absent: the preferred one (3.91)")
 

@@ -10,21 +10,25 @@ from scipy.interpolate import BSpline
 from cspr_jax.curves.several import SeveralSplines
 from cspr_jax.curves.spline import Spline
 from cspr_jax.free.basis import DEGREE, Basis, basis
-from cspr_jax.free.free_motion import FEWEST, FINE, ON, ROUNDS, FreeSettings, tightened
+from cspr_jax.free.free_motion import FEWEST, FINE, ON, ROUNDS, tightened
 from cspr_jax.free.instants import ValueBounds, bounds
-from cspr_jax.free.neighbours import FROM_NEIGHBOUR, Neighbours
+from cspr_jax.free.neighbours import Neighbours
 from cspr_jax.free.poses import FreePoses, check_searched, motions_of, tasks_of
 from cspr_jax.free.search import again, optima, started
 from cspr_jax.free.tasks import Tasks, Unknowns
 from cspr_jax.motions.criteria import criteria
 from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.proved_answers import ProvedAnswers, answers_of, judge_all_robots, proofs_of
+from cspr_jax.motions.proved_answers import MotionProof, ProvedAnswers, answers_of, judge_all_robots, proofs_of
 from cspr_jax.robots.clearance import Scene
 
-# Intervals of the first searches; of those where their motions lead to none on all intervals.
-COARSE, MIDDLE = 12, 24
-# Splines of maps are coarser than those of plans, and some parts in a thousand slower.
-MAP = FreeSettings(32, 4)
+# Intervals of the first searches, and of the motions in the end, each for pairs for which the ones before led to no
+# proved motion: a search that gets stuck on some intervals does not on others. Plans have more intervals, and motions
+# that are some parts in a thousand faster. Instants of each interval.
+MESHES, INSTANTS = ((12, 32), (16, 28), (24, 36)), 4
+
+
+# Numbers of pairs, and their motions with proofs.
+_Found = tuple[np.ndarray, list[Spline], list[MotionProof]]
 
 
 class ManyFreeMotions(NamedTuple):
@@ -42,13 +46,14 @@ class ManyFreeMotions(NamedTuple):
 
 
 def free_motions(
-    problem: Problem, scene: Scene | None, pairs: Sequence[FreePoses], settings: FreeSettings = MAP
+    problem: Problem, scene: Scene | None, pairs: Sequence[FreePoses], meshes: Sequence[tuple[int, int]] = MESHES
 ) -> ManyFreeMotions:
     """Search for the fastest motions of many pairs of poses, and prove them.
 
     Args:
         scene: bodies that can meet; they are judged with the motions, and do not change them.
         pairs: two poses each, at least one pair.
+        meshes: intervals of the first searches, and of the motions in the end, even.
 
     Returns:
         the motions.
@@ -58,29 +63,37 @@ def free_motions(
     """
     check_searched(problem)
     limits = bounds(problem.robot, problem.limits, criteria(problem.robot, problem.limits, scene))
+    found = dict[int, tuple[Spline, MotionProof]]()
+    for mesh in meshes:
+        left = [k for k in range(len(pairs)) if k not in found or found[k][1].verdict]
+        if left:
+            rows, motions, proofs = _on_mesh(problem, scene, limits, [pairs[k] for k in left], mesh)
+            for k, motion, proof in zip(rows.tolist(), motions, proofs, strict=True):
+                if left[k] not in found or not proof.verdict:
+                    found[left[k]] = motion, proof
+    rows = np.array(sorted(found), int)
+    motions = [found[k][0] for k in rows.tolist()]
+    answers = answers_of([found[k][1] for k in rows.tolist()], np.array([float(one.knots[-1]) for one in motions]))
+    judge_all_robots(problem, answers, motions, scene)
+    return ManyFreeMotions(rows, motions, answers)
 
+
+def _on_mesh(
+    problem: Problem, scene: Scene | None, limits: ValueBounds, pairs: Sequence[FreePoses], mesh: tuple[int, int]
+) -> _Found:
     def on(intervals: int, instants: int) -> Tasks:
         return _stacked([tasks_of(problem, basis(intervals, instants), limits, pair) for pair in pairs])
 
-    coarse, fine = on(COARSE, FEWEST), on(settings.intervals, settings.instants)
+    coarse, fine = on(mesh[0], FEWEST), on(mesh[1], INSTANTS)
     search = Neighbours(coarse, [pair.z0 for pair in pairs])
     search.search()
     rows = np.flatnonzero(np.isfinite(search.duration))
     if not len(rows):
-        return ManyFreeMotions(rows, [], answers_of([], np.empty(0)))
+        return rows, [], []
     begun = _refined(coarse.basis, fine.taken(rows), search.controls[rows], search.duration[rows], FINE[0][0])
     unknowns, is_optimal = _first_optima(fine.taken(rows), begun, FINE)
-    lost = rows[~is_optimal]
-    if len(lost):
-        middle = on(MIDDLE, FEWEST).taken(lost)
-        begun = _refined(coarse.basis, middle, search.controls[lost], search.duration[lost], FROM_NEIGHBOUR[0])
-        between = optima(middle, begun, *FROM_NEIGHBOUR).unknowns
-        controls, duration = middle.controls(between)[:, 0], between.duration[:, 0]
-        begun = _refined(middle.basis, fine.taken(lost), controls, duration, FINE[0][0])
-        _put(unknowns, *_first_optima(fine.taken(lost), begun, FINE), ~is_optimal, is_optimal)
-    tasks, unknowns = fine.taken(rows[is_optimal]), unknowns.taken(is_optimal)
-    rows = rows[is_optimal]
-    return _proved(problem, scene, limits, rows, tasks, unknowns, [pairs[k].z0 for k in rows.tolist()])
+    tasks, unknowns, rows = fine.taken(rows[is_optimal]), unknowns.taken(is_optimal), rows[is_optimal]
+    return rows, *_proved(problem, scene, limits, tasks, unknowns, [pairs[k].z0 for k in rows.tolist()])
 
 
 def _stacked(tasks: Sequence[Tasks]) -> Tasks:
@@ -123,18 +136,17 @@ def _proved(
     problem: Problem,
     scene: Scene | None,
     limits: ValueBounds,
-    rows: np.ndarray,
     tasks: Tasks,
     unknowns: Unknowns,
     depths: list[float],
-) -> ManyFreeMotions:
+) -> tuple[list[Spline], list[MotionProof]]:
     # Motions, tightened and searched again until all are proved, or no more helps.
     def motion(k: int) -> Spline:
         one = np.array([k])
         return motions_of(tasks.taken(one), unknowns.taken(one), depths[k])[0]
 
-    motions, proofs = [motion(k) for k in range(len(rows))], np.empty(len(rows), object)
-    left = np.arange(len(rows))
+    motions, proofs = [motion(k) for k in range(len(depths))], np.empty(len(depths), object)
+    left = np.arange(len(depths))
     for number in range(1, ROUNDS + 1):
         if len(left):
             several = SeveralSplines([motions[k] for k in left.tolist()])
@@ -153,6 +165,4 @@ def _proved(
             leaf[left] = values[is_optimal]
         for k in left.tolist():
             motions[k] = motion(k)
-    answers = answers_of(proofs, unknowns.duration[:, 0])
-    judge_all_robots(problem, answers, motions, scene)
-    return ManyFreeMotions(rows, motions, answers)
+    return motions, proofs.tolist()

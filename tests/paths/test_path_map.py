@@ -118,7 +118,7 @@ def test_platforms_keep_their_orientation(path):
         ({"trajectory": {"path": {"points": [[0, 0, 1]]}}}, "trajectory.path.points"),
         ({"trajectory": {"max_acceleration": 2.0}}, 'max_acceleration: must be absent with family = "path"'),
         ({"trajectory": {"family": "s-curve"}}, 'trajectory.path: must be absent with family = "s-curve"'),
-        ({"trajectory": {"family": "transition"}}, '"s-curve" or "path" in this map'),
+        ({"trajectory": {"family": "transition"}}, '"s-curve", "path" or "free" in this map'),
         ({"run": {"store": ["margin"]}}, "run.store: margin: must be one of"),
         ({"run": {"store": ["clearance"]}}, "run.store: clearance: must be absent without"),
         ({"platform_hull": True}, "platform_hull: must be absent"),

@@ -30,9 +30,9 @@ def ratio_of(results: list[Result], names: list[str], quantity: str | None) -> R
     if len(results) != len(("over", "under")) or not all(result.is_map for result in results):
         raise InputError("--ratio", f"{len(results)} results", "absent but for two maps")
     name = quantity or shown_first(results[0])
-    for path, result in zip(names, results, strict=True):
-        if name not in result.data:
-            raise InputError("--quantity", name, f"one of {', '.join(sorted(result.data))}, which {path} has")
+    both = sorted(results[0].data.keys() & results[1].data.keys())
+    if name not in both:
+        raise InputError("--quantity", name, f"one that both maps have ({', '.join(both) or 'none'})")
     axes = [{axis: points for axis, points in result.axes.items() if len(points) > 1} for result in results]
     shared = results[0].axes.keys() & results[1].axes.keys()
     if axes[0].keys() != axes[1].keys() or not all(
