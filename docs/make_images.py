@@ -112,7 +112,7 @@ IMAGES = {
     "least_time": Image("Least duration of the S-model from one place to each target.", 10),
     "least_time_ratio": Image(
         "Least duration by free motions over that by hypocycloids: 1 where a closed form is as fast as any motion.",
-        150,
+        260,
         "--ratio --quantity duration",
         ("least_time_free", "least_time_arcs"),
     ),

@@ -925,7 +925,7 @@ QUANTITIES = {
         ),
     )
 }
-# What a picture of two maps shows.
+# A picture of two maps shows this.
 RATIO = Quantity("ratio", "1", "ratio", "A quantity of one map over that of another, as `cspr plot --ratio` shows it.")
 EVERY = ChainMap(AXES, QUANTITIES, BEST, {RATIO.name: RATIO}, TRAJECTORY, SEGMENTS, FLIGHT, FAILURES, PATHS)
 _OWN = frozenset(QUANTITIES)

@@ -41,9 +41,9 @@ def ratio_of(results: list[Result], names: list[str], quantity: str | None) -> R
     ):
         raise InputError("--ratio", f"{names[0]} and {names[1]}", "absent but for two maps over the same cells")
     over, under = (np.asarray(result.data[name], float) for result in results)
-    kept = [axis for axis in results[1].axes if axis in axes[0]]
-    under = under.reshape([len(axes[0][axis]) for axis in kept])
-    under = under.transpose([kept.index(axis) for axis in axes[0]]).reshape(over.shape)
+    order = [axis for axis in results[1].axes if axis in axes[0]]
+    under = under.reshape([len(axes[0][axis]) for axis in order])
+    under = under.transpose([order.index(axis) for axis in axes[0]]).reshape(over.shape)
     ratio = over / np.where(under == 0.0, np.nan, under)
     label = f"{results[0].labels[name]}, over that of {_words(results[1])}"
     return dataclasses.replace(
