@@ -24,6 +24,8 @@ from cspr_jax.robots.clearance import Scene
 # proved motion: a search that gets stuck on some intervals does not on others. Splines of plans have more intervals,
 # and are some parts in a thousand faster. Instants of each interval.
 MESHES, INSTANTS = ((12, 32), (16, 28), (24, 36)), 4
+# What is tried on one mesh of the ways in which searches of plans go on.
+TRIED = 2
 
 
 class ManyFreeMotions(NamedTuple):
@@ -82,7 +84,7 @@ def _on_mesh(questions: Sequence[FreeQuestion], mesh: tuple[int, int]) -> Iterat
     if not len(rows):
         return
     begun = _refined(coarse.basis, fine.taken(rows), search.controls[rows], search.duration[rows], FINE[0][0])
-    unknowns, is_optimal = _first_optima(fine.taken(rows), begun, FINE)
+    unknowns, is_optimal = _first_optima(fine.taken(rows), begun, FINE[:TRIED])
     rows = rows[is_optimal]
     yield from zip(rows.tolist(), *_proved(questions, rows, fine.taken(rows), unknowns.taken(is_optimal)), strict=True)
 
@@ -146,7 +148,7 @@ def _proved(
             tighter = tightened(questions[0], tasks.taken(left), [motions[k] for k in left.tolist()])
         if tighter is None:
             break
-        further, is_optimal = _first_optima(tighter, unknowns.taken(left), ON)
+        further, is_optimal = _first_optima(tighter, unknowns.taken(left), ON[:TRIED])
         left = left[is_optimal]
         tasks.low[left], tasks.high[left] = tighter.low[is_optimal], tighter.high[is_optimal]
         for leaf, values in zip(unknowns, further, strict=True):

@@ -60,7 +60,6 @@ class Neighbours:
         self._from_neighbours()
         if len(self.lacking):
             self._from_starts(self.lacking, others=True)
-            self._from_neighbours()
 
     def _from_starts(self, rows: np.ndarray, *, others: bool) -> None:
         parts = [starts(self._tasks.taken(rows[i : i + 1]), self._depths[k]) for i, k in enumerate(rows.tolist())]
