@@ -36,5 +36,7 @@ class FreeMotionKeys(Table):
         "lines, bent lines, and swings of 1, 2, ... arcs",
     )
     search_time: Positive | None = Field(
-        None, description="free: time after which no search goes on, s; the best motion so far is proved"
+        None,
+        description="free: time after which the search ends, s, of each segment with together = false; the best motion "
+        "so far is proved",
     )

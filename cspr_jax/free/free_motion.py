@@ -29,7 +29,6 @@ FINE = ((1e-4, 1e-1), (1e-2, 1.0), (1e-2, 10.0))
 # this part of its duration: by what the intervals are divided, and the softness; instants of each interval.
 SEARCHES, FEWEST, SAME = ((2, 10.0), (2, 1.0), (1, 1.0)), 3, 1e-3
 
-
 USUAL = FreeSettings()
 
 
@@ -89,7 +88,11 @@ def free_motion(problem: Problem, scene: Scene | None, poses: FreePoses, setting
             tighter = tightened(question, tasks, motions)
         if tighter is None:
             break
-        further = _first_optimum(tighter, ((again(tighter, unknowns, each[0]), *each) for each in ON))
+        try:
+            further = _first_optimum(tighter, ((again(tighter, unknowns, each[0]), *each) for each in ON))
+        except KeyboardInterrupt:
+            is_stopped = True
+            break
         if further is None:
             break
         tasks, unknowns = tighter, further

@@ -24,7 +24,7 @@ from cspr_jax.robots.clearance import Scene
 # proved motion: a search that gets stuck on some intervals does not on others. Splines of plans have more intervals,
 # and are some parts in a thousand faster. Instants of each interval.
 MESHES, INSTANTS = ((12, 32), (16, 28), (24, 36)), 4
-# What is tried on one mesh of the ways in which searches of plans go on.
+# Number of the ways in which searches of plans go on that are tried on one mesh.
 TRIED = 2
 
 

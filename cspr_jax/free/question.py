@@ -28,7 +28,7 @@ class FreeSettings(NamedTuple):
         objective: row of `objectives.OBJECTIVES`.
         longest: duration of a segment, s; None for any.
         starts: number of motions from which the search of a segment begins; None for those of `starts.starts`.
-        search_time: after which no more searches begin, s; None for none.
+        search_time: after which the search ends, s; None for none.
         intervals: of the spline of a segment, even.
         instants: of each interval, at which the search looks.
     """

@@ -208,7 +208,7 @@ def optima(
     start: Unknowns,
     barrier: float = BARRIERS[0],
     softness: float = SOFTNESS[0],
-    until: float = np.inf,
+    until: float | None = None,
 ) -> Optima:
     """Search for the best motions.
 
@@ -216,17 +216,22 @@ def optima(
         start: from which the search begins.
         barrier: weight of the barriers at the start.
         softness: of the equations at the start.
-        until: time of `time.monotonic` at which the search ends, s.
+        until: time of `time.monotonic` at which the search ends, s; then Ctrl-C ends it, too, and what has converged
+            stays. None: neither.
 
     Returns:
-        the motions; those that have not converged as they were last. Ctrl-C ends the search: what has converged stays.
+        the motions; those that have not converged as they were last.
     """
     count, points = len(start.duration), _Points.of(tasks, start)
     soft = Softness(np.full(count, softness), points.metric(), start.multipliers.copy())
     result = Optima(Unknowns(*(leaf.copy() for leaf in start)), np.zeros(count, bool), np.zeros(count, int))
     try:
-        is_stopped = not _sought(points, Levels(np.full(count, barrier), soft), result, until)
+        is_stopped = not _sought(
+            points, Levels(np.full(count, barrier), soft), result, np.inf if until is None else until
+        )
     except KeyboardInterrupt:
+        if until is None:
+            raise
         is_stopped = True
     return result._replace(is_stopped=is_stopped)
 
