@@ -5,7 +5,7 @@ own: equations say that they balance the motion, and that all other values are t
 need no rule, and no matrix is inverted, which may be singular on the way.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -28,7 +28,7 @@ from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.schema.limits import Limit
 from cspr_jax.schema.verdicts import Verdict
 
-BATCH = 512
+BATCH = 128
 # Entries of x behind the coordinates.
 SCALARS = 2
 # Depth below the spools, over the size of the robot, that a search keeps at least.
@@ -126,20 +126,37 @@ def _other_values(robot: AnyRobot, limits: Limits, longest: Array | None, state:
     return jnp.concatenate(parts) if parts else jnp.zeros(0)
 
 
+def _missed(
+    robot: AnyRobot,
+    limits: Limits,
+    longest: Array | None,
+    reference: Array,
+    place: Array,
+    duration: Array,
+    tensions: Array,
+) -> Array:
+    # Residuals of one instant.
+    state, unit = state_of(robot, reference, place, duration), wrench_units(robot)
+    wrench = robot.wrench_matrix(state) @ tensions - robot.inertial_wrench(state) / (robot.mass * robot.gravity)
+    return jnp.concatenate([wrench / unit, -_other_values(robot, limits, longest, state, duration)])
+
+
+@jax.jit
+def _residual_kernel(robot: AnyRobot, limits: Limits, longest: Array | None, instants: tuple[Array, ...]) -> Array:
+    return jax.vmap(partial(_missed, robot, limits, longest))(*instants)
+
+
 @jax.jit
 def _kernel(robot: AnyRobot, limits: Limits, longest: Array | None, instants: tuple[Array, ...]) -> InstantValues:
     def one(reference: Array, place: Array, duration: Array, tensions: Array, multipliers: Array) -> InstantValues:
-        unit, weight = wrench_units(robot), robot.mass * robot.gravity
-
-        def state(x: Array) -> State:
-            return state_of(robot, reference, x[:-1].reshape(place.shape), x[-1])
+        unit = wrench_units(robot)
 
         def matrix(x: Array) -> Array:
-            return robot.wrench_matrix(state(x)) / unit[:, None]
+            state = state_of(robot, reference, x[:-1].reshape(place.shape), x[-1])
+            return robot.wrench_matrix(state) / unit[:, None]
 
         def residual(x: Array) -> Array:
-            missing = matrix(x) @ tensions - robot.inertial_wrench(state(x)) / unit / weight
-            return jnp.concatenate([missing, -_other_values(robot, limits, longest, state(x), x[-1])])
+            return _missed(robot, limits, longest, reference, x[:-1].reshape(place.shape), x[-1], tensions)
 
         def widened(derivatives: Array, axes: int = 1) -> Array:
             return jnp.pad(derivatives, [(0, 0)] * (2 - axes) + [(0, SCALARS - 1)] * axes)
@@ -168,10 +185,29 @@ def instant_values(robot: AnyRobot, limits: Limits, longest: np.ndarray | None, 
     Returns:
         the equations, leaves (..., ...).
     """
+    return InstantValues(*_at_all(partial(_kernel, robot, limits, longest), instants))
+
+
+def residuals(robot: AnyRobot, limits: Limits, longest: np.ndarray | None, *instants: np.ndarray) -> np.ndarray:
+    """Residuals of the equations at many instants, for trials of steps, which need no derivatives.
+
+    Args:
+        longest: () longest duration, s; None for any.
+        instants: as of `instant_values`, without multipliers.
+
+    Returns:
+        (..., n_equations).
+    """
+    return _at_all(lambda part: (_residual_kernel(robot, limits, longest, part),), instants)[0]
+
+
+def _at_all(
+    kernel: Callable[[tuple[Array, ...]], Sequence[Array]], instants: tuple[np.ndarray, ...]
+) -> list[np.ndarray]:
+    # Results of a kernel, leaves (..., ...).
     shape = instants[2].shape
     flat = tuple(np.ascontiguousarray(part.reshape(-1, *part.shape[len(shape) :])) for part in instants)
-    values = in_batches(partial(_kernel, robot, limits, longest), flat, size=BATCH)
-    return InstantValues(*(leaf.reshape(*shape, *leaf.shape[1:]) for leaf in values))
+    return [leaf.reshape(*shape, *leaf.shape[1:]) for leaf in in_batches(kernel, flat, size=BATCH)]
 
 
 class ValueBounds(NamedTuple):

@@ -72,15 +72,6 @@ class _Points:
         equations = InstantValues(*(leaf[rows] for leaf in self.equations))
         return _Points(self.tasks.taken(rows), self.unknowns.taken(rows), equations, self.residual[rows])
 
-    def put(self, rows: np.ndarray, others: "_Points") -> None:
-        # Replaces some of the motions, in place.
-        for leaf, values in zip(self._leaves, others._leaves, strict=True):
-            leaf[rows] = values
-
-    @property
-    def _leaves(self) -> tuple[np.ndarray, ...]:
-        return *self.unknowns, *self.equations, self.residual
-
     def metric(self) -> np.ndarray:
         # A force that is missed counts as the tensions that it would take.
         matrix = self.equations.matrix
@@ -88,14 +79,6 @@ class _Points:
 
     def missed(self) -> np.ndarray:
         return np.abs(self.residual).reshape(len(self.residual), -1).max(1)
-
-    def merit(self, levels: Levels) -> np.ndarray:
-        soft, barrier = levels.soft, np.zeros(self.unknowns.values.shape)
-        for gap in self.tasks.gaps(self.unknowns):
-            barrier -= np.log(np.where(np.isfinite(gap), gap, 1.0))
-        price = (soft.level + 0.5 * soft.paid(self.residual)) * self.residual
-        each = price, wide(levels.barrier) * barrier
-        return self.tasks.cost(self.unknowns) + sum(part.reshape(len(part), -1).sum(1) for part in each)
 
     def errors(self, levels: Levels) -> np.ndarray:
         # Largest error of Newton's equations.
@@ -156,26 +139,29 @@ def _lengths(points: _Points, step: Step) -> tuple[np.ndarray, np.ndarray]:
     return _length(*gaps, (0.5 * unknowns.duration, change.duration)), _length(*duals)
 
 
+def _merit(tasks: Tasks, unknowns: Unknowns, residual: np.ndarray, levels: Levels) -> np.ndarray:
+    soft, barrier = levels.soft, np.zeros(unknowns.values.shape)
+    for gap in tasks.gaps(unknowns):
+        barrier -= np.log(np.where(np.isfinite(gap), gap, 1.0))
+    price = (soft.level + 0.5 * soft.paid(residual)) * residual
+    each = price, wide(levels.barrier) * barrier
+    return tasks.cost(unknowns) + sum(part.reshape(len(part), -1).sum(1) for part in each)
+
+
 def _descended(points: _Points, step: Step, levels: Levels) -> _Points:
     # The motions after a step, halved until the merit falls.
     primal, dual = _lengths(points, step)
-    before, after = points.merit(levels), points
-    rows = np.arange(len(primal))
-    for halving in range(HALVINGS + 1):
-        part = points.taken(rows)
-        trial = _Points.of(part.tasks, _moved(part.unknowns, step.change.taken(rows), primal[rows], dual[rows]))
-        merit = trial.merit(_taken(levels, rows))
+    before, rows = _merit(points.tasks, points.unknowns, points.residual, levels), np.arange(len(primal))
+    for _ in range(HALVINGS):
+        tasks, part = points.tasks.taken(rows), points.unknowns.taken(rows)
+        trial = _moved(part, step.change.taken(rows), primal[rows], dual[rows])
+        merit = _merit(tasks, trial, tasks.residual(trial), _taken(levels, rows))
         least = before[rows] + DESCENT * primal[rows] * step.fall[rows] + 1e-12 * np.abs(before[rows])
-        falls = (merit <= least) | (halving == HALVINGS)
-        if halving == 0 and falls.all():
-            return trial
-        after = after if halving else points.taken(rows)
-        after.put(rows[falls], trial.taken(falls))
-        rows = rows[~falls]
+        rows = rows[~(merit <= least)]
         if not len(rows):
             break
         primal[rows] *= 0.5
-    return after
+    return _Points.of(points.tasks, _moved(points.unknowns, step.change, primal, dual))
 
 
 def _taken(levels: Levels, rows: np.ndarray) -> Levels:

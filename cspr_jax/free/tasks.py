@@ -5,12 +5,12 @@ both sides share. So the outer three control points at each end follow from the 
 """
 
 import dataclasses
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cspr_jax.free.basis import Basis
-from cspr_jax.free.instants import InstantValues, instant_values
+from cspr_jax.free.instants import InstantValues, instant_values, residuals
 from cspr_jax.free.objectives import Objective
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
@@ -258,17 +258,30 @@ class Tasks:
         Returns:
             the equations, leaves (l, s, m, n, ...); their residuals with all values.
         """
-        shape, cables = unknowns.values.shape[:-1], self.robot.n_cables
-        equations = instant_values(
+        equations = instant_values(*self._instants(unknowns), unknowns.multipliers)
+        return equations, self._with_values(equations.residual.copy(), unknowns)
+
+    def residual(self, unknowns: Unknowns) -> np.ndarray:
+        """Residuals of the equations at all instants, with all values.
+
+        Returns:
+            (l, s, m, n, n_equations).
+        """
+        return self._with_values(residuals(*self._instants(unknowns)), unknowns)
+
+    def _instants(self, unknowns: Unknowns) -> tuple[Any, ...]:
+        # Arguments of the equations at all instants, but multipliers.
+        shape = unknowns.values.shape[:-1]
+        return (
             self.robot,
             self.limits,
             self.longest,
             np.broadcast_to(self.references[:, :, None, None], (*shape, 4)),
             self.basis.places(self.controls(unknowns)),
             np.broadcast_to(unknowns.duration[:, :, None, None], shape),
-            unknowns.values[..., :cables],
-            unknowns.multipliers,
+            unknowns.values[..., : self.robot.n_cables],
         )
-        residual = equations.residual.copy()
-        residual[..., self.robot.dof :] += unknowns.values[..., cables:]
-        return equations, residual
+
+    def _with_values(self, residual: np.ndarray, unknowns: Unknowns) -> np.ndarray:
+        residual[..., self.robot.dof :] += unknowns.values[..., self.robot.n_cables :]
+        return residual

@@ -113,6 +113,12 @@ def test_equations_have_their_derivatives(searched):
     np.testing.assert_allclose(times(equations.mixed, state), (high - low) / (2 * STEP), rtol=1e-4, atol=1e-5)
 
 
+def test_residuals_alone_are_those_of_the_equations(searched):
+    tasks, unknowns = searched
+    with double_precision():
+        np.testing.assert_allclose(tasks.residual(unknowns), tasks.equations(unknowns)[1], atol=1e-14)
+
+
 def test_what_is_eliminated_is_that_of_the_whole_matrix(searched):
     tasks, unknowns = searched
     rng = np.random.default_rng(4)
