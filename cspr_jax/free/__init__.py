@@ -14,6 +14,8 @@ Files, each importing only from those above it:
     tasks           motions that are sought together, and their unknowns
     elimination     tensions and multipliers, eliminated from Newton's equations of each instant
     newton          steps of Newton's method, with banded matrices
+    points          motions with their equations during a search, and how far they are from an optimum
+    descent         steps along which the merit falls
     search          the interior-point method
     starts          lines, bent lines and swings, from which searches begin
     poses           tasks from poses, and motions from what is found

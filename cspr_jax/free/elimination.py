@@ -147,3 +147,25 @@ def eliminated(
     starts = start, aim[..., dof:] + size * multiplier, multiplier
     falls = fall, (1.0 - size * share)[..., None] * jacobian, -share[..., None] * jacobian
     return Eliminated(bend, slope, np.concatenate(starts, axis=-1), np.concatenate(falls, axis=-2))
+
+
+def less_missed(matrix: np.ndarray, weights: np.ndarray, missed: np.ndarray, soft: Softness) -> np.ndarray:
+    """Changes dv of the values that make up for what equations miss, e, with the state as it is.
+
+    They make dv^T W dv + (e + A dv)^T (e + A dv) / S least.
+
+    Args:
+        matrix: (l, s, m, n, dof, n_cables) A of the tensions.
+        weights: (l, s, m, n, n_values) W.
+        missed: (l, s, m, n, n_equations) e.
+
+    Returns:
+        (l, s, m, n, n_values).
+    """
+    dof, cables = matrix.shape[-2:]
+    size = soft.size[:, None, None, None, None]
+    lighter = matrix / weights[..., None, :cables]
+    stiff = lighter @ transposed(matrix) + size[..., None] * soft.metric
+    push = np.linalg.solve(stiff, missed[..., :dof, None])[..., 0]
+    others = missed[..., dof:] / (1.0 + size * weights[..., cables:])
+    return -np.concatenate([times(transposed(lighter), push), others], axis=-1)

@@ -21,11 +21,26 @@ class Step(NamedTuple):
         change: of the unknowns.
         fall: (l,) slope of the merit along it.
         curved: (l,) what was added to the diagonal.
+        missed: (l, s, m, n, n_equations) change of what equations miss, to first order.
+        weights: (l, s, m, n, n_values) of the bounds of the values.
     """
 
     change: Unknowns
     fall: np.ndarray
     curved: np.ndarray
+    missed: np.ndarray
+    weights: np.ndarray
+
+    def taken(self, rows: np.ndarray) -> "Step":
+        """Steps of some of the motions.
+
+        Args:
+            rows: numbers, or a mask.
+
+        Returns:
+            the steps.
+        """
+        return Step(self.change.taken(rows), *(leaf[rows] for leaf in self[1:]))
 
 
 class _Bordered(NamedTuple):
@@ -190,7 +205,7 @@ def newton_step(
     price = (soft.level + soft.paid(residual)) * missed
     fall = tasks.cost_change(unknowns, change) + _sum(price)
     fall -= sum(_sum(wide(barrier) / gap * step) for gap, step in zip(gaps, steps, strict=True))
-    return Step(Unknowns(*change[:-2], *pushes), fall, used)
+    return Step(Unknowns(*change[:-2], *pushes), fall, used, missed, weights)
 
 
 def _with_objective(

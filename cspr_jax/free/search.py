@@ -11,9 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cspr_jax.free.descent import descended
 from cspr_jax.free.elimination import Softness, times, transposed
-from cspr_jax.free.instants import SCALARS, InstantValues
-from cspr_jax.free.newton import Step, gathered, newton_step
+from cspr_jax.free.newton import newton_step
+from cspr_jax.free.points import REGULAR, Levels, SearchPoints
 from cspr_jax.free.tasks import OUTER, Tasks, Unknowns, wide
 
 # Weight of the barriers and softness of the equations: at the start, at the end, and by what they fall.
@@ -22,22 +23,12 @@ SOFTNESS, SOFTNESS_FALL = (1.0, 1e-6), 0.2
 # Errors of Newton's equations, over the weight of the barriers, with which these fall; by how much equations are missed
 # in the end.
 CLOSE, MISSED = 10.0, 1e-6
-# Steps, all and for one weight of the barriers; halvings of one; part of the way to a bound that one goes; part of the
-# slope by which the merit falls at least.
-STEPS, PATIENCE, HALVINGS, SHARE, DESCENT = 150, 40, 8, 0.99, 1e-4
-# Multipliers of equations beyond which their mean counts as the unit of errors.
-LARGE = 100.0
+# Steps, all and for one weight of the barriers.
+STEPS, PATIENCE = 250, 80
 # Part of the range by which values are inside their bounds at the start, at least, and at most.
 INSIDE, AWAY = 0.1, 1e-2
-# Keeps the metric of the tensions regular; by how much multipliers of bounds and barriers over gaps may differ.
-REGULAR, APART = 1e-6, 1e10
-
-
-class Levels(NamedTuple):
-    """Weight of the barriers, (l,), and how far equations may be missed."""
-
-    barrier: np.ndarray
-    soft: Softness
+# By how much multipliers of bounds and barriers over gaps may differ.
+APART = 1e10
 
 
 class Optima(NamedTuple):
@@ -56,119 +47,7 @@ class Optima(NamedTuple):
     is_stopped: bool = False
 
 
-@dataclasses.dataclass(frozen=True)
-class _Points:
-    # Motions with their equations.
-    tasks: Tasks
-    unknowns: Unknowns
-    equations: InstantValues
-    residual: np.ndarray
-
-    @classmethod
-    def of(cls, tasks: Tasks, unknowns: Unknowns) -> "_Points":
-        return cls(tasks, unknowns, *tasks.equations(unknowns))
-
-    def taken(self, rows: np.ndarray) -> "_Points":
-        equations = InstantValues(*(leaf[rows] for leaf in self.equations))
-        return _Points(self.tasks.taken(rows), self.unknowns.taken(rows), equations, self.residual[rows])
-
-    def metric(self) -> np.ndarray:
-        # A force that is missed counts as the tensions that it would take.
-        matrix = self.equations.matrix
-        return matrix @ transposed(matrix) + REGULAR * np.eye(matrix.shape[-2])
-
-    def missed(self) -> np.ndarray:
-        return np.abs(self.residual).reshape(len(self.residual), -1).max(1)
-
-    def errors(self, levels: Levels) -> np.ndarray:
-        # Largest error of Newton's equations.
-        tasks, unknowns, soft = self.tasks, self.unknowns, levels.soft
-        count, dof, d, cables = len(unknowns.values), tasks.robot.dof, tasks.places.shape[-1], tasks.robot.n_cables
-        slope = gathered(tasks.basis, times(transposed(self.equations.slope), unknowns.multipliers))
-        tensions, shares = unknowns.values[..., :cables], tasks.energy_shares
-        slope[..., -2] += tasks.objective.time / tasks.scale[:, None] + np.sum(shares * tensions**2, axis=(2, 3, 4))
-        along = times(transposed(tasks.border_slopes(unknowns)), slope[..., tasks.border])
-        segments, accelerations = unknowns.duration.shape[1], np.zeros_like(unknowns.acceleration)
-        for side in (0, 1):
-            accelerations[:, side : segments + side] += along[..., 1 + side * d : 1 + (1 + side) * d]
-        balance = times(transposed(self.equations.matrix), unknowns.multipliers[..., :dof])
-        values = np.concatenate([balance, unknowns.multipliers[..., dof:]], axis=-1)
-        values = values - unknowns.low_push + unknowns.high_push
-        values[..., :cables] += 2.0 * shares * wide(unknowns.duration) * tensions
-        parts = [slope[..., OUTER * d : -SCALARS - OUTER * d], slope[..., -2] + along[..., 0], values]
-        parts.append(np.where(tasks.is_free[..., None], accelerations, 0.0))
-        pushes = unknowns.low_push, unknowns.high_push
-        if tasks.objective.level > 0.0:
-            lifts = tasks.objective.low_lift, -tasks.objective.high_lift
-            by_level = sum(push * lift for push, lift in zip(pushes, lifts, strict=True))
-            parts.append(tasks.objective.level + by_level.sum((2, 3, 4)))
-        for push, gap in zip(pushes, tasks.gaps(unknowns), strict=True):
-            is_bound = np.isfinite(gap)
-            parts.append(np.where(is_bound, np.where(is_bound, gap, 0.0) * push - wide(levels.barrier), 0.0))
-        unit = np.maximum(LARGE, (pushes[0] + pushes[1]).reshape(count, -1).mean(1)) / LARGE
-        largest = np.max([np.abs(part).reshape(count, -1).max(1, initial=0.0) for part in parts], axis=0)
-        price = self.residual - soft.missed(unknowns.multipliers - soft.level)
-        return np.maximum(largest / unit, np.abs(price).reshape(count, -1).max(1))
-
-
-def _moved(unknowns: Unknowns, change: Unknowns, primal: np.ndarray, dual: np.ndarray) -> Unknowns:
-    sizes = [primal] * 6 + [dual] * 2
-    return Unknowns(
-        *(
-            leaf + size.reshape(-1, *[1] * (leaf.ndim - 1)) * step
-            for leaf, size, step in zip(unknowns, sizes, change, strict=True)
-        )
-    )
-
-
-def _length(*pairs: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-    # Longest steps, up to 1, by which no value loses more than a share of itself, (l,).
-    lengths = np.ones(len(pairs[0][0]))
-    for value, change in pairs:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            longest = np.where(change < 0.0, -SHARE * value / change, np.inf)
-        lengths = np.minimum(lengths, longest.reshape(len(lengths), -1).min(1))
-    return lengths
-
-
-def _lengths(points: _Points, step: Step) -> tuple[np.ndarray, np.ndarray]:
-    # Longest steps of the unknowns, and of the multipliers of bounds.
-    tasks, unknowns, change = points.tasks, points.unknowns, step.change
-    gaps = zip(tasks.gaps(unknowns), tasks.gap_changes(change), strict=True)
-    duals = (unknowns.low_push, change.low_push), (unknowns.high_push, change.high_push)
-    return _length(*gaps, (0.5 * unknowns.duration, change.duration)), _length(*duals)
-
-
-def _merit(tasks: Tasks, unknowns: Unknowns, residual: np.ndarray, levels: Levels) -> np.ndarray:
-    soft, barrier = levels.soft, np.zeros(unknowns.values.shape)
-    for gap in tasks.gaps(unknowns):
-        barrier -= np.log(np.where(np.isfinite(gap), gap, 1.0))
-    price = (soft.level + 0.5 * soft.paid(residual)) * residual
-    each = price, wide(levels.barrier) * barrier
-    return tasks.cost(unknowns) + sum(part.reshape(len(part), -1).sum(1) for part in each)
-
-
-def _descended(points: _Points, step: Step, levels: Levels) -> _Points:
-    # The motions after a step, halved until the merit falls.
-    primal, dual = _lengths(points, step)
-    before, rows = _merit(points.tasks, points.unknowns, points.residual, levels), np.arange(len(primal))
-    for _ in range(HALVINGS):
-        tasks, part = points.tasks.taken(rows), points.unknowns.taken(rows)
-        trial = _moved(part, step.change.taken(rows), primal[rows], dual[rows])
-        merit = _merit(tasks, trial, tasks.residual(trial), _taken(levels, rows))
-        least = before[rows] + DESCENT * primal[rows] * step.fall[rows] + 1e-12 * np.abs(before[rows])
-        rows = rows[~(merit <= least)]
-        if not len(rows):
-            break
-        primal[rows] *= 0.5
-    return _Points.of(points.tasks, _moved(points.unknowns, step.change, primal, dual))
-
-
-def _taken(levels: Levels, rows: np.ndarray) -> Levels:
-    return Levels(levels.barrier[rows], Softness(*(leaf[rows] for leaf in levels.soft)))
-
-
-def _sharpened(points: _Points, levels: Levels) -> tuple[Levels, np.ndarray]:
+def _sharpened(points: SearchPoints, levels: Levels) -> tuple[Levels, np.ndarray]:
     # Weights and softness, smaller where their optimum is reached; errors.
     barrier, (size, metric, level) = levels
     while True:
@@ -208,7 +87,7 @@ def optima(
     Returns:
         the motions; those that have not converged as they were last.
     """
-    count, points = len(start.duration), _Points.of(tasks, start)
+    count, points = len(start.duration), SearchPoints.of(tasks, start)
     soft = Softness(np.full(count, softness), points.metric(), start.multipliers.copy())
     result = Optima(Unknowns(*(leaf.copy() for leaf in start)), np.zeros(count, bool), np.zeros(count, int))
     try:
@@ -222,7 +101,7 @@ def optima(
     return result._replace(is_stopped=is_stopped)
 
 
-def _sought(points: _Points, levels: Levels, result: Optima, until: float) -> bool:
+def _sought(points: SearchPoints, levels: Levels, result: Optima, until: float) -> bool:
     # Puts motions into the result as their searches end; whether all have ended in time.
     rows = np.arange(len(result.steps))
     curved, waited = np.zeros(len(rows)), np.zeros(len(rows))
@@ -240,16 +119,16 @@ def _sought(points: _Points, levels: Levels, result: Optima, until: float) -> bo
             return not is_late
         if is_over.any():
             rows, curved, waited = rows[~is_over], curved[~is_over], waited[~is_over]
-            points, levels = points.taken(~is_over), _taken(levels, ~is_over)
+            points, levels = points.taken(~is_over), levels.taken(~is_over)
         step = newton_step(
             points.tasks, points.unknowns, points.equations, points.residual, levels.barrier, levels.soft, curved
         )
         curved = np.where(step.curved > 0.0, step.curved, curved)
-        points = _safeguarded(_descended(points, step, levels), levels.barrier)
+        points = _safeguarded(descended(points, step, levels), levels.barrier)
     return True
 
 
-def _safeguarded(points: _Points, barrier: np.ndarray) -> _Points:
+def _safeguarded(points: SearchPoints, barrier: np.ndarray) -> SearchPoints:
     # Multipliers of bounds not too far from barriers over gaps.
     unknowns, pushes = points.unknowns, []
     for push, gap in zip((unknowns.low_push, unknowns.high_push), points.tasks.gaps(unknowns), strict=True):

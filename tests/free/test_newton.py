@@ -9,7 +9,7 @@ from support.free_motions import problem_of
 
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.free.basis import basis
-from cspr_jax.free.elimination import Softness, eliminated, times, transposed
+from cspr_jax.free.elimination import Softness, eliminated, less_missed, times, transposed
 from cspr_jax.free.instants import ValueBounds, bounds
 from cspr_jax.free.newton import gathered, newton_step
 from cspr_jax.free.objectives import OBJECTIVES
@@ -145,6 +145,27 @@ def test_what_is_eliminated_is_that_of_the_whole_matrix(searched):
     whole = times(equations.bend, step) + times(transposed(mixed), change)
     whole = whole + times(transposed(equations.slope), multipliers)
     np.testing.assert_allclose(times(local.bend, step) + local.slope, whole, atol=1e-8)
+
+
+def test_values_make_up_for_what_equations_miss(searched):
+    """At the least of a convex function its slope vanishes."""
+    tasks, unknowns = searched
+    rng = np.random.default_rng(5)
+    with double_precision():
+        matrix, residual = tasks.equations(unknowns)[0].matrix, tasks.residual(unknowns)
+    weights = rng.uniform(0.1, 2.0, unknowns.values.shape)
+    factor = rng.normal(size=(*residual.shape[:-1], 3, 3))
+    soft = Softness(np.array([0.3]), np.eye(3) + factor @ transposed(factor), unknowns.multipliers)
+    missed = rng.normal(size=residual.shape)
+    change = less_missed(matrix, weights, missed, soft)
+    left = missed.copy()
+    left[..., :3] += times(matrix, change[..., :3])
+    left[..., 3:] += change[..., 3:]
+    price = soft.paid(left)
+    slope = weights * change
+    slope[..., :3] += times(transposed(matrix), price[..., :3])
+    slope[..., 3:] += price[..., 3:]
+    np.testing.assert_allclose(slope, 0.0, atol=1e-9)
 
 
 def merit(tasks, name, unknowns, barrier, soft):
