@@ -74,7 +74,7 @@ def free_motion(problem: Problem, scene: Scene | None, poses: FreePoses, setting
     """
     question = FreeQuestion.of(problem, scene, poses, settings)
     best, is_stopped = _searched(question)
-    tasks, optimum = question.tasks(settings.intervals, settings.instants), None
+    tasks, optimum = question.tasks(settings.intervals, question.instants), None
     if all(one.is_optimal for one in best):
         optimum = _first_optimum(tasks, ((_together(tasks, best, each[0]), *each) for each in FINE))
     unknowns, is_optimal = optimum or _together(tasks, best, FINE[0][0]), optimum is not None

@@ -7,7 +7,7 @@ import numpy as np
 
 from cspr_jax.curves.spline import Spline, chained
 from cspr_jax.free.basis import basis
-from cspr_jax.free.instants import ValueBounds, bounds
+from cspr_jax.free.instants import ValueBounds, bounds, coordinates
 from cspr_jax.free.objectives import OBJECTIVES, Objective
 from cspr_jax.free.poses import FreePoses, check_searched, tasks_of
 from cspr_jax.free.tasks import Tasks
@@ -17,8 +17,11 @@ from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.clearance import Scene
 
 # Slack that is left after tightening, in the units of values; by what more than is missed, and by how much at least and
-# at most, bounds tighten; by what share of it those of the next pieces do.
+# at most, bounds tighten, the latter times half their range where that is above 1; by what share of it those of the
+# next pieces do.
 LEFT, MORE, STEP, MOST, BESIDE = 1e-7, 1.5, 1e-6, 0.03, 0.5
+# Instants of each interval, of point masses and of platforms: between two of them, the tensions of platforms bend more.
+INSTANTS = 4, 8
 
 
 class FreeSettings(NamedTuple):
@@ -30,7 +33,7 @@ class FreeSettings(NamedTuple):
         starts: number of motions from which the search of a segment begins; None for those of `starts.starts`.
         search_time: after which the search ends, s; None for none.
         intervals: of the spline of a segment, even.
-        instants: of each interval, at which the search looks.
+        instants: of each interval, at which the search looks; None for those of `INSTANTS`.
     """
 
     objective: str = "time"
@@ -38,7 +41,7 @@ class FreeSettings(NamedTuple):
     starts: int | None = None
     search_time: float | None = None
     intervals: int = 48
-    instants: int = 4
+    instants: int | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,6 +71,12 @@ class FreeQuestion:
         limits = bounds(robot, problem.limits, criteria(robot, problem.limits, scene), settings.longest is not None)
         objective, limits = OBJECTIVES[settings.objective](limits, robot.n_cables)
         return cls(problem, scene, poses, limits, objective, settings)
+
+    @property
+    def instants(self) -> int:
+        """Instants of each interval at which the search looks in the end."""
+        turns = len(coordinates(self.problem.robot.pattern)[1]) > 0
+        return self.settings.instants or INSTANTS[turns]
 
     def tasks(self, intervals: int, instants: int) -> Tasks:
         """The question on some intervals.
@@ -100,7 +109,9 @@ def tightened(question: FreeQuestion, tasks: Tasks, motions: list[Spline]) -> Ta
     missed = np.where(unit > 0.0, LEFT - slacks.low * unit, 0.0)
     if not (missed > 0.0).any():
         return None
-    steps = np.where(missed > 0.0, np.minimum(MORE * missed + STEP, MOST), 0.0) / np.where(unit > 0.0, unit, 1.0)
+    half = 0.5 * (limits.high - limits.low)
+    size = np.max(np.where((changes > 0.0) & np.isfinite(half), half, 1.0), axis=1, initial=1.0)
+    steps = np.where(missed > 0.0, np.minimum(MORE * missed + STEP, MOST * size), 0.0) / np.where(unit > 0.0, unit, 1.0)
     # A slack that is smallest beside a border depends on the bounds of the next piece as much.
     steps = steps.reshape(len(tasks.low), -1, len(unit))
     near = steps.copy()
