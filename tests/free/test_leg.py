@@ -84,6 +84,23 @@ def test_energy_between_velocities():
 
 
 @pytest.mark.thorough
+@pytest.mark.parametrize(
+    ("robot", "tension_max", "z0", "place", "longest"),
+    [("laval-mssm", 60.0, 2.0, [0.2, 0.1, 2.2], 0.52), ("cogiro", 1500.0, 3.0, [1.0, 0.5, 2.5], 0.48)],
+)
+def test_platforms_leave_rest(robot, tension_max, z0, place, longest):
+    """Six and eight cables; samples of the proved motion agree."""
+    keys = {"robot": robot, "z0": z0, "limits": {"tension_max": tension_max}}
+    planned = cspr_jax.plan(KEYS | keys | {"pose": [{"rest": True}, *poses(place)]})
+    (segment,) = planned.to_dict()["segments"]
+    assert segment["verdict"] == "feasible"
+    assert segment["lower_bound"] < segment["duration"] < longest
+    tensions = planned.rows(rate=2000.0)["tension"]
+    assert -1e-9 < tensions.min()
+    assert tensions.max() < tension_max + 1e-9
+
+
+@pytest.mark.thorough
 def test_nothing_is_found():
     """Below 3 m/s no motion stays taut between these poses."""
     planned = cspr_jax.plan(KEYS | {"limits": LIMITS | {"speed_max": 3.0}, "pose": poses(*PLACES[:2])})
