@@ -122,7 +122,8 @@ def test_platforms_keep_their_orientation():
             assert np.isnan(cell["duration"])
             continue
         planned = plan(keys)
-        assert cell["duration"] == pytest.approx(planned.to_dict()["segments"][0]["duration"], rel=0.02)
+        # Maps search from fewer starts, and with wider intervals.
+        assert cell["duration"] == pytest.approx(planned.to_dict()["segments"][0]["duration"], rel=0.05)
         np.testing.assert_allclose(planned.rows()["quaternion"][[0, -1]], [turn, turn], atol=1e-9)
 
 
