@@ -10,7 +10,7 @@ from scipy.interpolate import BSpline
 
 from cspr_jax.curves.spline import Spline
 from cspr_jax.free.basis import DEGREE, Basis
-from cspr_jax.free.poses import FreePoses, motions_of, segments_of
+from cspr_jax.free.poses import FreePoses, divided, motions_of, segments_of
 from cspr_jax.free.question import FreeQuestion, FreeSettings, tightened
 from cspr_jax.free.search import Optima, again, optima, started
 from cspr_jax.free.starts import starts
@@ -25,6 +25,9 @@ ROUNDS = 10
 # Weights of barriers, and softness, with which searches go on from a motion within tighter bounds, or a coarser one.
 ON = ((1e-5, 1e-2), (1e-3, 1e-1), (1e-2, 1.0), (1e-2, 10.0))
 FINE = ((1e-4, 1e-1), (1e-2, 1.0), (1e-2, 10.0))
+# Searches of all segments together: by what the intervals are divided, and the number of a way of `FINE`. Searches that
+# get stuck on many intervals converge on fewer, on which motions are some parts in a thousand slower.
+TOGETHER = ((1.0, 0), (1.0, 1), (1.5, 0), (2.0, 0), (1.0, 2))
 # Searches of single segments, each for those for which the ones before have no two starts with the same best motion, by
 # this part of its duration: by what the intervals are divided, and the softness; instants of each interval.
 SEARCHES, FEWEST, SAME = ((2, 10.0), (2, 1.0), (1, 1.0)), 3, 1e-3
@@ -73,10 +76,13 @@ def free_motion(problem: Problem, scene: Scene | None, poses: FreePoses, setting
         InputError: a robot for which no free motion is sought, or a cable without a largest tension.
     """
     question = FreeQuestion.of(problem, scene, poses, settings)
-    best, is_stopped = _searched(question)
+    best, is_stopped = (_begun(question), False) if len(divided(problem, poses)) else _searched(question)
     tasks, optimum = question.tasks(settings.intervals, question.instants), None
-    if all(one.is_optimal for one in best):
-        optimum = _first_optimum(tasks, ((_together(tasks, best, each[0]), *each) for each in FINE))
+    for share, way in TOGETHER if all(one.is_optimal for one in best) else ():
+        tasks = question.tasks(2 * round(0.5 * settings.intervals / share), question.instants)
+        optimum = _first_optimum(tasks, [(_together(tasks, best, FINE[way][0]), *FINE[way])])
+        if optimum is not None:
+            break
     unknowns, is_optimal = optimum or _together(tasks, best, FINE[0][0]), optimum is not None
     searched = float(unknowns.duration.sum()) if is_optimal else np.nan
     for number in range(1, ROUNDS + 1):
@@ -118,6 +124,14 @@ class _Best(NamedTuple):
     basis: Basis
     is_optimal: bool
     is_shared: bool
+
+
+def _begun(question: FreeQuestion) -> list[_Best]:
+    # Starts that are not searched from, since no motion can be proved.
+    single = segments_of(question.tasks(question.settings.intervals, FEWEST))
+    begun = starts(single, question.poses.z0, 1)
+    pairs = zip(begun.controls[:, 0], begun.duration[:, 0].tolist(), strict=True)
+    return [_Best(*pair, np.inf, single.basis, is_optimal=False, is_shared=False) for pair in pairs]
 
 
 def _searched(question: FreeQuestion) -> tuple[list[_Best], bool]:

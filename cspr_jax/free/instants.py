@@ -5,6 +5,7 @@ own: equations say that they balance the motion, and that all other values are t
 need no rule, and no matrix is inverted, which may be singular on the way.
 """
 
+import itertools
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple
@@ -33,6 +34,10 @@ BATCH = 128
 SCALARS = 2
 # Depth below the spools, over the size of the robot, that a search keeps at least.
 BELOW = 0.02
+# Choices of three of six columns, and the others; the signs of their products in the determinant.
+HALVES = np.array(list(itertools.combinations(range(6), 3)))
+OTHERS = np.array([np.setdiff1d(np.arange(6), half) for half in HALVES])
+SIGNS = (-1.0) ** (HALVES.sum(1) - 3)
 
 
 class InstantValues(NamedTuple):
@@ -119,11 +124,38 @@ def _other_values(robot: AnyRobot, limits: Limits, longest: Array | None, state:
         limit = jnp.atleast_1d(jnp.asarray(getattr(limits, row.name)))
         scale = size if row.is_height else limit**2 if row.of_mass_centre else limit
         parts.append(values[row.quantity] / scale)
-    if judged_poses(robot)[1]:
+    is_regular, is_below = judged_poses(robot)
+    if is_regular:
+        parts.append(determinant(robot, state)[None])
+    if is_below:
         parts.append(jnp.dot(plane_normal(robot), state.position)[None] / size)
     if longest is not None:
         parts.append(duration[None] / longest)
     return jnp.concatenate(parts) if parts else jnp.zeros(0)
+
+
+def determinant(robot: AnyRobot, state: State) -> Array:
+    """Determinant of the wrenches of unit tensions, their moments over the size of the platform.
+
+    It is a polynomial in their components, so that its derivatives are numbers where it vanishes, too.
+
+    Args:
+        robot: a platform on as many cables as degrees of freedom.
+
+    Returns:
+        ().
+    """
+    matrix = robot.wrench_matrix(state) / wrench_units(robot)[:, None]
+    if robot.dof == 3:
+        return _triple(matrix[:, None])[0]
+    forces, moments = (_triple(rows[:, chosen]) for rows, chosen in ((matrix[:3], HALVES), (matrix[3:], OTHERS)))
+    return jnp.sum(SIGNS * forces * moments)
+
+
+def _triple(columns: Array) -> Array:
+    # Triple products (k,) of three columns each, (3, k, 3).
+    a, b, c = (columns[:, :, j].T for j in range(3))
+    return jnp.sum(a * jnp.cross(b, c), axis=1)
 
 
 def _missed(
@@ -218,12 +250,14 @@ class ValueBounds(NamedTuple):
         high: (n_values,) inf for none.
         rises: (n_criteria, n_values) by how much a lower bound rises so that the slack of a criterion grows by 1.
         falls: (n_criteria, n_values) by how much an upper bound falls.
+        determinant: number of the value that is the determinant; None without one.
     """
 
     low: np.ndarray
     high: np.ndarray
     rises: np.ndarray
     falls: np.ndarray
+    determinant: int | None = None
 
 
 class _Value(NamedTuple):
@@ -260,7 +294,11 @@ def bounds(robot: AnyRobot, limits: Limits, rows: Sequence[Criterion], is_timed:
             top = most / size if row.is_height else 1.0
             bottom = -1.0 if row.quantity in ("speed", "acceleration") else -np.inf
             values.append(_Value(bottom, top, row.flag, row.flag, k if row.per_cable else -1, change))
-    if judged_poses(robot)[1]:
+    is_regular, is_below = judged_poses(robot)
+    if is_regular:
+        # Bounded on the side of the poses, `poses.tasks_of`.
+        values.append(_Value(-np.inf, np.inf, Verdict.SINGULAR, Verdict.SINGULAR, -1, 0.0))
+    if is_below:
         values.append(_Value(BELOW, np.inf, Verdict.ABOVE_SPOOLS, Verdict.FEASIBLE, -1, 1.0 / size))
     if is_timed:
         values.append(_Value(-np.inf, 1.0, Verdict.FEASIBLE, Verdict.FEASIBLE, -1, 0.0))
@@ -281,4 +319,5 @@ def bounds(robot: AnyRobot, limits: Limits, rows: Sequence[Criterion], is_timed:
         )
 
     low, high = (np.array([getattr(value, side) for value in values]) for side in ("low", "high"))
-    return ValueBounds(low, high, changes("least", "low"), changes("most", "high"))
+    place = [k for k, value in enumerate(values) if value.least == Verdict.SINGULAR]
+    return ValueBounds(low, high, changes("least", "low"), changes("most", "high"), *place)

@@ -10,7 +10,7 @@ from cspr_jax.build.orientations import pose_quaternions
 from cspr_jax.build.scenes import scene_of
 from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.free.free_motion import FreeMotion, free_motion
-from cspr_jax.free.poses import FreePoses
+from cspr_jax.free.poses import FreePoses, divided
 from cspr_jax.free.question import FreeSettings
 from cspr_jax.free.time_bounds import time_bounds
 from cspr_jax.motions.answers import Answers, joined
@@ -25,6 +25,10 @@ from cspr_jax.robots.point_mass import rest_point
 
 LEVELS = ("tension", "margin")
 STOPPED = "the search was stopped before its end: more starts might have led to a better motion"
+DIVIDED = (
+    "{} and {} lie on opposite sides of singular poses (determinants {:.3g} and {:.3g}): every motion between them "
+    "passes one, at which the cables cannot carry every wrench, so nothing is sought"
+)
 MISSED = "the search found no motion that keeps all limits; the numbers are those of the last one that it looked at"
 
 
@@ -86,7 +90,10 @@ class FreeMotions(Leg):
             raise ConfigError(stops.path, str(error)) from error
         if any(part.is_stopped for part in parts):
             self._notes.append(f'family = "free": {STOPPED}')
-        if not all(part.is_optimal for part in parts):
+        sides = divided(problem, poses)
+        for i, *ends in sides.tolist():
+            self._notes.append(f'family = "free": {DIVIDED.format(stops.name(int(i)), stops.name(int(i) + 1), *ends)}')
+        if not len(sides) and not all(part.is_optimal for part in parts):
             self._notes.append(f'family = "free": {MISSED}')
         answers = joined([part.answers for part in parts])
         columns = {field.name: getattr(answers, field.name) for field in dataclasses.fields(answers)}

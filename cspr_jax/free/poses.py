@@ -1,21 +1,28 @@
 """Poses between which free motions are sought, as tasks of the search, and motions from what it finds."""
 
 import dataclasses
+from functools import partial
 from typing import NamedTuple
 
+import jax
 import numpy as np
 
+from cspr_jax.arithmetic import rotations
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.rotations import products
 from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import InputError
 from cspr_jax.free.basis import Basis
-from cspr_jax.free.instants import ValueBounds, coordinates
+from cspr_jax.free.instants import ValueBounds, coordinates, determinant
 from cspr_jax.free.objectives import Objective
 from cspr_jax.free.tasks import Tasks, Unknowns
+from cspr_jax.motions.criteria import judged_poses
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.robots.wrench_balance import at_rest
 
+# Part of the smaller determinant of both ends that a motion keeps.
+REGULAR = 1e-2
 BACK = np.array([1.0, -1.0, -1.0, -1.0])
 
 
@@ -88,6 +95,40 @@ def _joined(problem: Problem, poses: FreePoses) -> _Joined:
     return _Joined(places, velocities, references, turns, accelerations)
 
 
+def determinants(problem: Problem, poses: FreePoses) -> np.ndarray:
+    """Determinants at the poses of a platform on as many cables as degrees of freedom; see `instants.determinant`.
+
+    Returns:
+        (k,).
+    """
+    turned = jax.vmap(rotations.matrix)(leaf(poses.quaternions))
+    states = jax.vmap(at_rest)(leaf(poses.positions), turned)
+    return np.asarray(jax.vmap(partial(determinant, problem.robot))(states))
+
+
+def divided(problem: Problem, poses: FreePoses) -> np.ndarray:
+    """Segments whose ends lie on opposite sides of singular poses.
+
+    Every motion between them passes one, where the cables cannot carry every wrench, so that none is proved.
+
+    Returns:
+        (n, 3) number of the segment, and determinants at both ends.
+    """
+    if not judged_poses(problem.robot)[0]:
+        return np.zeros((0, 3))
+    values = determinants(problem, poses)
+    rows = np.flatnonzero(values[:-1] * values[1:] < 0.0)
+    return np.stack([rows, values[rows], values[rows + 1]], axis=1)
+
+
+def _sides(problem: Problem, poses: FreePoses) -> np.ndarray:
+    # Bounds (2, s) of the determinant, which keep motions on the side of singular poses on which both ends are.
+    values = determinants(problem, poses)
+    ends = np.stack([values[:-1], values[1:]])
+    least = REGULAR * np.abs(ends).min(0)
+    return np.stack([np.where((ends > 0.0).all(0), least, -np.inf), np.where((ends < 0.0).all(0), -least, np.inf)])
+
+
 def tasks_of(
     problem: Problem, basis: Basis, bounds: ValueBounds, objective: Objective, poses: FreePoses, longest: float | None
 ) -> Tasks:
@@ -103,6 +144,9 @@ def tasks_of(
     places, velocities, references, turns, accelerations = _joined(problem, poses)
     is_free = np.isnan(accelerations).any(1)
     shape = 1, len(places), *basis.tau.shape, len(bounds.low)
+    low, high = (np.broadcast_to(side, shape).copy() for side in (bounds.low, bounds.high))
+    if bounds.determinant is not None:
+        low[0, ..., bounds.determinant], high[0, ..., bounds.determinant] = _sides(problem, poses)[..., None, None]
     return Tasks(
         robot=problem.robot,
         limits=problem.limits,
@@ -113,8 +157,8 @@ def tasks_of(
         turns=turns[None],
         accelerations=np.where(is_free[:, None], 0.0, accelerations)[None],
         is_free=is_free[None],
-        low=np.broadcast_to(bounds.low, shape).copy(),
-        high=np.broadcast_to(bounds.high, shape).copy(),
+        low=low,
+        high=high,
         scale=np.full(1, np.pi * np.sqrt(poses.z0 / float(problem.robot.gravity))),
         objective=objective,
         longest=None if longest is None else np.asarray(longest, float),

@@ -183,7 +183,7 @@ def started(tasks: Tasks, controls: np.ndarray, duration: np.ndarray, barrier: f
     equations, residual = tasks.equations(unknowns)
     # Tensions nearest to the middle of their range that balance the motion.
     low, high = tasks.bounds(level)
-    middle = 0.5 * (low + high)[..., :cables]
+    middle = 0.5 * (low[..., :cables] + high[..., :cables])
     matrix = equations.matrix
     lacking = -residual[..., :dof] - times(matrix, middle)
     metric = matrix @ transposed(matrix) + REGULAR * np.eye(dof)
