@@ -19,8 +19,10 @@ Files, each importing only from those above it:
     search          the interior-point method
     starts          lines, bent lines and swings, from which searches begin
     poses           tasks from poses, and motions from what is found
+    closed_forms    motions of other families, from which searches begin, too
     question        poses, limits and objective of a search, and how bounds tighten
     free_motion     the fastest motion through poses, tightened until it is proved
+    no_slower       closed forms in place of what a search finds, where they are faster
     neighbours      the best motions of many pairs of poses, from few starts and from neighbours' motions
     many            the fastest motions of many pairs of poses, tightened until they are proved
     time_bounds     lower bounds of the time of all motions between two poses

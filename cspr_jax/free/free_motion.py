@@ -2,7 +2,7 @@
 
 import dataclasses
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +10,7 @@ from scipy.interpolate import BSpline
 
 from cspr_jax.curves.spline import Spline
 from cspr_jax.free.basis import DEGREE, Basis
+from cspr_jax.free.closed_forms import ClosedForm, with_forms
 from cspr_jax.free.poses import FreePoses, divided, motions_of, segments_of
 from cspr_jax.free.question import FreeQuestion, FreeSettings, tightened
 from cspr_jax.free.search import Optima, again, optima, started
@@ -47,6 +48,7 @@ class FreeMotion:
         is_optimal: whether the search met all limits at the instants that it looks at.
         is_stopped: whether Ctrl-C, or `search_time`, has ended it before its end.
         searched: duration of all segments before bounds were tightened, s; NaN without a motion.
+        family: whose motions these are, where the search came to none that are faster; None: its own.
     """
 
     motions: list[Spline]
@@ -56,6 +58,7 @@ class FreeMotion:
     is_optimal: bool
     is_stopped: bool
     searched: float
+    family: str | None = None
 
     @property
     def duration(self) -> float:
@@ -63,11 +66,18 @@ class FreeMotion:
         return float(sum(motion.knots[-1] for motion in self.motions))
 
 
-def free_motion(problem: Problem, scene: Scene | None, poses: FreePoses, settings: FreeSettings = USUAL) -> FreeMotion:
+def free_motion(
+    problem: Problem,
+    scene: Scene | None,
+    poses: FreePoses,
+    settings: FreeSettings = USUAL,
+    forms: Sequence[ClosedForm] = (),
+) -> FreeMotion:
     """Search for the fastest motion through poses, all its segments together, and prove it.
 
     Args:
         scene: bodies that can meet; they are judged with the motion, and do not change it.
+        forms: motions of other families, from which the search begins, too.
 
     Returns:
         the motion; where tightening ends before all is proved, the last one.
@@ -76,7 +86,7 @@ def free_motion(problem: Problem, scene: Scene | None, poses: FreePoses, setting
         InputError: a robot for which no free motion is sought, or a cable without a largest tension.
     """
     question = FreeQuestion.of(problem, scene, poses, settings)
-    best, is_stopped = (_begun(question), False) if len(divided(problem, poses)) else _searched(question)
+    best, is_stopped = (_begun(question), False) if len(divided(problem, poses)) else _searched(question, forms)
     tasks, optimum = question.tasks(settings.intervals, question.instants), None
     for share, way in TOGETHER if all(one.is_optimal for one in best) else ():
         tasks = question.tasks(2 * round(0.5 * settings.intervals / share), question.instants)
@@ -134,7 +144,7 @@ def _begun(question: FreeQuestion) -> list[_Best]:
     return [_Best(*pair, np.inf, single.basis, is_optimal=False, is_shared=False) for pair in pairs]
 
 
-def _searched(question: FreeQuestion) -> tuple[list[_Best], bool]:
+def _searched(question: FreeQuestion, forms: Sequence[ClosedForm]) -> tuple[list[_Best], bool]:
     # The best motion along each segment by itself, from all starts; where starts disagree, by all searches. Whether the
     # search has been stopped: by Ctrl-C only where there is something to keep.
     settings, poses = question.settings, question.poses
@@ -146,7 +156,7 @@ def _searched(question: FreeQuestion) -> tuple[list[_Best], bool]:
             return list(best.values()), bool(len(rows))
         stage(f"free motion: search {number}{_said(best, settings.objective)}")
         single = segments_of(question.tasks(settings.intervals // share, FEWEST))
-        begun = starts(single.taken(rows), poses.z0, settings.starts)
+        begun = with_forms(starts(single.taken(rows), poses.z0, settings.starts), single, rows, forms)
         lanes = single.taken(rows[begun.task])
         result = optima(lanes, started(lanes, begun.controls, begun.duration), softness=softness, until=until)
         _keep(best, rows, begun.task, lanes, result)

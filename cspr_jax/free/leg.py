@@ -1,6 +1,8 @@
 """Leg of free motions: poses joined by the fastest motions that are found between them."""
 
 import dataclasses
+from collections.abc import Callable, Sequence
+from functools import cache, partial
 from typing import Any
 
 import jax.numpy as jnp
@@ -9,7 +11,9 @@ import numpy as np
 from cspr_jax.build.orientations import pose_quaternions
 from cspr_jax.build.scenes import scene_of
 from cspr_jax.errors import ConfigError, InputError, shown
+from cspr_jax.free.closed_forms import ClosedForm, closed_forms
 from cspr_jax.free.free_motion import FreeMotion, free_motion
+from cspr_jax.free.no_slower import can_be_faster, no_slower
 from cspr_jax.free.poses import FreePoses, divided
 from cspr_jax.free.question import FreeSettings
 from cspr_jax.free.time_bounds import time_bounds
@@ -29,6 +33,7 @@ DIVIDED = (
     "{} and {} lie on opposite sides of singular poses (determinants {:.3g} and {:.3g}): every motion between them "
     "passes one, at which the cables cannot carry every wrench, so nothing is sought"
 )
+FOLLOWED = 'the search found nothing faster than family = "{}", whose motions these are'
 MISSED = "the search found no motion that keeps all limits; the numbers are those of the last one that it looked at"
 
 
@@ -63,6 +68,7 @@ class FreeMotions(Leg):
         """Refuse keys of other families, and accelerations that do not fit the poses."""
         super().__init__(stops)
         self._notes: list[str] = []
+        self._others: Sequence[Leg] = ()
         self._refuse("arcs", "beta_hat")
         accelerations = stops.keys.end_accelerations
         if isinstance(accelerations, list) and len(accelerations) != len(stops.keys.pose):
@@ -77,6 +83,10 @@ class FreeMotions(Leg):
             why = f'which objective = "{stops.keys.objective}" needs: the slower a motion, the better it is'
             raise ConfigError(stops.path, f"duration_max is missing: longest duration of a segment, s, {why}")
 
+    def begin_with(self, others: Sequence[Leg]) -> None:
+        """Begin searches from motions of other families, too; see `Leg.begin_with`."""
+        self._others = others
+
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the poses; see `Leg.join`."""
         stops = self.stops
@@ -90,6 +100,8 @@ class FreeMotions(Leg):
             raise ConfigError(stops.path, str(error)) from error
         if any(part.is_stopped for part in parts):
             self._notes.append(f'family = "free": {STOPPED}')
+        for family in dict.fromkeys(part.family for part in parts if part.family):
+            self._notes.append(f'family = "free": {FOLLOWED.format(family)}')
         sides = divided(problem, poses)
         for i, *ends in sides.tolist():
             self._notes.append(f'family = "free": {DIVIDED.format(stops.name(int(i)), stops.name(int(i) + 1), *ends)}')
@@ -114,19 +126,34 @@ class FreeMotions(Leg):
         return self._notes
 
     def _together(self, problem: Problem, scene: Scene, poses: FreePoses) -> list[FreeMotion]:
-        return [free_motion(problem, scene, poses, self._settings)]
+        return [self._no_slower(problem, scene, poses, lambda: closed_forms(self._others, problem, poses))]
 
     def _separate(self, problem: Problem, scene: Scene, poses: FreePoses) -> list[FreeMotion]:
         # Each segment begins with the acceleration with which the one before ends.
         parts, accelerations = list[FreeMotion](), poses.accelerations.copy()
+        forms = cache(lambda: closed_forms(self._others, problem, poses))
         for i in range(len(self)):
             quaternions = None if poses.quaternions is None else poses.quaternions[i : i + 2]
-            ends = poses.positions[i : i + 2], quaternions, poses.velocities[i : i + 2], accelerations[i : i + 2]
-            parts.append(free_motion(problem, scene, FreePoses(*ends, poses.z0), self._settings))
+            ends = poses.positions[i : i + 2], quaternions, poses.velocities[i : i + 2], accelerations[i : i + 2].copy()
+            segment = FreePoses(*ends, poses.z0)
+            parts.append(self._no_slower(problem, scene, segment, partial(_of_segment, forms, i)))
             end = parts[-1].motions[0].state(jnp.asarray(1.0))
             turning = [] if quaternions is None else [np.asarray(end.angular_acceleration)]
             accelerations[i + 1] = np.concatenate([np.asarray(end.acceleration), *turning])
         return parts
+
+    def _no_slower(
+        self, problem: Problem, scene: Scene, poses: FreePoses, forms: Callable[[], list[ClosedForm]]
+    ) -> FreeMotion:
+        # Other families are asked only where they can help, since they take their time.
+        settings = self._settings
+        free = free_motion(problem, scene, poses, settings)
+        if free.is_stopped or len(divided(problem, poses)) or not can_be_faster(free, problem, poses, settings):
+            return free
+        others = forms()
+        if others and not free.answers.feasible.all():
+            free = free_motion(problem, scene, poses, settings, others)
+        return no_slower(free, problem, scene, poses, settings, others)
 
     def _poses(self, problem: Problem, z0: float) -> FreePoses:
         # The poses in the axes of the kernels.
@@ -146,3 +173,7 @@ class FreeMotions(Leg):
         rates = np.array([pose.velocity or (0.0, 0.0, 0.0) for pose in stops.poses])
         middle = z0 if np.isfinite(z0) else float(positions[:, 2].mean())
         return FreePoses(positions, quaternions, stops.frame.turned(rates), accelerations, middle)
+
+
+def _of_segment(forms: Callable[[], list[ClosedForm]], i: int) -> list[ClosedForm]:
+    return [form.segment(i) for form in forms()]

@@ -2,6 +2,7 @@
 
 import abc
 import dataclasses
+from collections.abc import Sequence
 from typing import ClassVar
 
 import jax
@@ -63,6 +64,9 @@ class Leg(abc.ABC):
         Raises:
             ConfigError: which pose, and why.
         """
+
+    def begin_with(self, others: "Sequence[Leg]") -> None:  # noqa: B027
+        """Take legs of other families over the same poses, from whose motions a search can begin."""
 
     @abc.abstractmethod
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:

@@ -6,6 +6,7 @@ vmapped and differentiated. Normalised time tau runs from 0 to 1.
 
 import dataclasses
 from collections.abc import Callable
+from functools import partial
 from typing import Any, Generic, Protocol, TypeVar, cast
 
 import jax
@@ -13,11 +14,15 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.robots import state as states
 from cspr_jax.robots import state_bounds
 from cspr_jax.robots.state import State
 from cspr_jax.robots.state_bounds import StateBounds
+
+# States that are computed at once.
+STATES = 64
 
 jax.tree_util.register_dataclass(Frame, ["signs", "origin", "rest"], [])
 
@@ -141,6 +146,26 @@ class Placed(Generic[Kind]):
     def breaks(self) -> Array:
         """Breaks; see `Motion.breaks`."""
         return self.motion.breaks()
+
+
+def states_at(motion: Motion, tau: np.ndarray, size: int = STATES) -> State:
+    """States of a motion at many instants.
+
+    Args:
+        tau: (k,) normalised time.
+        size: of the batches.
+
+    Returns:
+        the states, leaves (k, ...).
+    """
+    leaves, structure = jax.tree.flatten(motion)
+    state: Any = in_batches(partial(_states, structure, leaves), tau, size=size)
+    return state
+
+
+@partial(jax.jit, static_argnums=0)
+def _states(structure: Any, leaves: Any, tau: Array) -> State:
+    return jax.vmap(jax.tree.unflatten(structure, leaves).state)(tau)
 
 
 def inward(frame: Frame, state: State) -> State:

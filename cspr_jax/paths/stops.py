@@ -2,16 +2,12 @@
 
 import itertools
 from collections.abc import Sequence
-from functools import partial
 from typing import Any, NamedTuple
 
-import jax
 import numpy as np
 
-from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.errors import InputError
-from cspr_jax.motions.motion import Motion
-from cspr_jax.robots.state import State
+from cspr_jax.motions.motion import Motion, states_at
 
 # Samples of a motion among which stops are sought, and the fewest of a smooth part.
 SAMPLES, FEWEST = 2000, 8
@@ -122,8 +118,7 @@ class MotionSequence:
         return np.array([(part.end - part.start) * self.duration[part.motion] for part in parts])
 
     def _of_one(self, motion: Motion, tau: np.ndarray) -> MovingPlaces:
-        leaves, structure = jax.tree.flatten(motion)
-        state: Any = in_batches(partial(_states, structure, leaves), tau, size=BATCH)
+        state: Any = states_at(motion, tau, BATCH)
         p, v, a = state.position, state.velocity, state.acceleration
         if state.quaternion is None:
             return MovingPlaces(p, v, a, v, a)
@@ -201,11 +196,6 @@ class MotionSequence:
             if not better.any():
                 break
         return best, (speed <= still) | (radius <= CUSP)
-
-
-@partial(jax.jit, static_argnums=0)
-def _states(structure: Any, leaves: Any, tau: Any) -> State:
-    return jax.vmap(jax.tree.unflatten(structure, leaves).state)(tau)
 
 
 def _product(vector: np.ndarray, quaternion: np.ndarray) -> np.ndarray:

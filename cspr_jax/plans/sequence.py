@@ -1,5 +1,7 @@
 """Sequence of a plan: its poses, in legs of one family each."""
 
+import contextlib
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -46,8 +48,9 @@ class PlanLegs:
             family = keys.family_of(first)
             leg = FAMILIES[family].leg(robot_file.own_pattern)
             plain = leg(Waypoints(robot_file, keys, path, frame, family, first, after))
-            has_pulleys = robot_file.pulley_radius is not None
-            self.legs.append(judged(plain, surroundings=bool(keys.surroundings), pulleys=has_pulleys))
+            if FAMILIES[family].is_searched:
+                plain.begin_with(_others(plain.stops))
+            self.legs.append(_judged(plain))
 
     def table(self, problem: Problem, depths: np.ndarray) -> dict[str, np.ndarray]:
         """Feasibility, durations and margins for several depths of P0.
@@ -63,6 +66,21 @@ class PlanLegs:
             name: np.hstack([getattr(leg_answers, name).reshape(len(depths), -1) for leg_answers in answers])
             for name in ("feasible", "duration", "margin")
         }
+
+
+def _judged(leg: Leg) -> Leg:
+    stops = leg.stops
+    return judged(leg, surroundings=bool(stops.keys.surroundings), pulleys=stops.robot_file.pulley_radius is not None)
+
+
+def _others(stops: Waypoints) -> list[Leg]:
+    # Legs over the same poses of the families from whose motions searches begin.
+    pattern, legs = stops.robot_file.own_pattern, list[Leg]()
+    for row in FAMILIES.values():
+        if row.begins_searches and pattern in row.legs:
+            with contextlib.suppress(ConfigError):  # of poses that the family does not join
+                legs.append(_judged(row.leg(pattern)(dataclasses.replace(stops, family=row.name))))
+    return legs
 
 
 def _check_families(robot_file: RobotFile, keys: PlanFile, path: Path) -> None:

@@ -34,6 +34,8 @@ class Family:
             its motions are judged once more in plans.
         knows_pulleys: whether its own verdicts are right for cables that leave from pulleys; if not, likewise.
         knows_mass_centre: whether its verdicts take limits of the mass centre's speed and acceleration into account.
+        is_searched: whether its motions are searched for, also from those of other families.
+        begins_searches: whether such searches begin from its motions.
     """
 
     name: str
@@ -52,6 +54,8 @@ class Family:
     knows_obstacles: bool = False
     knows_pulleys: bool = False
     knows_mass_centre: bool = False
+    is_searched: bool = False
+    begins_searches: bool = False
 
     def leg(self, pattern: str) -> Any:
         """Class that joins the poses of a robot.
@@ -77,6 +81,7 @@ _ROWS = (
         {"3T": "cspr_jax.swings.hypocycloid_leg:Hypocycloids", "3R3T": "cspr_jax.platforms.leg:StandardPoses"},
         any_cables=("3T", "3R3T"),
         knows_uncertainty=True,
+        begins_searches=True,
     ),
     Family(
         "transition",
@@ -85,6 +90,7 @@ _ROWS = (
         free_end=True,
         any_cables=("2T", "3T"),
         knows_uncertainty=True,
+        begins_searches=True,
     ),
     Family(
         "hypocycloid",
@@ -92,6 +98,7 @@ _ROWS = (
         {"3R3T": "cspr_jax.platforms.leg:VariablePoses"},
         any_cables=("3R3T",),
         knows_uncertainty=True,
+        begins_searches=True,
     ),
     *(
         Family(
@@ -102,6 +109,7 @@ _ROWS = (
             takes_amplitude=False,
             any_cables=("2T", "3T"),
             is_line=True,
+            begins_searches=name == "quintic",
             keys=("max_acceleration", *keys),
         )
         for name, law, keys in (
@@ -177,6 +185,7 @@ _ROWS = (
         knows_obstacles=True,
         knows_pulleys=True,
         knows_mass_centre=True,
+        is_searched=True,
         keys=("objective", "duration_max", "end_accelerations", "together", "starts", "search_time"),
         end_keys=("velocity",),
     ),

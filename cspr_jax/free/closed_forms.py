@@ -1,0 +1,129 @@
+"""Motions of other families over the same poses, from which searches begin, too."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.arithmetic.rotations import products
+from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.free.instants import coordinates
+from cspr_jax.free.poses import BACK, FreePoses
+from cspr_jax.free.starts import Starts
+from cspr_jax.free.tasks import Tasks
+from cspr_jax.motions.leg import Leg
+from cspr_jax.motions.motion import Motion, states_at
+from cspr_jax.motions.problem import Problem
+from cspr_jax.robots.point_mass import spool_radius
+
+# Part of the robot's size, and of the speed of a fall from its height, by which motions may miss poses.
+NEAR = 1e-9
+
+
+class ClosedForm(NamedTuple):
+    """Motions of a family through the poses of a search.
+
+    Fields:
+        family: its name.
+        motions: n of them, in the axes of the kernels.
+        is_feasible: (n,) whether each is proved.
+        duration: (n,) s.
+    """
+
+    family: str
+    motions: list[Motion]
+    is_feasible: np.ndarray
+    duration: np.ndarray
+
+    def segment(self, i: int) -> "ClosedForm":
+        """The motion of one segment alone.
+
+        Returns:
+            the form.
+        """
+        rows = slice(i, i + 1)
+        return ClosedForm(self.family, self.motions[rows], self.is_feasible[rows], self.duration[rows])
+
+
+def closed_forms(legs: Sequence[Leg], problem: Problem, poses: FreePoses) -> list[ClosedForm]:
+    """Join poses by other families.
+
+    Args:
+        legs: of these families.
+
+    Returns:
+        the forms of the families that join these poses.
+    """
+    forms = list[ClosedForm]()
+    for leg in legs:
+        try:
+            leg.check(problem)
+            answers, motions = leg.join(problem, poses.z0)
+        except (ConfigError, InputError):
+            continue  # the family joins other poses
+        form = ClosedForm(leg.stops.family, motions, answers.feasible, np.asarray(answers.duration))
+        if answers.feasible.any() and _passes(form, problem, poses):
+            forms.append(form)
+    return forms
+
+
+def _passes(form: ClosedForm, problem: Problem, poses: FreePoses) -> bool:
+    # Tell whether motions that are proved begin and end as the poses say; accelerations may differ.
+    size = float(spool_radius(problem.robot))
+    speed = np.sqrt(size * float(problem.robot.gravity))
+    for i in np.flatnonzero(form.is_feasible).tolist():
+        state = states_at(form.motions[i], np.array([0.0, 1.0]))
+        ends = slice(i, i + 2)
+        far = np.abs(state.position - poses.positions[ends]).max() > NEAR * size
+        fast = np.abs(state.velocity - poses.velocities[ends]).max() > NEAR * speed
+        turned = poses.quaternions is not None and (
+            np.abs(np.sum(state.quaternion * poses.quaternions[ends], axis=1)).min() < 1.0 - NEAR
+        )
+        if far or fast or turned:
+            return False
+    return True
+
+
+def controls_of(tasks: Tasks, segment: int, motion: Motion) -> np.ndarray:
+    """Control points of a spline that is near a motion.
+
+    Args:
+        tasks: with one row, of which the segment is one.
+
+    Returns:
+        (K, d).
+    """
+    along, about = coordinates(tasks.robot.pattern)
+    state = states_at(motion, tasks.basis.averages)
+    places = np.asarray(state.position)[:, along]
+    if len(about):
+        turning = products(np.asarray(state.quaternion), tasks.references[0, segment][None] * BACK)
+        places = np.concatenate([places, turning[:, 1 + about] / turning[:, :1]], axis=1)
+    return tasks.basis.fit @ places
+
+
+def with_forms(begun: Starts, single: Tasks, rows: np.ndarray, forms: Sequence[ClosedForm]) -> Starts:
+    """Starts of a search, and those from closed forms.
+
+    Args:
+        begun: of some segments.
+        single: all segments as tasks of their own.
+        rows: numbers of the segments in question.
+
+    Returns:
+        the starts.
+    """
+    added = [
+        (i, controls_of(single.taken(np.array([k])), 0, form.motions[k]), form.duration[k])
+        for form in forms
+        for i, k in enumerate(rows.tolist())
+        if form.is_feasible[k]
+    ]
+    if not added:
+        return begun
+    task, controls, duration = zip(*added, strict=True)
+    return Starts(
+        np.concatenate([begun.task, task]),
+        np.concatenate([begun.controls, np.array(controls)[:, None]]),
+        np.concatenate([begun.duration, np.array(duration)[:, None]]),
+    )

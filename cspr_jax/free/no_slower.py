@@ -1,0 +1,103 @@
+"""Closed forms in place of what a search finds, where they are faster, or it finds nothing."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from cspr_jax.free.closed_forms import ClosedForm, controls_of
+from cspr_jax.free.free_motion import FreeMotion
+from cspr_jax.free.poses import FreePoses, motions_of
+from cspr_jax.free.question import FreeQuestion, FreeSettings
+from cspr_jax.free.search import started
+from cspr_jax.free.starts import ARCS
+from cspr_jax.motions.motion import states_at
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.proved_answers import proved_answers
+from cspr_jax.robots.clearance import Scene
+
+# Intervals of each half swing of a spline that follows a closed form, at first, and how often they are doubled.
+INTERVALS, DOUBLINGS = 16, 3
+# Part of gravity by which accelerations may miss those of the poses.
+NEAR = 1e-6
+
+
+def can_be_faster(free: FreeMotion, problem: Problem, poses: FreePoses, settings: FreeSettings) -> bool:
+    """Tell whether closed forms may take the place of a motion: an arc takes about half a swing.
+
+    Args:
+        free: as it was found.
+
+    Returns:
+        False of a motion that is proved, and no slower than the swings from which searches begin.
+    """
+    if not free.answers.feasible.all():
+        return True
+    return settings.objective == "time" and free.duration > ARCS * len(free.motions) * _half_swing(problem, poses)
+
+
+def _half_swing(problem: Problem, poses: FreePoses) -> float:
+    return float(np.pi * np.sqrt(poses.z0 / float(problem.robot.gravity)))
+
+
+def no_slower(
+    free: FreeMotion,
+    problem: Problem,
+    scene: Scene | None,
+    poses: FreePoses,
+    settings: FreeSettings,
+    forms: Sequence[ClosedForm],
+) -> FreeMotion:
+    """A motion that is at most as slow as closed forms through the same poses.
+
+    Args:
+        free: as it was found.
+
+    Returns:
+        the motion, or a spline that follows the fastest of the forms, which it then names.
+    """
+    is_proved = bool(free.answers.feasible.all())
+    for form in sorted(forms, key=lambda one: float(one.duration.sum())):
+        whole = float(form.duration.sum())
+        is_better = not is_proved or (settings.objective == "time" and whole < free.duration)
+        is_short = settings.longest is None or bool((form.duration <= settings.longest).all())
+        if is_better and is_short and form.is_feasible.all() and _accelerates(form, problem, poses):
+            spline = _followed(problem, scene, poses, settings, form)
+            if spline is not None:
+                return dataclasses.replace(spline, is_stopped=free.is_stopped, searched=free.searched)
+    return free
+
+
+def _accelerates(form: ClosedForm, problem: Problem, poses: FreePoses) -> bool:
+    # Tell whether accelerations are those of the poses, where these have any, and go on at inner poses.
+    ends = [states_at(motion, np.array([0.0, 1.0])) for motion in form.motions]
+    rows = [
+        state.acceleration
+        if poses.quaternions is None
+        else np.concatenate([state.acceleration, state.angular_acceleration], axis=1)
+        for state in ends
+    ]
+    sides = np.array(rows)
+    required = np.stack([poses.accelerations[:-1], poses.accelerations[1:]], axis=1)
+    missed = np.max(np.abs(np.where(np.isnan(required), 0.0, sides - required)), initial=0.0)
+    jump = np.max(np.abs(sides[1:, 0] - sides[:-1, 1]), initial=0.0)
+    return bool(max(missed, jump) <= NEAR * float(problem.robot.gravity))
+
+
+def _followed(
+    problem: Problem, scene: Scene | None, poses: FreePoses, settings: FreeSettings, form: ClosedForm
+) -> FreeMotion | None:
+    # The spline of so many intervals that it is proved.
+    question = FreeQuestion.of(problem, scene, poses, settings)
+    arcs = float(form.duration.max()) / _half_swing(problem, poses)
+    intervals = max(settings.intervals, 2 * int(np.ceil(0.5 * INTERVALS * arcs)))
+    for doubling in range(DOUBLINGS):
+        tasks = question.tasks(intervals * 2**doubling, question.instants)
+        controls = np.array([controls_of(tasks, i, motion) for i, motion in enumerate(form.motions)])
+        unknowns = started(tasks, controls[None], form.duration[None])
+        motions = motions_of(tasks, unknowns, poses.z0)
+        answers = proved_answers(problem, motions, scene)
+        if answers.feasible.all():
+            energy, level = tasks.energies(unknowns)[0], np.full(len(motions), np.nan)
+            return FreeMotion(motions, answers, energy, level, True, False, np.nan, form.family)
+    return None

@@ -1,0 +1,125 @@
+"""Free motions beside closed forms of other families: starts from them, and no motion slower than they are."""
+
+import dataclasses
+
+import jax
+import numpy as np
+import pytest
+
+import cspr_jax
+from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.free import leg, no_slower
+from cspr_jax.free.closed_forms import ClosedForm, controls_of, with_forms
+from cspr_jax.free.free_motion import free_motion
+from cspr_jax.free.poses import segments_of
+from cspr_jax.free.question import FreeQuestion
+from cspr_jax.free.starts import Starts
+from cspr_jax.motions.motion import states_at
+from cspr_jax.schema.verdicts import Verdict
+
+KEYS = {"schema": 1, "robot": "prototype", "family": "free", "z0": 1.7, "limits": {"tension_max": 1.6}}
+# The hypocycloid takes five arcs.
+POSES = [{"position": [-1.1, -0.9, 1.5]}, {"position": [0.8, 0.5, 1.5]}]
+ARCS = 5
+
+
+@pytest.fixture(scope="module")
+def asked():
+    """What the leg of a plan asks the search: its arguments, and the forms of other families."""
+    box = {}
+
+    def grasp(*arguments):
+        box["question"] = arguments
+        box["free"] = missed(free_motion(*arguments))
+        return box["free"]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(leg, "free_motion", grasp)
+        patch.setattr(leg, "no_slower", lambda free, *rest: box.update(forms=rest[-1]) or free)
+        cspr_jax.plan(KEYS | {"starts": 1, "pose": POSES})
+    return box
+
+
+def duration(robot):
+    """About that of five half swings."""
+    return ARCS * np.pi * np.sqrt(KEYS["z0"] / float(robot.gravity))
+
+
+def missed(free):
+    """A motion that the proof leaves open."""
+    verdict = np.full(len(free.motions), Verdict.UNDECIDED)
+    return dataclasses.replace(free, answers=dataclasses.replace(free.answers, verdict=verdict), is_optimal=False)
+
+
+def test_other_families_are_asked(asked):
+    (form,) = asked["forms"]
+    assert form.family == "hypocycloid-standard"
+    assert form.is_feasible.all()
+    np.testing.assert_allclose(form.duration, duration(asked["question"][0].robot), rtol=1e-3)
+    # The second search began from them.
+    assert len(asked["question"][-1]) == 1
+
+
+def test_splines_follow_a_motion(asked):
+    problem, scene, poses, settings = asked["question"][:4]
+    (form,) = asked["forms"]
+    with double_precision():
+        tasks = FreeQuestion.of(problem, scene, poses, settings).tasks(96, 3)
+        controls = controls_of(tasks, 0, form.motions[0])
+        at = states_at(form.motions[0], tasks.basis.tau.ravel())
+    near = tasks.basis.places(controls).reshape(-1, 3, 3) / form.duration[0] ** np.arange(3)[:, None]
+    np.testing.assert_allclose(near[:, 0], at.position, atol=1e-7)
+    np.testing.assert_allclose(near[:, 2], at.acceleration, atol=1e-2)
+
+
+def test_starts_of_the_segments_in_question(asked):
+    """Those of forms come behind the others, with the number of their segment among those in question."""
+    problem, scene, poses, settings = asked["question"][:4]
+    (form,) = asked["forms"]
+    several = ClosedForm("several", form.motions * 3, np.array([True, False, True]), np.repeat(form.duration, 3))
+    with double_precision():
+        single = segments_of(FreeQuestion.of(problem, scene, poses, settings).tasks(24, 3))
+        begun = Starts(np.array([0, 1]), np.zeros((2, 1, 29, 3)), np.ones((2, 1)))
+        whole = with_forms(begun, single.taken(np.zeros(3, int)), np.array([1, 2]), [several])
+    assert whole.task.tolist() == [0, 1, 1]
+    np.testing.assert_allclose(whole.duration[:, 0], [1.0, 1.0, form.duration[0]])
+
+
+def test_a_closed_form_stands_in_for_nothing(asked):
+    problem, scene, poses, settings = asked["question"][:4]
+    with double_precision():
+        free = no_slower.no_slower(asked["free"], problem, scene, poses, settings, asked["forms"])
+        ends = jax.vmap(free.motions[0].state)(np.array([0.0, 1.0]))
+    assert free.family == "hypocycloid-standard"
+    assert free.answers.feasible.all()
+    assert free.duration == pytest.approx(asked["forms"][0].duration.sum(), rel=1e-12)
+    np.testing.assert_allclose(ends.position, poses.positions, atol=1e-12)
+
+
+@pytest.mark.parametrize("change", ["accelerations", "verdict", "duration", "objective"])
+def test_a_closed_form_that_does_not_serve(asked, change):
+    """It accelerates otherwise, is not proved, takes too long, or is slower than what is proved."""
+    problem, scene, poses, settings = asked["question"][:4]
+    (form,), free = asked["forms"], asked["free"]
+    if change == "accelerations":
+        poses = poses._replace(accelerations=np.zeros((2, 3)))
+    elif change == "verdict":
+        form = form._replace(is_feasible=np.array([False]))
+    elif change == "duration":
+        settings = settings._replace(longest=0.9 * float(form.duration[0]))
+    else:
+        free = dataclasses.replace(free, answers=dataclasses.replace(free.answers, verdict=np.array([0])))
+        assert not no_slower.can_be_faster(free, problem, poses, settings)
+    with double_precision():
+        assert no_slower.no_slower(free, problem, scene, poses, settings, [form]) is free
+
+
+def test_a_plan_says_whose_motion_it_is(monkeypatch):
+    monkeypatch.setattr(leg, "free_motion", lambda *arguments: missed(free_motion(*arguments)))
+    planned = cspr_jax.plan(KEYS | {"starts": 1, "pose": POSES})
+    (segment,) = planned.to_dict()["segments"]
+    assert planned.feasible
+    assert segment["duration"] == pytest.approx(duration(planned.problem.robot), rel=1e-3)
+    assert segment["energy"] > 0.0
+    expected = 'the search found nothing faster than family = "hypocycloid-standard", whose motions these are'
+    assert planned.warnings == (f'family = "free": {expected}',)
