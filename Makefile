@@ -6,6 +6,9 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 TESTS := $(VENV)/.installed-tests
 
+# Python compiles modules when they are first imported; most of those installed never are.
+INSTALL := pip install --quiet --disable-pip-version-check --no-compile
+
 # What another folder, or another version, is tried in: environments of their own, made anew.
 WHEEL := build/wheel
 LOWEST := build/lowest
@@ -88,13 +91,15 @@ images: $(STAMP)
 $(STAMP): pyproject.toml hatch_build.py
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "cspr_jax needs Python 3.11 or newer; call: make PYTHON=python3.11"; exit 1; }
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
-	touch $(STAMP)
+	@echo "Installing jax, numpy, scipy, matplotlib, h5py and what they need into $(VENV), some 650 MB ..."
+	@$(PYTHON) -m venv $(VENV)
+	@$(BIN)/python -m $(INSTALL) --editable .
+	@touch $(STAMP)
 
 $(TESTS): $(STAMP)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
-	touch $(TESTS)
+	@echo "Installing what the tests, checks and documents need, too ..."
+	@$(BIN)/python -m $(INSTALL) --editable '.[test]'
+	@touch $(TESTS)
 
 clean:
 	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis results/demo build dist
