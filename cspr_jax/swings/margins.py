@@ -4,7 +4,7 @@ Every block is sampled; where its smallest sample lies, a parabola estimates the
 three estimates of a group of functions over all blocks are then refined by parabolas, each narrower.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import NamedTuple
 
@@ -119,6 +119,14 @@ def _best_of_groups(groups: tuple[int, ...], estimates: Array, places: Array) ->
     return jnp.stack(functions).reshape(shape), jnp.stack(taus).reshape(shape)
 
 
+def _chosen(values: Sequence[Array], number: Array) -> Array:
+    # One of some numbers. Of an array of them, XLA would compute what they share for each of them anew.
+    chosen = values[0]
+    for i, value in enumerate(values[1:], 1):
+        chosen = jnp.where(number == i, value, chosen)
+    return chosen
+
+
 @partial(jax.jit, static_argnums=0)
 def _minima(functions: Functions, problem: Problem, edges: Array, counts: Array, arguments) -> Array:
     segments, arcs = arguments
@@ -137,7 +145,7 @@ def _minima(functions: Functions, problem: Problem, edges: Array, counts: Array,
     def refine(segment, p, number, where, width):
         # number, where: (n_groups, CANDIDATES). One copy of the function serves all: it compiles much faster.
         def one(number, tau):
-            return refined_minimum(lambda t: jnp.stack(evaluate(*problem, segment, p, t))[number], tau, width)
+            return refined_minimum(lambda t: _chosen(evaluate(*problem, segment, p, t), number), tau, width)
 
         return jnp.min(jax.vmap(jax.vmap(one))(number, where), axis=1)
 
