@@ -22,7 +22,7 @@ import zlib
 from collections.abc import Callable
 from pathlib import Path
 
-# Entries kept, the newest ones; one is a kernel for one shape, some 0.1 to 1 MB.
+# Entries kept, the newest ones; one is a kernel for one shape, some 0.1 to 1 MB, or its program, a tenth of that.
 LARGEST = 512
 LARGEST_ENTRY = 1 << 28  # bytes
 # With a largest size, jax notes beside each entry when it was used last.
@@ -149,7 +149,7 @@ def _take(whole: Path, run_folder: Path) -> int:
                 damaged += 1
             else:
                 _place(entry, data, run_folder / name)
-                if is_bounded:
+                if is_bounded and name.endswith(_ENTRY):
                     used = run_folder / f"{name.removesuffix(_ENTRY)}{_USED}"
                     used.write_bytes(entry.stat().st_mtime_ns.to_bytes(8, "little"))
     return damaged

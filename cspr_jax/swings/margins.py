@@ -16,6 +16,7 @@ from jax import Array, lax
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.elementary import vertex
 from cspr_jax.motions.problem import Problem
+from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.swings.blocks import INTERVALS, blocks, over_blocks
 from cspr_jax.swings.criteria import counts, smooth_slacks
 from cspr_jax.swings.hypocycloid import Segment
@@ -119,7 +120,7 @@ def _best_of_groups(groups: tuple[int, ...], estimates: Array, places: Array) ->
     return jnp.stack(functions).reshape(shape), jnp.stack(taus).reshape(shape)
 
 
-@partial(jax.jit, static_argnums=0)
+@persistent_jit(static_argnames="functions")
 def _minima(functions: Functions, problem: Problem, edges: Array, counts: Array, arguments) -> Array:
     segments, arcs = arguments
     evaluate, groups = functions
