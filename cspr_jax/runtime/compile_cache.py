@@ -32,6 +32,8 @@ _OWN, _MARK = "run", "~"
 _TROUBLE = re.compile(r"Error (reading|writing) persistent compilation cache entry")
 # This list holds the function that hands over the entries of this process, if there is one.
 _pending: list[Callable[[], None]] = []
+# Environment variable with the folder of the programs of `persistent_jit`: that of this run.
+PROGRAMS = "CSPR_PROGRAMS"
 # Whatever the umask says, others write into none of our folders.
 PRIVATE = 0o700
 

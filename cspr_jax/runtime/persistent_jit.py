@@ -26,8 +26,8 @@ import jaxlib.version
 import numpy as np
 
 from cspr_jax.runtime import compile_cache
+from cspr_jax.runtime.compile_cache import PROGRAMS
 from cspr_jax.runtime.program_keys import Undescribed, described, described_tree, tree_of
-from cspr_jax.runtime.xla import PROGRAMS
 
 # It is part of each key: a change of what is written makes former programs those of nobody.
 _FORMAT = 1
@@ -40,7 +40,7 @@ _SETTINGS = (
     "jax_numpy_rank_promotion",
     "jax_default_matmul_precision",
 )
-# Where compiled code is kept says nothing of programs; the folder of a run has another name each time.
+# The place of compiled code says nothing of programs; the folder of a run has another name each time.
 _APART = ("jax_compilation_cache", "jax_persistent_cache", "jax_log", "jax_raise_persistent")
 # A program that cannot be written, read or called; then jax traces the function, as ever.
 _TROUBLE = (Undescribed, ImportError, OSError, ValueError, TypeError, LookupError, AttributeError, RuntimeError)
@@ -78,7 +78,7 @@ def persistent_jit(
         if PROGRAMS in os.environ and not jax.config.jax_disable_jit:  # type: ignore[attr-defined]
             with contextlib.suppress(*_TROUBLE):
                 return programs.result(arguments, keywords)
-        # Where something is wrong with the arguments, jax says what.
+        # If something is wrong with the arguments, jax says what.
         return compiled(*arguments, **keywords)
 
     call.lower = compiled.lower  # type: ignore[attr-defined]
@@ -123,12 +123,12 @@ class _Programs:
             words = [_name(self._function), described(static), described_tree(tree), _written(shapes), _settings()]
             key = json.dumps([_FORMAT, *_versions(), _sources(), *words])
             path = Path(os.environ[PROGRAMS]) / f"{self._function.__name__}-{hashlib.sha256(key.encode()).hexdigest()}"
-            found = _read(path, key)
-            if found is None:
-                found = self._lowered(leaves, tree, static)
+            stored = _read(path, key)
+            if stored is None:
+                stored = self._lowered(leaves, tree, static)
                 with contextlib.suppress(OSError):
-                    _write(path, key, *found)
-            return self._compiled(*found)
+                    _write(path, key, *stored)
+            return self._compiled(*stored)
         except _UNREADABLE:
             return None
 

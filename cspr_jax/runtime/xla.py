@@ -43,8 +43,6 @@ _listeners: list[Any] = []
 # exceptions, or are fatal and shown still.
 _ONLY_FATAL = ("TF_CPP_MIN_LOG_LEVEL", "3")
 CACHE = "JAX_COMPILATION_CACHE_DIR"
-# Where `persistent_jit` keeps programs: the same folder, where it is ours.
-PROGRAMS = "CSPR_PROGRAMS"
 _KEPT = {
     # Else the name of the folder is part of the key of each entry.
     "JAX_PERSISTENT_CACHE_ENABLE_XLA_CACHES": "none",
@@ -125,7 +123,7 @@ def _keep(folder: Path, warn: Callable[[str], None]) -> Path | None:
     except OSError as error:
         warn(f"{folder}: compiled code cannot be kept: {error.strerror or error}")
         return None
-    os.environ[CACHE] = os.environ[PROGRAMS] = str(run_folder)
+    os.environ[CACHE] = os.environ[compile_cache.PROGRAMS] = str(run_folder)
     for name, value in _KEPT.items():
         os.environ.setdefault(name, value)
     return run_folder

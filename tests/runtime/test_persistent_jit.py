@@ -16,8 +16,8 @@ from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.motions import amplitudes
 from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.runtime import persistent_jit as programs
+from cspr_jax.runtime.compile_cache import PROGRAMS
 from cspr_jax.runtime.program_keys import Undescribed, described, described_tree, tree_of
-from cspr_jax.runtime.xla import PROGRAMS
 
 QUINTIC = amplitudes.named("quintic")
 TAU = np.linspace(0.0, 1.0, 7)
@@ -47,7 +47,7 @@ import json, os
 import numpy as np
 from cspr_jax.runtime import xla
 xla.prepare("cpu", quick=True)
-if {off}: os.environ.pop(xla.PROGRAMS)
+if {off}: os.environ.pop(xla.compile_cache.PROGRAMS)
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.motions import amplitudes
 traces, polynomial = [], amplitudes.polynomial
