@@ -15,7 +15,6 @@ from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.motions.landings import LaunchErrors, Scatter
 from cspr_jax.motions.launch_outcome import LaunchOutcome
 from cspr_jax.outputs import motion_files, plan_report
-from cspr_jax.outputs.mjcf import write_mjcf
 from cspr_jax.outputs.mujoco_motion import STEP
 from cspr_jax.plans import planning
 from cspr_jax.schema import labelled
@@ -98,6 +97,8 @@ class Plan(planning.PlannedMotions):
         if not (self.feasible or anyway):
             raise ConfigError(path, "not written, since a segment is not proved feasible (anyway=True writes it)")
         with double_precision():
+            from cspr_jax.outputs.mjcf import write_mjcf  # SciPy's rotations take time
+
             write_mjcf(self, path, step)
         return path
 

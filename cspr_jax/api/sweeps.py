@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cspr_jax.api.argument_checks import checked
-from cspr_jax.config.hints import robot_hints, sweep_hints
 from cspr_jax.config.mappings import plain, text_of
 from cspr_jax.errors import ConfigError
 from cspr_jax.outputs.volumes import WorkspaceVolume, volume_of
@@ -92,6 +91,8 @@ class Job:
         """
         with _executor(self, prepare) as executor:  # refuses in one line, so hints come after it
             robot = self.sweep.robot
+            from cspr_jax.config.hints import robot_hints, sweep_hints  # with the keys of plans, which take time
+
             for line in [*robot_hints(robot), *sweep_hints(self.sweep.keys, robot)]:
                 self.hooks.warn(f"hint: {line}")
             return self._run.go(executor).result

@@ -37,23 +37,20 @@ def bernstein() -> np.ndarray:
     """Matrix from values at the nodes to Bernstein coefficients.
 
     Returns:
-        (n + 1, n + 1), computed in fractions and rounded once.
+        (n + 1, n + 1), computed in integers and rounded once.
     """
     places = [(1 + Fraction(float(x))) / 2 for x in nodes()]
-    rows = [
-        [Fraction(math.comb(DEGREE, j)) * t**j * (1 - t) ** (DEGREE - j) for j in range(DEGREE + 1)]
-        + [Fraction(int(i == k)) for k in range(DEGREE + 1)]
-        for i, t in enumerate(places)
-    ]
-    for k in range(DEGREE + 1):
-        sizes = [abs(row[k]) for row in rows[k:]]
-        pivot = k + sizes.index(max(sizes))
-        rows[k], rows[pivot] = rows[pivot], rows[k]
-        rows[k] = [x / rows[k][k] for x in rows[k]]
-        for i in range(DEGREE + 1):
-            if i != k and rows[i][k]:
-                rows[i] = [x - rows[i][k] * y for x, y in zip(rows[i], rows[k], strict=True)]
-    return np.array([[float(x) for x in row[DEGREE + 1 :]] for row in rows])
+    scale = max(place.denominator for place in places)  # a power of two, as all of them
+    whole, columns = [int(place * scale) for place in places], []
+    for k, place in enumerate(whole):
+        # Lagrange's polynomial of one node, a product of linear ones: coefficients of (1 - t)^(n - j) t^j.
+        powers, size = [1], 1
+        for other in whole[:k] + whole[k + 1 :]:
+            powers = [(scale - other) * a - other * b for a, b in zip([0, *powers], [*powers, 0], strict=True)]
+            size *= place - other
+        # Python rounds quotients of integers once, however large they are; no -0.
+        columns.append([power / (math.comb(DEGREE, j) * size) + 0.0 for j, power in enumerate(powers)])
+    return np.array(columns).T
 
 
 def remainders(radii: np.ndarray) -> np.ndarray:

@@ -68,6 +68,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _flushed(error.exit_code)
     with prompt_end(compile_cache.hand_over if arguments is None else None) as prompt:
         code = _answered(options, prompt)
+    if arguments is None:
+        gc.freeze()  # the end of the process frees all memory at once: a last look for what nobody needs takes 0.2 s
     return _flushed(code)
 
 

@@ -7,7 +7,6 @@ largest value of any derivative is known, which proofs between samples need.
 import dataclasses
 import math
 from collections.abc import Sequence
-from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -16,6 +15,7 @@ from jax import Array
 
 from cspr_jax.arithmetic.elementary import leaf, polynomial
 from cspr_jax.errors import InputError
+from cspr_jax.runtime.persistent_jit import persistent_jit
 
 HIGHEST_DERIVATIVE = 5
 NAMES = ("A1", "quintic", "A2", "A3", "effective", "effective-c3", "ideal")
@@ -69,7 +69,7 @@ _FIELDS = [field.name for field in dataclasses.fields(Amplitude)]
 jax.tree_util.register_dataclass(Amplitude, _FIELDS[:-1], [], drop_fields=["name"])
 
 
-@partial(jax.jit, static_argnames="order")
+@persistent_jit(static_argnames="order")
 def derivatives(amplitude: Amplitude, tau: Array, *, order: int) -> tuple[Array, ...]:
     """A and its derivatives with respect to tau.
 

@@ -17,6 +17,7 @@ from cspr_jax.robots import cables
 from cspr_jax.robots.limits import NO_LIMITS, Limits
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.tension_rule_table import CENTRED
+from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.runtime.stages import stage
 
 # Samples of an arc, at least, and instants computed at a time.
@@ -59,12 +60,12 @@ _SIGNS = np.array([1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0, 1.0])
 _NAMES = [field.name for field in dataclasses.fields(Demands)][:-1]
 
 
-@partial(jax.jit, static_argnames="rule")
+@persistent_jit(static_argnames="rule")
 def _values(robot, limits: Limits, arguments, *, rule: str) -> Array:
     return jax.vmap(partial(_at_instant, robot, limits, rule))(*arguments)
 
 
-@partial(jax.jit, static_argnames="rule")
+@persistent_jit(static_argnames="rule")
 def _values_of_one(robot, limits: Limits, motion: Motion, tau: Array, *, rule: str) -> Array:
     return jax.vmap(partial(_at_instant, robot, limits, rule, motion))(tau)
 

@@ -9,10 +9,9 @@ import dataclasses
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import Frame
@@ -22,6 +21,9 @@ from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.pulleys import Pulleys
 from cspr_jax.robots.shapes import Body, Obstacle, inward, rotated
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 STEP = 0.0005  # s, the longest that MuJoCo takes unless it is told another one
 # Parts of normalised time: rows at a jump are taken the first of them to either side of it, and jumps that are nearer
@@ -91,7 +93,7 @@ class Played:
     position: np.ndarray
     velocity: np.ndarray
     acceleration: np.ndarray
-    rotation: Rotation | None = None
+    rotation: "Rotation | None" = None
     omega: np.ndarray | None = None
     omega_dot: np.ndarray | None = None
 
@@ -178,6 +180,8 @@ def _body(plan: PlannedMotions, points: np.ndarray) -> Body | None:
     shape = plan.keys.body(centre.tolist(), written.platform_points or ())
     if shape is None:
         return None
+    from scipy.spatial.transform import Rotation  # takes time, and plans import this file
+
     return rotated(shape, Rotation.align_vectors(points, np.asarray(written.platform_points) - centre)[0].as_matrix())
 
 
@@ -257,6 +261,8 @@ def in_world(columns: Mapping[str, np.ndarray], segment: np.ndarray, z_axis: str
     world = upward(z_axis)
     moved: dict[str, Any] = {name: world.turned(columns[name]) for name in ("position", "velocity", "acceleration")}
     if "quaternion" in columns:
+        from scipy.spatial.transform import Rotation  # takes time, likewise
+
         # SciPy has the scalar last.
         rotation = Rotation.from_quat(np.roll(world.turned_quaternions(columns["quaternion"]), -1, axis=1))
         back = rotation.inv()

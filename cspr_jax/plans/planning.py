@@ -6,7 +6,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -31,6 +30,7 @@ from cspr_jax.robots.limits import NO_LIMITS
 from cspr_jax.robots.point_mass import spool_radius
 from cspr_jax.robots.tension_rule_table import TENSION_RULES
 from cspr_jax.robots.wrench_sets import tension_range
+from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.families import FAMILIES
 
 # Value that a search for z0 takes for a "best" epsilon, until that is chosen.
@@ -274,7 +274,7 @@ def _counts(leg: JoinedLeg, keys: PlanFile) -> np.ndarray:
     return np.maximum(SAMPLES * leg.answers.tried_arcs, keys.samples) + 1
 
 
-@jax.jit
+@persistent_jit
 def _ends(before: Motion, after: Motion):
     return before.state(jnp.asarray(1.0))[:3], after.state(jnp.asarray(0.0))[:3]
 

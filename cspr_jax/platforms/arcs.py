@@ -14,6 +14,7 @@ from cspr_jax.platforms.motion_checker import MotionChecker, PlatformChecks
 from cspr_jax.platforms.motions import rows
 from cspr_jax.platforms.platform_segment import PlatformSegment, pose_segment
 from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.verdicts import Verdict
 
@@ -74,7 +75,7 @@ class FewestArcs(NamedTuple):
     checks: PlatformChecks
 
 
-@jax.jit
+@persistent_jit
 def _motions(robot: PlatformRobot, odd, motions) -> PlatformSegment:
     def one(start, end, z0):
         return pose_segment(robot, start, end, z0, (jnp.zeros_like(z0), jnp.zeros_like(z0)), odd=odd)

@@ -36,6 +36,7 @@ from cspr_jax.platforms.work_list import TOLERANCE, allowance
 from cspr_jax.robots import interference_lanes
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.wrench_lanes import cable_lanes
+from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.verdicts import Verdict
 
 # Largest number of blocks in a call, and of arcs that are held at a time.
@@ -50,7 +51,7 @@ NEAR = 0.5
 _end = jax.jit(endpoint)
 
 
-@partial(jax.jit, static_argnames=("pairs", "kind"))
+@persistent_jit(static_argnames=("pairs", "kind"))
 def slacks_at(problem: Problem, items, *, pairs: tuple, kind: PlatformMotionKind) -> tuple[Array, ...]:
     """Slacks and distances between cables at instants.
 

@@ -4,7 +4,6 @@ import itertools
 from pathlib import Path
 from typing import ClassVar
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -35,6 +34,7 @@ from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.reference_pose import reference_pose
 from cspr_jax.robots.wrench_balance import determinant_share, is_regular
+from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.families import WITHOUT_BETA_HAT
 
 # Tensions jump where the third derivative of the amplitude function changes across a knot by more than this part of its
@@ -241,7 +241,7 @@ def _is_determined(problem: Problem) -> bool:
     return problem.robot.n_cables == problem.robot.dof
 
 
-@jax.jit
+@persistent_jit
 def _standing(robot: PlatformRobot, position: Array, quaternion: Array, pairs: Array):
     # Return the depth below the spool plane, the determinant over that of the reference orientation in the middle at
     # the same depth, and the distances between cables.
@@ -267,5 +267,7 @@ def _check_pose(
 
 def _jumps(amplitude: Amplitude) -> bool:
     # Tell whether A''' jumps between pieces.
-    sides = [derivatives(amplitude, jnp.asarray(amplitude.knots) + s, order=3)[3] for s in (-NEAR_KNOT, NEAR_KNOT)]
-    return bool((np.abs(np.asarray(sides[1] - sides[0])) > JUMP * float(amplitude.largest[3])).any())
+    # Sums of a few numbers by jax would be programs of their own.
+    knots = np.asarray(amplitude.knots)
+    before, after = (np.asarray(derivatives(amplitude, knots + s, order=3)[3]) for s in (-NEAR_KNOT, NEAR_KNOT))
+    return bool((np.abs(after - before) > JUMP * float(amplitude.largest[3])).any())

@@ -12,6 +12,7 @@ from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.tolerances import Tolerated
 from cspr_jax.platforms.platform_segment import PlatformSegment, duration
+from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.verdicts import Verdict
 
 # Sizes of batches for few and for many cases: a batch is always full, and every size is compiled for.
@@ -99,7 +100,7 @@ class Sieve(Protocol):
         ...
 
 
-@jax.jit
+@persistent_jit
 def _durations(arguments) -> jax.Array:
     return jax.vmap(duration)(*arguments)
 

@@ -8,10 +8,8 @@ projection of the cable onto the sector (Moreau).
 Between instants h apart a function f with |f''| <= C stays above its smaller end less C h^2 / 8.
 """
 
-from functools import partial
 from typing import NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
@@ -28,6 +26,7 @@ from cspr_jax.robots import interference_lanes
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.wrench_lanes import CABLES, CableLanes, cable_lanes
+from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.limits import Limit
 
 # Steps of a block, and the instants at their ends.
@@ -79,7 +78,7 @@ def of_pose(problem: Problem) -> list[Limit]:
     return [row for row in limits_set(problem.limits) if not row.of_motion]
 
 
-@partial(jax.jit, static_argnames=("pairs", "kind", "margins"))
+@persistent_jit(static_argnames=("pairs", "kind", "margins"))
 def place_blocks(
     problem: Problem, platform, one: Array, items, *, pairs: tuple, kind: PlatformMotionKind, margins: bool
 ) -> PlaceBounds:

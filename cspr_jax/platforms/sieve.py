@@ -26,13 +26,14 @@ from cspr_jax.platforms.platform_segment_lanes import instant_lanes
 from cspr_jax.platforms.slack_lanes import certain_tension, lowest_tension
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.wrench_lanes import balance, cable_lanes
+from cspr_jax.runtime.persistent_jit import persistent_jit
 
 # Instants of one call; how many times more motions are looked at than checked at a time; and the part of a batch up to
 # which motions count as few.
 CHUNK, FIRST, FEWER = 8, 2, 8
 
 
-@partial(jax.jit, static_argnames=("kind", "single_precision"))
+@persistent_jit(static_argnames=("kind", "single_precision"))
 def smallest_tensions(
     robot: PlatformRobot,
     amplitude: Amplitude,

@@ -31,6 +31,7 @@ from cspr_jax.platforms.platform_segment_lanes import StateLanes, squared_durati
 from cspr_jax.platforms.work_list import allowance, least_nodes
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.wrench_lanes import CABLES, balance, cable_lanes, inertial_wrench
+from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.limits import Limit
 
 # A value at a node may be wrong by this part of its bound on real time (tests find a tenth of that), times Lebesgue's
@@ -82,7 +83,7 @@ def of_motion(problem: Problem) -> list[Limit]:
     return [row for row in limits_set(problem.limits) if row.of_motion]
 
 
-@partial(jax.jit, static_argnames=("kind", "margins", "least"))
+@persistent_jit(static_argnames=("kind", "margins", "least"))
 def tension_blocks(
     problem: Problem, one: Array, items, *, kind: PlatformMotionKind, margins: bool, least: bool = False
 ) -> TensionBounds:

@@ -22,7 +22,7 @@ import zlib
 from collections.abc import Callable
 from pathlib import Path
 
-# Entries kept, the newest ones; one is a kernel for one shape, some 0.1 to 1 MB.
+# Entries kept, the newest ones; one is a kernel for one shape, some 0.1 to 1 MB, or its program, a tenth of that.
 LARGEST = 512
 LARGEST_ENTRY = 1 << 28  # bytes
 # With a largest size, jax notes beside each entry when it was used last.
@@ -32,6 +32,8 @@ _OWN, _MARK = "run", "~"
 _TROUBLE = re.compile(r"Error (reading|writing) persistent compilation cache entry")
 # This list holds the function that hands over the entries of this process, if there is one.
 _pending: list[Callable[[], None]] = []
+# Environment variable with the folder of the programs of `persistent_jit`: that of this run.
+PROGRAMS = "CSPR_PROGRAMS"
 # Whatever the umask says, others write into none of our folders.
 PRIVATE = 0o700
 
@@ -149,7 +151,7 @@ def _take(whole: Path, run_folder: Path) -> int:
                 damaged += 1
             else:
                 _place(entry, data, run_folder / name)
-                if is_bounded:
+                if is_bounded and name.endswith(_ENTRY):
                     used = run_folder / f"{name.removesuffix(_ENTRY)}{_USED}"
                     used.write_bytes(entry.stat().st_mtime_ns.to_bytes(8, "little"))
     return damaged

@@ -123,7 +123,7 @@ def _keep(folder: Path, warn: Callable[[str], None]) -> Path | None:
     except OSError as error:
         warn(f"{folder}: compiled code cannot be kept: {error.strerror or error}")
         return None
-    os.environ[CACHE] = str(run_folder)
+    os.environ[CACHE] = os.environ[compile_cache.PROGRAMS] = str(run_folder)
     for name, value in _KEPT.items():
         os.environ.setdefault(name, value)
     return run_folder

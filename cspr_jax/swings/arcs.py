@@ -15,6 +15,7 @@ from cspr_jax.motions.amplitudes import boundary_errors
 from cspr_jax.motions.answers import Answers, joined
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.point_mass import AT_P0, LARGEST_LENGTH, PointMassRobot, spool_radius
+from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.runtime.stages import stage
 from cspr_jax.swings import hypocycloid, sieve
 from cspr_jax.swings.decide import decided, end_slacks
@@ -24,7 +25,7 @@ from cspr_jax.swings.hypocycloid import Segment
 PART = 16 * sieve.BATCH
 
 
-@jax.jit
+@persistent_jit
 def _segments(problem: Problem, points) -> tuple[Segment, Segment, jax.Array]:
     def one(start, end, z0):
         even, odd = (hypocycloid.segment(problem.robot, start, end, z0, odd=jnp.asarray(odd)) for odd in (False, True))

@@ -18,6 +18,7 @@ from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.tolerances import Tolerated
+from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.swings import criteria, hypocycloid
 from cspr_jax.swings.criteria import BASIC
@@ -35,7 +36,7 @@ BATCH = 4096
 TIE = 1e-9
 
 
-@jax.jit
+@persistent_jit
 def _durations(arguments) -> jax.Array:
     return jax.vmap(hypocycloid.duration)(*arguments)
 
@@ -109,7 +110,7 @@ def decided(
     return answers, chosen
 
 
-@jax.jit
+@persistent_jit
 def end_slacks(problem: Problem, arcs: float, segments: Segment) -> jax.Array:
     """Smallest slack of each criterion at the two ends.
 

@@ -14,6 +14,7 @@ from jax import Array
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
+from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.swings.criteria import BASIC, slacks
 from cspr_jax.swings.hypocycloid import Segment
 from cspr_jax.swings.parities import pick
@@ -84,7 +85,7 @@ def upcoming(candidates: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.n
     return rows[owner], column + 1
 
 
-@jax.jit
+@persistent_jit
 def _lowest(problem: Problem, arguments) -> tuple[Array, Array]:
     # Return the smallest sampled slack of each limit (n, n_limits), and the tolerances (n,).
     segments, arcs = arguments

@@ -16,6 +16,7 @@ from jax import Array, lax
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.elementary import vertex
 from cspr_jax.motions.problem import Problem
+from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.swings.blocks import INTERVALS, blocks, over_blocks
 from cspr_jax.swings.criteria import counts, smooth_slacks
 from cspr_jax.swings.hypocycloid import Segment
@@ -127,7 +128,7 @@ def _chosen(values: Sequence[Array], number: Array) -> Array:
     return chosen
 
 
-@partial(jax.jit, static_argnums=0)
+@persistent_jit(static_argnames="functions")
 def _minima(functions: Functions, problem: Problem, edges: Array, counts: Array, arguments) -> Array:
     segments, arcs = arguments
     evaluate, groups = functions

@@ -25,6 +25,7 @@ from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.motions.amplitudes import Amplitude
 from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
+from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.swings.blocks import INTERVALS, blocks, over_blocks
 from cspr_jax.swings.criteria import curvatures, slacks
 from cspr_jax.swings.hypocycloid import Segment
@@ -93,7 +94,7 @@ def block_bounds(problem: Problem, segments: Segment, arcs: Array, start: Array,
     return sampled, sampled - bound * (((stop - start) / INTERVALS) ** 2)[None] / 8.0
 
 
-@jax.jit
+@persistent_jit
 def _first_look(problem: Problem, edges: Array, counts: Array, arguments) -> tuple[Array, Array, Array]:
     segments, arcs = arguments
 
@@ -107,7 +108,7 @@ def _first_look(problem: Problem, edges: Array, counts: Array, arguments) -> tup
     return sampled.T, proved.T, near
 
 
-@jax.jit
+@persistent_jit
 def _closer_look(problem: Problem, arguments) -> tuple[Array, Array]:
     sampled, proved = block_bounds(problem, *arguments)
     return sampled.T, proved.T

@@ -20,6 +20,7 @@ from jax import Array
 from cspr_jax.arithmetic.batches import row_by_row
 from cspr_jax.arithmetic.elementary import lesser, sincospi
 from cspr_jax.motions.amplitudes import Amplitude, derivatives
+from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.swings.hypocycloid import Segment, oscillation
 from cspr_jax.swings.slacks import largest_term
 
@@ -104,7 +105,7 @@ def smallest_sampled(amplitude: Amplitude, segments: Segment, arcs: np.ndarray, 
     return row_by_row(one, (jnp.asarray(arcs, dtype), sample_table(amplitude, arcs, tau, dtype)))
 
 
-@partial(jax.jit, static_argnames="max_arcs")
+@persistent_jit(static_argnames="max_arcs")
 def upper_bounds(amplitude: Amplitude, even: Segment, odd: Segment, *, max_arcs: int) -> Array:
     """Upper bounds of the margin of segments, for every number of arcs; rounding is allowed for.
 

@@ -193,7 +193,29 @@ print("found:", found)
     assert done.stdout.splitlines()[-1] == "found: []"
 
 
-@pytest.mark.parametrize(("name", "most"), [("workspace", 67), ("minimum_arcs", 118), ("plan", 168)])
+def test_lists_and_templates_load_no_jax(tmp_path):
+    """Nor what else takes long to load; the folder of a run is none here."""
+    commands = [["robots"], ["robots", "prototype"], ["examples"], ["quantities"], ["status", str(tmp_path)]]
+    commands += [["new", kind, str(tmp_path / f"{kind}.toml")] for kind in ("robot", "sweep", "plan")]
+    code = f"""
+import sys
+from cspr_jax.cli import main
+codes = [main(words) for words in {commands}]
+print("found:", codes, [name for name in ("jax", "scipy", "matplotlib", "distributed") if name in sys.modules])
+"""
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "found: [0, 0, 0, 0, 4, 0, 0, 0] []"
+
+
+def test_plans_load_no_pieces_of_scipy():
+    """These take 0.2 s; jax loads no more of SciPy than its name."""
+    pieces = ("scipy.linalg", "scipy.spatial", "scipy.special", "scipy.interpolate", "scipy.optimize")
+    code = f"import sys, cspr_jax; cspr_jax.plan; print([name for name in {pieces} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+
+
+@pytest.mark.parametrize(("name", "most"), [("workspace", 71), ("minimum_arcs", 121), ("plan", 169)])
 def test_a_function_imports_what_it_is_about(name, most):
     """So many modules at most, and no proofs of platforms: a program that asks about a point mass starts sooner."""
     code = f"import sys, cspr_jax; cspr_jax.{name}; print(*(n for n in sys.modules if n.startswith('cspr_jax.')))"

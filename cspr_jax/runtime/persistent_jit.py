@@ -1,0 +1,230 @@
+"""`jax.jit` whose traced programs persist from run to run, beside the compiled code.
+
+A second run finds compiled code by its program, for which jax traces and lowers the function anew. Here the program
+itself is read (`lowered_programs`); it goes through the same folder, checks and limits as compiled code
+(`compile_cache`). Its key is all that tracing depends on: sources of this package, versions, settings of jax, the
+function, static arguments, structure and shapes of the others. A run that makes a program calls what it has written, so
+that first and later runs compile one program.
+"""
+
+import contextlib
+import functools
+import hashlib
+import inspect
+import json
+import os
+import struct
+import sys
+import threading
+import zlib
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+import jax
+import jaxlib.version
+import numpy as np
+
+from cspr_jax.runtime import compile_cache
+from cspr_jax.runtime.compile_cache import PROGRAMS
+from cspr_jax.runtime.program_keys import Undescribed, described, described_tree, tree_of
+
+# It is part of each key: a change of what is written makes former programs those of nobody.
+_FORMAT = 1
+_FASTEST = 1  # of zlib
+_SCALARS = (bool, int, float, complex)
+# Settings of one thread that programs depend on; those of the process are in `jax.config.values`.
+_SETTINGS = (
+    "jax_enable_x64",
+    "jax_numpy_dtype_promotion",
+    "jax_numpy_rank_promotion",
+    "jax_default_matmul_precision",
+)
+# The place of compiled code says nothing of programs; the folder of a run has another name each time.
+_APART = ("jax_compilation_cache", "jax_persistent_cache", "jax_log", "jax_raise_persistent")
+# A program that cannot be written, read or called; then jax traces the function, as ever.
+_TROUBLE = (Undescribed, ImportError, OSError, ValueError, TypeError, LookupError, AttributeError, RuntimeError)
+_UNREADABLE = (*_TROUBLE, struct.error, zlib.error)
+Function = TypeVar("Function", bound=Callable)
+
+
+def persistent_jit(
+    function: Function | None = None,
+    *,
+    static_argnames: str | Sequence[str] = (),
+    compiler_options: dict[str, Any] | None = None,
+) -> Any:
+    """Compile a function like `jax.jit`, and keep its programs where compiled code is kept.
+
+    Inside of other compiled functions, and wherever a program cannot be kept, it is `jax.jit`.
+
+    Args:
+        function: of a module of this package, without positional-only arguments; None: the result is a decorator.
+        static_argnames: as of `jax.jit`.
+        compiler_options: likewise.
+
+    Returns:
+        the compiled function.
+    """
+    static = (static_argnames,) if isinstance(static_argnames, str) else tuple(static_argnames)
+    if function is None:
+        return functools.partial(persistent_jit, static_argnames=static, compiler_options=compiler_options)
+    compiled = jax.jit(function, static_argnames=static, compiler_options=compiler_options)
+    programs = _Programs(function, static, compiler_options)
+
+    @functools.wraps(function)
+    def call(*arguments: Any, **keywords: Any) -> Any:
+        # jax does not say the types of its settings.
+        if PROGRAMS in os.environ and not jax.config.jax_disable_jit:  # type: ignore[attr-defined]
+            with contextlib.suppress(*_TROUBLE):
+                return programs.result(arguments, keywords)
+        # If something is wrong with the arguments, jax says what.
+        return compiled(*arguments, **keywords)
+
+    call.lower = compiled.lower  # type: ignore[attr-defined]
+    return call
+
+
+class _Programs:
+    # Programs of one function, by all that they depend on within this process.
+
+    def __init__(self, function: Callable, static: tuple[str, ...], options: dict[str, Any] | None) -> None:
+        self._function, self._static, self._options = function, static, options
+        self._signature = inspect.signature(function)
+        self._lock = threading.RLock()
+        self._programs: dict[Any, tuple[Callable, Any] | None] = {}
+
+    def result(self, arguments: tuple, keywords: dict[str, Any]) -> Any:
+        bound = self._signature.bind(*arguments, **keywords).arguments
+        static = {name: bound.pop(name) for name in self._static if name in bound}
+        leaves, tree = jax.tree.flatten(bound)
+        shapes = tuple([_shape(leaf) for leaf in leaves])
+        typed = tuple([(name, type(value), value) for name, value in static.items()])
+        key = (tree, shapes, typed, tuple([getattr(jax.config, name) for name in _SETTINGS]))
+        if key not in self._programs:
+            with self._lock:  # another thread may be making it
+                if key not in self._programs:
+                    self._programs[key] = self._made(leaves, tree, shapes, static)
+        program = self._programs[key]
+        if program is None:
+            raise Undescribed(self._function.__name__)
+        call, tree = program
+        try:
+            return jax.tree.unflatten(tree, call(*leaves))
+        except _TROUBLE:
+            self._programs[key] = None
+            raise
+
+    def _made(self, leaves: list, tree: Any, shapes: tuple, static: dict[str, Any]) -> tuple[Callable, Any] | None:
+        is_wanted = jax.config.jax_enable_compilation_cache  # type: ignore[attr-defined]
+        if not is_wanted or jax.default_backend() != "cpu" or jax.device_count() != 1:
+            return None
+        try:
+            words = [_name(self._function), described(static), described_tree(tree), _written(shapes), _settings()]
+            key = json.dumps([_FORMAT, *_versions(), _sources(), *words])
+            path = Path(os.environ[PROGRAMS]) / f"{self._function.__name__}-{hashlib.sha256(key.encode()).hexdigest()}"
+            stored = _read(path, key)
+            if stored is None:
+                stored = self._lowered(leaves, tree, static)
+                with contextlib.suppress(OSError):
+                    _write(path, key, *stored)
+            return self._compiled(*stored)
+        except _UNREADABLE:
+            return None
+
+    def _lowered(self, leaves: list, tree: Any, static: dict[str, Any]) -> tuple[Any, bytes]:
+        # Only arrays cross: classes of this package come and go outside.
+        from cspr_jax.runtime.lowered_programs import lowered
+
+        trees = []
+
+        def flat(*leaves: Any) -> list:
+            results, results_tree = jax.tree.flatten(self._function(**jax.tree.unflatten(tree, leaves), **static))
+            trees.append(results_tree)
+            return results
+
+        flat.__name__ = self._function.__name__
+        program = lowered(flat, leaves)
+        if program is None:
+            raise Undescribed(flat.__name__)
+        return [described_tree(trees[-1]), program.name, program.results], program.code
+
+    def _compiled(self, head: list, code: bytes) -> tuple[Callable, Any]:
+        from cspr_jax.runtime.lowered_programs import LoweredProgram, call
+
+        tree, name, results = head
+        program = LoweredProgram(name, code, tuple((tuple(shape), dtype) for shape, dtype in results))
+
+        def called(*leaves: Any) -> list:
+            return call(program, *leaves)
+
+        called.__name__ = name  # people see it while it is compiled
+        return jax.jit(called, compiler_options=self._options), tree_of(tree)
+
+
+def _name(function: Callable) -> str:
+    # Its name leads to its compiled form, so that nothing but a place in this package says which one it is.
+    name = f"{function.__module__}:{function.__qualname__}"
+    if not name.startswith(f"{__name__.partition('.')[0]}.") or "<" in name:
+        raise Undescribed(name)
+    return name
+
+
+def _shape(leaf: Any) -> tuple:
+    if isinstance(leaf, np.ndarray | np.generic):
+        return leaf.shape, leaf.dtype
+    if isinstance(leaf, jax.Array) and not isinstance(leaf, jax.core.Tracer):
+        return leaf.shape, leaf.dtype, leaf.weak_type
+    if type(leaf) in _SCALARS:
+        return (type(leaf),)
+    raise Undescribed(type(leaf).__name__)
+
+
+def _written(shapes: tuple) -> list:
+    return [[described(part) for part in shape] for shape in shapes]
+
+
+def _settings() -> list[str]:
+    # All settings of the process, whatever they mean, and those of this thread.
+    of_process = [f"{name}={value}" for name, value in sorted(jax.config.values.items()) if not name.startswith(_APART)]
+    return [*of_process, *(f"{name}={getattr(jax.config, name)}" for name in _SETTINGS)]
+
+
+def _versions() -> tuple[str, ...]:
+    return jax.__version__, jaxlib.version.__version__, np.__version__, sys.version
+
+
+@functools.cache
+def _sources() -> str:
+    # All of them, since any may be traced; times of files say too little, and reading them takes 15 ms.
+    package, total = Path(__file__).parents[1], hashlib.sha256()
+    for path in sorted(package.rglob("*.py")):
+        content = path.read_bytes()
+        total.update(f"{path.relative_to(package)} {len(content)}\n".encode() + content)
+    return total.hexdigest()
+
+
+def _read(path: Path, key: str) -> tuple[Any, bytes] | None:
+    # None where it is not there, or is not whole, or is another one's; then it is made again.
+    try:
+        data = zlib.decompress(compile_cache.plain_bytes(path))
+        checksum, _, content = data.partition(b"\n")
+        if checksum != hashlib.sha256(content).hexdigest().encode():
+            return None
+        head, _, program = content.partition(b"\n")
+        written_key, description = json.loads(head)
+    except _UNREADABLE:
+        return None
+    return (description, program) if written_key == key else None
+
+
+def _write(path: Path, key: str, description: Any, program: bytes) -> None:
+    # It may be a link to a damaged one of former runs: it is replaced, not written into.
+    content = json.dumps([key, description]).encode() + b"\n" + program
+    checksum = hashlib.sha256(content).hexdigest().encode()
+    partial = path.with_name(f".{path.name}.{os.getpid()}.{threading.get_ident()}")
+    try:
+        partial.write_bytes(zlib.compress(checksum + b"\n" + content, _FASTEST))
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)

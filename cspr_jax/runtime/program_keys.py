@@ -1,0 +1,164 @@
+"""Descriptions of what decides a traced program, and of the pytrees that it returns: plain JSON, without pickle.
+
+A value that has no such description raises `Undescribed`, and its program is not kept.
+"""
+
+import dataclasses
+import enum
+import functools
+import importlib
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import numpy as np
+
+# Names come from these packages alone: their versions, or their sources, are part of a key.
+_PACKAGES = ("cspr_jax", "builtins", "numpy", "jax")
+_PLAIN = (bool, int, str, type(None))
+
+
+class Undescribed(Exception):
+    """A value is not described completely by what can be written down."""
+
+
+def described(value: Any) -> Any:
+    """Description of a static argument or of the static part of a pytree: equal for equal values in every process.
+
+    Args:
+        value: numbers, words, arrays of NumPy, functions and classes by their names, and what is made of these.
+
+    Returns:
+        what `json` writes.
+
+    Raises:
+        Undescribed: it holds something else, such as a function within a function.
+    """
+    if type(value) in _PLAIN:
+        return value
+    for is_kind, parts in _KINDS:
+        if is_kind(value):
+            return parts(value)
+    return ["fields", name_of(type(value)), [[name, described(item)] for name, item in _fields(value).items()]]
+
+
+def _is_array(value: Any) -> bool:
+    return isinstance(value, np.ndarray | np.generic) and value.dtype.kind in "biuf"
+
+
+def _is_named(value: Any) -> bool:
+    return isinstance(value, type) or (callable(value) and hasattr(value, "__qualname__"))
+
+
+# The first row that fits describes a value.
+_KINDS: tuple[tuple[Callable[[Any], bool], Callable[[Any], Any]], ...] = (
+    (lambda v: type(v) is float, lambda v: ["float", v.hex()]),
+    (lambda v: isinstance(v, enum.Enum), lambda v: ["member", name_of(type(v)), v.name]),
+    (_is_named, lambda v: ["name", name_of(v)]),
+    (lambda v: isinstance(v, np.dtype), lambda v: ["dtype", v.str]),
+    (lambda v: type(v) in (tuple, list), lambda v: [type(v).__name__, [described(item) for item in v]]),
+    (lambda v: type(v) is dict, lambda v: ["dict", [[described(key), described(item)] for key, item in v.items()]]),
+    (_is_array, lambda v: ["array", name_of(type(v)), v.dtype.str, list(v.shape), v.tobytes().hex()]),
+    (
+        lambda v: type(v) is functools.partial,
+        lambda v: ["partial", described(v.func), described(v.args), described(v.keywords)],
+    ),
+)
+
+
+def _fields(value: Any) -> dict[str, Any]:
+    if isinstance(value, tuple) and hasattr(value, "_fields"):
+        return dict(zip(value._fields, value, strict=True))
+    if dataclasses.is_dataclass(value):
+        fields = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+        if vars(value).keys() <= fields.keys():
+            return fields
+    raise Undescribed(type(value).__name__)
+
+
+def name_of(thing: Any) -> str:
+    """Name by which a process finds a class or a function.
+
+    Args:
+        thing: of one of the packages that a key covers.
+
+    Returns:
+        module:name.
+
+    Raises:
+        Undescribed: nothing, or something else, is found there.
+    """
+    name = f"{getattr(thing, '__module__', None) or 'builtins'}:{getattr(thing, '__qualname__', '')}"
+    try:
+        is_there = _named(name) is thing
+    except (AttributeError, ImportError):
+        is_there = False
+    if not is_there:
+        raise Undescribed(name)
+    return name
+
+
+def _named(name: str) -> Any:
+    module, _, path = name.partition(":")
+    if module.partition(".")[0] not in _PACKAGES:
+        raise ImportError(module)
+    loaded = sys.modules.get(module) or importlib.import_module(module)
+    return functools.reduce(getattr, path.split("."), loaded)
+
+
+def described_tree(tree: Any) -> Any:
+    """Description of the structure of a pytree, with its static parts.
+
+    Args:
+        tree: `jax.tree.structure` of it.
+
+    Returns:
+        what `json` writes.
+
+    Raises:
+        Undescribed: a static part has no description.
+    """
+    node = tree.node_data()
+    if node is None:
+        return "leaf"
+    kind = "None" if node[0] is type(None) else name_of(node[0])
+    return [kind, described(node[1]), [described_tree(child) for child in tree.children()]]
+
+
+def tree_of(description: Any) -> Any:
+    """Structure of a pytree from its description.
+
+    Args:
+        description: of `described_tree`.
+
+    Returns:
+        the structure, as `jax.tree.structure` gives it.
+
+    Raises:
+        Undescribed: static parts that this does not make again, or something that is no description.
+    """
+    if description == "leaf":
+        return jax.tree.structure(0)
+    kind, static, children = description
+    if kind == "None":
+        return jax.tree.structure(None)
+    node = _named(kind), _value(static)
+    trees = [tree_of(child) for child in children]
+    return jax.tree_util.PyTreeDef.from_node_data_and_children(jax.tree_util.default_registry, node, trees)
+
+
+def _value(description: Any) -> Any:
+    # The opposite of `described`, of what static parts of results hold.
+    if type(description) in _PLAIN:
+        return description
+    kind, *parts = description
+    if kind == "float":
+        return float.fromhex(parts[0])
+    if kind == "name":
+        return _named(parts[0])
+    if kind in ("tuple", "list"):
+        return {"tuple": tuple, "list": list}[kind](_value(item) for item in parts[0])
+    if kind == "fields" and isinstance(_named(parts[0]), type):
+        return _named(parts[0])(**{name: _value(item) for name, item in parts[1]})
+    raise Undescribed(kind)
