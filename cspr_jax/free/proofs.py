@@ -62,7 +62,6 @@ def proved(question: FreeQuestion, tasks: Tasks, unknowns: Unknowns, *, is_optim
     Args:
         question: about the planned robot, or about all within an uncertainty.
         tasks: one.
-        unknowns: of the motion.
         is_optimal: whether the search has met all limits; else bounds are not tightened.
 
     Returns:
@@ -105,7 +104,7 @@ def robust_proof(
     Args:
         question: about the planned robot.
         tasks: one.
-        unknowns: of the best motion of the planned robot.
+        unknowns: those of the fastest, or otherwise best, motion of the planned robot, from which the search goes on.
 
     Returns:
         the motion; where none is found for all robots, one for those within a part of the uncertainty; None without.

@@ -36,7 +36,7 @@ def for_all_robots(question: FreeQuestion, uncertainty: Uncertainty, multiple: f
 
     Args:
         question: about the planned robot.
-        multiple: of the uncertainty; a little more is asked about.
+        multiple: a little more of the uncertainty is asked about.
 
     Returns:
         the question.

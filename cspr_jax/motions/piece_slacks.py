@@ -53,7 +53,7 @@ def piece_slacks(problem: Problem, motion: BoundedMotion, knots: np.ndarray, sce
         slacks = block_slacks(problem.robot, problem.limits, motion.bounds, start, end, scene)
         if problem.limits.uncertainty is None:
             return slacks.low, slacks.high
-        # What is proved of all robots in the middle of a block is not far above the smallest of their slacks.
+        # Slacks that are proved of all robots in the middle of a block are not far above the smallest of them.
         middles = motion.bounds(*short_blocks(0.5 * (start + end), end - start))
         low, high = (all_robots_slacks(problem, states) for states in (motion.bounds(start, end), middles))
         return _first_less(slacks.low, low), _first_less(slacks.high, high)
@@ -68,7 +68,7 @@ def all_robots_slacks(problem: Problem, states: StateBounds, multiple: float = 1
     Args:
         problem: robot without pulleys, limits with an uncertainty.
         states: over k blocks.
-        multiple: of the uncertainty.
+        multiple: () by which all parts of the uncertainty grow; 0 for the planned robot.
 
     Returns:
         (k, n) of the first n criteria, as `uncertain_slacks.lower_slacks` gives them.

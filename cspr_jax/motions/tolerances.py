@@ -171,7 +171,7 @@ class _MultipleSearch:
 
     @property
     def _most_open(self) -> np.ndarray:
-        # Of motions that are known to be feasible for more robots, or fewer, the multiple need not be so close.
+        # Multiples other than 1 need not be so close: they decide nothing.
         return OPEN * self._arcs * np.where(self.targets == 1.0, DECIDED, 1.0)
 
     def left(self, pool: Pool) -> Pool:

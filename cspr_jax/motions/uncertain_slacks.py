@@ -54,7 +54,7 @@ def share_of(limits: Limits, multiple: np.ndarray) -> Share:
     """Multiples of an uncertainty.
 
     Args:
-        limits: with an uncertainty.
+        limits: those with an uncertainty; others have no shares.
         multiple: (k,).
 
     Returns:
