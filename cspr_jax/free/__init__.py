@@ -3,8 +3,9 @@
 Between poses a motion is a quintic B-spline of normalised time, with four continuous derivatives, so that tensions and
 their rates are continuous. Its control points, its duration and the accelerations at the poses are found by an
 interior-point method on the limits at many instants, from several starts. The proof of any motion then says where
-limits are missed between instants; there they are tightened, and the search goes on. The orientation is a Rodrigues
-vector from an orientation half-way, so that the motion is a spline of quaternions as all others are.
+limits are missed between instants; there they are tightened, and the search goes on. For all robots within an
+uncertainty they are tightened by what these lose. The orientation is a Rodrigues vector from an orientation half-way,
+so that the motion is a spline of quaternions as all others are.
 
 Files, each importing only from those above it:
 
@@ -21,7 +22,9 @@ Files, each importing only from those above it:
     poses           tasks from poses, and motions from what is found
     closed_forms    motions of other families, from which searches begin, too
     question        poses, limits and objective of a search, and how bounds tighten
-    free_motion     the fastest motion through poses, tightened until it is proved
+    robust          bounds that leave room for all robots within an uncertainty
+    proofs          motions tightened until they are proved, for the planned robot or for all
+    free_motion     the fastest motion through poses, proved
     no_slower       closed forms in place of what a search finds, where they are faster
     neighbours      the best motions of many pairs of poses, from few starts and from neighbours' motions
     many            the fastest motions of many pairs of poses, tightened until they are proved

@@ -2,7 +2,7 @@
 
 import dataclasses
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,20 +11,18 @@ from scipy.interpolate import BSpline
 from cspr_jax.curves.spline import Spline
 from cspr_jax.free.basis import DEGREE, Basis
 from cspr_jax.free.closed_forms import ClosedForm, with_forms
-from cspr_jax.free.poses import FreePoses, divided, motions_of, segments_of
-from cspr_jax.free.question import FreeQuestion, FreeSettings, tightened
-from cspr_jax.free.search import Optima, again, optima, started
+from cspr_jax.free.poses import FreePoses, divided, segments_of
+from cspr_jax.free.proofs import first_optimum, proved, robust_proof
+from cspr_jax.free.question import FreeQuestion, FreeSettings, planned_problem
+from cspr_jax.free.search import Optima, optima, started
 from cspr_jax.free.starts import starts
 from cspr_jax.free.tasks import Tasks, Unknowns
 from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.proved_answers import ProvedAnswers, proved_answers
+from cspr_jax.motions.proved_answers import ProvedAnswers, judge_all_robots
 from cspr_jax.robots.clearance import Scene
 from cspr_jax.runtime.stages import stage
 
-# Rounds of proof and tightening.
-ROUNDS = 10
-# Weights of barriers, and softness, with which searches go on from a motion within tighter bounds, or a coarser one.
-ON = ((1e-5, 1e-2), (1e-3, 1e-1), (1e-2, 1.0), (1e-2, 10.0))
+# Weights of barriers, and softness, with which searches go on from a coarser motion.
 FINE = ((1e-4, 1e-1), (1e-2, 1.0), (1e-2, 10.0))
 # Searches of all segments together: by what the intervals are divided, and the number of a way of `FINE`. Searches that
 # get stuck on many intervals converge on fewer, on which motions are some parts in a thousand slower.
@@ -85,44 +83,23 @@ def free_motion(
     Raises:
         InputError: a robot for which no free motion is sought, or a cable without a largest tension.
     """
-    question = FreeQuestion.of(problem, scene, poses, settings)
+    question = FreeQuestion.of(planned_problem(problem), scene, poses, settings)
+    uncertainty = problem.limits.uncertainty
     best, is_stopped = (_begun(question), False) if len(divided(problem, poses)) else _searched(question, forms)
     tasks, optimum = question.tasks(settings.intervals, question.instants), None
     for share, way in TOGETHER if all(one.is_optimal for one in best) else ():
         tasks = question.tasks(2 * round(0.5 * settings.intervals / share), question.instants)
-        optimum = _first_optimum(tasks, [(_together(tasks, best, FINE[way][0]), *FINE[way])])
+        optimum = first_optimum(tasks, [(_together(tasks, best, FINE[way][0]), *FINE[way])])
         if optimum is not None:
             break
     unknowns, is_optimal = optimum or _together(tasks, best, FINE[0][0]), optimum is not None
     searched = float(unknowns.duration.sum()) if is_optimal else np.nan
-    for number in range(1, ROUNDS + 1):
-        stage(f"free motion: proof {number}")
-        motions = motions_of(tasks, unknowns, poses.z0)
-        answers = proved_answers(problem, motions, scene)
-        tighter = None
-        if is_optimal and number < ROUNDS and not answers.feasible.all():
-            tighter = tightened(question, tasks, motions)
-        if tighter is None:
-            break
-        try:
-            further = _first_optimum(tighter, ((again(tighter, unknowns, each[0]), *each) for each in ON))
-        except KeyboardInterrupt:
-            is_stopped = True
-            break
-        if further is None:
-            break
-        tasks, unknowns = tighter, further
-    energy, level = tasks.energies(unknowns)[0], unknowns.level[0]
-    return FreeMotion(motions, answers, energy, level, is_optimal, is_stopped, searched)
-
-
-def _first_optimum(tasks: Tasks, begun: Iterable[tuple[Unknowns, float, float]]) -> Unknowns | None:
-    # The optimum of the first search that converges, of one task, with its start, barrier and softness.
-    for start in begun:
-        result = optima(tasks, *start)
-        if result.is_optimal[0] and tasks.objective.keeps_limits(result.unknowns.level)[0]:
-            return result.unknowns
-    return None
+    proof = robust_proof(question, uncertainty, tasks, unknowns) if uncertainty is not None and is_optimal else None
+    proof = proof or proved(question, tasks, unknowns, is_optimal=is_optimal)
+    judge_all_robots(problem, proof.answers, proof.motions, scene)
+    energy, level = proof.tasks.energies(proof.unknowns)[0], proof.unknowns.level[0]
+    is_stopped |= proof.is_stopped
+    return FreeMotion(proof.motions, proof.answers, energy, level, is_optimal, is_stopped, searched)
 
 
 class _Best(NamedTuple):

@@ -10,10 +10,11 @@ from scipy.interpolate import BSpline
 from cspr_jax.curves.several import SeveralSplines
 from cspr_jax.curves.spline import Spline
 from cspr_jax.free.basis import DEGREE, Basis
-from cspr_jax.free.free_motion import FEWEST, FINE, ON, ROUNDS
+from cspr_jax.free.free_motion import FEWEST, FINE
 from cspr_jax.free.neighbours import Neighbours
 from cspr_jax.free.poses import FreePoses, motions_of
-from cspr_jax.free.question import FreeQuestion, FreeSettings, tightened
+from cspr_jax.free.proofs import ON, ROUNDS
+from cspr_jax.free.question import FreeQuestion, FreeSettings, planned_problem, tightened
 from cspr_jax.free.search import again, optima, started
 from cspr_jax.free.tasks import Tasks, Unknowns
 from cspr_jax.motions.problem import Problem
@@ -58,7 +59,7 @@ def free_motions(
     Raises:
         InputError: a robot for which no free motion is sought, or a cable without a largest tension.
     """
-    questions = [FreeQuestion.of(problem, scene, pair, FreeSettings()) for pair in pairs]
+    questions = [FreeQuestion.of(planned_problem(problem), scene, pair, FreeSettings()) for pair in pairs]
     best = dict[int, tuple[Spline, MotionProof]]()
     for mesh in meshes:
         left = [k for k in range(len(pairs)) if k not in best or best[k][1].verdict]

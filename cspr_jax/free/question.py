@@ -44,6 +44,15 @@ class FreeSettings(NamedTuple):
     instants: int | None = None
 
 
+def planned_problem(problem: Problem) -> Problem:
+    """A problem without uncertainty.
+
+    Returns:
+        the problem.
+    """
+    return problem._replace(limits=dataclasses.replace(problem.limits, uncertainty=None))
+
+
 @dataclasses.dataclass(frozen=True)
 class FreeQuestion:
     """The best motion through poses within limits is sought.
@@ -71,6 +80,16 @@ class FreeQuestion:
         limits = bounds(robot, problem.limits, criteria(robot, problem.limits, scene), settings.longest is not None)
         objective, limits = OBJECTIVES[settings.objective](limits, robot.n_cables)
         return cls(problem, scene, poses, limits, objective, settings)
+
+    @property
+    def is_planned(self) -> bool:
+        """Tell whether it is about the planned robot alone, and not about all within an uncertainty."""
+        return self.problem.limits.uncertainty is None
+
+    @property
+    def planned(self) -> Problem:
+        """The problem of the planned robot alone."""
+        return planned_problem(self.problem)
 
     @property
     def instants(self) -> int:

@@ -5,21 +5,19 @@ The search is that of `motions.tolerances`; blocks are proved and refuted by `mo
 
 import dataclasses
 from functools import partial
-from typing import Any
 
 import jax
 import numpy as np
 
 from cspr_jax.arithmetic.affine_bounds import constant
 from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.motions.block_slacks import BATCH
 from cspr_jax.motions.blocks import Blocks
 from cspr_jax.motions.motion import BoundedMotion, Motion
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.time_proof import FIRST
 from cspr_jax.motions.tolerances import Tolerated, tolerated_by
-from cspr_jax.motions.uncertain_slacks import Share, blocks_hold, instants_fail, worst_ways
+from cspr_jax.motions.uncertain_slacks import blocks_hold, instants_fail, share_of, worst_ways
 from cspr_jax.robots.clearance import Scene
 from cspr_jax.robots.contact_bodies import Bodies, bodies_of, default_scene
 from cspr_jax.robots.state_bounds import StateBounds
@@ -57,21 +55,16 @@ class _StatePool:
             return np.zeros(0, bool)
         of_robot = self.problem.robot, self.problem.limits, self.bodies
         kernel = partial(blocks_hold, *of_robot, contacts_alone=self.contacts_alone)
-        return in_batches(kernel, (self.states, _share(self.problem, multiple)), size=BATCH)
+        return in_batches(kernel, (self.states, share_of(self.problem.limits, multiple)), size=BATCH)
 
     def fail(self, multiple: np.ndarray) -> np.ndarray:
         if not len(self.blocks.row):
             return np.zeros(0, bool)
-        share, of_robot = _share(self.problem, multiple), (self.problem.robot, self.problem.limits, self.bodies)
+        share, of_robot = (
+            share_of(self.problem.limits, multiple),
+            (self.problem.robot, self.problem.limits, self.bodies),
+        )
         return instants_fail(*of_robot, self.instants, share, self.ways, contacts_alone=self.contacts_alone)
-
-
-def _share(problem: Problem, multiple: np.ndarray) -> Share:
-    uncertainty: Any = problem.limits.uncertainty
-    with np.errstate(over="ignore"):
-        factor = leaf(float(uncertainty.mass_factor) ** multiple)
-    spools, centre = (leaf(multiple * float(size)) for size in (uncertainty.spool_positions, uncertainty.mass_centre))
-    return Share(spools, centre, factor)
 
 
 def _pool(
@@ -80,7 +73,7 @@ def _pool(
     middle = 0.5 * (blocks.start + blocks.stop)
     each = motion.bounds(blocks.start, blocks.stop), instant_states(motion, middle / float(motion.duration()))
     states, instants = (jax.tree.map(np.asarray, bounds) for bounds in each)
-    share, of_robot = _share(problem, np.ones(len(middle))), (problem.robot, problem.limits, bodies)
+    share, of_robot = share_of(problem.limits, np.ones(len(middle))), (problem.robot, problem.limits, bodies)
     ways = worst_ways(*of_robot, instants, share, contacts_alone=contacts_alone)
     return _StatePool(problem, bodies, motion, contacts_alone, blocks, states, instants, ways)
 

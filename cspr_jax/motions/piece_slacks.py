@@ -1,16 +1,22 @@
 """Slacks of motions over their pieces, so that a search can be tightened where they are too small."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from cspr_jax.motions.block_slacks import block_slacks
+from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.motions.block_slacks import BATCH, block_slacks
 from cspr_jax.motions.criteria import Criterion, criteria
 from cspr_jax.motions.motion import BoundedMotion
 from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.uncertain_slacks import lower_slacks, share_of
 from cspr_jax.robots.clearance import Scene
+from cspr_jax.robots.state_bounds import StateBounds
 
+# Half the length of short blocks over the usual one.
+SHORT = 1e-6
 # By how much of what is missed the bounds of a piece may be apart. Of slacks in their units: by how much at least, and
 # times that a piece is halved.
 LOOSE, LEAST, HALVINGS = 0.5, 1e-7, 5
@@ -32,9 +38,10 @@ class PieceSlacks(NamedTuple):
 
 
 def piece_slacks(problem: Problem, motion: BoundedMotion, knots: np.ndarray, scene: Scene | None) -> PieceSlacks:
-    """Bounds of the slacks over pieces, close where they are negative.
+    """Bounds of the slacks over pieces, close where they are negative; of all robots within an uncertainty.
 
     Args:
+        problem: of a robot without pulleys, if its limits have an uncertainty.
         knots: (n_pieces + 1,) borders of the pieces, s.
         scene: as for `motions.proved_answers.proved_answers`.
 
@@ -44,10 +51,49 @@ def piece_slacks(problem: Problem, motion: BoundedMotion, knots: np.ndarray, sce
 
     def bounded(_: np.ndarray, start: np.ndarray, end: np.ndarray) -> Sides:
         slacks = block_slacks(problem.robot, problem.limits, motion.bounds, start, end, scene)
-        return slacks.low, slacks.high
+        if problem.limits.uncertainty is None:
+            return slacks.low, slacks.high
+        # Slacks that are proved of all robots in the middle of a block are not far above the smallest of them.
+        middles = motion.bounds(*short_blocks(0.5 * (start + end), end - start))
+        low, high = (all_robots_slacks(problem, states) for states in (motion.bounds(start, end), middles))
+        return _first_less(slacks.low, low), _first_less(slacks.high, high)
 
     rows = criteria(problem.robot, problem.limits, scene)
     return PieceSlacks(rows, *close_bounds(bounded, (knots[:-1], knots[1:]), LEAST, HALVINGS))
+
+
+def all_robots_slacks(problem: Problem, states: StateBounds, multiple: float = 1.0) -> np.ndarray:
+    """Lower bounds of the slacks of tensions and limits of all robots within an uncertainty.
+
+    Args:
+        problem: robot without pulleys, limits with an uncertainty.
+        states: over k blocks.
+        multiple: () by which all parts of the uncertainty grow; 0 for the planned robot.
+
+    Returns:
+        (k, n) of the first n criteria, as `uncertain_slacks.lower_slacks` gives them.
+    """
+    share = share_of(problem.limits, np.full(len(states.position.middle), multiple))
+    return in_batches(partial(lower_slacks, problem.robot, problem.limits), (states, share), size=BATCH)
+
+
+def short_blocks(instants: np.ndarray, sizes: np.ndarray) -> Sides:
+    """Blocks that are so short that what is bounded over them is known.
+
+    Args:
+        instants: (k,) in their middles, s.
+        sizes: (k,) of blocks of usual length, s.
+
+    Returns:
+        (k,) starts and ends, s.
+    """
+    return instants - SHORT * sizes, instants + SHORT * sizes
+
+
+def _first_less(slacks: np.ndarray, others: np.ndarray) -> np.ndarray:
+    # The smaller ones of slacks, of which the others are the first columns.
+    count = others.shape[1]
+    return np.concatenate([np.minimum(slacks[:, :count], others), slacks[:, count:]], axis=1)
 
 
 def close_bounds(
@@ -71,7 +117,9 @@ def close_bounds(
         low, high = bounds = bounds or (np.full(below.shape, np.inf), np.full(below.shape, np.inf))
         np.minimum.at(high, piece, above)
         # A block says how much is missed where the lower bound is about as close as the upper one.
-        is_loose = ((below < 0.0) & (above - below > LOOSE * np.maximum(-above, least))).any(1) & (level < halvings)
+        # Halving does not help if nothing is known even of the middle.
+        is_open = (below < 0.0) & (below < above - LOOSE * np.maximum(-above, least))
+        is_loose = np.any(is_open, axis=1) & (level < halvings)
         np.minimum.at(low, piece[~is_loose], below[~is_loose])
         if not is_loose.any():
             break

@@ -23,6 +23,8 @@ ROW = (1.0, 8.0, 64.0, 512.0, LARGEST_MULTIPLE)
 NEAR, STEPS = 0.99, 12
 # Most halvings of a block, and most open blocks of an arc.
 HALVINGS, OPEN = 14, 256
+# Times as many blocks as usual may be open where it is decided whether a motion is feasible: at the multiple 1.
+DECIDED = 4.0
 # Factor by which a target is lowered where more blocks are open, and how often it is applied in a row.
 LESS, LESSER = 0.95, 8
 # Levels of halving at which a robot that fails is still looked for once the bounds cannot hold.
@@ -167,6 +169,11 @@ class _MultipleSearch:
         self.refuted, self.targets = np.full(len(arcs), np.inf), np.ones(len(arcs))
         self.proved, self._is_hopeless = np.full(len(arcs), np.nan), np.zeros(len(arcs), bool)
 
+    @property
+    def _most_open(self) -> np.ndarray:
+        # Multiples other than 1 need not be so close: they decide nothing.
+        return OPEN * self._arcs * np.where(self.targets == 1.0, DECIDED, 1.0)
+
     def left(self, pool: Pool) -> Pool:
         # Return the blocks of motions that are not settled.
         if self._whole:
@@ -180,7 +187,7 @@ class _MultipleSearch:
         is_open = ~pool.hold(self.targets[row])
         is_open = self._lessened(pool, is_open) if self._whole else self._hopeful(pool, is_open)
         many = np.bincount(row[is_open], minlength=self._count)
-        ends = (many > OPEN * self._arcs) | ((many > 0) & (level == HALVINGS))
+        ends = (many > self._most_open) | ((many > 0) & (level == HALVINGS))
         ends |= self._is_hopeless & (many > 0) & (level >= MORE)
         left = is_open & ends[row]
         if left.any():
@@ -193,10 +200,10 @@ class _MultipleSearch:
         # Lower the targets of motions of which too many blocks are open.
         row = pool.blocks.row
         for _ in range(LESSER):
-            much = np.bincount(row[is_open], minlength=self._count) > OPEN * self._arcs
+            much = np.bincount(row[is_open], minlength=self._count) > self._most_open
             if not much.any():
                 break
-            self.targets = np.where(much, LESS * self.targets, self.targets)
+            self.targets = np.where(much, _not_across_one(LESS * self.targets, self.targets), self.targets)
             indices = np.flatnonzero(is_open & much[row])
             is_open[indices] = ~pool.part(indices).hold(self.targets[row[indices]])
         return is_open
@@ -243,7 +250,12 @@ def _targets(refuted: np.ndarray, *, whole: bool) -> np.ndarray:
 
 def _near(multiple: np.ndarray) -> np.ndarray:
     # Return a slightly smaller multiple, but not less than 1 if it is more.
-    return np.where(multiple > 1.0, np.maximum(NEAR * multiple, 1.0), NEAR * multiple)
+    return _not_across_one(NEAR * multiple, multiple)
+
+
+def _not_across_one(smaller: np.ndarray, multiple: np.ndarray) -> np.ndarray:
+    # At 1 it is decided whether a motion is feasible.
+    return np.where(multiple > 1.0, np.maximum(smaller, 1.0), smaller)
 
 
 def _any(row: np.ndarray, is_so: np.ndarray, count: int) -> np.ndarray:

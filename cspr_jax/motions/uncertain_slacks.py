@@ -10,7 +10,7 @@ What is refuted rests on the slacks of single robots at instants, displaced alon
 
 import dataclasses
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -19,7 +19,9 @@ from jax import Array
 
 from cspr_jax.arithmetic.affine_bounds import AffineBounds, norm
 from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.motions.block_slacks import limit_slacks, tension_slacks
+from cspr_jax.motions.limits import limits_set
 from cspr_jax.robots.cables import AnyRobot, wrench_units
 from cspr_jax.robots.contact_bodies import Bodies
 from cspr_jax.robots.contact_bounds import contact_bounds
@@ -48,6 +50,23 @@ class Share(NamedTuple):
     factor: Array
 
 
+def share_of(limits: Limits, multiple: np.ndarray) -> Share:
+    """Multiples of an uncertainty.
+
+    Args:
+        limits: those with an uncertainty; others have no shares.
+        multiple: (k,).
+
+    Returns:
+        the shares, (k,).
+    """
+    uncertainty: Any = limits.uncertainty
+    with np.errstate(over="ignore"):
+        factor = leaf(float(uncertainty.mass_factor) ** multiple)
+    spools, centre = (leaf(multiple * float(size)) for size in (uncertainty.spool_positions, uncertainty.mass_centre))
+    return Share(spools, centre, factor)
+
+
 @partial(jax.jit, static_argnames="contacts_alone", compiler_options=compile_options.least())
 def blocks_hold(
     robot: AnyRobot, limits: Limits, bodies: Bodies, cases: tuple[StateBounds, Share], *, contacts_alone: bool = False
@@ -65,7 +84,7 @@ def blocks_hold(
 
     def one(state: StateBounds, share: Share) -> Array:
         cables = cable_bounds(robot, state)
-        is_met = jnp.ones((), bool) if contacts_alone else _cables_hold(robot, limits, state, cables, share)
+        parts = [] if contacts_alone else _cable_slacks(robot, limits, state, cables, share)
         turn = jnp.arcsin(share.spools / cables.length.low())
         wide = cables._replace(
             exit=_wider(cables.exit, share.spools),
@@ -73,7 +92,28 @@ def blocks_hold(
             length=_wider(cables.length, share.spools),
         )
         apart = contact_bounds(robot, bodies, state, wide)[0]
+        is_met = (jnp.concatenate(parts) > 0.0).all() if parts else jnp.ones((), bool)
         return is_met & ((apart > 0.0).all() | (share.spools == 0.0))
+
+    return jax.vmap(one)(*cases)
+
+
+@partial(jax.jit, compiler_options=compile_options.least())
+def lower_slacks(robot: AnyRobot, limits: Limits, cases: tuple[StateBounds, Share]) -> Array:
+    """Lower bounds of the slacks of tensions and limits of all robots over blocks.
+
+    Args:
+        robot: without pulleys.
+        cases: bounds of k states, and shares (k,).
+
+    Returns:
+        (k, n_slacks), the first ones of `criteria.criteria`; -inf where nothing is known, inf where a criterion is
+        judged for the planned robot alone.
+    """
+
+    def one(state: StateBounds, share: Share) -> Array:
+        slacks = jnp.concatenate(_cable_slacks(robot, limits, state, cable_bounds(robot, state), share))
+        return jnp.where(jnp.isnan(slacks), -jnp.inf, slacks)
 
     return jax.vmap(one)(*cases)
 
@@ -82,36 +122,47 @@ def _wider(bounds: AffineBounds, radius: Array) -> AffineBounds:
     return bounds._replace(radius=bounds.radius + radius)
 
 
-def _cables_hold(robot: AnyRobot, limits: Limits, state: StateBounds, cables: CableBounds, share: Share) -> Array:
-    # Prove tensions, and the limits of lengths, speeds and accelerations, with the unit vectors u' of cables at most
-    # `turn` from u.
-    (low, high), spools = tension_range(robot, limits), share.spools
+def _cable_slacks(
+    robot: AnyRobot, limits: Limits, state: StateBounds, cables: CableBounds, share: Share
+) -> list[Array]:
+    # Bound the slacks of tensions, and of the limits of lengths, speeds and accelerations, from below, with the unit
+    # vectors u' of cables at most `turn` from u.
+    low, high = tension_range(robot, limits)
 
     def at_mass(ratio: Array) -> UncertainTensions:
         other = with_mass(robot, ratio)
-        return uncertain_tensions(other, state, cables, (low, high), (spools, share.centre))
+        return uncertain_tensions(other, state, cables, (low, high), (share.spools, share.centre))
 
     tensions = jax.vmap(at_mass)(jnp.stack([1.0 / share.factor, share.factor]))
-    is_met = ((tensions.low > low[None]) & (tensions.high < high[None])).all()
-    if limits.cable_length_max is not None:
-        is_met &= (cables.length.high() + spools < limits.cable_length_max).all()
+    parts = [jnp.min(tensions.low - low[None], axis=0)]
+    parts += [] if limits.tension_max is None else [jnp.min(high[None] - tensions.high, axis=0)]
+    parts = [jnp.min(jnp.concatenate(parts), keepdims=True)] if robot.n_cables > robot.dof else parts
+    most = _largest(robot, limits, state, cables, share.spools)
+    for row in limits_set(limits):
+        if row.quantity != "tension":
+            limit = jnp.broadcast_to(getattr(limits, row.name), robot.n_cables if row.per_cable else 1)
+            parts.append(limit - most.get(row.quantity, jnp.full(limit.shape, -jnp.inf)))
+    return parts
+
+
+def _largest(
+    robot: AnyRobot, limits: Limits, state: StateBounds, cables: CableBounds, spools: Array
+) -> dict[str, Array]:
+    # Bound the lengths, speeds and accelerations of the cables of all robots from above.
+    lengths = {"length": cables.length.high() + spools}
     if limits.cable_speed_max is None and limits.cable_acceleration_max is None:
-        return is_met
+        return lengths
     _, _, velocity, pull = attachments(robot, state)
     near, speed = cables.length.low(), cables.rate.size()
     sine = spools / near
     slowest = jnp.maximum(0.0, jnp.maximum(cables.rate.low(), -cables.rate.high()))
     square = jnp.maximum(norm(velocity).high() ** 2 - slowest**2, 0.0)
     faster = sine * jnp.sqrt(square) + (1.0 - jnp.sqrt(1.0 - sine**2)) * speed
-    if limits.cable_speed_max is not None:
-        is_met &= (speed + faster < limits.cable_speed_max).all()
-    if limits.cable_acceleration_max is not None:
-        # With q = v^2 - rate^2, of length q / l + u pull: q' / l' - q / l, and (u' - u) pull.
-        short = jnp.where(near > spools, near - spools, jnp.nan)
-        more = faster * (2.0 * speed + faster) / short + square * spools / (near * short)
-        more += jnp.arcsin(sine) * norm(pull).high()
-        is_met &= (cables.acceleration.size() + more < limits.cable_acceleration_max).all()
-    return is_met
+    # With q = v^2 - rate^2, of length q / l + u pull: q' / l' - q / l, and (u' - u) pull.
+    short = jnp.where(near > spools, near - spools, jnp.nan)
+    more = faster * (2.0 * speed + faster) / short + square * spools / (near * short)
+    more += jnp.arcsin(sine) * norm(pull).high()
+    return lengths | {"speed": speed + faster, "acceleration": cables.acceleration.size() + more}
 
 
 @partial(jax.jit, static_argnames="contacts_alone", compiler_options=compile_options.least())

@@ -49,7 +49,8 @@ class Judged:
 def problem_of(robot, limits):
     """The problem of a robot of the reference, with its limits (a floor from the spools), and the frame of its axes."""
     prepared, frame = centred(robot_of(robot))
-    return Problem(prepared, Limits(**{name: leaf(value) for name, value in limits.items()}), named("A1")), frame
+    values = {name: value if name == "uncertainty" else leaf(value) for name, value in limits.items()}
+    return Problem(prepared, Limits(**values), named("A1")), frame
 
 
 def solve(robot, limits, positions, accelerations=None, settings=QUICK):

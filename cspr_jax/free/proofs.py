@@ -1,0 +1,136 @@
+"""Motions that a search has found, tightened until they are proved: for the planned robot, or for all like it."""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from cspr_jax.curves.spline import Spline
+from cspr_jax.free.poses import motions_of
+from cspr_jax.free.question import FreeQuestion, tightened
+from cspr_jax.free.robust import for_all_robots, widened
+from cspr_jax.free.search import again, optima
+from cspr_jax.free.tasks import Tasks, Unknowns
+from cspr_jax.motions.proved_answers import ProvedAnswers, proved_answers
+from cspr_jax.robots.limits import Uncertainty
+from cspr_jax.runtime.stages import stage
+
+# Rounds of proof and tightening, and rounds before in which room is left for all robots.
+ROUNDS, WIDER = 10, 3
+# Weights of barriers, and softness, with which searches go on from a motion within tighter bounds.
+ON = ((1e-5, 1e-2), (1e-3, 1e-1), (1e-2, 1.0), (1e-2, 10.0))
+# Part of an uncertainty, by way of which the search goes where it finds no motion for all of it.
+PART = 0.5
+
+
+class FreeProof(NamedTuple):
+    """A motion with its proof.
+
+    Fields:
+        tasks: one, with the bounds within which the motion is the best one.
+        unknowns: of it.
+        motions: one a segment.
+        answers: of them, of the planned robot alone.
+        is_stopped: whether Ctrl-C has ended the search.
+    """
+
+    tasks: Tasks
+    unknowns: Unknowns
+    motions: list[Spline]
+    answers: ProvedAnswers
+    is_stopped: bool
+
+
+def first_optimum(tasks: Tasks, begun: Iterable[tuple[Unknowns, float, float]]) -> Unknowns | None:
+    """The optimum of the first search that converges.
+
+    Args:
+        tasks: one.
+        begun: starts, and the weight of barriers and the softness with which each search begins.
+
+    Returns:
+        the optimum; None where no search converges.
+    """
+    for start in begun:
+        result = optima(tasks, *start)
+        if result.is_optimal[0] and tasks.objective.keeps_limits(result.unknowns.level)[0]:
+            return result.unknowns
+    return None
+
+
+def proved(question: FreeQuestion, tasks: Tasks, unknowns: Unknowns, *, is_optimal: bool = True) -> FreeProof:
+    """A motion that is tightened until the limits of a question are proved.
+
+    Args:
+        question: about the planned robot, or about all within an uncertainty.
+        tasks: one.
+        is_optimal: whether the search has met all limits; else bounds are not tightened.
+
+    Returns:
+        the motion; where tightening ends before all is proved, the last one.
+    """
+    planned, is_stopped = question.planned, False
+    for number in range(1, ROUNDS + 1):
+        stage(f"free motion: proof {number}")
+        motions = motions_of(tasks, unknowns, question.poses.z0)
+        answers = proved_answers(planned, motions, question.scene)
+        tighter = None
+        if is_optimal and number < ROUNDS and not (answers.feasible.all() and question.is_planned):
+            tighter = tightened(question, tasks, motions)
+        if tighter is None:
+            break
+        try:
+            further = _again(tighter, unknowns)
+        except KeyboardInterrupt:
+            is_stopped = True
+            break
+        if further is None:
+            break
+        tasks, unknowns = tighter, further
+    return FreeProof(tasks, unknowns, motions, answers, is_stopped)
+
+
+def _again(tasks: Tasks, unknowns: Unknowns) -> Unknowns | None:
+    # The best motion within other bounds, from one found before; None where no room is left between them.
+    low, high = tasks.bounds(unknowns.level)
+    if not (low < high).all():
+        return None
+    return first_optimum(tasks, ((again(tasks, unknowns, each[0]), *each) for each in ON))
+
+
+def robust_proof(
+    question: FreeQuestion, uncertainty: Uncertainty, tasks: Tasks, unknowns: Unknowns
+) -> FreeProof | None:
+    """The best motion for all robots within an uncertainty, from that of the planned robot.
+
+    Args:
+        question: about the planned robot.
+        tasks: one.
+        unknowns: those of the fastest, or otherwise best, motion of the planned robot, from which the search goes on.
+
+    Returns:
+        the motion; where none is found for all robots, one for those within a part of the uncertainty; None without.
+    """
+    all_robots, fewer = (for_all_robots(question, uncertainty, multiple) for multiple in (1.0, PART))
+    try:
+        whole = _with_room(all_robots, tasks, tasks, unknowns)
+        part = None if whole else _with_room(fewer, tasks, tasks, unknowns)
+        whole = _with_room(all_robots, tasks, *part) if part else whole
+    except KeyboardInterrupt:
+        return None
+    if whole:
+        return proved(all_robots, *whole)
+    return proved(fewer, *part) if part else None
+
+
+def _with_room(
+    question: FreeQuestion, nominal: Tasks, tasks: Tasks, unknowns: Unknowns
+) -> tuple[Tasks, Unknowns] | None:
+    # The best motion with room for all robots beside the bounds of the planned one, from one found before.
+    best = None
+    for number in range(1, WIDER + 1):
+        stage(f"free motion: room for all robots {number}")
+        wider = widened(question, nominal, motions_of(tasks, unknowns, question.poses.z0))
+        further = _again(wider, unknowns)
+        if further is None:
+            break
+        best = tasks, unknowns = wider, further
+    return best
