@@ -18,9 +18,9 @@ from cspr_jax.arithmetic.elementary import vertex
 from cspr_jax.motions.problem import Problem
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.swings.blocks import INTERVALS, blocks, over_blocks
-from cspr_jax.swings.criteria import counts, smooth_slacks
+from cspr_jax.swings.criteria import BASIC, counts, smooth_slacks
 from cspr_jax.swings.hypocycloid import Segment
-from cspr_jax.swings.proof import BATCH
+from cspr_jax.swings.proof import SMALL, length
 
 CANDIDATES = 3
 # Distance of the points of the first refining parabola, in steps between samples; how much narrower each next one is.
@@ -153,9 +153,7 @@ def _minima(functions: Functions, problem: Problem, edges: Array, counts: Array,
     return jax.vmap(refine, in_axes=(0, 0, 2, 2, 0))(segments, arcs, number, where, steps)
 
 
-def smallest_values(
-    functions: Functions, problem: Problem, segments: Segment, arcs: np.ndarray, table, *, batch: int = BATCH
-) -> np.ndarray:
+def smallest_values(functions: Functions, problem: Problem, segments: Segment, arcs: np.ndarray, table) -> np.ndarray:
     """Smallest values along each segment of functions of one instant.
 
     Args:
@@ -163,7 +161,6 @@ def smallest_values(
         segments: leaves (n, ...), of the parity of `arcs`.
         arcs: (n,) number of arcs, 1 or more.
         table: blocks to sample, from `blocks.blocks`.
-        batch: segments computed at a time.
 
     Returns:
         (n, n_groups).
@@ -171,14 +168,16 @@ def smallest_values(
     arcs = np.asarray(arcs, float)
     order = np.argsort(arcs, kind="stable")
     arguments = jax.tree.map(lambda x: x[order], (segments, arcs))
-    minima = in_batches(partial(_minima, functions, problem, *table), arguments, size=batch)
+    minima = in_batches(partial(_minima, functions, problem, *table), arguments, size=length(problem, len(arcs)))
     return minima[np.argsort(order, kind="stable")]
 
 
 def margins(problem: Problem, segments: Segment, arcs: np.ndarray) -> np.ndarray:
     """Smallest slack of each criterion along each segment.
 
-    The smallest sample of every block is refined, so the value does not depend on where the samples lie.
+    The smallest sample of every block is refined, so the value does not depend on where the samples lie. For many
+    segments with limits, where all slacks are positive, the smaller one of the cables' and the depth's stands in the
+    first two columns, and the smallest one of the limits in the others: refining two numbers takes less time.
 
     Args:
         segments: leaves (n, ...), of the parity of `arcs`.
@@ -188,6 +187,20 @@ def margins(problem: Problem, segments: Segment, arcs: np.ndarray) -> np.ndarray
         (n, n_criteria) in the order of `criteria.flags`; NaN where the motion is not finite.
     """
     table = blocks(problem.amplitude, int(np.max(arcs)))
+    sizes = counts(problem.robot, problem.limits)
+    if len(sizes) == BASIC or len(arcs) <= SMALL:
+        return _each(problem, segments, arcs, table)
+    both = sum(sizes[:BASIC]), sum(sizes[BASIC:])
+    least = smallest_values(Functions(smooth_slacks, both), problem, segments, arcs, table)
+    smallest = np.repeat(least, [BASIC, len(sizes) - BASIC], axis=1)
+    unclear = np.flatnonzero(~(np.isfinite(least) & (least > 0.0)).all(1))
+    if len(unclear):
+        some, numbers = jax.tree.map(lambda leaf: np.asarray(leaf)[unclear], (segments, np.asarray(arcs)))
+        smallest[unclear] = _each(problem, some, numbers, table)
+    return smallest
+
+
+def _each(problem: Problem, segments: Segment, arcs: np.ndarray, table) -> np.ndarray:
     # The smallest over the cables has kinks, each cable's own slack has none.
     functions = Functions(smooth_slacks, counts(problem.robot, problem.limits))
     smallest = smallest_values(functions, problem, segments, arcs, table)

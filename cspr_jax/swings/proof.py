@@ -33,6 +33,8 @@ from cspr_jax.swings.slacks import largest_term
 
 SMALLEST_MARGIN = 1e-9
 BATCH = 1024
+# Length of the batches of few segments with limits, for which a whole batch would take several times as long.
+SMALL = 128
 FINEST_CUT = 12
 
 
@@ -149,6 +151,15 @@ def prove(
     return Proof(feasible, infeasible, met | (feasible[:, None] & counted), broken, sampled, bound)
 
 
+def length(problem: Problem, count: int) -> int:
+    """Length of the batches for some segments, or blocks of them.
+
+    Returns:
+        that of small batches where limits, whose slacks take long, leave much of a batch to fill.
+    """
+    return SMALL if 2 * count <= BATCH and limits_set(problem.limits) else BATCH
+
+
 def is_met_at_samples(problem: Problem, segments: Segment, arcs: np.ndarray) -> np.ndarray:
     """Criteria that no sample of a first look breaks.
 
@@ -164,7 +175,7 @@ def is_met_at_samples(problem: Problem, segments: Segment, arcs: np.ndarray) -> 
     return sampled + _allowance(sampled.shape[1], near) >= -near[:, None]
 
 
-def first_look(problem: Problem, segments: Segment, arcs: np.ndarray) -> tuple[np.ndarray, ...]:
+def first_look(problem: Problem, segments: Segment, arcs: np.ndarray, *, batch: int = BATCH) -> tuple[np.ndarray, ...]:
     """A first look at segments: smallest samples and proved bounds of all criteria.
 
     Args:
@@ -178,7 +189,7 @@ def first_look(problem: Problem, segments: Segment, arcs: np.ndarray) -> tuple[n
     order = np.argsort(arcs, kind="stable")
     back = np.argsort(order, kind="stable")
     arguments = jax.tree.map(lambda x: x[order], (segments, arcs))
-    look = in_batches(partial(_first_look, problem, *table), arguments, size=BATCH)
+    look = in_batches(partial(_first_look, problem, *table), arguments, size=length(problem, len(arcs)))
     return jax.tree.map(lambda x: x[back], look)
 
 
@@ -202,7 +213,7 @@ def _cut(
     start, stop = edges[row, place], edges[row, place + 1]
     for _ in range(FINEST_CUT):
         items = (*jax.tree.map(lambda x, o=owner: x[o], (segments, arcs)), start, stop)
-        sampled, proved = in_batches(partial(_closer_look, problem), items, size=BATCH)
+        sampled, proved = in_batches(partial(_closer_look, problem), items, size=length(problem, len(owner)))
         limit, allowed = near[owner, None], _allowance(sampled.shape[1], near[owner])
         fails: np.ndarray = ~(sampled + allowed >= -limit) & counted[owner]
         failing = np.flatnonzero(fails.any(1))

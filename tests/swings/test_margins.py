@@ -17,7 +17,7 @@ from cspr_jax.robots import point_mass
 from cspr_jax.robots.limits import Limits
 from cspr_jax.swings import criteria, hypocycloid
 from cspr_jax.swings.margins import margins
-from cspr_jax.swings.proof import prove
+from cspr_jax.swings.proof import SMALL, prove
 
 N, Z0 = 40, 1.7
 BASES = {"prototype": equilateral(0.26), "tilted": TILTED}
@@ -116,6 +116,22 @@ def test_margins_of_limits():
         extremes = oracle.limits(BASES[name], 0.8, starts[i], ends[i], Z0, 9.81, int(arcs[i]), samples=10_001)
         assert found[i, 4] == pytest.approx((3.1 - extremes["z_max"]) / Z0, abs=1e-4)
         assert found[i, 5] == pytest.approx((2.4**2 - extremes["length_max"] ** 2) / (2.0 * Z0**2), abs=1e-4)
+
+
+def test_many_segments_with_limits_have_the_margins_of_few():
+    """Two numbers are refined where all slacks are positive, and one for each criterion elsewhere."""
+    wide = {"tension_max": 60.0, "cable_speed_max": 9.0, "cable_length_max": 4.4}
+    limits = Limits(**{key: np.full(3, value) for key, value in wide.items()})
+    problem, count = Problem(ROBOTS["prototype"], limits, QUINTIC), 3 * SMALL
+    _, _, arcs, segments = random_segments("prototype", 8, count)
+    many = margins(problem, segments, arcs)
+    rows = np.split(np.arange(count), 3)
+    few = np.concatenate([margins(problem, jax.tree.map(lambda leaf, k=k: leaf[k], segments), arcs[k]) for k in rows])
+    is_met = (few > 0.0).all(1)
+    assert 20 < is_met.sum() < count - 20
+    for columns in (slice(None, 2), slice(2, None)):
+        np.testing.assert_allclose(many[:, columns].min(1), few[:, columns].min(1), rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(many[~is_met], few[~is_met], rtol=1e-12, atol=1e-13)
 
 
 def test_order_of_the_segments_does_not_matter():
