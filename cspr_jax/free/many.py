@@ -12,7 +12,7 @@ from cspr_jax.curves.spline import Spline
 from cspr_jax.free.basis import DEGREE, Basis
 from cspr_jax.free.free_motion import FEWEST, FINE
 from cspr_jax.free.neighbours import Neighbours
-from cspr_jax.free.poses import FreePoses, motions_of
+from cspr_jax.free.poses import FreePoses, divided, motions_of
 from cspr_jax.free.proofs import ON, ROUNDS
 from cspr_jax.free.question import FreeQuestion, FreeSettings, planned_problem, tightened
 from cspr_jax.free.search import again, optima, started
@@ -61,8 +61,9 @@ def free_motions(
     """
     questions = [FreeQuestion.of(planned_problem(problem), scene, pair, FreeSettings()) for pair in pairs]
     best = dict[int, tuple[Spline, MotionProof]]()
+    sought = [k for k, pair in enumerate(pairs) if not len(divided(problem, pair))]
     for mesh in meshes:
-        left = [k for k in range(len(pairs)) if k not in best or best[k][1].verdict]
+        left = [k for k in sought if k not in best or best[k][1].verdict]
         for i, motion, proof in _on_mesh([questions[k] for k in left], mesh) if left else ():
             if left[i] not in best or not proof.verdict:
                 best[left[i]] = motion, proof
