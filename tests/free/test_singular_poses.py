@@ -9,7 +9,7 @@ from support.platforms import general, ours, random_pose
 
 from cspr_jax.arithmetic.elementary import double_precision, leaf
 from cspr_jax.free.free_motion import free_motion
-from cspr_jax.free.instants import determinant
+from cspr_jax.free.instants import determinant, instant_values, residuals
 from cspr_jax.free.poses import FreePoses, determinants, divided
 from cspr_jax.free.question import FreeQuestion, FreeSettings
 from cspr_jax.motions.amplitudes import named
@@ -75,6 +75,43 @@ def test_second_derivatives_at_a_singular_pose_are_numbers():
         )
     assert abs(float(value)) < 1e-12
     assert np.isfinite(bend).all()
+
+
+def test_derivatives_are_finite_differences():
+    """By coordinates and their derivatives; the determinant is the last value, and changes with coordinates alone."""
+    rng, robot, step = np.random.default_rng(4), general(), 1e-5
+    place = np.zeros((1, 3, 6))
+    place[0] = np.array([0.2, -0.1, 1.3, 0.1, -0.2, 0.15]) + 0.1 * rng.normal(size=(3, 6))
+    tensions, reference, duration = rng.uniform(0.1, 0.5, (1, 6)), np.array([[1.0, 0.0, 0.0, 0.0]]), np.array([0.8])
+    # Of the wrench, the depth below the spools, and the determinant.
+    multipliers = rng.normal(size=(1, 8))
+
+    with double_precision():
+        problem = problem_of(robot)
+
+        def at(change):
+            moved = place + change.reshape(1, 3, 6)
+            fixed = problem.robot, problem.limits, None, reference, moved, duration, tensions
+            return instant_values(*fixed, multipliers), residuals(*fixed)
+
+        here, missed = at(np.zeros(18))
+        sides = [[at(sign * step * row) for sign in (-1.0, 1.0)] for row in np.eye(18)]
+    np.testing.assert_allclose(here.residual, missed, atol=1e-13)
+    slopes = np.stack([(after[1] - before[1])[0] / (2.0 * step) for before, after in sides], axis=-1)
+    np.testing.assert_allclose(here.slope[0, :, :18], slopes, atol=1e-6)
+    bends = [multipliers[0] @ (after[0].slope - before[0].slope)[0, :, :18] / (2.0 * step) for before, after in sides]
+    np.testing.assert_allclose(here.bend[0, :18, :18], bends, atol=1e-5)
+    assert here.slope[0, -1, :6].any()
+    assert not here.slope[0, -1, 6:].any()
+    assert here.residual[0, -1] == pytest.approx(-at_place(problem, place[0, 0]), rel=1e-12)
+
+
+def at_place(problem, place):
+    """The determinant at coordinates, of which the last three are a Rodrigues vector."""
+    quaternion = np.array([1.0, *place[3:]])
+    turn = oracle.matrix(quaternion / np.linalg.norm(quaternion))
+    with double_precision():
+        return float(determinant(problem.robot, at_rest(leaf(place[:3]), leaf(turn))))
 
 
 @pytest.mark.parametrize("seed", range(3))
