@@ -195,8 +195,8 @@ def margins(problem: Problem, segments: Segment, arcs: np.ndarray) -> np.ndarray
     smallest = np.repeat(least, [BASIC, len(sizes) - BASIC], axis=1)
     unclear = np.flatnonzero(~(np.isfinite(least) & (least > 0.0)).all(1))
     if len(unclear):
-        some, numbers = jax.tree.map(lambda leaf: np.asarray(leaf)[unclear], (segments, np.asarray(arcs)))
-        smallest[unclear] = _each(problem, some, numbers, table)
+        part, numbers = jax.tree.map(lambda leaf: np.asarray(leaf)[unclear], (segments, np.asarray(arcs)))
+        smallest[unclear] = _each(problem, part, numbers, table)
     return smallest
 
 
