@@ -1,5 +1,6 @@
 """Motions of other families over the same poses, from which searches begin, too."""
 
+import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -15,6 +16,7 @@ from cspr_jax.motions.leg import Leg
 from cspr_jax.motions.motion import Motion, states_at
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.point_mass import spool_radius
+from cspr_jax.schema.limits import LIMITS
 
 # Part of the robot's size, and of the speed of a fall from its height, by which motions may miss poses.
 NEAR = 1e-9
@@ -49,16 +51,18 @@ def closed_forms(legs: Sequence[Leg], problem: Problem, poses: FreePoses) -> lis
     """Join poses by other families.
 
     Args:
-        legs: of these families.
+        legs: of these families, which take no limits of the mass centre.
 
     Returns:
-        the forms of the families that join these poses.
+        the forms of the families that join these poses, within all limits but those of the mass centre.
     """
     forms = list[ClosedForm]()
+    limits = dataclasses.replace(problem.limits, **{row.name: None for row in LIMITS if row.of_mass_centre})
+    taken = problem._replace(limits=limits)
     for leg in legs:
         try:
-            leg.check(problem)
-            answers, motions = leg.join(problem, poses.z0)
+            leg.check(taken)
+            answers, motions = leg.join(taken, poses.z0)
         except (ConfigError, InputError):
             continue  # the family joins other poses
         form = ClosedForm(leg.stops.family, motions, answers.feasible, np.asarray(answers.duration))

@@ -9,7 +9,7 @@ import pytest
 import cspr_jax
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.free import leg, no_slower
-from cspr_jax.free.closed_forms import ClosedForm, controls_of, with_forms
+from cspr_jax.free.closed_forms import ClosedForm, closed_forms, controls_of, with_forms
 from cspr_jax.free.free_motion import free_motion
 from cspr_jax.free.poses import segments_of
 from cspr_jax.free.question import FreeQuestion
@@ -35,6 +35,7 @@ def asked():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(leg, "free_motion", grasp)
+        patch.setattr(leg, "closed_forms", lambda legs, *rest: box.update(legs=legs) or closed_forms(legs, *rest))
         patch.setattr(leg, "no_slower", lambda free, *rest: box.update(forms=rest[-1]) or free)
         cspr_jax.plan(KEYS | {"starts": 1, "pose": POSES})
     return box
@@ -58,6 +59,18 @@ def test_other_families_are_asked(asked):
     np.testing.assert_allclose(form.duration, duration(asked["question"][0].robot), rtol=1e-3)
     # The second search began from them.
     assert len(asked["question"][-1]) == 1
+
+
+def test_limits_of_the_mass_centre_are_left_to_the_proof(asked):
+    """Families do not take them: a form is there, and does not stand in where it breaks one."""
+    problem, scene, poses, settings = asked["question"][:4]
+    for most, stands_in in ((1.0, False), (50.0, True)):
+        limited = problem._replace(limits=dataclasses.replace(problem.limits, speed_max=np.asarray(most)))
+        with double_precision():
+            forms = closed_forms(asked["legs"], limited, poses)
+            free = no_slower.no_slower(asked["free"], limited, scene, poses, settings, forms)
+        assert [form.family for form in forms] == ["hypocycloid-standard"]
+        assert (free.family is not None) == stands_in
 
 
 def test_splines_follow_a_motion(asked):
