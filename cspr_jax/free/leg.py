@@ -150,10 +150,17 @@ class FreeMotions(Leg):
         free = free_motion(problem, scene, poses, settings)
         if free.is_stopped or len(divided(problem, poses)) or not can_be_faster(free, problem, poses, settings):
             return free
-        others = forms()
-        if others and not free.answers.feasible.all():
-            free = free_motion(problem, scene, poses, settings, others)
-        return no_slower(free, problem, scene, poses, settings, others)
+        is_proved = bool(free.answers.feasible.all())
+        try:
+            others = forms()
+            if any(not is_proved or form.duration.sum() < free.duration for form in others):
+                further = free_motion(problem, scene, poses, settings, others)
+                free = further if further.answers.feasible.all() or not is_proved else free
+            return no_slower(free, problem, scene, poses, settings, others)
+        except KeyboardInterrupt:
+            if not is_proved:
+                raise
+            return dataclasses.replace(free, is_stopped=True)
 
     def _poses(self, problem: Problem, z0: float) -> FreePoses:
         # The poses in the axes of the kernels.

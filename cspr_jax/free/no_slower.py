@@ -7,7 +7,7 @@ import numpy as np
 
 from cspr_jax.free.closed_forms import ClosedForm, controls_of
 from cspr_jax.free.free_motion import FreeMotion
-from cspr_jax.free.poses import FreePoses, motions_of
+from cspr_jax.free.poses import FreePoses, half_swing, motions_of
 from cspr_jax.free.question import FreeQuestion, FreeSettings
 from cspr_jax.free.search import started
 from cspr_jax.free.starts import ARCS
@@ -33,11 +33,7 @@ def can_be_faster(free: FreeMotion, problem: Problem, poses: FreePoses, settings
     """
     if not free.answers.feasible.all():
         return True
-    return settings.objective == "time" and free.duration > ARCS * len(free.motions) * _half_swing(problem, poses)
-
-
-def _half_swing(problem: Problem, poses: FreePoses) -> float:
-    return float(np.pi * np.sqrt(poses.z0 / float(problem.robot.gravity)))
+    return settings.objective == "time" and free.duration > ARCS * len(free.motions) * half_swing(problem, poses)
 
 
 def no_slower(
@@ -89,7 +85,7 @@ def _followed(
 ) -> FreeMotion | None:
     # The spline of so many intervals that it is proved.
     question = FreeQuestion.of(problem, scene, poses, settings)
-    arcs = float(form.duration.max()) / _half_swing(problem, poses)
+    arcs = float(form.duration.max()) / half_swing(problem, poses)
     intervals = max(settings.intervals, 2 * int(np.ceil(0.5 * INTERVALS * arcs)))
     for doubling in range(DOUBLINGS):
         tasks = question.tasks(intervals * 2**doubling, question.instants)

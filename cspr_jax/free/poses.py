@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import jax
 import numpy as np
+from jax import Array
 
 from cspr_jax.arithmetic import rotations
 from cspr_jax.arithmetic.elementary import leaf
@@ -18,6 +19,7 @@ from cspr_jax.free.objectives import Objective
 from cspr_jax.free.tasks import Tasks, Unknowns
 from cspr_jax.motions.criteria import judged_poses
 from cspr_jax.motions.problem import Problem
+from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.wrench_balance import at_rest
 
@@ -101,9 +103,22 @@ def determinants(problem: Problem, poses: FreePoses) -> np.ndarray:
     Returns:
         (k,).
     """
-    turned = jax.vmap(rotations.matrix)(leaf(poses.quaternions))
-    states = jax.vmap(at_rest)(leaf(poses.positions), turned)
-    return np.asarray(jax.vmap(partial(determinant, problem.robot))(states))
+    return np.asarray(_determinants(problem.robot, leaf(poses.positions), leaf(poses.quaternions)))
+
+
+@jax.jit
+def _determinants(robot: AnyRobot, positions: Array, quaternions: Array) -> Array:
+    states = jax.vmap(at_rest)(positions, jax.vmap(rotations.matrix)(quaternions))
+    return jax.vmap(partial(determinant, robot))(states)
+
+
+def half_swing(problem: Problem, poses: FreePoses) -> float:
+    """Duration of half a swing about P0, over which durations count.
+
+    Returns:
+        s.
+    """
+    return float(np.pi * np.sqrt(poses.z0 / float(problem.robot.gravity)))
 
 
 def divided(problem: Problem, poses: FreePoses) -> np.ndarray:
@@ -159,7 +174,7 @@ def tasks_of(
         is_free=is_free[None],
         low=low,
         high=high,
-        scale=np.full(1, np.pi * np.sqrt(poses.z0 / float(problem.robot.gravity))),
+        scale=np.full(1, half_swing(problem, poses)),
         objective=objective,
         longest=None if longest is None else np.asarray(longest, float),
     )

@@ -60,10 +60,8 @@ class _StatePool:
     def fail(self, multiple: np.ndarray) -> np.ndarray:
         if not len(self.blocks.row):
             return np.zeros(0, bool)
-        share, of_robot = (
-            share_of(self.problem.limits, multiple),
-            (self.problem.robot, self.problem.limits, self.bodies),
-        )
+        of_robot = self.problem.robot, self.problem.limits, self.bodies
+        share = share_of(self.problem.limits, multiple)
         return instants_fail(*of_robot, self.instants, share, self.ways, contacts_alone=self.contacts_alone)
 
 

@@ -175,7 +175,7 @@ def is_met_at_samples(problem: Problem, segments: Segment, arcs: np.ndarray) -> 
     return sampled + _allowance(sampled.shape[1], near) >= -near[:, None]
 
 
-def first_look(problem: Problem, segments: Segment, arcs: np.ndarray, *, batch: int = BATCH) -> tuple[np.ndarray, ...]:
+def first_look(problem: Problem, segments: Segment, arcs: np.ndarray) -> tuple[np.ndarray, ...]:
     """A first look at segments: smallest samples and proved bounds of all criteria.
 
     Args:

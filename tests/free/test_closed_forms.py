@@ -127,6 +127,22 @@ def test_a_closed_form_that_does_not_serve(asked, change):
         assert no_slower.no_slower(free, problem, scene, poses, settings, [form]) is free
 
 
+def test_ctrl_c_keeps_what_is_proved(monkeypatch):
+    """While other families are asked."""
+
+    def interrupted(*arguments):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(leg, "can_be_faster", lambda *arguments: True)
+    monkeypatch.setattr(leg, "closed_forms", interrupted)
+    planned = cspr_jax.plan(KEYS | {"starts": 1, "pose": POSES})
+    assert planned.feasible
+    assert "the search was stopped before its end" in planned.warnings[0]
+    monkeypatch.setattr(leg, "free_motion", lambda *arguments: missed(free_motion(*arguments)))
+    with pytest.raises(KeyboardInterrupt):
+        cspr_jax.plan(KEYS | {"starts": 1, "pose": POSES})
+
+
 def test_a_plan_says_whose_motion_it_is(monkeypatch):
     monkeypatch.setattr(leg, "free_motion", lambda *arguments: missed(free_motion(*arguments)))
     planned = cspr_jax.plan(KEYS | {"starts": 1, "pose": POSES})
