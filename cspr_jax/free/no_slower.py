@@ -11,15 +11,12 @@ from cspr_jax.free.poses import FreePoses, half_swing, motions_of
 from cspr_jax.free.question import FreeQuestion, FreeSettings
 from cspr_jax.free.search import started
 from cspr_jax.free.starts import ARCS
-from cspr_jax.motions.motion import states_at
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import proved_answers
 from cspr_jax.robots.clearance import Scene
 
 # Intervals of each half swing of a spline that follows a closed form, at first, and how often they are doubled.
 INTERVALS, DOUBLINGS = 16, 3
-# Part of gravity by which accelerations may miss those of the poses.
-NEAR = 1e-6
 
 
 def can_be_faster(free: FreeMotion, problem: Problem, poses: FreePoses, settings: FreeSettings) -> bool:
@@ -57,33 +54,17 @@ def no_slower(
         whole = float(form.duration.sum())
         is_better = not is_proved or (settings.objective == "time" and whole < free.duration)
         is_short = settings.longest is None or bool((form.duration <= settings.longest).all())
-        if is_better and is_short and form.is_feasible.all() and _accelerates(form, problem, poses):
+        if is_better and is_short and form.is_feasible.all():
             spline = _followed(problem, scene, poses, settings, form)
             if spline is not None:
                 return dataclasses.replace(spline, is_stopped=free.is_stopped, searched=free.searched)
     return free
 
 
-def _accelerates(form: ClosedForm, problem: Problem, poses: FreePoses) -> bool:
-    # Tell whether accelerations are those of the poses, where these have any, and go on at inner poses.
-    ends = [states_at(motion, np.array([0.0, 1.0])) for motion in form.motions]
-    rows = [
-        state.acceleration
-        if poses.quaternions is None
-        else np.concatenate([state.acceleration, state.angular_acceleration], axis=1)
-        for state in ends
-    ]
-    sides = np.array(rows)
-    required = np.stack([poses.accelerations[:-1], poses.accelerations[1:]], axis=1)
-    missed = np.max(np.abs(np.where(np.isnan(required), 0.0, sides - required)), initial=0.0)
-    jump = np.max(np.abs(sides[1:, 0] - sides[:-1, 1]), initial=0.0)
-    return bool(max(missed, jump) <= NEAR * float(problem.robot.gravity))
-
-
 def _followed(
     problem: Problem, scene: Scene | None, poses: FreePoses, settings: FreeSettings, form: ClosedForm
 ) -> FreeMotion | None:
-    # The spline of so many intervals that it is proved.
+    # The spline of so many intervals that it is proved; at the poses it has the accelerations that these have.
     question = FreeQuestion.of(problem, scene, poses, settings)
     arcs = float(form.duration.max()) / half_swing(problem, poses)
     intervals = max(settings.intervals, 2 * int(np.ceil(0.5 * INTERVALS * arcs)))

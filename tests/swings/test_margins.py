@@ -118,9 +118,16 @@ def test_margins_of_limits():
         assert found[i, 5] == pytest.approx((2.4**2 - extremes["length_max"] ** 2) / (2.0 * Z0**2), abs=1e-4)
 
 
-def test_many_segments_with_limits_have_the_margins_of_few():
+@pytest.mark.parametrize(
+    "wide",
+    [
+        {"tension_max": 60.0, "cable_speed_max": 9.0, "cable_length_max": 4.4},
+        {"tension_max": 6e3, "cable_length_max": 44.0},
+    ],
+    ids=["limits are nearest", "the depth is nearer than limits"],
+)
+def test_many_segments_with_limits_have_the_margins_of_few(wide):
     """Two numbers are refined where all slacks are positive, and one for each criterion elsewhere."""
-    wide = {"tension_max": 60.0, "cable_speed_max": 9.0, "cable_length_max": 4.4}
     limits = Limits(**{key: np.full(3, value) for key, value in wide.items()})
     problem, count = Problem(ROBOTS["prototype"], limits, QUINTIC), 3 * SMALL
     _, _, arcs, segments = random_segments("prototype", 8, count)
