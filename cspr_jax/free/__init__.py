@@ -11,6 +11,8 @@ Files, each importing only from those above it:
 
     basis           quintic B-splines, and the instants at which motions are looked at
     instants        equations and bounds of a motion at an instant
+    determinants    determinants of the wrenches of unit tensions, with derivatives
+    derivatives     equations at many instants, with first and second derivatives
     objectives      what a motion is the best in
     tasks           motions that are sought together, and their unknowns
     elimination     tensions and multipliers, eliminated from Newton's equations of each instant

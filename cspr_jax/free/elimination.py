@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cspr_jax.free.instants import InstantValues
+from cspr_jax.free.derivatives import InstantValues
 
 
 def transposed(matrix: np.ndarray) -> np.ndarray:

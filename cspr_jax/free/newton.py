@@ -6,8 +6,8 @@ import numpy as np
 from scipy.linalg.lapack import dpbtrf, dpbtrs
 
 from cspr_jax.free.basis import LOCAL, Basis
+from cspr_jax.free.derivatives import SCALARS, InstantValues
 from cspr_jax.free.elimination import Softness, eliminated, times, transposed
-from cspr_jax.free.instants import SCALARS, InstantValues
 from cspr_jax.free.tasks import OUTER, Tasks, Unknowns, wide
 
 # Added to the diagonal where the matrix has a negative curvature: least, at first; by what it grows and shrinks; tries.

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cspr_jax.free.derivatives import SCALARS, InstantValues
 from cspr_jax.free.elimination import Softness, times, transposed
-from cspr_jax.free.instants import SCALARS, InstantValues
 from cspr_jax.free.newton import gathered
 from cspr_jax.free.tasks import OUTER, Tasks, Unknowns, wide
 

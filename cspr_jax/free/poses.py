@@ -14,7 +14,8 @@ from cspr_jax.arithmetic.rotations import products
 from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import InputError
 from cspr_jax.free.basis import Basis
-from cspr_jax.free.instants import ValueBounds, coordinates, determinant
+from cspr_jax.free.determinants import determinant
+from cspr_jax.free.instants import ValueBounds, coordinates
 from cspr_jax.free.objectives import Objective
 from cspr_jax.free.tasks import Tasks, Unknowns
 from cspr_jax.motions.criteria import judged_poses
@@ -98,7 +99,7 @@ def _joined(problem: Problem, poses: FreePoses) -> _Joined:
 
 
 def determinants(problem: Problem, poses: FreePoses) -> np.ndarray:
-    """Determinants at the poses of a platform on as many cables as degrees of freedom; see `instants.determinant`.
+    """Determinants at the poses of a platform on as many cables as degrees of freedom; see `determinants.determinant`.
 
     Returns:
         (k,).

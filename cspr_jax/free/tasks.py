@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cspr_jax.free.basis import Basis
-from cspr_jax.free.instants import InstantValues, instant_values, residuals
+from cspr_jax.free.derivatives import InstantValues, instant_values, residuals
 from cspr_jax.free.objectives import Objective
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits

@@ -8,8 +8,9 @@ from support.commands import plan
 from support.platforms import general, ours, random_pose
 
 from cspr_jax.arithmetic.elementary import double_precision, leaf
+from cspr_jax.free.derivatives import instant_values, residuals
+from cspr_jax.free.determinants import determinant
 from cspr_jax.free.free_motion import free_motion
-from cspr_jax.free.instants import determinant, instant_values, residuals
 from cspr_jax.free.poses import FreePoses, determinants, divided
 from cspr_jax.free.question import FreeQuestion, FreeSettings
 from cspr_jax.motions.amplitudes import named
