@@ -7,9 +7,10 @@ from oracles import platform as oracle
 from support.commands import plan
 from support.platforms import general, ours, random_pose
 
+import cspr_jax
 from cspr_jax.arithmetic.elementary import double_precision, leaf
 from cspr_jax.free.derivatives import instant_values, residuals
-from cspr_jax.free.determinants import determinant
+from cspr_jax.free.determinants import determinant, unit_wrenches, with_derivatives
 from cspr_jax.free.free_motion import free_motion
 from cspr_jax.free.poses import FreePoses, determinants, divided
 from cspr_jax.free.question import FreeQuestion, FreeSettings
@@ -19,6 +20,11 @@ from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.wrench_balance import at_rest
 
 FREE = np.full((2, 6), np.nan)
+# Spools and attachment points of a planar platform on three cables, m.
+PLANAR = (
+    np.array([[-1.0, 0.0, 0.0], [0.8, 0.0, 0.1], [1.1, 0.0, -0.1]]),
+    np.array([[-0.2, 0.0, -0.1], [0.25, 0.0, -0.1], [0.1, 0.0, 0.2]]),
+)
 GREENLINE = """
 schema = 1
 robot = "greenline"
@@ -34,6 +40,14 @@ position = [0.3, 0.2, 2.2]
 
 def poses(positions, quaternions):
     return FreePoses(np.array(positions), np.array(quaternions), np.zeros((2, 3)), FREE, 1.4)
+
+
+def robot_of(robot, pattern="3R3T"):
+    if pattern == "3R3T":
+        return ours(robot)
+    return cspr_jax.platform(
+        robot.base, robot.platform, mass=robot.mass, inertia=robot.inertia, pattern=pattern, z_axis="down"
+    )
 
 
 def problem_of(robot, tension=60.0):
@@ -62,57 +76,62 @@ def test_determinant_is_that_of_the_oracle():
 
 
 def test_second_derivatives_at_a_singular_pose_are_numbers():
-    """All cables are vertical: the matrix has rank 3."""
+    """All cables are vertical: the matrix has rank 3, and cofactors of the whole vanish."""
     robot, still = general(), leaf(np.eye(3))
     robot = oracle.Robot(robot.platform * [1.0, 1.0, 0.0], robot.platform, robot.mass, robot.inertia)
     with double_precision():
         prepared = ours(robot)
-        value, bend = (
-            f(leaf(np.array([0.0, 0.0, 1.4])))
-            for f in (
-                lambda p: determinant(prepared, at_rest(p, still)),
-                jax.hessian(lambda p: determinant(prepared, at_rest(p, still))),
-            )
+        regular = with_derivatives(
+            lambda p: unit_wrenches(prepared, at_rest(p, still)), leaf(np.array([0.0, 0.0, 1.4]))
         )
-    assert abs(float(value)) < 1e-12
-    assert np.isfinite(bend).all()
+    assert abs(float(regular.value)) < 1e-12
+    assert all(np.isfinite(part).all() for part in regular)
+    np.testing.assert_allclose(regular.cofactors, 0.0, atol=1e-12)
 
 
-def test_derivatives_are_finite_differences():
-    """By coordinates and their derivatives; the determinant is the last value, and changes with coordinates alone."""
-    rng, robot, step = np.random.default_rng(4), general(), 1e-5
-    place = np.zeros((1, 3, 6))
-    place[0] = np.array([0.2, -0.1, 1.3, 0.1, -0.2, 0.15]) + 0.1 * rng.normal(size=(3, 6))
-    tensions, reference, duration = rng.uniform(0.1, 0.5, (1, 6)), np.array([[1.0, 0.0, 0.0, 0.0]]), np.array([0.8])
-    # Of the wrench, the depth below the spools, and the determinant.
-    multipliers = rng.normal(size=(1, 8))
+@pytest.mark.parametrize(("pattern", "longest"), [("3R3T", None), ("3R3T", np.array(3.0)), ("1R2T", np.array(3.0))])
+def test_derivatives_are_finite_differences(pattern, longest):
+    """By coordinates, their derivatives and the duration. The determinant is last, and changes with coordinates."""
+    rng, step, robot = np.random.default_rng(4), 1e-5, general()
+    if pattern == "1R2T":
+        base, platform = PLANAR
+        robot = oracle.Robot(base, platform, robot.mass, robot.inertia)
+    d = robot_of(robot, pattern).dof
+    place = np.array([0.2, -0.1, 1.3, 0.1, -0.2, 0.15] if d == 6 else [0.2, 1.3, 0.1]) + 0.1 * rng.normal(
+        size=(1, 3, d)
+    )
+    tensions, reference = rng.uniform(0.1, 0.5, (1, d)), np.array([[1.0, 0.0, 0.0, 0.0]])
 
     with double_precision():
-        problem = problem_of(robot)
+        problem = Problem(robot_of(robot, pattern), Limits(tension_max=leaf(np.full(d, 60.0))), named("A1"))
+        count = residuals(problem.robot, problem.limits, longest, reference, place, np.array([0.8]), tensions).shape[1]
+        multipliers = rng.normal(size=(1, count))
 
         def at(change):
-            moved = place + change.reshape(1, 3, 6)
-            fixed = problem.robot, problem.limits, None, reference, moved, duration, tensions
+            moved, duration = place + change[:-1].reshape(place.shape), np.array([0.8]) + change[-1]
+            fixed = problem.robot, problem.limits, longest, reference, moved, duration, tensions
             return instant_values(*fixed, multipliers), residuals(*fixed)
 
-        here, missed = at(np.zeros(18))
-        sides = [[at(sign * step * row) for sign in (-1.0, 1.0)] for row in np.eye(18)]
+        here, missed = at(np.zeros(3 * d + 1))
+        sides = [[at(sign * step * row) for sign in (-1.0, 1.0)] for row in np.eye(3 * d + 1)]
     np.testing.assert_allclose(here.residual, missed, atol=1e-13)
     slopes = np.stack([(after[1] - before[1])[0] / (2.0 * step) for before, after in sides], axis=-1)
-    np.testing.assert_allclose(here.slope[0, :, :18], slopes, atol=1e-6)
-    bends = [multipliers[0] @ (after[0].slope - before[0].slope)[0, :, :18] / (2.0 * step) for before, after in sides]
-    np.testing.assert_allclose(here.bend[0, :18, :18], bends, atol=1e-5)
-    assert here.slope[0, -1, :6].any()
-    assert not here.slope[0, -1, 6:].any()
+    np.testing.assert_allclose(here.slope[0, :, :-1], slopes, atol=1e-6)
+    bends = [multipliers[0] @ (after[0].slope - before[0].slope)[0, :, :-1] / (2.0 * step) for before, after in sides]
+    np.testing.assert_allclose(here.bend[0, :-1, :-1], bends, atol=1e-5)
+    assert here.slope[0, -1, :d].any()
+    assert not here.slope[0, -1, d:].any()
     assert here.residual[0, -1] == pytest.approx(-at_place(problem, place[0, 0]), rel=1e-12)
 
 
 def at_place(problem, place):
-    """The determinant at coordinates, of which the last three are a Rodrigues vector."""
-    quaternion = np.array([1.0, *place[3:]])
+    """The determinant at coordinates, of which the last are a Rodrigues vector."""
+    quaternion, position = np.array([1.0, *place[3:]]), place[:3]
+    if len(place) == 3:
+        quaternion, position = np.array([1.0, 0.0, place[2], 0.0]), np.array([place[0], 0.0, place[1]])
     turn = oracle.matrix(quaternion / np.linalg.norm(quaternion))
     with double_precision():
-        return float(determinant(problem.robot, at_rest(leaf(place[:3]), leaf(turn))))
+        return float(determinant(problem.robot, at_rest(leaf(position), leaf(turn))))
 
 
 @pytest.mark.parametrize("seed", range(3))
