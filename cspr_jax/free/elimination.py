@@ -13,6 +13,9 @@ import numpy as np
 
 from cspr_jax.free.derivatives import InstantValues
 
+# Part of its trace that keeps a matrix regular which is only so within rounding.
+ROUNDED = 1e-14
+
 
 def transposed(matrix: np.ndarray) -> np.ndarray:
     """Transposes.
@@ -166,6 +169,7 @@ def less_missed(matrix: np.ndarray, weights: np.ndarray, missed: np.ndarray, sof
     size = soft.size[:, None, None, None, None]
     lighter = matrix / weights[..., None, :cables]
     stiff = lighter @ transposed(matrix) + size[..., None] * soft.metric
+    stiff += ROUNDED * np.trace(stiff, axis1=-2, axis2=-1)[..., None, None] * np.eye(dof)
     push = np.linalg.solve(stiff, missed[..., :dof, None])[..., 0]
     others = missed[..., dof:] / (1.0 + size * weights[..., cables:])
     return -np.concatenate([times(transposed(lighter), push), others], axis=-1)

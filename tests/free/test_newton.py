@@ -168,6 +168,15 @@ def test_values_make_up_for_what_equations_miss(searched):
     np.testing.assert_allclose(slope, 0.0, atol=1e-9)
 
 
+def test_wrenches_of_fewer_dimensions_give_numbers():
+    """Beside light tensions what softness adds is less than rounding, so that a matrix is singular."""
+    matrix = np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])[None, None, None, None]
+    weights = np.array([1e-7, 1e-7, 1.0, 1.0])[None, None, None, None]
+    soft = Softness(np.array([1e-6]), 1e-6 * np.eye(3)[None, None, None, None], np.zeros((1, 1, 1, 1, 4)))
+    change = less_missed(matrix, weights, np.array([1.0, 1.0, 0.5, 0.2])[None, None, None, None], soft)
+    np.testing.assert_allclose(change.ravel(), [-0.5, -0.5, -0.5, -0.2], rtol=1e-5)
+
+
 def merit(tasks, name, unknowns, barrier, soft):
     """Time, energy, largest tension over its limit (16 N), or margin, with barriers, and equations that are missed."""
     _, residual = tasks.equations(unknowns)
