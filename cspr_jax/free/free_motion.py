@@ -104,13 +104,14 @@ def free_motion(
 
 class _Best(NamedTuple):
     # The best motion along one segment: control points, (K, d), duration, s, the objective, and the basis; whether a
-    # search has converged to it, and whether two starts or more have.
+    # search has converged to it, whether two starts or more have, and the number of the start.
     controls: np.ndarray
     duration: float
     cost: float
     basis: Basis
     is_optimal: bool
     is_shared: bool
+    start: int
 
 
 def _begun(question: FreeQuestion) -> list[_Best]:
@@ -118,7 +119,7 @@ def _begun(question: FreeQuestion) -> list[_Best]:
     single = segments_of(question.tasks(question.settings.intervals, FEWEST))
     begun = starts(single, question.poses.z0, 1)
     pairs = zip(begun.controls[:, 0], begun.duration[:, 0].tolist(), strict=True)
-    return [_Best(*pair, np.inf, single.basis, is_optimal=False, is_shared=False) for pair in pairs]
+    return [_Best(*pair, np.inf, single.basis, is_optimal=False, is_shared=False, start=0) for pair in pairs]
 
 
 def _searched(question: FreeQuestion, forms: Sequence[ClosedForm]) -> tuple[list[_Best], bool]:
@@ -152,19 +153,25 @@ def _said(best: dict[int, _Best], objective: str) -> str:
 
 
 def _keep(best: dict[int, _Best], rows: np.ndarray, of_task: np.ndarray, lanes: Tasks, result: Optima) -> None:
-    # Keeps what is better than before.
+    # Keeps what is better than before. Starts of different searches that lead to the same motion agree, too.
     controls, costs = lanes.controls(result.unknowns)[:, 0], lanes.cost(result.unknowns)
     is_optimal = result.is_optimal & lanes.objective.keeps_limits(result.unknowns.level)
     costs = np.where(is_optimal, costs, np.inf)
     for i, k in enumerate(rows.tolist()):
         lanes_of = np.flatnonzero(of_task == i)
-        nearest = lanes_of[costs[lanes_of].argmin()]
-        if k in best and not (is_optimal[nearest] and (costs[nearest] < best[k].cost or not best[k].is_optimal)):
-            continue
-        room = costs[nearest] + SAME * abs(costs[nearest])
-        is_shared = bool(is_optimal[nearest]) and bool(np.sum(costs[lanes_of] <= room) > 1)
-        duration = float(result.unknowns.duration[nearest, 0])
-        best[k] = _Best(controls[nearest], duration, costs[nearest], lanes.basis, bool(is_optimal[nearest]), is_shared)
+        start = int(costs[lanes_of].argmin())
+        nearest = lanes_of[start]
+        before = best[k].cost if k in best and best[k].is_optimal else np.inf
+        least = min(costs[nearest], before)
+        room = least + SAME * abs(least)
+        agreeing = set(np.flatnonzero(np.isfinite(costs[lanes_of]) & (costs[lanes_of] <= room)).tolist())
+        if np.isfinite(before) and before <= room:
+            agreeing.add(best[k].start)
+        if k not in best or costs[nearest] < before:
+            duration = float(result.unknowns.duration[nearest, 0])
+            part = controls[nearest], duration, costs[nearest], lanes.basis
+            best[k] = _Best(*part, bool(is_optimal[nearest]), is_shared=False, start=start)
+        best[k] = best[k]._replace(is_shared=len(agreeing) > 1)
 
 
 def _together(tasks: Tasks, best: list[_Best], barrier: float) -> Unknowns:
