@@ -5,6 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.optimize import linprog
+from support.motions import states_along
 
 import cspr_jax
 from cspr_jax.arithmetic import rotations
@@ -66,8 +67,8 @@ def wrenches(robot, state):
 
 
 def states_of(motion, count):
-    states = jax.jit(jax.vmap(motion.state))(jnp.linspace(0.0, 1.0, count))
-    return [jax.tree.map(lambda x, i=i: np.asarray(x)[i], states) for i in range(count)]
+    states = states_along(motion, np.linspace(0.0, 1.0, count))
+    return [jax.tree.map(lambda x, i=i: x[i], states) for i in range(count)]
 
 
 @pytest.fixture(scope="module")
