@@ -70,7 +70,7 @@ class Spline:
         if more == 0:
             return self
         tables = {name: getattr(self, name) for name in ("knots", "position", "quaternion")}
-        longer = {
+        longer: dict[str, Any] = {
             name: leaf(np.concatenate([np.repeat(np.asarray(table)[:1], more, axis=0), table]))
             for name, table in tables.items()
             if table is not None
