@@ -8,10 +8,15 @@ import sys
 import tempfile
 from pathlib import Path
 
+# Before NumPy and SciPy are imported: their small products do not pay for a second thread, which waits for work in a
+# loop. What tests start inherits it.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import jax
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
+from support import readers
 from xdist.scheduler import LoadScopeScheduling
 
 from cspr_jax.arithmetic import batches, elementary
@@ -25,13 +30,13 @@ gc.set_threshold(200_000, 20, 50)
 BESIDE = sys.prefix if sys.prefix != sys.base_prefix else tempfile.gettempdir()
 COMPILED = Path(os.environ.setdefault("CSPR_TESTS_COMPILED", f"{BESIDE}/cspr-tests-compiled")).absolute()
 LARGEST = 1_000_000_000  # bytes; beyond that all of it is taken away
-# Most of a test is compiling: these take half of the time for it, and the code is slower. Level 0 would take a third,
-# but moves a verdict. The soak runs with what users run with, and so does what runtime/test_xla starts.
-CHEAP = xla.QUICK
+# Most of a test is compiling: these take a third of the time for it, and the code is slower. The soak runs with what
+# users run with, and so does what runtime/test_xla starts.
+CHEAP = ("--xla_backend_optimization_level=0", *xla.QUICK[1:])
 # Most quick tests ask for a handful of cases, and a batch is padded.
 LARGEST_BATCH = 64
 # Compiled code of finished files goes where a process has more than so many bytes.
-ROOM = 1_500_000_000
+ROOM = 3_000_000_000
 os.environ["CSPR_CACHE_DIR"] = str(COMPILED)
 jax.config.update("jax_enable_x64", True)
 jax.config.update("jax_compilation_cache_dir", str(COMPILED / "tests"))
@@ -80,10 +85,15 @@ def pytest_configure(config):
                 path.unlink()
 
 
-def pytest_collection_finish():
-    """What is imported stays: Python's collector need not look at it again."""
-    gc.collect()
-    gc.freeze()
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """What is imported stays: Python's collector need not look at it, then or later."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def pytest_collection_modifyitems(items):
@@ -106,6 +116,13 @@ def room():
         gc.collect()
         if platform.libc_ver()[0] == "glibc":  # else the next file finds as little room
             ctypes.CDLL(None).malloc_trim(0)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def reader(request):
+    """A process that reads files serves a whole file of tests."""
+    with readers.shared(request.path.parent.name):
+        yield
 
 
 def equilateral(radius: float) -> np.ndarray:

@@ -18,6 +18,8 @@ from cspr_jax.robots.state_bounds import StateBounds
 
 # Second derivatives that differ by less than this part of the largest one do not jump.
 SAME = 1e-9
+# Numbers of pieces that numbers are rounded up to; copies of longer tables would cost more than compiling.
+USUAL = (64, 256, 1024, 4096)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -56,6 +58,24 @@ class Spline:
         share = (t - knots[piece]) / width
         quaternion = None if self.quaternion is None else jnp.asarray(self.quaternion)[piece]
         return piece_state(jnp.asarray(self.position)[piece], quaternion, share, width, self.offset)
+
+    def padded(self) -> "Spline":
+        """The same motion of a usual number of pieces: the first one is repeated at its start, without a duration.
+
+        Returns:
+            the motion; NumPy leaves.
+        """
+        count = len(self.knots) - 1
+        more = next((usual - count for usual in USUAL if usual >= count), 0)
+        if more == 0:
+            return self
+        tables = {name: getattr(self, name) for name in ("knots", "position", "quaternion")}
+        longer: dict[str, Any] = {
+            name: leaf(np.concatenate([np.repeat(np.asarray(table)[:1], more, axis=0), table]))
+            for name, table in tables.items()
+            if table is not None
+        }
+        return dataclasses.replace(self, **longer)
 
     def stretched(self, factor: float) -> "Spline":
         """The motion run more slowly, or faster.

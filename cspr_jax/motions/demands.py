@@ -12,7 +12,7 @@ from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.minima import narrowed
-from cspr_jax.motions.motion import Motion
+from cspr_jax.motions.motion import Motion, common_shape
 from cspr_jax.robots import cables
 from cspr_jax.robots.limits import NO_LIMITS, Limits
 from cspr_jax.robots.point_mass import plane_normal
@@ -131,7 +131,7 @@ def _of_alike(robot: Any, limits: Limits, rule: str, motions: list[Motion], coun
     tau = np.linspace(0.0, 1.0, count)
     if len(motions) == 1:
         # One motion may have very many pieces, and is not copied for each instant.
-        of_one = partial(_values_of_one, robot, limits, motions[0], rule=rule)
+        of_one = partial(_values_of_one, robot, limits, common_shape(motions[0]), rule=rule)
 
         def along(tau: np.ndarray) -> np.ndarray:
             return in_batches(of_one, tau.ravel(), size=BATCH).reshape(*tau.shape, -1)

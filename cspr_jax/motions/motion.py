@@ -148,6 +148,22 @@ class Placed(Generic[Kind]):
         return self.motion.breaks()
 
 
+def common_shape(motion: Kind) -> Kind:
+    """The same motion, of which pieces are repeated until their number is a usual one, so that compiled code is shared.
+
+    Args:
+        motion: NumPy leaves.
+
+    Returns:
+        the motion; where nothing in it has pieces, itself.
+    """
+    return jax.tree.map(lambda part: part.padded() if _has_pieces(part) else part, motion, is_leaf=_has_pieces)
+
+
+def _has_pieces(part: Any) -> bool:
+    return hasattr(part, "padded")
+
+
 def states_at(motion: Motion, tau: np.ndarray, size: int = STATES) -> State:
     """States of a motion at many instants.
 
@@ -158,7 +174,7 @@ def states_at(motion: Motion, tau: np.ndarray, size: int = STATES) -> State:
     Returns:
         the states, leaves (k, ...).
     """
-    leaves, structure = jax.tree.flatten(motion)
+    leaves, structure = jax.tree.flatten(common_shape(motion))
     state: Any = in_batches(partial(_states, structure, leaves), tau, size=size)
     return state
 

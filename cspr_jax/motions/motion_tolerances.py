@@ -13,7 +13,7 @@ from cspr_jax.arithmetic.affine_bounds import constant
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.motions.block_slacks import BATCH
 from cspr_jax.motions.blocks import Blocks
-from cspr_jax.motions.motion import BoundedMotion, Motion
+from cspr_jax.motions.motion import BoundedMotion, Motion, common_shape
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.time_proof import FIRST
 from cspr_jax.motions.tolerances import Tolerated, tolerated_by
@@ -92,7 +92,7 @@ def instant_states(motion: Motion, tau: np.ndarray) -> StateBounds:
     Returns:
         the states, leaves (k, ...).
     """
-    leaves, structure = jax.tree.flatten(motion)
+    leaves, structure = jax.tree.flatten(common_shape(motion))
     return in_batches(partial(_instants, structure, leaves), tau, size=INSTANTS)
 
 

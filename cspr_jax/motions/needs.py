@@ -13,7 +13,7 @@ from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.minima import narrowed_places
 from cspr_jax.motions.limits import limits_set, scales, slack, values
-from cspr_jax.motions.motion import Motion
+from cspr_jax.motions.motion import Motion, common_shape
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots import wrench_balance
 from cspr_jax.robots.cables import AnyRobot
@@ -68,7 +68,7 @@ def needs(problem: Problem, motion: Motion, samples: int) -> list[Need]:
     """
     robot, limits = problem.robot, _with_tensions(problem.robot, problem.limits)
     moves = bool(np.isfinite(float(motion.duration())))
-    leaves, structure = jax.tree.flatten(motion)
+    leaves, structure = jax.tree.flatten(common_shape(motion))
     kernel = partial(_values, structure, moves, _pairs(robot), leaves, robot, limits)
 
     def at(tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -8,7 +8,7 @@ import numpy as np
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.minima import narrowed
 from cspr_jax.motions.answers import Answers
-from cspr_jax.motions.motion import Motion
+from cspr_jax.motions.motion import Motion, common_shape
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.slacks import flags, slacks
 from cspr_jax.schema.verdicts import FLAGS, Verdict
@@ -35,7 +35,7 @@ def sampled_answers(problem: Problem, motions: list[Motion], samples: int = 400)
     tau = np.linspace(0.0, 1.0, samples + 1)
     least, duration = [], []
     for motion in motions:
-        leaves, structure = jax.tree.flatten(motion)
+        leaves, structure = jax.tree.flatten(common_shape(motion))
         kernel = partial(_slacks, structure, leaves, problem)
 
         def at(points: np.ndarray, kernel=kernel) -> np.ndarray:

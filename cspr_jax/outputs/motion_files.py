@@ -16,7 +16,7 @@ from cspr_jax import __version__
 from cspr_jax.errors import ConfigError
 from cspr_jax.lines.motion import TimedLine
 from cspr_jax.motions.acceleration_sets import along
-from cspr_jax.motions.motion import Motion, outward
+from cspr_jax.motions.motion import Motion, common_shape, outward
 from cspr_jax.motions.proved_answers import united
 from cspr_jax.outputs.path_columns import path_columns
 from cspr_jax.plans.causes import cause_columns
@@ -137,9 +137,9 @@ def rows_at(plan: PlannedMotions, taus: Sequence[np.ndarray]) -> dict[str, np.nd
     longest = max(len(tau) for tau in taus)
     for i, tau in enumerate(taus):
         # Segments of one length are compiled once.
-        padded = np.concatenate([tau, np.ones(longest - len(tau))])
+        padded, motion = np.concatenate([tau, np.ones(longest - len(tau))]), common_shape(motions[i])
         states_of_segment = _states(
-            robot, limits, motions[i], padded, rule=plan.keys.tension_rule, with_couples=with_couples
+            robot, limits, motion, padded, rule=plan.keys.tension_rule, with_couples=with_couples
         )
         state, of_cables = jax.tree.map(np.asarray, states_of_segment)
         state = outward(plan.frame, state)

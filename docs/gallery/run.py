@@ -10,6 +10,8 @@ import re
 import sys
 import tempfile
 import time
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import nbformat
@@ -18,6 +20,7 @@ from nbclient.exceptions import CellExecutionError
 
 HERE = Path(__file__).parent
 SECONDS = 600  # of a cell, on a machine that has other work too
+TOGETHER = 2  # notebooks at a time: much of each is compiling, on one core
 # Other processors and versions may change last digits, and what a random search finds a little more.
 TOLERANCE = 0.03
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
@@ -71,6 +74,19 @@ def run(path: Path, *, store: bool) -> list[str]:
     return [f"it shows\n{one}\nbut now prints\n{other}" for one, other in pairs if not alike(one, other)]
 
 
+def timed(name: str, *, store: bool) -> tuple[list[str], float]:
+    """Run one notebook.
+
+    Args:
+        store: whether to keep its outputs.
+
+    Returns:
+        what is wrong, and how many seconds it took.
+    """
+    began = time.monotonic()
+    return run(HERE / f"{name}.ipynb", store=store), time.monotonic() - began
+
+
 def main() -> int:
     """Run the notebooks that are named."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -80,13 +96,13 @@ def main() -> int:
     every, faults = sorted(path.stem for path in HERE.glob("*.ipynb")), 0
     if unknown := sorted({*options.names} - {*every}):
         parser.error(f"no notebook {unknown[0]}: there are {', '.join(every)}")
-    for name in options.names or every:
-        began = time.monotonic()
-        wrong = run(HERE / f"{name}.ipynb", store=options.store)
-        print(f"{name}: {'failed' if wrong else 'runs'}, {time.monotonic() - began:.0f} s", flush=True)
-        for text in wrong:
-            print(text, file=sys.stderr)
-        faults += len(wrong)
+    names = options.names or every
+    with ProcessPoolExecutor(TOGETHER) as pool:
+        for name, (wrong, seconds) in zip(names, pool.map(partial(timed, store=options.store), names), strict=True):
+            print(f"{name}: {'failed' if wrong else 'runs'}, {seconds:.0f} s", flush=True)
+            for text in wrong:
+                print(text, file=sys.stderr)
+            faults += len(wrong)
     return int(faults > 0)
 
 

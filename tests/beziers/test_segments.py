@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from oracles import beziers as oracle
 from scipy.spatial.transform import Rotation
+from support.motions import states_along
 
 import cspr_jax
 from cspr_jax import Limits, Verdict
@@ -78,7 +79,7 @@ def test_the_motion_is_the_curve_of_its_control_points():
     points = np.array([[0.1, 0.2, 1.3], [0.4, -0.2, 1.0], [-0.3, 0.1, 1.7]])
     motion = cspr_jax.bezier(robot, *points, duration=1.7)
     tau = np.linspace(0.0, 1.0, 41)
-    state = jax.jit(jax.vmap(motion.state))(jnp.asarray(tau))
+    state = states_along(motion, tau)
     for own, wanted in zip(state[:3], oracle.states(points, 1.7, 40), strict=True):
         np.testing.assert_allclose(own, wanted, atol=1e-13)
     # Derivatives of one another.

@@ -4,6 +4,7 @@ import jax
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline, make_interp_spline
+from support.motions import states_along
 
 from cspr_jax.curves.interpolation import continuous, interpolated
 from cspr_jax.errors import InputError
@@ -19,8 +20,7 @@ def float64():
 
 
 def values(spline, times):
-    states = jax.jit(jax.vmap(spline.state))((times - TIMES[0]) / float(spline.duration()))
-    return [np.asarray(part) for part in states[:3]]
+    return list(states_along(spline, (times - TIMES[0]) / float(spline.duration()))[:3])
 
 
 def check_same(spline, curve):
@@ -63,7 +63,7 @@ def test_a_whole_turn_is_periodic(kind):
     none = np.zeros_like(angles)
     turn = np.stack([np.cos(0.5 * angles), none, none, np.sin(0.5 * angles)], axis=1)
     spline = interpolated(times, np.zeros((13, 3)), turn, interpolation=kind, ends="periodic")
-    found = jax.jit(jax.vmap(spline.state))(np.array([0.0, 0.5, 1.0]))
+    found = states_along(spline, [0.0, 0.5, 1.0])
     np.testing.assert_allclose(found.rotation[0], found.rotation[2], atol=1e-9)
     np.testing.assert_allclose(found.angular_velocity, [[0.0, 0.0, 0.5 * np.pi]] * 3, atol=1e-2)
     np.testing.assert_allclose(found.angular_velocity[0], found.angular_velocity[2], atol=1e-9)

@@ -4,6 +4,7 @@ import jax
 import numpy as np
 import pytest
 from scipy.interpolate import BPoly, BSpline, CubicSpline, PchipInterpolator, make_interp_spline
+from support.motions import states_along
 
 from cspr_jax.config.motions import text
 from cspr_jax.config.motions.table import MotionPieces, MotionTable
@@ -23,7 +24,7 @@ def float64():
 
 def states(spline, count=41):
     tau = np.linspace(0.0, 1.0, count)
-    return tau * float(spline.duration()), jax.jit(jax.vmap(spline.state))(tau)
+    return tau * float(spline.duration()), states_along(spline, tau)
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,7 @@
 """States of splines: SciPy's values and derivatives, and rotations by finite differences."""
 
+import dataclasses
+
 import jax
 import numpy as np
 import pytest
@@ -41,3 +43,18 @@ def test_angular_velocity_by_differences():
 def test_breaks_are_knots():
     spline, table = random_spline(3)
     np.testing.assert_allclose(np.asarray(spline.breaks()) * table.x[-1], table.x[1:-1], rtol=1e-14)
+
+
+@pytest.mark.parametrize(("count", "usual"), [(6, 64), (100, 256), (256, 256), (4097, 4097)])
+def test_a_usual_number_of_pieces_is_the_same_motion(count, usual):
+    """Bit for bit; with turning or without."""
+    spline, _ = random_spline(1, count=count)
+    for motion in (spline, dataclasses.replace(spline, quaternion=None)):
+        longer = motion.padded()
+        assert len(longer.knots) == usual + 1 and longer.duration() == motion.duration()
+        if count > 100:
+            assert longer is motion
+            continue
+        tau = np.concatenate([np.linspace(0.0, 1.0, 41), spline.breaks()])
+        states = (jax.jit(jax.vmap(one.state))(tau) for one in (motion, longer))
+        jax.tree.map(np.testing.assert_array_equal, *states)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from oracles import ellipses as oracle
 from support.ellipses import ellipses, triangle
+from support.motions import states_along
 
 import cspr_jax
 
@@ -28,7 +29,7 @@ def test_places_and_derivatives(z_axis):
     duration = float(motion.duration())
     assert duration == pytest.approx(turns * 2.0 * np.pi / frequency, rel=1e-14)
     tau = np.linspace(0.0, 1.0, 101)
-    state = jax.jit(jax.vmap(motion.state))(jnp.asarray(tau))
+    state = states_along(motion, tau)
     exact_states = oracle.states(centre, a, b, frequency, phase + frequency * duration * tau)
     for found, exact in zip(state[:3], exact_states, strict=True):
         np.testing.assert_allclose(found, exact[0], atol=1e-12)
@@ -44,7 +45,7 @@ def test_bounds_contain_samples():
     end = start + np.concatenate([[1.0], rng.uniform(1e-6, 0.1, 63)])
     bounds = motion.bounds(float(motion.duration()) * start, float(motion.duration()) * end)
     share = np.linspace(0.0, 1.0, 41)
-    state = jax.jit(jax.vmap(jax.vmap(motion.state)))(jnp.asarray(start[:, None] + (end - start)[:, None] * share))
+    state = states_along(motion, start[:, None] + (end - start)[:, None] * share)
     for band, found in zip(bounds[:3], state[:3], strict=True):
         line = band.middle[:, None] + (2.0 * share[:, None] - 1.0) * np.asarray(band.slope)[:, None]
         assert (np.abs(found - line) <= np.asarray(band.radius)[:, None]).all()

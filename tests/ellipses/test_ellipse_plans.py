@@ -1,13 +1,12 @@
 """Plans on ellipses against plain NumPy at 20,001 instants: limits, joints, turns, and the least numbers of arcs."""
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from oracles import ellipses as oracle
 from oracles.beziers import cable_states, tensions
 from oracles.lines import tension_margin
 from support.ellipses import triangle
+from support.motions import states_along
 
 import cspr_jax
 
@@ -33,8 +32,7 @@ def on_ellipse(centre, a, b, frequency="natural", phase=0.0, **keys):
 
 
 def sampled(motion):
-    state = jax.jit(jax.vmap(motion.state))(jnp.linspace(0.0, 1.0, INSTANTS))
-    return [np.asarray(x) for x in state[:3]]
+    return list(states_along(motion, np.linspace(0.0, 1.0, INSTANTS))[:3])
 
 
 def breaches(spools, limits, position, velocity, acceleration):

@@ -1,11 +1,13 @@
 """Orientations on ellipses: kinematics against derivatives, bounds against samples, natural frequencies of rotation."""
 
 import dataclasses
+from functools import partial
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from support.motions import states_along
 
 import cspr_jax
 from cspr_jax.arithmetic import rotations
@@ -68,7 +70,7 @@ def test_rates_are_derivatives(motion):
 
 def test_bounds_hold_all_states(motion):
     start = np.linspace(0.0, TIME - 0.1, 64)
-    bounds, states = motion.bounds(start, start + 0.1), jax.jit(jax.vmap(motion.state))
+    bounds, states = motion.bounds(start, start + 0.1), partial(states_along, motion)
     for share in np.linspace(0.0, 1.0, 7):
         state = states((start + 0.1 * share) / TIME)
         for name, band in bounds._asdict().items():

@@ -2,9 +2,9 @@
 
 import dataclasses
 
-import jax
 import numpy as np
 import pytest
+from support.motions import states_along
 
 import cspr_jax
 from cspr_jax.arithmetic.elementary import double_precision
@@ -102,7 +102,7 @@ def test_a_closed_form_stands_in_for_nothing(asked):
     problem, scene, poses, settings = asked["question"][:4]
     with double_precision():
         free = no_slower.no_slower(asked["free"], problem, scene, poses, settings, asked["forms"])
-        ends = jax.vmap(free.motions[0].state)(np.array([0.0, 1.0]))
+        ends = states_along(free.motions[0], [0.0, 1.0])
     assert free.family == "hypocycloid-standard"
     assert free.answers.feasible.all()
     assert free.duration == pytest.approx(asked["forms"][0].duration.sum(), rel=1e-12)

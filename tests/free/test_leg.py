@@ -1,9 +1,9 @@
 """Plans of free motions: keys, accelerations at poses, motions between other families', refusals in one line."""
 
-import jax
 import numpy as np
 import pytest
 from support.commands import plan
+from support.motions import states_along
 
 import cspr_jax
 from cspr_jax.arithmetic.elementary import double_precision
@@ -20,7 +20,7 @@ def poses(*places, **keys):
 
 def ends(motion):
     with double_precision():
-        return jax.vmap(motion.state)(np.array([0.0, 1.0]))
+        return states_along(motion, [0.0, 1.0])
 
 
 @pytest.fixture(scope="module")

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from oracles import platform as oracle
 from support.commands import plan
+from support.motions import states_along
 from support.platforms import general, ours, random_pose
 
 import cspr_jax
@@ -173,7 +174,7 @@ def test_a_motion_goes_round_singular_poses():
         problem = problem_of(oracle.mssm(), 40.0)
         motion = free_motion(problem, None, ends, FreeSettings(intervals=24, instants=3, starts=4))
         (spline,) = motion.motions
-        states = jax.vmap(spline.state)(np.linspace(0.0, 1.0, 201))
+        states = states_along(spline, np.linspace(0.0, 1.0, 201))
         values = jax.vmap(lambda p, r: determinant(problem.robot, at_rest(p, r)))(states.position, states.rotation)
     assert motion.is_optimal
     assert len({*np.sign(values).tolist()}) == 1

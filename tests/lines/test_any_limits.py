@@ -2,11 +2,10 @@
 
 import dataclasses
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from oracles import limited_lines as oracle
+from support.motions import states_along
 
 import cspr_jax
 from cspr_jax import Verdict
@@ -114,8 +113,7 @@ def test_a_line_beside_a_spool(height):
         robot = cspr_jax.point_mass(RECTANGLE, mass=10.0, z_axis="up")
         share = found.acceleration_time[0] / found.duration[0]
         motion = cspr_jax.straight_line(robot, start, end, duration=duration, acceleration_time=share * duration)
-        tau = jnp.linspace(0.0, 1.0, 200_001)
-        position, velocity, acceleration = (np.asarray(x) for x in jax.jit(jax.vmap(motion.state))(tau)[:3])
+        position, velocity, acceleration = states_along(motion, np.linspace(0.0, 1.0, 200_001))[:3]
         ray = position - spool
         length = np.linalg.norm(ray, axis=1)
         rate = (ray * velocity).sum(1) / length

@@ -6,6 +6,7 @@ from functools import partial
 import jax
 import numpy as np
 import pytest
+from support.motions import states_along
 from support.platforms import crossed_robot
 from support.splines import random_spline
 
@@ -229,7 +230,7 @@ def test_instants_at_which_cables_pass_each_other(shift):
     proof = time_proof(partial(block_slacks, robot, Limits(), spline.bounds), 2.0)
     at = criteria(robot, Limits()).index(Criterion(Verdict.CABLE_CABLE, (0, 1), "m"))
     fine = np.linspace(0.0, 2.0, 200_001)
-    tilt = jax.jit(jax.vmap(spline.state))(fine / 2.0).quaternion[:, 1]
+    tilt = states_along(spline, fine / 2.0).quaternion[:, 1]
     instant = fine[np.argmin(np.abs(tilt))]
     assert proof.failing[at].shape == (1, 2) and abs(proof.failing[at] - instant).max() < 1.1e-5
     assert np.diff(proof.failing[at])[0, 0] < 2e-6
@@ -254,7 +255,7 @@ def test_thick_cables_obstacles_and_floors():
         duration = float(table.x[-1])
         slacks = partial(block_slacks, robot, limits, spline.bounds, scene=around)
         proof, times = time_proof(slacks, duration), np.linspace(0.0, duration, SAMPLES)
-        state = jax.jit(jax.vmap(spline.state))(times / duration)
+        state = states_along(spline, times / duration)
         exact = clearance.clearances(around, np.asarray(state.position), np.asarray(state.quaternion))
         for kinds, values in (
             ((Verdict.OBSTACLE,), exact.obstacles),
@@ -288,7 +289,7 @@ def test_planar_cables_that_cross():
     rows = criteria(robot, Limits())
     assert all(row.flag != Verdict.ABOVE_SPOOLS for row in rows)
     at = rows.index(Criterion(Verdict.CABLE_CABLE, (0, 1), "m"))
-    state = jax.jit(jax.vmap(spline.state))(np.linspace(0.0, 1.0, 2001))
+    state = states_along(spline, np.linspace(0.0, 1.0, 2001))
     ends = np.asarray(state.rotation) @ np.asarray(robot.platform_points)[:2].T
     (ax, az), (bx, bz) = (ends[:, ::2, k].T for k in range(2))
 

@@ -4,6 +4,7 @@ import jax
 import numpy as np
 import pytest
 from scipy.optimize import linprog
+from support.motions import states_along
 from support.other_robots import on_balls, uncertain
 from support.splines import random_spline
 
@@ -42,8 +43,7 @@ def case(name, seed, **more):
 
 
 def states_of(spline, samples):
-    states = jax.jit(jax.vmap(spline.state))(np.linspace(0.0, 1.0, samples))
-    return jax.tree.map(np.asarray, states)
+    return states_along(spline, np.linspace(0.0, 1.0, samples))
 
 
 def balances(robot, state, base, centre=(0.0, 0.0, 0.0), ratio=1.0):

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from scipy.spatial.transform import Rotation
-from support.browsers import opened
+from support.browsers import opened, shown, started
 
 import cspr_jax
 from cspr_jax.cli import main
@@ -379,14 +379,15 @@ def test_a_name_leaves_a_page_whole(name):
 @pytest.mark.thorough
 @BROWSER
 def test_hostile_names_in_a_browser(folder):
-    for number, name in enumerate(HOSTILE):
-        path = folder / f"hostile_{number}.html"
-        path.write_text(hostile_page(name), "utf-8")
-        with opened(path) as (tab, told):
-            assert tab.text_content("#title") == f"Motion of {name}"
-            assert tab.evaluate("document.title.replace(/\\s+/g, ' ')") == " ".join(f"Motion of {name}".split())
-            assert tab.evaluate("getComputedStyle(document.body).display") == "block"
-            assert told == []
+    with started() as browser:
+        for number, name in enumerate(HOSTILE):
+            path = folder / f"hostile_{number}.html"
+            path.write_text(hostile_page(name), "utf-8")
+            with shown(browser, path) as (tab, told):
+                assert tab.text_content("#title") == f"Motion of {name}"
+                assert tab.evaluate("document.title.replace(/\\s+/g, ' ')") == " ".join(f"Motion of {name}".split())
+                assert tab.evaluate("getComputedStyle(document.body).display") == "block"
+                assert told == []
 
 
 def test_a_page_of_a_workspace_has_spools_and_no_motions(folder):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BPoly, CubicSpline
 from scipy.spatial.transform import Rotation
+from support.motions import states_along
 
 from cspr_jax.errors import InputError
 from cspr_jax.paths.corners import ROUNDED, tracks_of
@@ -197,12 +198,12 @@ def test_two_orientations_turn_at_a_constant_rate(angle):
     units = np.roll([first.as_quat(), -last.as_quat()], 1, axis=1)  # the other sign is the same orientation
     (track,) = through_points("line", POINTS[:2])
     section = section_of(track, units)
-    for s in np.linspace(0.0, 1.0, 101):
-        state = section.curve.state(s)
-        expected = (Rotation.from_rotvec(angle * s * axis) * first).as_matrix()
-        np.testing.assert_allclose(state.rotation, expected, atol=1e-6)
-        np.testing.assert_allclose(state.angular_velocity, angle * axis, rtol=1e-5)
-    np.testing.assert_allclose(section.curve.state(0.3).position, 0.7 * POINTS[0] + 0.3 * POINTS[1], atol=1e-15)
+    shares = np.linspace(0.0, 1.0, 101)
+    states = states_along(section.curve, shares)
+    expected = (Rotation.from_rotvec(angle * shares[:, None] * axis) * first).as_matrix()
+    np.testing.assert_allclose(states.rotation, expected, atol=1e-6)
+    np.testing.assert_allclose(states.angular_velocity, np.tile(angle * axis, (101, 1)), rtol=1e-5)
+    np.testing.assert_allclose(states.position[30], 0.7 * POINTS[0] + 0.3 * POINTS[1], atol=1e-15)
 
 
 def test_more_orientations_are_a_smooth_curve_through_them():

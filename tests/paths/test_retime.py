@@ -3,12 +3,12 @@
 import tomllib
 from pathlib import Path
 
-import jax
 import numpy as np
 import pytest
 from scipy.interpolate import make_interp_spline
 from scipy.spatial import cKDTree
 from support.commands import cspr, plan, strict_json
+from support.motions import states_along
 
 import cspr_jax
 from cspr_jax.arithmetic.elementary import double_precision
@@ -27,7 +27,7 @@ def hypocycloid(places=POSES, **keys):
 
 def states(motion, count: int):
     with double_precision():
-        return jax.vmap(motion.state)(np.linspace(0.0, 1.0, count))
+        return states_along(motion, np.linspace(0.0, 1.0, count))
 
 
 def distance(before, after, count: int = 400_001) -> float:

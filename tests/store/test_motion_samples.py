@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from plans.test_planning import SHORT
 from support.commands import plan
+from support.motions import states_along
 
 import cspr_jax
 from cspr_jax.curves.reading import spline_of
@@ -37,7 +38,7 @@ def test_motions_of_this_program(folder):
             spline = spline_of(source)
             times = rows.axes["t"]
             after = np.append(np.diff(times) > 0.0, True)  # of two rows of one time, the motion goes on with the later
-            found = jax.jit(jax.vmap(spline.state))(times[after] / times[-1])
+            found = states_along(spline, times[after] / times[-1])
             pairs = {"position": found.position, "velocity": found.velocity, "acceleration": found.acceleration}
             if source.quaternions is not None:
                 pairs |= {"omega": found.angular_velocity, "omega_dot": found.angular_acceleration}

@@ -4,7 +4,6 @@ import dataclasses
 from collections.abc import Callable
 from functools import partial
 
-import jax
 import numpy as np
 from oracles.sampled_motion import State
 
@@ -21,6 +20,7 @@ from cspr_jax.paths.section import Section, SectionSettings
 from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
+from support.motions import states_along
 
 
 @dataclasses.dataclass(frozen=True)
@@ -82,20 +82,15 @@ def section_of(path, frame):
 
 
 def sampled_states(motion, times):
-    # Compiled for one number of instants at a time; the last instant belongs to the motion.
+    # The last instant belongs to the motion.
     with double_precision():
         tau = np.clip(np.asarray(times) / float(motion.duration()), 0.0, 1.0)
-        states = jax.tree.map(np.asarray, _at(motion, tau))
+        states = states_along(motion, tau)
     count = len(tau)
     if states.rotation is None:
         eye, none = np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))
         return State(states.position, states.velocity, states.acceleration, eye, none, none)
     return State(*states[:3], states.rotation, states.angular_velocity, states.angular_acceleration)
-
-
-@jax.jit
-def _at(motion, tau):
-    return jax.vmap(motion.state)(tau)
 
 
 def robot_of(robot):

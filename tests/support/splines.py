@@ -1,15 +1,12 @@
 """Random splines, by SciPy."""
 
-import jax
 import numpy as np
 from scipy.interpolate import CubicSpline, PPoly, make_interp_spline
 
 from cspr_jax.arithmetic.piecewise_bounds import bernstein_of_powers
 from cspr_jax.curves.spline import Spline
 from cspr_jax.robots.state import State
-
-# Instants that are computed together: splines of as many pieces, and any number of instants, share what is compiled.
-TOGETHER = 1024
+from support.motions import states_along
 
 
 def pieces(times: np.ndarray, values: np.ndarray, degree: int) -> PPoly:
@@ -45,14 +42,6 @@ def random_spline(
     return spline_of(table), table
 
 
-@jax.jit
-def _states(spline: Spline, tau) -> State:
-    return jax.vmap(spline.state)(tau)
-
-
 def states_of(spline: Spline, times: np.ndarray) -> State:
     """States at times of any shape, s, NumPy."""
-    tau = np.asarray(times) / float(spline.duration())
-    rows = np.resize(tau, (-(-tau.size // TOGETHER), TOGETHER))
-    parts = [jax.tree.map(np.asarray, _states(spline, row)) for row in rows]
-    return jax.tree.map(lambda *x: np.concatenate(x)[: tau.size].reshape(*tau.shape, *x[0].shape[1:]), *parts)
+    return states_along(spline, np.asarray(times) / float(spline.duration()))
