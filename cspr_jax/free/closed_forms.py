@@ -1,4 +1,4 @@
-"""Motions of other families over the same poses, from which searches begin, too."""
+"""Motions of other families over the same poses, from which searches go on."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -106,28 +106,21 @@ def controls_of(tasks: Tasks, segment: int, motion: Motion) -> np.ndarray:
     return tasks.basis.fit @ places
 
 
-def with_forms(begun: Starts, single: Tasks, rows: np.ndarray, forms: Sequence[ClosedForm]) -> Starts:
-    """Starts of a search, and those from closed forms.
+def form_starts(single: Tasks, rows: np.ndarray, forms: Sequence[ClosedForm]) -> Starts:
+    """Starts of a search from closed forms.
 
     Args:
-        begun: of some segments.
         single: all segments as tasks of their own.
-        rows: numbers of the segments in question.
+        rows: numbers of the segments in question; one form or more is proved on each.
 
     Returns:
-        the starts.
+        the starts, of the first form on all segments, then of the second one, ...
     """
-    added = [
+    begun = [
         (i, controls_of(single.taken(np.array([k])), 0, form.motions[k]), form.duration[k])
         for form in forms
         for i, k in enumerate(rows.tolist())
         if form.is_feasible[k]
     ]
-    if not added:
-        return begun
-    task, controls, duration = zip(*added, strict=True)
-    return Starts(
-        np.concatenate([begun.task, task]),
-        np.concatenate([begun.controls, np.array(controls)[:, None]]),
-        np.concatenate([begun.duration, np.array(duration)[:, None]]),
-    )
+    task, controls, duration = zip(*begun, strict=True)
+    return Starts(np.array(task), np.array(controls)[:, None], np.array(duration)[:, None])

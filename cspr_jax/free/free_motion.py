@@ -10,7 +10,7 @@ from scipy.interpolate import BSpline
 
 from cspr_jax.curves.spline import Spline
 from cspr_jax.free.basis import DEGREE, Basis
-from cspr_jax.free.closed_forms import ClosedForm, with_forms
+from cspr_jax.free.closed_forms import ClosedForm, form_starts
 from cspr_jax.free.poses import FreePoses, divided, segments_of
 from cspr_jax.free.proofs import first_optimum, proved, robust_proof
 from cspr_jax.free.question import FreeQuestion, FreeSettings, planned_problem
@@ -34,6 +34,28 @@ SEARCHES, FEWEST, SAME = ((2, 10.0), (2, 1.0), (1, 1.0)), 3, 1e-3
 USUAL = FreeSettings()
 
 
+class SegmentMotion(NamedTuple):
+    """The best motion along one segment by itself.
+
+    Fields:
+        controls: (K, d) control points.
+        duration: s.
+        cost: the objective; inf where no search has converged.
+        basis: of the control points.
+        is_optimal: whether a search has converged to it.
+        is_shared: whether two starts or more have led to it.
+        start: number of its start.
+    """
+
+    controls: np.ndarray
+    duration: float
+    cost: float
+    basis: Basis
+    is_optimal: bool
+    is_shared: bool
+    start: int
+
+
 @dataclasses.dataclass(frozen=True)
 class FreeMotion:
     """The best motion that the search has come to.
@@ -46,6 +68,7 @@ class FreeMotion:
         is_optimal: whether the search met all limits at the instants that it looks at.
         is_stopped: whether Ctrl-C, or `search_time`, has ended it before its end.
         searched: duration of all segments before bounds were tightened, s; NaN without a motion.
+        parts: best motions along the segments by themselves.
         family: whose motions these are, where the search came to none that are faster; None: its own.
     """
 
@@ -56,6 +79,7 @@ class FreeMotion:
     is_optimal: bool
     is_stopped: bool
     searched: float
+    parts: tuple[SegmentMotion, ...] = ()
     family: str | None = None
 
     @property
@@ -69,13 +93,15 @@ def free_motion(
     scene: Scene | None,
     poses: FreePoses,
     settings: FreeSettings = USUAL,
+    before: FreeMotion | None = None,
     forms: Sequence[ClosedForm] = (),
 ) -> FreeMotion:
     """Search for the fastest motion through poses, all its segments together, and prove it.
 
     Args:
         scene: bodies that can meet; they are judged with the motion, and do not change it.
-        forms: motions of other families, from which the search begins, too.
+        before: what a search from the usual starts has come to, which goes on from other ones.
+        forms: these are motions of other families.
 
     Returns:
         the motion; where tightening ends before all is proved, the last one.
@@ -85,7 +111,10 @@ def free_motion(
     """
     question = FreeQuestion.of(planned_problem(problem), scene, poses, settings)
     uncertainty = problem.limits.uncertainty
-    best, is_stopped = (_begun(question), False) if len(divided(problem, poses)) else _searched(question, forms)
+    if len(divided(problem, poses)):
+        best, is_stopped = _begun(question), False
+    else:
+        best, is_stopped = _searched(question, () if before is None else before.parts, forms)
     tasks, optimum = question.tasks(settings.intervals, question.instants), None
     for share, way in TOGETHER if all(one.is_optimal for one in best) else ():
         tasks = question.tasks(2 * round(0.5 * settings.intervals / share), question.instants)
@@ -99,42 +128,34 @@ def free_motion(
     judge_all_robots(problem, proof.answers, proof.motions, scene)
     energy, level = proof.tasks.energies(proof.unknowns)[0], proof.unknowns.level[0]
     is_stopped |= proof.is_stopped
-    return FreeMotion(proof.motions, proof.answers, energy, level, is_optimal, is_stopped, searched)
+    return FreeMotion(proof.motions, proof.answers, energy, level, is_optimal, is_stopped, searched, tuple(best))
 
 
-class _Best(NamedTuple):
-    # The best motion along one segment: control points, (K, d), duration, s, the objective, and the basis; whether a
-    # search has converged to it, whether two starts or more have, and the number of the start.
-    controls: np.ndarray
-    duration: float
-    cost: float
-    basis: Basis
-    is_optimal: bool
-    is_shared: bool
-    start: int
-
-
-def _begun(question: FreeQuestion) -> list[_Best]:
+def _begun(question: FreeQuestion) -> list[SegmentMotion]:
     # Starts that are not searched from, since no motion can be proved.
     single = segments_of(question.tasks(question.settings.intervals, FEWEST))
     begun = starts(single, question.poses.z0, 1)
     pairs = zip(begun.controls[:, 0], begun.duration[:, 0].tolist(), strict=True)
-    return [_Best(*pair, np.inf, single.basis, is_optimal=False, is_shared=False, start=0) for pair in pairs]
+    return [SegmentMotion(*pair, np.inf, single.basis, is_optimal=False, is_shared=False, start=0) for pair in pairs]
 
 
-def _searched(question: FreeQuestion, forms: Sequence[ClosedForm]) -> tuple[list[_Best], bool]:
-    # The best motion along each segment by itself, from all starts; where starts disagree, by all searches. Whether the
-    # search has been stopped: by Ctrl-C only where there is something to keep.
+def _searched(
+    question: FreeQuestion, before: Sequence[SegmentMotion], forms: Sequence[ClosedForm]
+) -> tuple[list[SegmentMotion], bool]:
+    # The best motion along each segment by itself, from all starts, or after those from forms; where starts disagree,
+    # by all searches. Whether the search has been stopped: by Ctrl-C only where there is something to keep.
     settings, poses = question.settings, question.poses
-    count, best = len(poses.positions) - 1, dict[int, _Best]()
+    count, best = len(poses.positions) - 1, dict(enumerate(before))
+    can_begin = np.any([form.is_feasible for form in forms], axis=0) if forms else np.ones(count, bool)
     until = np.inf if settings.search_time is None else time.monotonic() + settings.search_time
     for number, (share, softness) in enumerate(SEARCHES, 1):
-        rows = np.array([k for k in range(count) if k not in best or not best[k].is_shared], int)
+        is_left = [k not in best or not best[k].is_shared or (number == 1 and bool(forms)) for k in range(count)]
+        rows = np.flatnonzero(is_left & can_begin)
         if not len(rows) or (best and time.monotonic() > until):
             return list(best.values()), bool(len(rows))
         stage(f"free motion: search {number}{_said(best, settings.objective)}")
         single = segments_of(question.tasks(settings.intervals // share, FEWEST))
-        begun = with_forms(starts(single.taken(rows), poses.z0, settings.starts), single, rows, forms)
+        begun = form_starts(single, rows, forms) if forms else starts(single.taken(rows), poses.z0, settings.starts)
         lanes = single.taken(rows[begun.task])
         result = optima(lanes, started(lanes, begun.controls, begun.duration), softness=softness, until=until)
         _keep(best, rows, begun.task, lanes, result)
@@ -145,14 +166,14 @@ def _searched(question: FreeQuestion, forms: Sequence[ClosedForm]) -> tuple[list
     return list(best.values()), False
 
 
-def _said(best: dict[int, _Best], objective: str) -> str:
+def _said(best: dict[int, SegmentMotion], objective: str) -> str:
     # The best so far, for people who wait.
     if not best or not all(one.is_optimal for one in best.values()):
         return ""
     return f", so far {sum(one.duration for one in best.values()):.4g} s" if objective == "time" else ", one is there"
 
 
-def _keep(best: dict[int, _Best], rows: np.ndarray, of_task: np.ndarray, lanes: Tasks, result: Optima) -> None:
+def _keep(best: dict[int, SegmentMotion], rows: np.ndarray, of_task: np.ndarray, lanes: Tasks, result: Optima) -> None:
     # Keeps what is better than before. Starts of different searches that lead to the same motion agree, too.
     controls, costs = lanes.controls(result.unknowns)[:, 0], lanes.cost(result.unknowns)
     is_optimal = result.is_optimal & lanes.objective.keeps_limits(result.unknowns.level)
@@ -170,11 +191,11 @@ def _keep(best: dict[int, _Best], rows: np.ndarray, of_task: np.ndarray, lanes: 
         if k not in best or costs[nearest] < before:
             duration = float(result.unknowns.duration[nearest, 0])
             part = controls[nearest], duration, costs[nearest], lanes.basis
-            best[k] = _Best(*part, bool(is_optimal[nearest]), is_shared=False, start=start)
+            best[k] = SegmentMotion(*part, bool(is_optimal[nearest]), is_shared=False, start=start)
         best[k] = best[k]._replace(is_shared=len(agreeing) > 1)
 
 
-def _together(tasks: Tasks, best: list[_Best], barrier: float) -> Unknowns:
+def _together(tasks: Tasks, best: list[SegmentMotion], barrier: float) -> Unknowns:
     # The motions along all segments as the start of a search for all together.
     averages, duration = tasks.basis.averages, np.array([[one.duration for one in best]])
     values = [BSpline(one.basis.knots, one.controls, DEGREE)(averages) for one in best]

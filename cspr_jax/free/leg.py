@@ -154,7 +154,7 @@ class FreeMotions(Leg):
         try:
             others = forms()
             if any(not is_proved or form.duration.sum() < free.duration for form in others):
-                further = free_motion(problem, scene, poses, settings, others)
+                further = free_motion(problem, scene, poses, settings, free, others)
                 free = further if further.answers.feasible.all() or not is_proved else free
             return no_slower(free, problem, scene, poses, settings, others)
         except KeyboardInterrupt:

@@ -76,5 +76,5 @@ def _followed(
         answers = proved_answers(problem, motions, scene)
         if answers.feasible.all():
             energy, level = tasks.energies(unknowns)[0], np.full(len(motions), np.nan)
-            return FreeMotion(motions, answers, energy, level, True, False, np.nan, form.family)
+            return FreeMotion(motions, answers, energy, level, True, False, np.nan, family=form.family)
     return None

@@ -9,11 +9,10 @@ from support.motions import states_along
 import cspr_jax
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.free import leg, no_slower
-from cspr_jax.free.closed_forms import ClosedForm, closed_forms, controls_of, with_forms
+from cspr_jax.free.closed_forms import ClosedForm, closed_forms, controls_of, form_starts
 from cspr_jax.free.free_motion import free_motion
 from cspr_jax.free.poses import segments_of
 from cspr_jax.free.question import FreeQuestion
-from cspr_jax.free.starts import Starts
 from cspr_jax.motions.motion import states_at
 from cspr_jax.schema.verdicts import Verdict
 
@@ -30,7 +29,9 @@ def asked():
 
     def grasp(*arguments):
         box["question"] = arguments
-        box["free"] = missed(free_motion(*arguments))
+        free = free_motion(*arguments)
+        box.setdefault("first", free)
+        box["free"] = missed(free)
         return box["free"]
 
     with pytest.MonkeyPatch.context() as patch:
@@ -86,16 +87,29 @@ def test_splines_follow_a_motion(asked):
 
 
 def test_starts_of_the_segments_in_question(asked):
-    """Those of forms come behind the others, with the number of their segment among those in question."""
+    """The number of each is that of its segment among those in question."""
     problem, scene, poses, settings = asked["question"][:4]
     (form,) = asked["forms"]
-    several = ClosedForm("several", form.motions * 3, np.array([True, False, True]), np.repeat(form.duration, 3))
+    several = ClosedForm("several", form.motions * 3, np.array([True, False, True]), np.array([5.0, 6.0, 7.0]))
     with double_precision():
         single = segments_of(FreeQuestion.of(problem, scene, poses, settings).tasks(24, 3))
-        begun = Starts(np.array([0, 1]), np.zeros((2, 1, 29, 3)), np.ones((2, 1)))
-        whole = with_forms(begun, single.taken(np.zeros(3, int)), np.array([1, 2]), [several])
-    assert whole.task.tolist() == [0, 1, 1]
-    np.testing.assert_allclose(whole.duration[:, 0], [1.0, 1.0, form.duration[0]])
+        begun = form_starts(single.taken(np.zeros(3, int)), np.array([0, 2]), [several, several])
+    assert begun.task.tolist() == [0, 1, 0, 1]
+    assert begun.duration.ravel().tolist() == [5.0, 7.0, 5.0, 7.0]
+    assert begun.controls.shape == (4, 1, 29, 3)
+
+
+def test_a_search_from_forms_goes_on_from_what_was_best(asked):
+    """It keeps what the usual starts have led to, and begins from nothing but the forms."""
+    problem, scene, poses, settings = asked["question"][:4]
+    first = asked["first"]
+    assert first.parts[0].is_optimal
+    better = first.parts[0]._replace(cost=0.0, duration=1e-3)
+    with double_precision():
+        further = free_motion(problem, scene, poses, settings, first, asked["forms"])
+        kept = free_motion(problem, scene, poses, settings, dataclasses.replace(first, parts=(better,)), asked["forms"])
+    assert further.parts[0].cost <= first.parts[0].cost
+    assert kept.parts[0].cost == 0.0
 
 
 def test_a_closed_form_stands_in_for_nothing(asked):
