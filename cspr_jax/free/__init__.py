@@ -27,6 +27,7 @@ Files, each importing only from those above it:
     robust          bounds that leave room for all robots within an uncertainty
     proofs          motions tightened until they are proved, for the planned robot or for all
     free_motion     the fastest motion through poses, proved
+    followed        splines that follow motions of other families
     no_slower       closed forms in place of what a search finds, where they are faster
     neighbours      the best motions of many pairs of poses, from few starts and from neighbours' motions
     many            the fastest motions of many pairs of poses, tightened until they are proved

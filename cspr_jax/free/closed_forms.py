@@ -20,6 +20,8 @@ from cspr_jax.schema.limits import LIMITS
 
 # Part of the robot's size, and of the speed of a fall from its height, by which motions may miss poses.
 NEAR = 1e-9
+# Rodrigues vectors beyond which no search begins.
+FAR = 10.0
 
 
 class ClosedForm(NamedTuple):
@@ -88,22 +90,23 @@ def _passes(form: ClosedForm, problem: Problem, poses: FreePoses) -> bool:
     return True
 
 
-def controls_of(tasks: Tasks, segment: int, motion: Motion) -> np.ndarray:
+def controls_of(single: Tasks, motion: Motion) -> np.ndarray:
     """Control points of a spline that is near a motion.
 
     Args:
-        tasks: with one row, of which the segment is one.
+        single: one segment.
 
     Returns:
-        (K, d).
+        (K, d); no numbers where the motion is half a turn from the orientation half-way.
     """
-    along, about = coordinates(tasks.robot.pattern)
-    state = states_at(motion, tasks.basis.averages)
+    along, about = coordinates(single.robot.pattern)
+    state = states_at(motion, single.basis.averages)
     places = np.asarray(state.position)[:, along]
     if len(about):
-        turning = products(np.asarray(state.quaternion), tasks.references[0, segment][None] * BACK)
-        places = np.concatenate([places, turning[:, 1 + about] / turning[:, :1]], axis=1)
-    return tasks.basis.fit @ places
+        turning = products(np.asarray(state.quaternion), single.references[0, 0][None] * BACK)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            places = np.concatenate([places, turning[:, 1 + about] / turning[:, :1]], axis=1)
+    return single.basis.fit @ places
 
 
 def form_starts(single: Tasks, rows: np.ndarray, forms: Sequence[ClosedForm]) -> Starts:
@@ -111,16 +114,20 @@ def form_starts(single: Tasks, rows: np.ndarray, forms: Sequence[ClosedForm]) ->
 
     Args:
         single: all segments as tasks of their own.
-        rows: numbers of the segments in question; one form or more is proved on each.
+        rows: numbers of the segments in question.
 
     Returns:
-        the starts, of the first form on all segments, then of the second one, ...
+        the starts, of the first form on all segments on which it is proved, then of the second one, ...; none of
+        motions that turn too far from the orientation half-way.
     """
-    begun = [
-        (i, controls_of(single.taken(np.array([k])), 0, form.motions[k]), form.duration[k])
-        for form in forms
-        for i, k in enumerate(rows.tolist())
-        if form.is_feasible[k]
-    ]
-    task, controls, duration = zip(*begun, strict=True)
-    return Starts(np.array(task), np.array(controls)[:, None], np.array(duration)[:, None])
+    places = [(i, form, k) for form in forms for i, k in enumerate(rows.tolist()) if form.is_feasible[k]]
+    controls = np.zeros((len(places), 1, single.basis.controls, single.places.shape[-1]))
+    for n, (_, form, k) in enumerate(places):
+        controls[n, 0] = controls_of(single.taken(np.array([k])), form.motions[k])
+    turns = np.abs(controls[..., len(coordinates(single.robot.pattern)[0]) :])
+    is_near = (turns < FAR).all(axis=(1, 2, 3))
+    task, duration = (
+        np.array([i for i, *_ in places], int),
+        np.array([float(form.duration[k]) for _, form, k in places]),
+    )
+    return Starts(task[is_near], controls[is_near], duration[is_near, None])

@@ -146,16 +146,17 @@ def _searched(
     # by all searches. Whether the search has been stopped: by Ctrl-C only where there is something to keep.
     settings, poses = question.settings, question.poses
     count, best = len(poses.positions) - 1, dict(enumerate(before))
-    can_begin = np.any([form.is_feasible for form in forms], axis=0) if forms else np.ones(count, bool)
     until = np.inf if settings.search_time is None else time.monotonic() + settings.search_time
     for number, (share, softness) in enumerate(SEARCHES, 1):
         is_left = [k not in best or not best[k].is_shared or (number == 1 and bool(forms)) for k in range(count)]
-        rows = np.flatnonzero(is_left & can_begin)
+        rows = np.flatnonzero(is_left)
         if not len(rows) or (best and time.monotonic() > until):
             return list(best.values()), bool(len(rows))
         stage(f"free motion: search {number}{_said(best, settings.objective)}")
         single = segments_of(question.tasks(settings.intervals // share, FEWEST))
         begun = form_starts(single, rows, forms) if forms else starts(single.taken(rows), poses.z0, settings.starts)
+        if not len(begun.task):
+            break
         lanes = single.taken(rows[begun.task])
         result = optima(lanes, started(lanes, begun.controls, begun.duration), softness=softness, until=until)
         _keep(best, rows, begun.task, lanes, result)
@@ -180,6 +181,8 @@ def _keep(best: dict[int, SegmentMotion], rows: np.ndarray, of_task: np.ndarray,
     costs = np.where(is_optimal, costs, np.inf)
     for i, k in enumerate(rows.tolist()):
         lanes_of = np.flatnonzero(of_task == i)
+        if not len(lanes_of):
+            continue
         start = int(costs[lanes_of].argmin())
         nearest = lanes_of[start]
         before = best[k].cost if k in best and best[k].is_optimal else np.inf

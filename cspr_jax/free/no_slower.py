@@ -5,11 +5,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cspr_jax.free.closed_forms import ClosedForm, controls_of
+from cspr_jax.free.closed_forms import ClosedForm
+from cspr_jax.free.followed import energy_along, followed
 from cspr_jax.free.free_motion import FreeMotion
-from cspr_jax.free.poses import FreePoses, half_swing, motions_of
+from cspr_jax.free.poses import FreePoses, half_swing
 from cspr_jax.free.question import FreeQuestion, FreeSettings
-from cspr_jax.free.search import started
 from cspr_jax.free.starts import ARCS
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import proved_answers
@@ -70,11 +70,9 @@ def _followed(
     intervals = max(settings.intervals, 2 * int(np.ceil(0.5 * INTERVALS * arcs)))
     for doubling in range(DOUBLINGS):
         tasks = question.tasks(intervals * 2**doubling, question.instants)
-        controls = np.array([controls_of(tasks, i, motion) for i, motion in enumerate(form.motions)])
-        unknowns = started(tasks, controls[None], form.duration[None])
-        motions = motions_of(tasks, unknowns, poses.z0)
+        motions = followed(tasks, form.motions, form.duration, poses.z0)
         answers = proved_answers(problem, motions, scene)
         if answers.feasible.all():
-            energy, level = tasks.energies(unknowns)[0], np.full(len(motions), np.nan)
+            energy, level = np.array([energy_along(tasks, motion) for motion in motions]), np.full(len(motions), np.nan)
             return FreeMotion(motions, answers, energy, level, True, False, np.nan, family=form.family)
     return None

@@ -79,7 +79,7 @@ def test_splines_follow_a_motion(asked):
     (form,) = asked["forms"]
     with double_precision():
         tasks = FreeQuestion.of(problem, scene, poses, settings).tasks(96, 3)
-        controls = controls_of(tasks, 0, form.motions[0])
+        controls = controls_of(tasks, form.motions[0])
         at = states_at(form.motions[0], tasks.basis.tau.ravel())
     near = tasks.basis.places(controls).reshape(-1, 3, 3) / form.duration[0] ** np.arange(3)[:, None]
     np.testing.assert_allclose(near[:, 0], at.position, atol=1e-7)
