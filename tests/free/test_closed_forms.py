@@ -10,9 +10,11 @@ import cspr_jax
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.free import leg, no_slower
 from cspr_jax.free.closed_forms import ClosedForm, closed_forms, controls_of, form_starts
-from cspr_jax.free.free_motion import free_motion
+from cspr_jax.free.free_motion import _keep, free_motion
 from cspr_jax.free.poses import segments_of
 from cspr_jax.free.question import FreeQuestion
+from cspr_jax.free.search import Optima, started
+from cspr_jax.free.starts import starts
 from cspr_jax.motions.motion import states_at
 from cspr_jax.schema.verdicts import Verdict
 
@@ -110,6 +112,25 @@ def test_a_search_from_forms_goes_on_from_what_was_best(asked):
         kept = free_motion(problem, scene, poses, settings, dataclasses.replace(first, parts=(better,)), asked["forms"])
     assert further.parts[0].cost <= first.parts[0].cost
     assert kept.parts[0].cost == 0.0
+
+
+@pytest.mark.parametrize(
+    ("durations", "is_shared"), [((1.0005, 1.5), False), ((1.5, 1.0005), True), ((1.5, 1.6), False)]
+)
+def test_starts_of_two_searches_agree(asked, durations, is_shared):
+    """Where another start leads to the same motion, and not the same one once more."""
+    problem, scene, poses, settings = asked["question"][:4]
+    with double_precision():
+        single = segments_of(FreeQuestion.of(problem, scene, poses, settings).tasks(24, 3))
+        begun, best = starts(single, KEYS["z0"], 2), {}
+        lanes = single.taken(begun.task)
+        unknowns = started(lanes, begun.controls, begun.duration)
+        for pair in ((1.0, 2.0), durations):
+            optimum = Optima(unknowns._replace(duration=np.array(pair)[:, None]), np.ones(2, bool), np.zeros(2, int))
+            _keep(best, np.array([0]), begun.task, lanes, optimum)
+    assert best[0].duration == 1.0
+    assert best[0].start == 0
+    assert best[0].is_shared == is_shared
 
 
 def test_a_closed_form_stands_in_for_nothing(asked):

@@ -8,10 +8,12 @@ from support.motions import states_along
 
 import cspr_jax
 from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.free import followed as module
 from cspr_jax.free.closed_forms import ClosedForm, form_starts
 from cspr_jax.free.followed import energy_along, followed
 from cspr_jax.free.poses import FreePoses, segments_of
 from cspr_jax.free.question import FreeQuestion, FreeSettings
+from cspr_jax.motions.motion import states_at
 from cspr_jax.motions.proved_answers import proved_answers
 
 # Targets 1 and 2 of Table 3.2 of the Dion-Gauvin thesis.
@@ -52,6 +54,22 @@ def test_it_follows_and_ends_at_the_poses(turning):
     rows = planned.rows(rate=500.0)
     squares = np.sum(rows["tension"] ** 2, axis=1)
     assert energy == pytest.approx(np.trapezoid(squares, rows["t"]), rel=1e-3)
+
+
+def test_quaternions_may_jump_to_their_negatives(turning, monkeypatch):
+    """Both stand for one orientation."""
+    motion, question, duration, _ = turning
+
+    def jumping(motion, tau):
+        state = states_at(motion, tau)
+        signs = np.where(np.arange(len(tau)) % 3 == 1, -1.0, 1.0)[:, None]
+        return state._replace(quaternion=np.asarray(state.quaternion) * signs)
+
+    with double_precision():
+        tasks = question.tasks(112, 3)
+        expected = followed(tasks, [motion], duration, KEYS["z0"])[0].quaternion
+        monkeypatch.setattr(module, "states_at", jumping)
+        np.testing.assert_allclose(followed(tasks, [motion], duration, KEYS["z0"])[0].quaternion, expected, atol=1e-12)
 
 
 def test_given_accelerations_are_those_at_the_poses(turning):
