@@ -126,8 +126,6 @@ def form_starts(single: Tasks, rows: np.ndarray, forms: Sequence[ClosedForm]) ->
         controls[n, 0] = controls_of(single.taken(np.array([k])), form.motions[k])
     turns = np.abs(controls[..., len(coordinates(single.robot.pattern)[0]) :])
     is_near = (turns < FAR).all(axis=(1, 2, 3))
-    task, duration = (
-        np.array([i for i, *_ in places], int),
-        np.array([float(form.duration[k]) for _, form, k in places]),
-    )
+    task = np.array([i for i, *_ in places], int)
+    duration = np.array([form.duration[k] for _, form, k in places], float)
     return Starts(task[is_near], controls[is_near], duration[is_near, None])

@@ -21,6 +21,7 @@ from cspr_jax.free.search import started
 from cspr_jax.free.tasks import OUTER, Tasks
 from cspr_jax.motions.motion import Motion, common_shape, states_at
 from cspr_jax.robots.cables import AnyRobot, tensions
+from cspr_jax.robots.limits import Limits
 
 BATCH = 128
 
@@ -79,11 +80,11 @@ def energy_along(tasks: Tasks, motion: Motion) -> float:
     Returns:
         N^2 s.
     """
-    kernel = partial(_tensions, tasks.robot, common_shape(motion))
+    kernel = partial(_tensions, tasks.robot, tasks.limits, common_shape(motion))
     force = in_batches(kernel, tasks.basis.tau.ravel(), size=BATCH)
     return float(motion.duration()) * float(np.sum(tasks.basis.shares.ravel() * np.sum(force**2, axis=1)))
 
 
 @jax.jit
-def _tensions(robot: AnyRobot, motion: Motion, tau: Array) -> Array:
-    return jax.vmap(lambda one: tensions(robot, motion.state(one)))(tau)
+def _tensions(robot: AnyRobot, limits: Limits, motion: Motion, tau: Array) -> Array:
+    return jax.vmap(lambda one: tensions(robot, motion.state(one), limits))(tau)

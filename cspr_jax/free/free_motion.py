@@ -42,7 +42,6 @@ class SegmentMotion(NamedTuple):
         duration: s.
         cost: the objective; inf where no search has converged.
         basis: of the control points.
-        is_optimal: whether a search has converged to it.
         is_shared: whether two starts or more have led to it.
         start: number of its start.
     """
@@ -51,9 +50,13 @@ class SegmentMotion(NamedTuple):
     duration: float
     cost: float
     basis: Basis
-    is_optimal: bool
     is_shared: bool
     start: int
+
+    @property
+    def is_optimal(self) -> bool:
+        """Tell whether a search has converged to it."""
+        return bool(np.isfinite(self.cost))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -136,7 +139,7 @@ def _begun(question: FreeQuestion) -> list[SegmentMotion]:
     single = segments_of(question.tasks(question.settings.intervals, FEWEST))
     begun = starts(single, question.poses.z0, 1)
     pairs = zip(begun.controls[:, 0], begun.duration[:, 0].tolist(), strict=True)
-    return [SegmentMotion(*pair, np.inf, single.basis, is_optimal=False, is_shared=False, start=0) for pair in pairs]
+    return [SegmentMotion(*pair, np.inf, single.basis, is_shared=False, start=0) for pair in pairs]
 
 
 def _searched(
@@ -145,7 +148,8 @@ def _searched(
     # The best motion along each segment by itself, from all starts, or after those from forms; where starts disagree,
     # by all searches. Whether the search has been stopped: by Ctrl-C only where there is something to keep.
     settings, poses = question.settings, question.poses
-    count, best = len(poses.positions) - 1, dict(enumerate(before))
+    # No form is the start that has led to what was there before.
+    count, best = len(poses.positions) - 1, {k: part._replace(start=-1) for k, part in enumerate(before)}
     until = np.inf if settings.search_time is None else time.monotonic() + settings.search_time
     for number, (share, softness) in enumerate(SEARCHES, 1):
         is_left = [k not in best or not best[k].is_shared or (number == 1 and bool(forms)) for k in range(count)]
@@ -185,7 +189,7 @@ def _keep(best: dict[int, SegmentMotion], rows: np.ndarray, of_task: np.ndarray,
             continue
         start = int(costs[lanes_of].argmin())
         nearest = lanes_of[start]
-        before = best[k].cost if k in best and best[k].is_optimal else np.inf
+        before = best[k].cost if k in best else np.inf
         least = min(costs[nearest], before)
         room = least + SAME * abs(least)
         agreeing = set(np.flatnonzero(np.isfinite(costs[lanes_of]) & (costs[lanes_of] <= room)).tolist())
@@ -193,8 +197,8 @@ def _keep(best: dict[int, SegmentMotion], rows: np.ndarray, of_task: np.ndarray,
             agreeing.add(best[k].start)
         if k not in best or costs[nearest] < before:
             duration = float(result.unknowns.duration[nearest, 0])
-            part = controls[nearest], duration, costs[nearest], lanes.basis
-            best[k] = SegmentMotion(*part, bool(is_optimal[nearest]), is_shared=False, start=start)
+            part = controls[nearest], duration, float(costs[nearest]), lanes.basis
+            best[k] = SegmentMotion(*part, is_shared=False, start=start)
         best[k] = best[k]._replace(is_shared=len(agreeing) > 1)
 
 

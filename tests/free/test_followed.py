@@ -83,6 +83,22 @@ def test_given_accelerations_are_those_at_the_poses(turning):
     np.testing.assert_allclose(ends.angular_acceleration, accelerations[0, :, 3:], atol=1e-8)
 
 
+def test_energy_is_that_of_the_tensions_that_are_printed():
+    """Those of redundant cables depend on the limits of tensions."""
+    poses = [{"position": [36.0, 11.0, -21.0]}, {"position": [60.0, 38.0, -60.0]}]
+    keys = {"schema": 1, "robot": "boralugoda-rectangle", "family": "hypocycloid-standard", "z0": 80.0, "pose": poses}
+    planned = cspr_jax.plan(keys | {"limits": {"tension_min": 0.1, "tension_max": 75.0}})
+    (motion,) = planned.legs[0].motions
+    ends = states_along(motion, [0.0, 1.0])
+    places = FreePoses(ends.position, None, np.zeros((2, 3)), np.full((2, 3), np.nan), keys["z0"])
+    with double_precision():
+        tasks = FreeQuestion.of(planned.problem, None, places, FreeSettings()).tasks(48, 4)
+        energy = energy_along(tasks, motion)
+    rows = planned.rows(rate=200.0)
+    squares = np.sum(rows["tension"] ** 2, axis=1)
+    assert energy == pytest.approx(np.trapezoid(squares, rows["t"]), rel=1e-3)
+
+
 def test_no_search_begins_where_rodrigues_vectors_end(turning):
     motion, question, duration, _ = turning
     form = ClosedForm("hypocycloid", [motion], np.array([True]), duration)
