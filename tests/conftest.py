@@ -13,6 +13,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import jax
+import jaxlib.version
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
@@ -76,7 +77,10 @@ def pytest_configure(config):
     if "not soak" in config.option.markexpr:
         # Workers find them set already. Twice, they would be other keys of compiled code than those of one process.
         given = os.environ.get("XLA_FLAGS", "").split()
-        os.environ["XLA_FLAGS"] = " ".join([*(flag for flag in CHEAP if flag not in given), *given])
+        place = COMPILED / jaxlib.version.__version__
+        place.mkdir(parents=True, exist_ok=True)
+        cheap = xla.known_flags(place, [flag for flag in CHEAP if flag not in given])
+        os.environ["XLA_FLAGS"] = " ".join([*cheap, *given])
         batches.LARGEST = LARGEST_BATCH
     is_first = not hasattr(config, "workerinput")
     if is_first and sum(path.stat().st_size for path in COMPILED.rglob("*") if path.is_file()) > LARGEST:

@@ -56,7 +56,7 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
     add_json(parser)
     add_files(parser, "400 rows", "write the motion even if it is not feasible")
     add_all_errors(parser)
-    add_device(parser, quick=True)
+    add_device(parser)
 
 
 def _keys(options: argparse.Namespace) -> dict[str, Any]:

@@ -37,13 +37,12 @@ def add_json(parser: argparse.ArgumentParser, what: str = "object") -> None:
     parser.add_argument("--json", action="store_true", help=f"print one JSON {what} and nothing else")
 
 
-def add_device(parser: argparse.ArgumentParser, *, quick: bool = False) -> None:
+def add_device(parser: argparse.ArgumentParser, usual: str = "cpu") -> None:
     """Add the option of the device.
 
     Args:
-        quick: whether the command computes little; see `xla.prepare`.
+        usual: where the command computes without it, for `--help`.
     """
-    usual = "cpu" if quick else "a GPU if jax finds one"
     parser.add_argument("--device", choices=("cpu", "gpu"), help=f"where to compute (default: {usual})")
 
 
@@ -66,11 +65,12 @@ def add_output(parser: argparse.ArgumentParser, text: str, **settings: Any) -> N
     parser.add_argument("-o", "--output", type=Path, help=text, **settings)
 
 
-def prepare_jax(options: argparse.Namespace, *, quick: bool = False) -> None:
+def prepare_jax(options: argparse.Namespace, *, quick: bool = False, prefers_cpu: bool = True) -> None:
     """Set up jax by the options; from here on a line says when it compiles.
 
     Args:
         quick: whether little is computed; see `xla.prepare`.
+        prefers_cpu: whether a GPU would take longer.
 
     Raises:
         ConfigError: there is no such device, or settings of jax cannot be used.
@@ -80,7 +80,7 @@ def prepare_jax(options: argparse.Namespace, *, quick: bool = False) -> None:
 
     surroundings.check_threads_of_jax()
     if getattr(options, "scheduler", None) is None:  # its workers have settings of their own
-        xla.prepare(options.device, warn, quick=quick)
+        xla.prepare(options.device, warn, quick=quick, prefers_cpu=prefers_cpu)
     xla.check_device(options.device)
     xla.tell_compiling()
 

@@ -61,7 +61,7 @@ def _add_report(parser: argparse.ArgumentParser) -> None:
     )
     add_motion_plan(parser)
     add_all_errors(parser)
-    add_device(parser, quick=True)
+    add_device(parser)
 
 
 def _report(options: argparse.Namespace) -> int:

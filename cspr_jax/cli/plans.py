@@ -30,7 +30,7 @@ def _add_plan(parser: argparse.ArgumentParser) -> None:
     add_retime(parser, "run along the paths of the plan in the least time that all limits allow")
     add_files(parser, "`samples` rows per segment", "write the best candidate's motion even if it is not feasible")
     add_all_errors(parser)
-    add_device(parser, quick=True)
+    add_device(parser)
 
 
 def add_retime(parser: argparse.ArgumentParser, does: str) -> None:
@@ -215,7 +215,7 @@ def _add_replay(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--step", type=float, metavar="S", help=_STEP)
     add_look(parser)
     add_all_errors(parser)
-    add_device(parser, quick=True)
+    add_device(parser)
 
 
 def _replay(options: argparse.Namespace) -> int:

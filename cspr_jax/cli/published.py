@@ -61,11 +61,11 @@ def _add_bench(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--kernels", type=Path, metavar="DIR", help="also measure the C++ kernels in this folder, such as benchmarks"
     )
-    add_device(parser)
+    add_device(parser, usual="a GPU if jax finds one")
 
 
 def _bench(options: argparse.Namespace) -> int:
-    prepare_jax(options)
+    prepare_jax(options, prefers_cpu=False)
     from cspr_jax.api.published import benchmark
     from cspr_jax.bench import lines
 

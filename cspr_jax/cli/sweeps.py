@@ -47,7 +47,7 @@ def _add_run(parser: argparse.ArgumentParser) -> None:
         "--prune", action="store_true", help="remove the files of finished tiles once the result is complete"
     )
     add_all_errors(parser)
-    add_device(parser)
+    add_device(parser, usual="a GPU if jax finds one, for large maps by formulas; cpu for others")
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -66,7 +66,7 @@ def _run(options: argparse.Namespace) -> int:
         job = sweeps.Job(sweep, directory, choices, hooks, options.workers, options.scheduler)
         path = job.finished()
         if path is None:
-            path = job.go(lambda: prepare_jax(options))
+            path = job.go(lambda: prepare_jax(options, prefers_cpu=sweep.prefers_cpu))
         else:
             print_line("already finished; nothing was computed")
     print_path(path)

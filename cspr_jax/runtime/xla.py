@@ -17,7 +17,7 @@ import signal
 import subprocess
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -53,14 +53,21 @@ _KEPT = {
 _VALUES = {"JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": 0.05, "JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES": -1}
 
 
-def prepare(device: str | None = None, warn: Callable[[str], None] = lambda line: None, *, quick: bool = False) -> None:
+def prepare(
+    device: str | None = None,
+    warn: Callable[[str], None] = lambda line: None,
+    *,
+    quick: bool = False,
+    prefers_cpu: bool = False,
+) -> None:
     """Set the variables that jax reads when it is imported; nothing if it has been imported.
 
     Args:
-        device: "cpu"; "gpu" and None leave the choice to jax, but where little is computed None is the CPU, since a GPU
-            has to be started and its code takes longer to compile.
+        device: "cpu"; "gpu" and None leave the choice to jax, but with `quick` or `prefers_cpu` None is the CPU.
         warn: called with a line for people where compiled code cannot be kept.
         quick: whether little is computed, so that compiling in less time is worth more than faster code.
+        prefers_cpu: whether a GPU would take longer: it has to be started, its code takes two to three times as long to
+            compile, and each call waits for it.
 
     Raises:
         ConfigError: XLA ends the process that has the user's XLA_FLAGS.
@@ -71,7 +78,7 @@ def prepare(device: str | None = None, warn: Callable[[str], None] = lambda line
         os.environ.setdefault(*_ONLY_FATAL)
     if device == "cpu":
         os.environ["JAX_PLATFORMS"] = "cpu"
-    elif device is None and quick:
+    elif device is None and (quick or prefers_cpu):
         os.environ.setdefault("JAX_PLATFORMS", "cpu")
     _few_arenas()
     if math.isfinite(quota()):
@@ -239,8 +246,23 @@ def _flags(folder: Path, settings: str, *, quick: bool = False) -> str:
     ours = [WIDE] if NEEDS in _processor() else []
     named = [word.partition("=")[0] for word in settings.split()]
     ours = [flag for flag in (*ours, *(QUICK if quick else ())) if flag.partition("=")[0] not in named]
-    our_flags = " ".join(ours)
-    return f"{our_flags} {settings}".strip() if ours and _is_known(folder, our_flags) else settings
+    return " ".join([*known_flags(folder, ours), settings]).strip()
+
+
+def known_flags(folder: Path, flags: Sequence[str]) -> list[str]:
+    """Flags that this XLA knows, of some: it ends a process whose XLA_FLAGS name another one.
+
+    Args:
+        folder: where answers are kept for later processes.
+        flags: words such as "--xla_backend_optimization_level=1".
+
+    Returns:
+        the flags, in their order.
+    """
+    refusal = _refusal(folder, " ".join(flags)) if flags else ""
+    if refusal is None:  # there was no answer
+        return []
+    return [flag for flag in flags if not refusal or _is_known(folder, flag)]
 
 
 def _check_flags(folder: Path | None, flags: str) -> None:

@@ -44,6 +44,8 @@ del sys.path[0]
 from cspr_jax.store.reader import serve
 serve()
 """
+# It imports these from elsewhere. Each may lie in a folder of its own, as where PYTHONPATH names them one by one.
+_LIBRARIES = ("h5py", "numpy", "pydantic", "pydantic_core", "annotated_types", "typing_extensions", "typing_inspection")
 # A file can end the process that reads it by these signals. Other signals come from people, batch systems or the
 # system's lack of memory, and say nothing about the file.
 _ENDS = {
@@ -205,12 +207,10 @@ class Reader:
         return pipe
 
     def _start(self, path: Path) -> None:
-        specs = [spec for name in ("h5py", "numpy") if (spec := importlib.util.find_spec(name)) is not None]
-        places = {str(Path(spec.origin).parent.parent) for spec in specs if spec.origin is not None}
         home = str(Path(__file__).parents[2])
         settings = {"OPENBLAS_NUM_THREADS": "1", "HDF5_PLUGIN_PRELOAD": "::", "HDF5_USE_FILE_LOCKING": "FALSE"}
         rows = json.dumps([dataclasses.asdict(quantity) for quantity in from_outside()])
-        command = [sys.executable, "-I", "-c", _CODE, "\n".join(sorted(places)), home, rows]
+        command = [sys.executable, "-I", "-c", _CODE, "\n".join(_places()), home, rows]
         here, there = socket.socketpair()
         with there:
             try:
@@ -265,6 +265,12 @@ class Reader:
         if "refused" in header:
             raise DamagedError(header["refused"])
         return header
+
+
+def _places() -> list[str]:
+    specs = [spec for name in _LIBRARIES if (spec := importlib.util.find_spec(name)) is not None]
+    depths = [(spec.origin, 1 if spec.submodule_search_locations else 0) for spec in specs]
+    return sorted({str(Path(origin).parents[depth]) for origin, depth in depths if origin is not None})
 
 
 def _array(pipe: RawIOBase, dtype: str, shape: list[int] | tuple[int, ...]) -> np.ndarray:

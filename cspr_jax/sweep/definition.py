@@ -31,6 +31,9 @@ from cspr_jax.sweep.tile_sizes import tile_cells
 LARGEST_TILES = 100_000
 LARGEST_RESULT = 1 << 46  # bytes; the free room on the disk is looked at when a run starts
 LONGEST_NAME = 200  # bytes, so that the names made of it fit a folder
+# Maps of fewer cells are done before a GPU has compiled its code; those whose cells cost more seconds are searches and
+# proofs in many short steps, for each of which a GPU has to start (docs/performance.md, GPU).
+LEAST_FOR_GPU, MOST_SECONDS_FOR_GPU = 100_000, 1e-3
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,6 +71,12 @@ class Sweep:
     def name(self) -> str:
         """The file's name, without its ending."""
         return self.file.stem
+
+    @property
+    def prefers_cpu(self) -> bool:
+        """Tell whether a GPU would take longer."""
+        is_stepwise = self.kind.by_processes or self.kind.cost.seconds > MOST_SECONDS_FOR_GPU
+        return is_stepwise or self.grid.size < LEAST_FOR_GPU
 
     @functools.cached_property
     def layout(self) -> Layout:

@@ -5,7 +5,11 @@ import json
 import os
 import shutil
 import signal
+import subprocess
+import sys
+import sysconfig
 import zlib
+from importlib.machinery import PathFinder
 
 import h5py
 import numpy as np
@@ -217,3 +221,22 @@ def test_a_disk_without_locks_is_named(finished, tmp_path, monkeypatch):
     with pytest.raises(StoreError, match=r"No locks available: .*choose -o on another disk") as raised:
         go(finished[0], tmp_path / "run")
     assert len(str(raised.value).splitlines()) == 1 and "HDF5_USE_FILE_LOCKING" in str(raised.value)
+
+
+def test_each_library_of_the_process_may_lie_in_a_folder_of_its_own():
+    """A variable or a loader of modules may name folders one by one: it is told the folders of all that it imports."""
+    code = "import sys, cspr_jax.store.reader; print(*[getattr(m, '__file__', '') for m in sys.modules.values()])"
+    words = [sys.executable, "-c", code]
+    files = subprocess.run(words, capture_output=True, text=True, check=True).stdout.split()
+    sites = {sysconfig.get_path("purelib"), sysconfig.get_path("platlib")}
+    needed = {
+        file[len(site) + 1 :].partition("/")[0].partition(".")[0]
+        for file in files
+        for site in sites
+        if file.startswith(site + "/")
+    }
+    at_start = {name for name in needed if name.startswith("_")}  # of installers
+    assert needed - at_start - {"cspr_jax"} == set(isolated._LIBRARIES)
+    places = isolated._places()
+    assert set(places) <= set(sys.path)
+    assert all(PathFinder.find_spec(name, places) is not None for name in isolated._LIBRARIES)

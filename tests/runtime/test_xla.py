@@ -89,6 +89,7 @@ def test_plans_compile_in_less_time_and_flags_of_the_user_are_not_set_twice(tmp_
     assert device == "cpu"  # a GPU would take longer, and may be asked for
     assert json.loads(told(tmp_path, code, JAX_PLATFORMS="cuda,cpu"))["JAX_PLATFORMS"] == "cuda,cpu"
     assert json.loads(told(tmp_path, SEEN.format(device='"gpu", quick=True')))["JAX_PLATFORMS"] is None
+    assert json.loads(told(tmp_path, SEEN.format(device="prefers_cpu=True")))["JAX_PLATFORMS"] == "cpu"
     assert [flag for flag in ours if flag != xla.WIDE] == list(xla.QUICK)
     theirs = "--xla_backend_optimization_level=3"
     given = json.loads(told(tmp_path, code, XLA_FLAGS=theirs))["XLA_FLAGS"].split()
@@ -110,6 +111,19 @@ def test_a_flag_is_tried_once_and_refused_ones_are_left_out(tmp_path, monkeypatc
     assert len(tries) == 1
     (tmp_path / "flags.json").write_text("{ half a rec")
     assert not xla._is_known(tmp_path, "--xla_no_such_flag=1") and len(tries) == 2
+
+
+def test_flags_that_another_xla_knows_do_not_take_ours_with_them(tmp_path, monkeypatch):
+    """Versions of XLA drop flags; what the others are worth stays."""
+    monkeypatch.setattr(xla, "QUICK", (xla.QUICK[0], "--xla_no_such_flag=1", xla.QUICK[2]))
+    monkeypatch.setattr(xla, "_processor", lambda: ())
+    assert xla._flags(tmp_path, "--xla_cpu_use_xnnpack=false ", quick=True).split() == [
+        *(xla.QUICK[0], xla.QUICK[2]),
+        "--xla_cpu_use_xnnpack=false",
+    ]
+    assert xla.known_flags(tmp_path, []) == []
+    monkeypatch.setattr(xla, "_refusal", lambda folder, flags: None)
+    assert xla.known_flags(tmp_path, xla.QUICK) == []  # nobody knows: each would be asked for as long again
 
 
 def test_the_library_sets_nothing(tmp_path):

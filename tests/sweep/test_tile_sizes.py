@@ -72,3 +72,13 @@ def test_a_tile_of_the_file_is_taken_as_it_is():
     tiled = sweep(run={"tile": [3, 81, 15, 1]})
     assert tiled.grid.tile == (3, 81, 15, 1)
     assert len(Tiling(tiled.grid.shape, tiled.grid.tile)) == 27
+
+
+def test_which_maps_a_gpu_computes():
+    """Large ones by formulas for all cells at once: not small ones, searches in many steps, nor platforms' sets."""
+    assert sweep().prefers_cpu  # 98,415 cells
+    large = sweep(axes=MAP["axes"] | {"z0": [1.7, 1.8]})
+    assert not large.prefers_cpu
+    axes = {name: {"start": 0.5, "stop": 1.5, "count": 50} for name in "xyz"}
+    path = {"family": "path", "from": {"position": [0.1, 0.0, 1.5]}}
+    assert sweep(map="least-time", axes=axes, trajectory=path, limits={"tension_max": 3.0}).prefers_cpu
