@@ -28,8 +28,9 @@ FINE = ((1e-4, 1e-1), (1e-2, 1.0), (1e-2, 10.0))
 # get stuck on many intervals converge on fewer, on which motions are some parts in a thousand slower.
 TOGETHER = ((1.0, 0), (1.0, 1), (1.5, 0), (2.0, 0), (1.0, 2))
 # Searches of single segments, each for those for which the ones before have no two starts with the same best motion, by
-# this part of its duration: by what the intervals are divided, and the softness; instants of each interval.
-SEARCHES, FEWEST, SAME = ((2, 10.0), (2, 1.0), (1, 1.0)), 3, 1e-3
+# this part of its duration: by what the intervals are divided, and the softness; instants of each interval. The last
+# one, on few intervals, is for those for which no start has led to any.
+SEARCHES, FEWEST, SAME = ((2, 10.0), (2, 1.0), (1, 1.0), (3, 10.0)), 3, 1e-3
 
 USUAL = FreeSettings()
 
@@ -152,7 +153,11 @@ def _searched(
     count, best = len(poses.positions) - 1, {k: part._replace(start=-1) for k, part in enumerate(before)}
     until = np.inf if settings.search_time is None else time.monotonic() + settings.search_time
     for number, (share, softness) in enumerate(SEARCHES, 1):
-        is_left = [k not in best or not best[k].is_shared or (number == 1 and bool(forms)) for k in range(count)]
+        is_last = number == len(SEARCHES)
+        is_left = [
+            k not in best or not (best[k].is_optimal if is_last else best[k].is_shared) or (number == 1 and bool(forms))
+            for k in range(count)
+        ]
         rows = np.flatnonzero(is_left)
         if not len(rows) or (best and time.monotonic() > until):
             return list(best.values()), bool(len(rows))

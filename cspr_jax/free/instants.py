@@ -14,12 +14,12 @@ from jax import Array
 
 from cspr_jax.arithmetic import rotations
 from cspr_jax.curves.spline import turning_of
-from cspr_jax.motions.criteria import Criterion, judged_poses
+from cspr_jax.motions.criteria import BELOW, Criterion, judged_poses
 from cspr_jax.motions.limits import limits_set
 from cspr_jax.robots.cables import AnyRobot, cable_motion, wrench_units
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.patterns import PATTERNS
-from cspr_jax.robots.point_mass import plane_normal, spool_radius
+from cspr_jax.robots.point_mass import in_one_plane, plane_normal, spool_radius
 from cspr_jax.robots.state import State
 from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.schema.limits import Limit
@@ -28,8 +28,8 @@ from cspr_jax.schema.verdicts import Verdict
 BATCH = 128
 # Entries of x behind the coordinates.
 SCALARS = 2
-# Depth below the spools, over the size of the robot, that a search keeps at least.
-BELOW = 0.02
+# Depth below the plane of the spools, over the size of the robot, that a search keeps at least.
+DEPTH = 0.02
 
 
 def coordinates(pattern: str) -> tuple[np.ndarray, np.ndarray]:
@@ -68,6 +68,18 @@ def state_of(robot: AnyRobot, reference: Array, *motion: Array) -> State:
     return State(position, velocity, acceleration, rotation, spin, spin_rate)
 
 
+def keeps_depth(robot: AnyRobot) -> bool:
+    """Tell whether the depth below the plane of the spools is a value.
+
+    Nobody judges it where cables of a point mass are redundant. But in a plane that holds all spools they carry no load
+    across it, so that a motion through it is not proved, although its instants on either side may be within all limits.
+
+    Returns:
+        whether it is.
+    """
+    return judged_poses(robot)[1] or (robot.pattern in BELOW and not PATTERNS[robot.pattern].is_body)
+
+
 def other_rows(limits: Limits) -> list[Limit]:
     """Rows of the limits that are set, but those of tensions.
 
@@ -95,7 +107,7 @@ def _other_values(robot: AnyRobot, limits: Limits, state: State) -> Array:
         limit = jnp.atleast_1d(jnp.asarray(getattr(limits, row.name)))
         scale = size if row.is_height else limit**2 if row.of_mass_centre else limit
         parts.append(values[row.quantity] / scale)
-    if judged_poses(robot)[1]:
+    if keeps_depth(robot):
         parts.append(jnp.dot(plane_normal(robot), state.position)[None] / size)
     return jnp.concatenate(parts) if parts else jnp.zeros(0)
 
@@ -126,6 +138,8 @@ class ValueBounds(NamedTuple):
         rises: (n_criteria, n_values) by how much a lower bound rises so that the slack of a criterion grows by 1.
         falls: (n_criteria, n_values) by how much an upper bound falls.
         determinant: number of the value that is the determinant; None without one.
+        depth: number of the value that is the depth below the plane of the spools, over the size of the robot; None
+            without such a plane.
     """
 
     low: np.ndarray
@@ -133,6 +147,7 @@ class ValueBounds(NamedTuple):
     rises: np.ndarray
     falls: np.ndarray
     determinant: int | None = None
+    depth: int | None = None
 
 
 class _Value(NamedTuple):
@@ -169,13 +184,15 @@ def bounds(robot: AnyRobot, limits: Limits, rows: Sequence[Criterion], is_timed:
             top = most / size if row.is_height else 1.0
             bottom = -1.0 if row.quantity in ("speed", "acceleration") else -np.inf
             values.append(_Value(bottom, top, row.flag, row.flag, k if row.per_cable else -1, change))
-    is_regular, is_below = judged_poses(robot)
-    if is_below:
-        values.append(_Value(BELOW, np.inf, Verdict.ABOVE_SPOOLS, Verdict.FEASIBLE, -1, 1.0 / size))
+    is_regular, _ = judged_poses(robot)
+    is_divided = PATTERNS[robot.pattern].is_body or in_one_plane(robot)
+    if keeps_depth(robot):
+        least = DEPTH if is_divided else -np.inf
+        values.append(_Value(least, np.inf, Verdict.ABOVE_SPOOLS, Verdict.FEASIBLE, -1, 1.0 / size))
     if is_timed:
         values.append(_Value(-np.inf, 1.0, Verdict.FEASIBLE, Verdict.FEASIBLE, -1, 0.0))
     if is_regular:
-        # Bounded on the side of the poses, `poses.tasks_of`.
+        # Bounded on the side of the poses, as the depth: `poses.tasks_of`.
         values.append(_Value(-np.inf, np.inf, Verdict.SINGULAR, Verdict.SINGULAR, -1, 0.0))
 
     def changes(side: str, bound: str) -> np.ndarray:
@@ -194,5 +211,7 @@ def bounds(robot: AnyRobot, limits: Limits, rows: Sequence[Criterion], is_timed:
         )
 
     low, high = (np.array([getattr(value, side) for value in values]) for side in ("low", "high"))
-    place = [k for k, value in enumerate(values) if value.least == Verdict.SINGULAR]
-    return ValueBounds(low, high, changes("least", "low"), changes("most", "high"), *place)
+    places = {value.least: k for k, value in enumerate(values)}
+    depth = places.get(Verdict.ABOVE_SPOOLS) if is_divided else None
+    sides = changes("least", "low"), changes("most", "high")
+    return ValueBounds(low, high, *sides, determinant=places.get(Verdict.SINGULAR), depth=depth)

@@ -147,7 +147,7 @@ def _proved(
         left = np.array([k for k in left.tolist() if proofs[k].verdict], int)
         tighter = None
         if len(left) and number < ROUNDS:
-            tighter = tightened(questions[0], tasks.taken(left), [motions[k] for k in left.tolist()])
+            tighter = tightened(questions[0], tasks.taken(left), [motions[k] for k in left.tolist()], number)
         if tighter is None:
             break
         further, is_optimal = _first_optima(tighter, unknowns.taken(left), ON[:TRIED])

@@ -15,17 +15,18 @@ from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import InputError
 from cspr_jax.free.basis import Basis
 from cspr_jax.free.determinants import determinant
-from cspr_jax.free.instants import ValueBounds, coordinates
+from cspr_jax.free.instants import DEPTH, ValueBounds, coordinates
 from cspr_jax.free.objectives import Objective
 from cspr_jax.free.tasks import Tasks, Unknowns
 from cspr_jax.motions.criteria import judged_poses
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.robots.point_mass import plane_normal, spool_radius
 from cspr_jax.robots.wrench_balance import at_rest
 
-# Part of the smaller determinant of both ends that a motion keeps.
-REGULAR = 1e-2
+# Part of the smaller determinant of both ends that a motion keeps, and of the smaller depth below the spools.
+REGULAR, SHALLOW = 1e-2, 0.5
 BACK = np.array([1.0, -1.0, -1.0, -1.0])
 
 
@@ -137,12 +138,17 @@ def divided(problem: Problem, poses: FreePoses) -> np.ndarray:
     return np.stack([rows, values[rows], values[rows + 1]], axis=1)
 
 
-def _sides(problem: Problem, poses: FreePoses) -> np.ndarray:
-    # Bounds (2, s) of the determinant, which keep motions on the side of singular poses on which both ends are.
-    values = determinants(problem, poses)
+def _sides(values: np.ndarray, part: float, most: float = np.inf) -> np.ndarray:
+    # Bounds (2, s) of a value that is zero at singular poses, from values (k,) at the poses: motions stay on the side on
+    # which both ends are, by this part of the smaller value, or by so much.
     ends = np.stack([values[:-1], values[1:]])
-    least = REGULAR * np.abs(ends).min(0)
+    least = np.minimum(part * np.abs(ends).min(0), most)
     return np.stack([np.where((ends > 0.0).all(0), least, -np.inf), np.where((ends < 0.0).all(0), -least, np.inf)])
+
+
+def _depths(problem: Problem, poses: FreePoses) -> np.ndarray:
+    # Depths (k,) of the poses below the plane of the spools, over the size of the robot.
+    return poses.positions @ np.asarray(plane_normal(problem.robot)) / float(spool_radius(problem.robot))
 
 
 def tasks_of(
@@ -162,7 +168,11 @@ def tasks_of(
     shape = 1, len(places), *basis.tau.shape, len(bounds.low)
     low, high = (np.broadcast_to(side, shape).copy() for side in (bounds.low, bounds.high))
     if bounds.determinant is not None:
-        low[0, ..., bounds.determinant], high[0, ..., bounds.determinant] = _sides(problem, poses)[..., None, None]
+        sides = _sides(determinants(problem, poses), REGULAR)
+        low[0, ..., bounds.determinant], high[0, ..., bounds.determinant] = sides[..., None, None]
+    if bounds.depth is not None:
+        sides = _sides(_depths(problem, poses), SHALLOW, DEPTH)
+        low[0, ..., bounds.depth], high[0, ..., bounds.depth] = sides[..., None, None]
     return Tasks(
         robot=problem.robot,
         limits=problem.limits,

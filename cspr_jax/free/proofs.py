@@ -16,7 +16,7 @@ from cspr_jax.runtime.stages import stage
 # Rounds of proof and tightening, and rounds before in which room is left for all robots.
 ROUNDS, WIDER = 10, 3
 # Weights of barriers, and softness, with which searches go on from a motion within tighter bounds.
-ON = ((1e-5, 1e-2), (1e-3, 1e-1), (1e-2, 1.0), (1e-2, 10.0))
+ON = ((1e-5, 1e-2), (1e-4, 1e-1), (1e-3, 1e-1), (1e-2, 1.0), (1e-2, 10.0))
 # Part of an uncertainty, by way of which the search goes where it finds no motion for all of it.
 PART = 0.5
 
@@ -74,7 +74,7 @@ def proved(question: FreeQuestion, tasks: Tasks, unknowns: Unknowns, *, is_optim
         answers = proved_answers(planned, motions, question.scene)
         tighter = None
         if is_optimal and number < ROUNDS and not (answers.feasible.all() and question.is_planned):
-            tighter = tightened(question, tasks, motions)
+            tighter = tightened(question, tasks, motions, number)
         if tighter is None:
             break
         try:

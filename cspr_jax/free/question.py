@@ -16,10 +16,10 @@ from cspr_jax.motions.piece_slacks import piece_slacks
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.clearance import Scene
 
-# Slack that is left after tightening, in the units of values; by what more than is missed, and by how much at least and
-# at most, bounds tighten, the latter times half their range where that is above 1; by what share of it those of the
-# next pieces do.
-LEFT, MORE, STEP, MOST, BESIDE = 1e-7, 1.5, 1e-6, 0.03, 0.5
+# Slack that is left after tightening, in the units of values; by what more than is missed each time, and by how much at
+# least and at most, bounds tighten, the latter times half their range where that is above 1; by what share of it those
+# of the next pieces do.
+LEFT, MORE, STEP, MOST, BESIDE = 1e-7, 1.3, 1e-6, 0.03, 0.5
 # Instants of each interval, of point masses and of platforms: between two of them, the tensions of platforms bend more.
 INSTANTS = 4, 8
 
@@ -110,13 +110,14 @@ class FreeQuestion:
         return tasks_of(self.problem, numbers, self.limits, self.objective, self.poses, self.settings.longest)
 
 
-def tightened(question: FreeQuestion, tasks: Tasks, motions: list[Spline]) -> Tasks | None:
+def tightened(question: FreeQuestion, tasks: Tasks, motions: list[Spline], number: int) -> Tasks | None:
     """Tighter bounds where the proof finds less slack than is needed.
 
     Args:
         question: with the same limits as the tasks.
         tasks: l of s segments each.
         motions: l s of them, along all segments.
+        number: how many times bounds have tightened with this one, from 1 on: the more, the more at once.
 
     Returns:
         the tasks; None where the proof finds enough everywhere, or no more helps.
@@ -130,7 +131,7 @@ def tightened(question: FreeQuestion, tasks: Tasks, motions: list[Spline]) -> Ta
         return None
     half = 0.5 * (limits.high - limits.low)
     size = np.max(np.where((changes > 0.0) & np.isfinite(half), half, 1.0), axis=1, initial=1.0)
-    steps = np.where(missed > 0.0, np.minimum(MORE * missed + STEP, MOST * size), 0.0) / np.where(unit > 0.0, unit, 1.0)
+    steps = np.where(missed > 0.0, np.minimum(MORE**number * missed + STEP, MOST * size), 0.0) / np.where(unit > 0.0, unit, 1.0)
     # A slack that is smallest beside a border depends on the bounds of the next piece as much.
     steps = steps.reshape(len(tasks.low), -1, len(unit))
     near = steps.copy()

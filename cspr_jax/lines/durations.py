@@ -11,14 +11,14 @@ import numpy as np
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.lines import s_model as fastest
 from cspr_jax.lines.any_limits import least_by_search
-from cspr_jax.lines.faces import in_one_plane, line_faces, sides
+from cspr_jax.lines.faces import line_faces, sides
 from cspr_jax.lines.lower_bounds import least_durations
 from cspr_jax.lines.motion import fixed_law
 from cspr_jax.lines.slacks import LineSlacks, line_slacks
 from cspr_jax.motions.amplitudes import Amplitude
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.point_mass import PointMassRobot, plane_normal
+from cspr_jax.robots.point_mass import PointMassRobot, in_one_plane, plane_normal
 from cspr_jax.robots.wrench_sets import spanning
 from cspr_jax.schema.limits import LIMITS
 

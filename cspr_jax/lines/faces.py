@@ -16,11 +16,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.robots.point_mass import PLANAR, PointMassRobot, relative_acceleration, spool_radius
-from cspr_jax.robots.spool_plane import spread
 from cspr_jax.robots.wrench_sets import FLAT, normals_to, spanning
-
-# Spools nearer to a plane than this, over the size of the robot, lie in it.
-IN_PLANE = 1e-9
 
 
 @jax.tree_util.register_dataclass
@@ -57,19 +53,6 @@ class LineFaces:
     def bounds(self) -> Array:
         """Tell whether each face bounds the accelerations of taut cables anywhere on the line, (..., n_faces)."""
         return self.last > self.first
-
-
-def in_one_plane(robot: PointMassRobot) -> bool:
-    """Tell whether the spools lie in one plane, those of a planar robot on one line.
-
-    Returns:
-        whether they do.
-    """
-    points = np.asarray(robot.base_points)
-    if robot.n_cables <= robot.dof:
-        return True
-    sizes = spread(points[:, [0, 2]] if robot.dof == PLANAR else points)
-    return bool(sizes[robot.dof - 1] <= IN_PLANE * sizes[0])
 
 
 def _normals(robot: PointMassRobot, place: Array) -> tuple[Array, Array]:

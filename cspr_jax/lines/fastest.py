@@ -10,12 +10,11 @@ import numpy as np
 from cspr_jax.arithmetic.batches import in_parts
 from cspr_jax.lines.any_limits import LONGER
 from cspr_jax.lines.durations import Durations, Rule, by_cells, by_formula, by_search, moving
-from cspr_jax.lines.faces import in_one_plane
 from cspr_jax.lines.verdicts import TOLERANCE, acceleration_slack, limits_at_rest, verdicts
 from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_verdicts import Verdicts
-from cspr_jax.robots.point_mass import spool_radius
+from cspr_jax.robots.point_mass import in_one_plane, spool_radius
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 

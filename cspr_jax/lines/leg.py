@@ -3,14 +3,13 @@
 import numpy as np
 
 from cspr_jax.errors import ConfigError
-from cspr_jax.lines.faces import in_one_plane
 from cspr_jax.lines.timed_lines import LineAnswers, motions_of, timed_lines
 from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.leg import Leg
 from cspr_jax.motions.motion import Motion
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.waypoints import Waypoints
-from cspr_jax.robots.point_mass import AT_P0, spool_radius
+from cspr_jax.robots.point_mass import AT_P0, in_one_plane, spool_radius
 from cspr_jax.schema.verdicts import Verdict
 
 

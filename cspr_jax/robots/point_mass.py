@@ -20,13 +20,15 @@ from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.pulleys import Pulleys, exits
 from cspr_jax.robots.robot import Robot
 from cspr_jax.robots.spool_plane import AT_P0 as AT_P0
-from cspr_jax.robots.spool_plane import SMALLEST_LEVEL_RATIO, is_on_line, is_vertical
+from cspr_jax.robots.spool_plane import SMALLEST_LEVEL_RATIO, is_on_line, is_vertical, spread
 from cspr_jax.robots.state import State
 
 STANDARD_GRAVITY = 9.81
 # Degrees of freedom of a point mass in space, in the plane y = 0, and on a vertical guide.
 SPATIAL, PLANAR, GUIDED = 3, 2, 1
 LARGEST_LENGTH = 1e6  # m; beyond, products of lengths lose their meaning
+# Spools nearer to a plane than this, over the size of the robot, lie in it.
+IN_PLANE = 1e-9
 # Two spools count as level if their heights differ by less than this part of their distance.
 LEVEL = 1e-9
 
@@ -281,6 +283,19 @@ def spool_radius(robot: Robot) -> Array:
         () m.
     """
     return jnp.max(jnp.linalg.norm(robot.base_points, axis=1))
+
+
+def in_one_plane(robot: PointMassRobot) -> bool:
+    """Tell whether the spools lie in one plane, those of a planar robot on one line.
+
+    Returns:
+        whether they do.
+    """
+    if robot.n_cables <= robot.dof:
+        return True
+    points = np.asarray(robot.base_points)
+    sizes = spread(points[:, [0, 2]] if robot.dof == PLANAR else points)
+    return bool(sizes[robot.dof - 1] <= IN_PLANE * sizes[0])
 
 
 @jax.jit
