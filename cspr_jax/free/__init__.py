@@ -24,6 +24,7 @@ Files, each importing only from those above it:
     poses           tasks from poses, and motions from what is found
     closed_forms    motions of other families, from which searches begin, too
     question        poses, limits and objective of a search, and how bounds tighten
+    contacts        planes that keep bodies apart where a motion brings them too near
     robust          bounds that leave room for all robots within an uncertainty
     proofs          motions tightened until they are proved, for the planned robot or for all
     free_motion     the fastest motion through poses, proved

@@ -103,7 +103,8 @@ def free_motion(
     """Search for the fastest motion through poses, all its segments together, and prove it.
 
     Args:
-        scene: bodies that can meet; they are judged with the motion, and do not change it.
+        scene: bodies that can meet; the search keeps them apart where the best motion brings them too near, but not for
+            all robots within an uncertainty: then they are judged alone.
         before: what a search from the usual starts has come to, which goes on from other ones.
         forms: these are motions of other families.
 

@@ -19,6 +19,7 @@ from cspr_jax.motions.limits import limits_set
 from cspr_jax.robots.cables import AnyRobot, cable_motion, wrench_units
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import in_one_plane, plane_normal, spool_radius
 from cspr_jax.robots.state import State
 from cspr_jax.robots.wrench_sets import tension_range
@@ -185,7 +186,7 @@ def bounds(robot: AnyRobot, limits: Limits, rows: Sequence[Criterion], is_timed:
             bottom = -1.0 if row.quantity in ("speed", "acceleration") else -np.inf
             values.append(_Value(bottom, top, row.flag, row.flag, k if row.per_cable else -1, change))
     is_regular, _ = judged_poses(robot)
-    is_divided = PATTERNS[robot.pattern].is_body or in_one_plane(robot)
+    is_divided = isinstance(robot, PlatformRobot) or in_one_plane(robot)
     if keeps_depth(robot):
         least = DEPTH if is_divided else -np.inf
         values.append(_Value(least, np.inf, Verdict.ABOVE_SPOOLS, Verdict.FEASIBLE, -1, 1.0 / size))

@@ -14,7 +14,7 @@ from cspr_jax.free.free_motion import FEWEST, FINE
 from cspr_jax.free.neighbours import Neighbours
 from cspr_jax.free.poses import FreePoses, divided, motions_of
 from cspr_jax.free.proofs import ON, ROUNDS
-from cspr_jax.free.question import FreeQuestion, FreeSettings, planned_problem, tightened
+from cspr_jax.free.question import FreeQuestion, FreeSettings, planned_problem, slacks_of, tightened
 from cspr_jax.free.search import again, optima, started
 from cspr_jax.free.tasks import Tasks, Unknowns
 from cspr_jax.motions.problem import Problem
@@ -147,7 +147,9 @@ def _proved(
         left = np.array([k for k in left.tolist() if proofs[k].verdict], int)
         tighter = None
         if len(left) and number < ROUNDS:
-            tighter = tightened(questions[0], tasks.taken(left), [motions[k] for k in left.tolist()], number)
+            tighter = tightened(
+                questions[0], tasks.taken(left), slacks_of(questions[0], [motions[k] for k in left.tolist()]), number
+            )
         if tighter is None:
             break
         further, is_optimal = _first_optima(tighter, unknowns.taken(left), ON[:TRIED])

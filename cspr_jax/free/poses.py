@@ -139,8 +139,8 @@ def divided(problem: Problem, poses: FreePoses) -> np.ndarray:
 
 
 def _sides(values: np.ndarray, part: float, most: float = np.inf) -> np.ndarray:
-    # Bounds (2, s) of a value that is zero at singular poses, from values (k,) at the poses: motions stay on the side on
-    # which both ends are, by this part of the smaller value, or by so much.
+    # Bounds (2, s) of a value that is zero at singular poses, from values (k,) at the poses: motions stay on the side
+    # of both ends, by this part of the smaller value, or by so much.
     ends = np.stack([values[:-1], values[1:]])
     least = np.minimum(part * np.abs(ends).min(0), most)
     return np.stack([np.where((ends > 0.0).all(0), least, -np.inf), np.where((ends < 0.0).all(0), -least, np.inf)])
@@ -218,6 +218,26 @@ def segments_of(tasks: Tasks) -> Tasks:
         high=one(tasks.high),
         scale=np.repeat(tasks.scale, count),
     )
+
+
+def quaternions_of(tasks: Tasks, places: np.ndarray) -> np.ndarray | None:
+    """Orientations of a task's platform.
+
+    Args:
+        places: (1, s, ..., d) coordinates.
+
+    Returns:
+        (1, s, ..., 4) unit quaternions, scalar first; None for a point mass.
+    """
+    along, about = coordinates(tasks.robot.pattern)
+    if not len(about):
+        return None
+    turning = np.zeros((*places.shape[:-1], 4))
+    turning[..., 0] = 1.0
+    turning[..., 1 + about] = places[..., len(along) :]
+    turning /= np.linalg.norm(turning, axis=-1, keepdims=True)
+    turned = [products(one.reshape(-1, 4), at[None]) for one, at in zip(turning[0], tasks.references[0], strict=True)]
+    return np.stack(turned).reshape(turning.shape)
 
 
 def motions_of(tasks: Tasks, unknowns: Unknowns, z0: float) -> list[Spline]:

@@ -4,11 +4,13 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from cspr_jax.curves.spline import Spline
+from cspr_jax.free.contacts import apart, around
 from cspr_jax.free.poses import motions_of
-from cspr_jax.free.question import FreeQuestion, tightened
+from cspr_jax.free.question import FreeQuestion, slacks_of, tightened
 from cspr_jax.free.robust import for_all_robots, widened
 from cspr_jax.free.search import again, optima
 from cspr_jax.free.tasks import Tasks, Unknowns
+from cspr_jax.motions.piece_slacks import PieceSlacks
 from cspr_jax.motions.proved_answers import ProvedAnswers, proved_answers
 from cspr_jax.robots.limits import Uncertainty
 from cspr_jax.runtime.stages import stage
@@ -74,26 +76,40 @@ def proved(question: FreeQuestion, tasks: Tasks, unknowns: Unknowns, *, is_optim
         answers = proved_answers(planned, motions, question.scene)
         tighter = None
         if is_optimal and number < ROUNDS and not (answers.feasible.all() and question.is_planned):
-            tighter = tightened(question, tasks, motions, number)
+            slacks = slacks_of(question, motions)
+            tighter = _tighter(question, tasks, unknowns, slacks, number)
         if tighter is None:
             break
         try:
-            further = _again(tighter, unknowns)
+            further = _again(*tighter)
+            if further is None and tighter[0].planes is not None and tasks.planes is None:
+                stage("free motion: round what is in the way")
+                further = around(question, tasks, unknowns, slacks)
         except KeyboardInterrupt:
             is_stopped = True
             break
         if further is None:
             break
-        tasks, unknowns = tighter, further
+        tasks, unknowns = further
     return FreeProof(tasks, unknowns, motions, answers, is_stopped)
 
 
-def _again(tasks: Tasks, unknowns: Unknowns) -> Unknowns | None:
+def _tighter(
+    question: FreeQuestion, tasks: Tasks, unknowns: Unknowns, slacks: PieceSlacks, number: int
+) -> tuple[Tasks, Unknowns] | None:
+    # The task within tighter bounds, and the motion as one of it; None where the proof finds enough room everywhere.
+    tighter = tightened(question, tasks, slacks, number)
+    parted = apart(question, tighter or tasks, unknowns, slacks, number) if question.is_planned else None
+    return parted or (None if tighter is None else (tighter, unknowns))
+
+
+def _again(tasks: Tasks, unknowns: Unknowns) -> tuple[Tasks, Unknowns] | None:
     # The best motion within other bounds, from one found before; None where no room is left between them.
     low, high = tasks.bounds(unknowns.level)
     if not (low < high).all():
         return None
-    return first_optimum(tasks, ((again(tasks, unknowns, each[0]), *each) for each in ON))
+    further = first_optimum(tasks, ((again(tasks, unknowns, each[0]), *each) for each in ON))
+    return None if further is None else (tasks, further)
 
 
 def robust_proof(
@@ -132,5 +148,5 @@ def _with_room(
         further = _again(wider, unknowns)
         if further is None:
             break
-        best = tasks, unknowns = wider, further
+        best = tasks, unknowns = further
     return best

@@ -12,7 +12,7 @@ from cspr_jax.free.objectives import OBJECTIVES, Objective
 from cspr_jax.free.poses import FreePoses, check_searched, tasks_of
 from cspr_jax.free.tasks import Tasks
 from cspr_jax.motions.criteria import criteria
-from cspr_jax.motions.piece_slacks import piece_slacks
+from cspr_jax.motions.piece_slacks import PieceSlacks, piece_slacks
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.clearance import Scene
 
@@ -110,20 +110,29 @@ class FreeQuestion:
         return tasks_of(self.problem, numbers, self.limits, self.objective, self.poses, self.settings.longest)
 
 
-def tightened(question: FreeQuestion, tasks: Tasks, motions: list[Spline], number: int) -> Tasks | None:
+def slacks_of(question: FreeQuestion, motions: list[Spline]) -> PieceSlacks:
+    """Slacks of motions, one behind the other, over their pieces.
+
+    Returns:
+        the slacks.
+    """
+    whole = chained(motions)
+    return piece_slacks(question.problem, whole, np.asarray(whole.knots), question.scene)
+
+
+def tightened(question: FreeQuestion, tasks: Tasks, slacks: PieceSlacks, number: int) -> Tasks | None:
     """Tighter bounds where the proof finds less slack than is needed.
 
     Args:
         question: with the same limits as the tasks.
         tasks: l of s segments each.
-        motions: l s of them, along all segments.
+        slacks: of l s motions, along all segments.
         number: how many times bounds have tightened with this one, from 1 on: the more, the more at once.
 
     Returns:
         the tasks; None where the proof finds enough everywhere, or no more helps.
     """
-    whole, limits = chained(motions), question.limits
-    slacks = piece_slacks(question.problem, whole, np.asarray(whole.knots), question.scene)
+    limits = question.limits
     changes = np.abs(limits.rises) + np.abs(limits.falls)
     unit = changes.max(1)
     missed = np.where(unit > 0.0, LEFT - slacks.low * unit, 0.0)
@@ -131,7 +140,9 @@ def tightened(question: FreeQuestion, tasks: Tasks, motions: list[Spline], numbe
         return None
     half = 0.5 * (limits.high - limits.low)
     size = np.max(np.where((changes > 0.0) & np.isfinite(half), half, 1.0), axis=1, initial=1.0)
-    steps = np.where(missed > 0.0, np.minimum(MORE**number * missed + STEP, MOST * size), 0.0) / np.where(unit > 0.0, unit, 1.0)
+    steps = np.where(missed > 0.0, np.minimum(MORE**number * missed + STEP, MOST * size), 0.0) / np.where(
+        unit > 0.0, unit, 1.0
+    )
     # A slack that is smallest beside a border depends on the bounds of the next piece as much.
     steps = steps.reshape(len(tasks.low), -1, len(unit))
     near = steps.copy()
@@ -139,4 +150,8 @@ def tightened(question: FreeQuestion, tasks: Tasks, motions: list[Spline], numbe
     near[:, :-1] = np.maximum(near[:, :-1], BESIDE * steps[:, 1:])
     shape = *tasks.low.shape[:3], 1, -1
     rise, fall = ((near[..., None] * side).max(2).reshape(shape) for side in (limits.rises, limits.falls))
-    return dataclasses.replace(tasks, low=tasks.low + rise, high=tasks.high - fall)
+    count = tasks.n_limited
+    tighter = dataclasses.replace(tasks, low=tasks.low.copy(), high=tasks.high.copy())
+    tighter.low[..., :count] += rise
+    tighter.high[..., :count] -= fall
+    return tighter

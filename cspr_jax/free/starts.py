@@ -67,10 +67,11 @@ def _lines(tasks: Tasks, start: np.ndarray, end: np.ndarray) -> list[_Start]:
     # The line, and lines that are bent to all sides.
     tau, along = tasks.basis.averages[:, None], coordinates(tasks.robot.pattern)[0]
     gravity, size = float(tasks.robot.gravity), float(spool_radius(tasks.robot))
-    chord, bulge = (end - start)[: len(along)], 16.0 * (tau * (1.0 - tau)) ** 2
-    length = float(np.linalg.norm(chord)) + size * float(np.linalg.norm((end - start)[len(along) :]))
+    length = float(np.linalg.norm((end - start)[: len(along)])) + size * float(
+        np.linalg.norm((end - start)[len(along) :])
+    )
     line, duration = _line(tasks, start, end), SLOWER * 2.0 * np.sqrt(2.0 * max(length, 0.1 * size) / gravity)
-    return [_Start(line + BENT * length * bulge * way, duration) for way in _ways(chord, along, len(start))]
+    return [_Start(line + BENT * length * bulge(tau) * way, duration) for way in ways(end - start, along)]
 
 
 def _swings(tasks: Tasks, start: np.ndarray, end: np.ndarray, z0: float, most: int) -> list[_Start]:
@@ -87,16 +88,35 @@ def _swings(tasks: Tasks, start: np.ndarray, end: np.ndarray, z0: float, most: i
     return swings
 
 
-def _ways(chord: np.ndarray, along: np.ndarray, d: int) -> list[np.ndarray]:
-    # Directions in which lines are bent: none, up and down, and to both sides.
-    ways = [np.zeros(d)]
-    down = np.zeros(d)
+def bulge(tau: np.ndarray) -> np.ndarray:
+    """How far motions are bent, at most 1 half-way; at the ends neither place nor velocity changes.
+
+    Args:
+        tau: (...) normalised time.
+
+    Returns:
+        (...).
+    """
+    return 16.0 * (tau * (1.0 - tau)) ** 2
+
+
+def ways(chord: np.ndarray, along: np.ndarray) -> list[np.ndarray]:
+    """Directions in which motions are bent.
+
+    Args:
+        chord: (d,) from start to end, of coordinates.
+        along: axes of those of a place.
+
+    Returns:
+        (d,) each: none, up and down, and to both sides.
+    """
+    down = np.zeros(len(chord))
     down[np.flatnonzero(along == 2)] = 1.0
-    ways += [-down, down]
+    directions = [np.zeros(len(chord)), -down, down]
     if len(along) == 3:
-        side = np.zeros(d)
+        side = np.zeros(len(chord))
         side[:2] = -chord[1], chord[0]
         length = np.linalg.norm(side)
         side[:2] = side[:2] / length if length > 0.0 else (1.0, 0.0)
-        ways += [side, -side]
-    return ways
+        directions += [side, -side]
+    return directions

@@ -66,6 +66,20 @@ class Unknowns(NamedTuple):
         return Unknowns(*(leaf[rows] for leaf in self))
 
 
+class ClearancePlanes(NamedTuple):
+    """Values at + slope . coordinates of instants that have lower bounds beside those of limits, K at each.
+
+    Fields:
+        slope: (l, s, m, n, K, d).
+        at: (l, s, m, n, K).
+        least: of each its number among the meetings of bodies, and the clearance that it stands for, m.
+    """
+
+    slope: np.ndarray
+    at: np.ndarray
+    least: tuple[tuple[int, float], ...]
+
+
 @dataclasses.dataclass(frozen=True)
 class Tasks:
     """l motions of s segments each, of d coordinates.
@@ -85,6 +99,7 @@ class Tasks:
         scale: (l,) half a swing, s, over which durations count.
         objective: what is to be least.
         longest: () longest duration of a segment, s; None for any.
+        planes: their values are the last ones; None without any.
     """
 
     robot: AnyRobot
@@ -101,6 +116,7 @@ class Tasks:
     scale: np.ndarray
     objective: Objective
     longest: np.ndarray | None = None
+    planes: ClearancePlanes | None = None
 
     def taken(self, rows: np.ndarray) -> "Tasks":
         """Some of the motions.
@@ -112,7 +128,55 @@ class Tasks:
             the tasks.
         """
         names = ("places", "velocities", "references", "turns", "accelerations", "is_free", "low", "high", "scale")
-        return dataclasses.replace(self, **{name: getattr(self, name)[rows] for name in names})
+        planes = self.planes
+        if planes is not None:
+            planes = planes._replace(slope=planes.slope[rows], at=planes.at[rows])
+        return dataclasses.replace(self, **{name: getattr(self, name)[rows] for name in names}, planes=planes)
+
+    @property
+    def n_limited(self) -> int:
+        """Number of the values that limits bound: those before planes."""
+        return self.low.shape[-1] - (0 if self.planes is None else self.planes.at.shape[-1])
+
+    def within(self, planes: ClearancePlanes, low: np.ndarray) -> "Tasks":
+        """Tasks with other planes.
+
+        Args:
+            low: (l, s, m, n, K) lower bounds of their values, -inf for none.
+
+        Returns:
+            the tasks.
+        """
+        count, none, objective = self.n_limited, np.full(low.shape, np.inf), self.objective
+        low_lift, high_lift = (
+            np.pad(lift[:count], (0, low.shape[-1])) for lift in (objective.low_lift, objective.high_lift)
+        )
+        return dataclasses.replace(
+            self,
+            low=np.concatenate([self.low[..., :count], low], axis=-1),
+            high=np.concatenate([self.high[..., :count], none], axis=-1),
+            objective=objective._replace(low_lift=low_lift, high_lift=high_lift),
+            planes=planes,
+        )
+
+    def beside(self, unknowns: Unknowns, values: np.ndarray) -> Unknowns:
+        """Unknowns of these tasks as those of tasks with other planes.
+
+        Args:
+            values: (l, s, m, n, K) of the planes.
+
+        Returns:
+            the unknowns; what planes push is not known.
+        """
+        old, new = self.low.shape[-1] - self.n_limited, values.shape[-1]
+
+        def changed(leaf: np.ndarray) -> np.ndarray:
+            return np.concatenate([leaf[..., : leaf.shape[-1] - old], np.zeros((*leaf.shape[:-1], new))], axis=-1)
+
+        names = "values", "multipliers", "low_push", "high_push"
+        unknowns = unknowns._replace(**{name: changed(getattr(unknowns, name)) for name in names})
+        unknowns.values[..., self.n_limited :] = values
+        return unknowns
 
     def bounds(self, level: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Bounds of the values.
@@ -258,7 +322,14 @@ class Tasks:
         Returns:
             the equations, leaves (l, s, m, n, ...); their residuals with all values.
         """
-        equations = instant_values(*self._instants(unknowns), unknowns.multipliers)
+        planes = self.planes
+        count = unknowns.multipliers.shape[-1] - (0 if planes is None else planes.at.shape[-1])
+        equations = instant_values(*self._instants(unknowns), unknowns.multipliers[..., :count])
+        if planes is not None:
+            others = equations.slope.shape[-1] - self.places.shape[-1]
+            slope = np.concatenate([equations.slope, np.pad(-planes.slope, [*[(0, 0)] * 5, (0, others)])], axis=-2)
+            residual = self._with_planes(equations.residual, planes, unknowns)
+            equations = equations._replace(residual=residual, slope=slope)
         return equations, self._with_values(equations.residual.copy(), unknowns)
 
     def residual(self, unknowns: Unknowns) -> np.ndarray:
@@ -267,7 +338,12 @@ class Tasks:
         Returns:
             (l, s, m, n, n_equations).
         """
-        return self._with_values(residuals(*self._instants(unknowns)), unknowns)
+        missed, planes = residuals(*self._instants(unknowns)), self.planes
+        return self._with_values(missed if planes is None else self._with_planes(missed, planes, unknowns), unknowns)
+
+    def _with_planes(self, residual: np.ndarray, planes: ClearancePlanes, unknowns: Unknowns) -> np.ndarray:
+        places = self.basis.places(self.controls(unknowns))[..., 0, :]
+        return np.concatenate([residual, -planes.at - np.sum(planes.slope * places[..., None, :], axis=-1)], axis=-1)
 
     def _instants(self, unknowns: Unknowns) -> tuple[Any, ...]:
         # Arguments of the equations at all instants, but multipliers.

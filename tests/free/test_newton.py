@@ -16,16 +16,18 @@ from cspr_jax.free.objectives import OBJECTIVES
 from cspr_jax.free.poses import FreePoses, tasks_of
 from cspr_jax.free.search import started
 from cspr_jax.free.starts import starts
-from cspr_jax.free.tasks import Unknowns
+from cspr_jax.free.tasks import ClearancePlanes, Unknowns
 from cspr_jax.motions.criteria import criteria
 
 RING = least_time_forms.ring_robot(3, 1.0, 2.0)
 LIMITS = {"tension_min": np.full(3, 0.4), "tension_max": np.full(3, 16.0)}
 STEP = 1e-5
+# Lower bound of planes.
+PLANE = -50.0
 
 
-@pytest.fixture(scope="module")
-def searched():
+@pytest.fixture(scope="module", params=["limits", "planes"])
+def searched(request):
     """A task of two segments with velocities at its ends, and unknowns with random multipliers."""
     rng = np.random.default_rng(0)
     with double_precision():
@@ -36,6 +38,11 @@ def searched():
         tasks = tasks_of(problem, basis(6, 3), limits, OBJECTIVES["time"](limits, 3)[0], poses, None)
         line = np.linspace(places[:-1], places[1:], tasks.basis.controls, axis=1)[None]
         unknowns = started(tasks, line + 0.02 * rng.normal(size=line.shape), np.array([[0.7, 0.9]]))
+    if request.param == "planes":
+        shape = *tasks.low.shape[:-1], 2
+        planes = ClearancePlanes(rng.normal(size=(*shape, 3)), rng.normal(size=shape), ((0, 0.1), (3, 0.2)))
+        unknowns = tasks.beside(unknowns, rng.normal(size=shape))
+        tasks = tasks.within(planes, np.full(shape, PLANE))
     return tasks, unknowns._replace(multipliers=rng.normal(size=unknowns.multipliers.shape))
 
 
@@ -196,8 +203,8 @@ def merit(tasks, name, unknowns, barrier, soft):
     if name == "margin":
         low, high = low - level[0], high + level[0]
     low, high = (one.reshape(1, 2, 1, 1, 1) for one in (low, high))
-    # Depths keep a distance from the spools, too.
-    sides = [tensions[..., :3] - low, high - tensions[..., :3], tensions[..., 3:] - 0.02]
+    # Depths keep a distance from the spools, too, and planes theirs.
+    sides = [tensions[..., :3] - low, high - tensions[..., :3], tensions[..., 3:4] - 0.02, tensions[..., 4:] - PLANE]
     price = np.sum((soft.level + 0.5 * soft.paid(residual)) * residual)
     return costs[name] + price - barrier * sum(np.sum(np.log(side)) for side in sides)
 

@@ -1,0 +1,178 @@
+"""Bodies that free motions keep apart: linearised clearances, sides of cables, ways round obstacles, proofs."""
+
+import numpy as np
+import pytest
+from oracles import clearance as oracle
+
+import cspr_jax
+from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.free import contacts
+from cspr_jax.free.poses import FreePoses, motions_of
+from cspr_jax.free.question import FreeQuestion, FreeSettings, slacks_of
+from cspr_jax.free.search import started
+from cspr_jax.motions.amplitudes import named
+from cspr_jax.motions.problem import Problem
+from cspr_jax.robots.clearance import Meeting, scene
+from cspr_jax.robots.kernel_axes import centred
+from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.shapes import box, cylinder, hull, sphere
+
+# A sphere half-way on the fastest motion between two poses.
+BESIDE = {
+    "schema": 1,
+    "robot": "prototype",
+    "family": "free",
+    "z0": 1.3,
+    "limits": {"tension_max": 4.0},
+    "pose": [{"position": [0.4, 0.1, 1.2]}, {"position": [-0.3, -0.2, 1.3]}],
+}
+IN_THE_WAY = {"kind": "sphere", "centre": [0.045, -0.05, 0.85], "radius": 0.1}
+
+
+def moved(name, rng, surroundings):
+    """A question about a robot among bodies, a task, and unknowns of a motion near its middle."""
+    robot = centred(cspr_jax.load_robot(name))[0]
+    body = hull(0.2 * rng.normal(size=(12, 3)), name="platform") if surroundings.pop("hull", False) else None
+    around = scene(robot, **surroundings, body=body)
+    problem = Problem(robot, Limits(tension_max=np.full(robot.n_cables, 5000.0)), named("A1"))
+    middle = 2.0 + rng.uniform(size=3) if body is None else np.array([0.3, 0.2, 3.0])
+    places = np.stack([middle, middle + 0.3 * rng.normal(size=3)])
+    quaternions = np.array([[1.0, 0.05, -0.1, 0.08], [1.0, -0.1, 0.05, 0.0]])
+    quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
+    turning = None if robot.dof == 3 else quaternions
+    free = np.full((2, robot.dof), np.nan)
+    poses = FreePoses(places, turning, np.zeros((2, 3)), free, float(middle[2]))
+    question = FreeQuestion.of(problem, around, poses, FreeSettings(intervals=6, instants=3))
+    tasks = question.tasks(6, 3)
+    line = np.linspace(tasks.places[0, :, 0], tasks.places[0, :, 1], tasks.basis.controls, axis=1)[None]
+    return question, tasks, started(tasks, line + 0.02 * rng.normal(size=line.shape), np.array([[1.0]]))
+
+
+SOLIDS = {
+    "sphere": (sphere([0.5, 0.3, 1.0], 0.2), Meeting("obstacle", 1, 0)),
+    "cylinder": (cylinder([0.5, 0.3, 1.0], [1.0, 0.0, 2.0], 0.1), Meeting("obstacle", 2, 0)),
+    "box": (box([0.5, 0.3, 1.0], [0.4, 0.6, 0.2]), Meeting("obstacle", 0, 0)),
+    "platform and box": (box([0.5, 0.6, 2.0], [0.4, 0.6, 0.2]), Meeting("platform-obstacle", -1, 0)),
+    "cable and platform": (None, Meeting("platform", 3, -1)),
+    "cables": (None, Meeting("cables", 0, 4)),
+}
+
+
+@pytest.mark.parametrize("kind", SOLIDS)
+def test_planes_are_clearances_to_first_order(kind):
+    """Their values are the clearances of the motion; of one that is near it, they differ by squares of the distance."""
+    rng, (shape, meeting) = np.random.default_rng(3), SOLIDS[kind]
+    with double_precision():
+        surroundings = {"obstacles": [] if shape is None else [shape], "hull": "platform" in kind}
+        question, tasks, unknowns = moved("cogiro", rng, surroundings)
+        gap = contacts._gap(question, question.scene, meeting)
+        places = tasks.basis.places(tasks.controls(unknowns))[..., 0, :]
+        # Cables that are far from each other are linear, too.
+        gap = gap._replace(of_poses=lambda p, q, whole=gap.of_poses: (whole(p, q)[0], np.ones(len(p), bool)))
+        values, slopes = contacts._linear(tasks, places, gap)
+        change = rng.normal(size=places.shape)
+        missed = []
+        for size in (2e-3, 1e-3):
+            there, _ = contacts._linear(tasks, places + size * change, gap)
+            missed.append(np.abs(there - values - size * np.sum(slopes * change, axis=-1)).max())
+        assert np.isfinite(values).all()
+        assert np.abs(slopes).max() > 0.1
+        assert missed[1] < 0.3 * missed[0] < 1e-4
+
+
+def test_distances_of_cables_keep_the_sign_of_the_poses():
+    """The distance of two lines is that of the oracle, and positive on the side of both poses."""
+    rng = np.random.default_rng(5)
+    with double_precision():
+        question, tasks, _ = moved("cogiro", rng, {})
+        pairs = [meeting for meeting in question.scene.meetings if meeting.kind == "cables"]
+        robot, places, seen = question.problem.robot, tasks.places, 0
+        flat = rng.uniform([-3.0, -2.0, 1.0, -0.3, -0.3, -0.3], [3.0, 2.0, 4.0, 0.3, 0.3, 0.3], (400, 6))
+        positions, vectors = flat[:, :3], flat[:, 3:]
+        quaternions = np.concatenate([np.ones((400, 1)), vectors], axis=1)
+        quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
+        turns = contacts._turns(positions, quaternions)
+        for _, k, other in pairs:
+            values, is_near = contacts._between_lines(question.scene, k, other)(positions, quaternions)
+            starts = [np.tile(robot.base_points[i], (400, 1)) for i in (k, other)]
+            rays = [positions + turns @ robot.platform_points[i] - robot.base_points[i] for i in (k, other)]
+            expected = oracle.segments(starts[0], rays[0], starts[1], rays[1])
+            np.testing.assert_allclose(np.abs(values[is_near]), expected[is_near].astype(float), atol=1e-9)
+            assert (np.abs(values) < expected + 1e-9).all()
+            seen += is_near.sum()
+            linear, _ = contacts._linear(
+                tasks, places, contacts._gap(question, question.scene, Meeting("cables", k, other))
+            )
+            assert not (linear < 0.0).any()
+        assert seen > 100
+
+
+def test_spools_over_a_face_keep_their_side():
+    """A platform that turns over: the height of the spool over its face is positive on the side of both poses."""
+    with double_precision():
+        robot = centred(cspr_jax.load_robot("laval-mssm"))[0]
+        around = scene(robot)
+        problem = Problem(robot, Limits(tension_max=np.full(6, 40.0)), named("A1"))
+        poses = FreePoses(
+            np.tile([0.0, 0.0, 1.7], (2, 1)),
+            np.tile([1.0, 0.0, 0.0, 0.0], (2, 1)),
+            np.zeros((2, 3)),
+            np.full((2, 6), np.nan),
+            1.7,
+        )
+        question = FreeQuestion.of(problem, around, poses, FreeSettings())
+        tasks = question.tasks(4, 3)
+        gaps = [contacts._gap(question, around, Meeting("platform", k, -1)) for k in range(6)]
+        half_turn = np.broadcast_to([0.0, 0.0, 1.7, 3.0, 0.0, 0.0], (1, 1, 4, 3, 6))
+        for gap in gaps:
+            always = gap._replace(of_poses=lambda p, q, whole=gap.of_poses: (whole(p, q)[0], np.ones(len(p), bool)))
+            assert (contacts._linear(tasks, tasks.places[:, :, :, None], always)[0] > 0.0).all()
+            assert (contacts._linear(tasks, half_turn, always)[0] < 0.0).all()
+
+
+def clear(planned, keys, samples=2000):
+    """Least distance of cables, and so of the mass, from the surface of the sphere, m."""
+    rows = planned.rows(rate=samples / planned.to_dict()["segments"][0]["duration"])
+    base = np.asarray(cspr_jax.load_robot(keys["robot"]).base_points)
+    centre, radius = np.array(keys["obstacle"][0]["centre"]), keys["obstacle"][0]["radius"]
+    places = np.asarray(rows["position"])
+    point = np.broadcast_to(centre, places.shape)
+    cables = [oracle.point_to_segment(point, np.broadcast_to(spool, places.shape), places - spool) for spool in base]
+    return float(np.min(cables)) - radius
+
+
+def test_a_motion_leads_round_what_is_in_its_way():
+    """Within all limits, clear by an oracle; the fastest motion without the sphere passes through it."""
+    keys = BESIDE | {"obstacle": [IN_THE_WAY]}
+    without, planned = cspr_jax.plan(BESIDE), cspr_jax.plan(keys)
+    durations = [float(one.answers.duration.sum()) for one in (without, planned)]
+    assert without.feasible
+    assert clear(without, keys) < -0.05
+    assert planned.feasible
+    assert planned.to_dict()["segments"][0].get("warnings", []) == []
+    assert clear(planned, keys) > 0.0
+    assert durations[0] < durations[1] < 1.5 * durations[0]
+
+
+def test_a_motion_gives_way_to_what_it_only_grazes():
+    """A pole beside the motion: the first planes are enough, and the motion is hardly slower."""
+    keys = BESIDE | {"obstacle": [IN_THE_WAY | {"centre": [0.045, -0.05, 0.85 + 0.11]}]}
+    planned = cspr_jax.plan(keys)
+    assert planned.feasible
+    assert clear(planned, keys) > 0.0
+
+
+def test_nothing_is_bounded_where_bodies_are_apart():
+    rng = np.random.default_rng(3)
+    with double_precision():
+        question, tasks, unknowns = moved("cogiro", rng, {"obstacles": [sphere([0.0, 0.0, 30.0], 0.1)]})
+        slacks = slacks_of(question, motions_of(tasks, unknowns, question.poses.z0))
+        assert contacts._clearances(question, slacks).shape[1] == len(question.scene.meetings)
+        assert contacts.apart(question, tasks, unknowns, slacks._replace(low=np.maximum(slacks.low, 0.0)), 1) is None
+        met = slacks.low.copy()
+        met[3, -1] = -0.01
+        within, begun = contacts.apart(question, tasks, unknowns, slacks._replace(low=np.where(met < 0.0, met, 0.0)), 1)
+    numbers = [number for number, _ in within.planes.least]
+    assert len(question.scene.meetings) - 1 in numbers
+    assert begun.values.shape == within.low.shape
+    assert within.n_limited == tasks.low.shape[-1]
