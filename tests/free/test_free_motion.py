@@ -3,12 +3,19 @@
 import numpy as np
 import pytest
 from oracles import any_motion, least_time_forms
-from support.free_motions import Judged, solve
+from support.free_motions import QUICK, Judged, problem_of, solve
 
+from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import InputError
-from cspr_jax.free.question import FreeSettings
+from cspr_jax.free import free_motion as free_motions
+from cspr_jax.free import search
+from cspr_jax.free.instants import DEPTH
+from cspr_jax.free.poses import FreePoses
+from cspr_jax.free.question import FreeQuestion, FreeSettings, slacks_of, tightened
 
-RING = least_time_forms.ring_robot(3, 1.0, 2.0)
+RING, SQUARE = (least_time_forms.ring_robot(count, 1.0, 2.0) for count in (3, 4))
+# One spool is out of the plane of the others.
+UNEVEN = {**SQUARE, "base_points": SQUARE["base_points"] + np.array([[0.0, 0.0, 0.1]] + 3 * [[0.0, 0.0, 0.0]])}
 WEIGHT = 2.0 * 9.81
 LIMITS = {"tension_min": np.full(3, 0.02 * WEIGHT), "tension_max": np.full(3, 0.8 * WEIGHT)}
 ASIDE = np.array([[0.3, 0.1, 1.0], [-0.2, 0.3, 1.4]])
@@ -114,6 +121,74 @@ def test_segments_together_share_their_acceleration_and_lose_no_time(aside):
     resting = np.full((3, 3), np.nan)
     resting[1] = 0.0
     assert free.duration < solve(RING, LIMITS, places, resting)[0].duration
+
+
+def test_redundant_cables_carry_a_motion_below_their_spools():
+    """The fastest search passes through the plane of the spools between two instants, where no proof can follow."""
+    limits = {"tension_max": np.full(4, 2.5 * WEIGHT)}
+    free, frame = solve(SQUARE, limits, [[0.0, 0.0, 2.5], [1.6, 1.2, 0.9]])
+    check_proved(SQUARE, limits, free, frame)
+    assert all(np.asarray(motion.position)[..., 2].min() > 0.0 for motion in free.motions)
+
+
+@pytest.mark.parametrize(
+    ("depths", "low", "high"),
+    [
+        ((1.0, 0.8), DEPTH, np.inf),
+        ((0.02, 1.0), 0.01, np.inf),
+        ((-1.0, -0.03), -np.inf, -0.015),
+        ((0.5, -0.5), -np.inf, np.inf),
+    ],
+)
+def test_depths_are_bounded_on_the_side_of_both_poses(depths, low, high):
+    places = np.array([[0.1, 0.0, depths[0]], [0.0, 0.2, depths[1]]])
+    with double_precision():
+        for robot, is_bounded in ((SQUARE, True), (UNEVEN, False)):
+            problem, _ = problem_of(robot, {"tension_max": np.full(4, WEIGHT)})
+            poses = FreePoses(places, None, np.zeros((2, 3)), np.full((2, 3), np.nan), 1.0)
+            question = FreeQuestion.of(problem, None, poses, QUICK)
+            tasks, place = question.tasks(4, 3), 4
+            assert question.limits.depth == (place if is_bounded else None)
+            np.testing.assert_allclose(tasks.low[..., place], low if is_bounded else -np.inf, rtol=1e-12)
+            np.testing.assert_allclose(tasks.high[..., place], high if is_bounded else np.inf, rtol=1e-12)
+
+
+def test_bounds_tighten_more_each_time(aside):
+    """By what is missed and more, so that rounds come to an end."""
+    free, frame = aside
+    with double_precision():
+        problem, _ = problem_of(RING, LIMITS)
+        poses = FreePoses(frame.inward(ASIDE), None, np.zeros((2, 3)), np.full((2, 3), np.nan), 1.0)
+        question = FreeQuestion.of(problem, None, poses, QUICK)
+        tasks, slacks = question.tasks(12, 3), slacks_of(question, free.motions)
+        missed = 1e-3 * WEIGHT
+        low = np.where(np.arange(len(slacks.low))[:, None] == 5, -missed, 1.0)
+        rises = [
+            tightened(question, tasks, slacks._replace(low=low * np.ones_like(slacks.low)), number).low - tasks.low
+            for number in (1, 2, 3)
+        ]
+    here = [rise[0, 0, 5, 0, :3] for rise in rises]
+    assert (here[0] > 1e-3).all()
+    np.testing.assert_allclose(here[1] / here[0], here[2] / here[1], rtol=1e-2)
+    assert (here[1] > 1.2 * here[0]).all()
+    assert not rises[2][0, 0, 8:, :, :3].any()
+
+
+@pytest.mark.parametrize(("misses", "intervals"), [(3, [6, 6, 12, 4]), (0, [6])])
+def test_few_intervals_are_tried_where_no_start_has_led_to_a_motion(monkeypatch, misses, intervals):
+    """The search after the usual ones is for such segments alone."""
+    begun, whole = [], search.optima
+
+    def missing(tasks, *arguments, **keywords):
+        result = whole(tasks, *arguments, **keywords)
+        begun.append(len(tasks.basis.tau))
+        return result if len(begun) > misses else result._replace(is_optimal=np.zeros_like(result.is_optimal))
+
+    monkeypatch.setattr(free_motions, "optima", missing)
+    free, _ = solve(RING, LIMITS, ASIDE)
+    assert begun == intervals
+    assert free.parts[0].is_optimal
+    assert free.answers.feasible.all()
 
 
 def test_no_motion_is_found_above_what_cables_carry():
