@@ -68,16 +68,19 @@ def apart(
 def around(
     question: FreeQuestion, tasks: Tasks, unknowns: Unknowns, slacks: PieceSlacks
 ) -> tuple[Tasks, Unknowns] | None:
-    """The best motion of those that lead round what is in the way of one, bent to all sides.
+    """The best motion of those that lead round the obstacles in the way of one, bent to all sides.
 
     Args:
         question: about the planned robot.
         slacks: of the motion, over its pieces.
 
     Returns:
-        the task within planes, and the motion; None where no search converges.
+        the task within planes, and the motion; None where no obstacle is in the way, or no search converges.
     """
     is_met, size = _clearances(question, slacks) < 0.0, float(spool_radius(tasks.robot))
+    pairs = meetings(tasks.robot, question.scene or default_scene(tasks.robot))
+    if not any("obstacle" in pairs[k].kind for k in np.flatnonzero(is_met.any(axis=0))):
+        return None
     segments = np.any(is_met.reshape(len(tasks.places[0]), -1), axis=1)
     least = dict.fromkeys(np.flatnonzero(is_met.any(axis=0)).tolist(), APART * size)
     best: tuple[Tasks, Unknowns] | None = None

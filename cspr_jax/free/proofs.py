@@ -83,7 +83,7 @@ def proved(question: FreeQuestion, tasks: Tasks, unknowns: Unknowns, *, is_optim
         try:
             further = _again(*tighter)
             if further is None and tighter[0].planes is not None and tasks.planes is None:
-                stage("free motion: round what is in the way")
+                stage("free motion: round obstacles")
                 further = around(question, tasks, unknowns, slacks)
         except KeyboardInterrupt:
             is_stopped = True
