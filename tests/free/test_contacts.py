@@ -55,6 +55,7 @@ SOLIDS = {
     "platform and box": (box([0.5, 0.6, 2.0], [0.4, 0.6, 0.2]), Meeting("platform-obstacle", -1, 0)),
     "cable and platform": (None, Meeting("platform", 3, -1)),
     "cables": (None, Meeting("cables", 0, 4)),
+    "cables on the other side": (None, Meeting("cables", 0, 3)),
 }
 
 
