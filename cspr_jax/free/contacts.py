@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from cspr_jax.free.instants import coordinates
 from cspr_jax.free.poses import quaternions_of
-from cspr_jax.free.question import MORE, FreeQuestion
+from cspr_jax.free.question import FreeQuestion, more
 from cspr_jax.free.search import BARRIERS, again, optima, started
 from cspr_jax.free.starts import BENT, bulge, ways
 from cspr_jax.free.tasks import OUTER, ClearancePlanes, Tasks, Unknowns
@@ -50,7 +50,7 @@ def apart(
         question: about the planned robot.
         tasks: one.
         slacks: of the motion, over its pieces.
-        number: how many times bounds have tightened with this one, from 1 on.
+        number: as of `question.more`.
 
     Returns:
         the task within planes, and the motion as one of it; None where no two bodies are too near.
@@ -61,7 +61,7 @@ def apart(
     size = float(spool_radius(tasks.robot))
     least = {} if tasks.planes is None else dict(tasks.planes.least)
     for k in np.flatnonzero(missed > 0.0).tolist():
-        least[k] = least.get(k, APART * size) + min(MORE**number * float(missed[k]), MOST * size)
+        least[k] = least.get(k, APART * size) + min(more(number) * float(missed[k]), MOST * size)
     return _parted(question, tasks, unknowns, least, NEAR * size)
 
 

@@ -16,10 +16,11 @@ from cspr_jax.motions.piece_slacks import PieceSlacks, piece_slacks
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.clearance import Scene
 
-# Slack that is left after tightening, in the units of values; by what more than is missed each time, and by how much at
-# least and at most, bounds tighten, the latter times half their range where that is above 1; by what share of it those
-# of the next pieces do.
-LEFT, MORE, STEP, MOST, BESIDE = 1e-7, 1.3, 1e-6, 0.03, 0.5
+# Slack that is left after tightening, in the units of values; by how much at least and at most bounds tighten, the most
+# times half their range where that is above 1; by what share of it those of the next pieces do.
+LEFT, STEP, MOST, BESIDE = 1e-7, 1e-6, 0.03, 0.5
+# By what more than is missed they tighten; from what time on by its powers, since some motions give way to each step.
+MORE, PATIENCE = 1.5, 4
 # Instants of each interval, of point masses and of platforms: between two of them, the tensions of platforms bend more.
 INSTANTS = 4, 8
 
@@ -110,6 +111,18 @@ class FreeQuestion:
         return tasks_of(self.problem, numbers, self.limits, self.objective, self.poses, self.settings.longest)
 
 
+def more(number: int) -> float:
+    """By what more than is missed bounds tighten.
+
+    Args:
+        number: how many times they have tightened with this one, from 1 on.
+
+    Returns:
+        the factor.
+    """
+    return MORE ** max(1, number - PATIENCE + 1)
+
+
 def slacks_of(question: FreeQuestion, motions: list[Spline]) -> PieceSlacks:
     """Slacks of motions, one behind the other, over their pieces.
 
@@ -127,7 +140,7 @@ def tightened(question: FreeQuestion, tasks: Tasks, slacks: PieceSlacks, number:
         question: with the same limits as the tasks.
         tasks: l of s segments each.
         slacks: of l s motions, along all segments.
-        number: how many times bounds have tightened with this one, from 1 on: the more, the more at once.
+        number: as of `more`.
 
     Returns:
         the tasks; None where the proof finds enough everywhere, or no more helps.
@@ -140,7 +153,7 @@ def tightened(question: FreeQuestion, tasks: Tasks, slacks: PieceSlacks, number:
         return None
     half = 0.5 * (limits.high - limits.low)
     size = np.max(np.where((changes > 0.0) & np.isfinite(half), half, 1.0), axis=1, initial=1.0)
-    steps = np.where(missed > 0.0, np.minimum(MORE**number * missed + STEP, MOST * size), 0.0) / np.where(
+    steps = np.where(missed > 0.0, np.minimum(more(number) * missed + STEP, MOST * size), 0.0) / np.where(
         unit > 0.0, unit, 1.0
     )
     # A slack that is smallest beside a border depends on the bounds of the next piece as much.

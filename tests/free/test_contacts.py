@@ -1,5 +1,7 @@
 """Bodies that free motions keep apart: linearised clearances, sides of cables, ways round obstacles, proofs."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from oracles import clearance as oracle
@@ -9,7 +11,7 @@ from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.free import contacts
 from cspr_jax.free.poses import FreePoses, motions_of
 from cspr_jax.free.question import FreeQuestion, FreeSettings, slacks_of
-from cspr_jax.free.search import started
+from cspr_jax.free.search import Optima, started
 from cspr_jax.motions.amplitudes import named
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.clearance import Meeting, scene
@@ -161,6 +163,30 @@ def test_a_motion_gives_way_to_what_it_only_grazes():
     planned = cspr_jax.plan(keys)
     assert planned.feasible
     assert clear(planned, keys) > 0.0
+
+
+def test_a_motion_that_does_not_get_clear_is_none(monkeypatch):
+    """Planes about one motion after the other, and no end: here a search always comes back to the line."""
+    with double_precision():
+        middle = {"obstacles": [sphere([0.0, 0.0, 2.2], 0.05)]}
+        question, tasks, unknowns = moved("prototype", np.random.default_rng(1), middle)
+        ends = np.array([[0.2, 0.0, 2.2], [-0.2, 0.0, 2.2]])
+        tasks = dataclasses.replace(tasks, places=ends[None, None])
+        begun = []
+
+        def straight(within, unknowns, *level, **levels):
+            begun.append(level)
+            line = np.linspace(ends[0], ends[1], within.basis.controls)[None, None, 3:-3]
+            return Optima(unknowns._replace(inner=line), np.ones(1, bool), np.ones(1, int))
+
+        monkeypatch.setattr(contacts, "optima", straight)
+        for radius, is_clear in ((0.05, False), (1e-9, True)):
+            begun.clear()
+            solid = scene(question.problem.robot, obstacles=[sphere([0.0, 0.0, 2.2 + 0.04], radius)])
+            among = dataclasses.replace(question, scene=solid)
+            clear = contacts._clear(among, tasks, unknowns, {0: 1e-5})
+            assert (clear is not None) == is_clear
+            assert len(begun) == (1 if is_clear else contacts.SEARCHES)
 
 
 def test_nothing_is_bounded_where_bodies_are_apart():

@@ -165,7 +165,7 @@ def test_bounds_tighten_more_each_time(aside):
         low = np.where(np.arange(len(slacks.low))[:, None] == 5, -missed, 1.0)
         rises = [
             tightened(question, tasks, slacks._replace(low=low * np.ones_like(slacks.low)), number).low - tasks.low
-            for number in (1, 2, 3)
+            for number in (4, 5, 6)
         ]
     here = [rise[0, 0, 5, 0, :3] for rise in rises]
     assert (here[0] > 1e-3).all()
@@ -174,9 +174,11 @@ def test_bounds_tighten_more_each_time(aside):
     assert not rises[2][0, 0, 8:, :, :3].any()
 
 
-@pytest.mark.parametrize(("misses", "intervals"), [(3, [6, 6, 12, 4]), (0, [6])])
-def test_few_intervals_are_tried_where_no_start_has_led_to_a_motion(monkeypatch, misses, intervals):
-    """The search after the usual ones is for such segments alone."""
+@pytest.mark.parametrize(
+    ("misses", "starts", "intervals"), [(3, None, [6, 6, 12, 4]), (0, None, [6]), (0, 1, [6, 6, 12])]
+)
+def test_few_intervals_are_tried_where_no_start_has_led_to_a_motion(monkeypatch, misses, starts, intervals):
+    """The search after the usual ones is for such segments alone, not for those of which no two starts agree."""
     begun, whole = [], search.optima
 
     def missing(tasks, *arguments, **keywords):
@@ -185,7 +187,7 @@ def test_few_intervals_are_tried_where_no_start_has_led_to_a_motion(monkeypatch,
         return result if len(begun) > misses else result._replace(is_optimal=np.zeros_like(result.is_optimal))
 
     monkeypatch.setattr(free_motions, "optima", missing)
-    free, _ = solve(RING, LIMITS, ASIDE)
+    free, _ = solve(RING, LIMITS, ASIDE, settings=QUICK._replace(starts=starts))
     assert begun == intervals
     assert free.parts[0].is_optimal
     assert free.answers.feasible.all()
