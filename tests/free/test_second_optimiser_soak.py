@@ -1,4 +1,4 @@
-"""Free motions of 50 random pairs beside a second optimiser: direct collocation by CasADi and ipopt."""
+"""Free motions of 100 random pairs beside a second optimiser: direct collocation by CasADi and ipopt."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from cspr_jax.free.question import FreeSettings
 pytestmark = pytest.mark.soak
 
 KINDS = ("2T-2", "2T-3", "2T-4", "3T-3", "3T-4")
-SEEDS = range(5)
+SEEDS = range(10)
 # By how much a motion may be slower than the other optimiser's.
 SLOWER = 0.005
 
