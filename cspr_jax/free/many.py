@@ -13,10 +13,11 @@ from cspr_jax.free.basis import DEGREE, Basis
 from cspr_jax.free.free_motion import FEWEST, FINE
 from cspr_jax.free.neighbours import Neighbours
 from cspr_jax.free.poses import FreePoses, divided, motions_of
-from cspr_jax.free.proofs import ON, ROUNDS
+from cspr_jax.free.proofs import ON, ROUNDS, proved
 from cspr_jax.free.question import FreeQuestion, FreeSettings, planned_problem, slacks_of, tightened
 from cspr_jax.free.search import again, optima, started
 from cspr_jax.free.tasks import Tasks, Unknowns
+from cspr_jax.maps.proved_map import CONTACTS
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import MotionProof, ProvedAnswers, answers_of, judge_all_robots, proofs_of
 from cspr_jax.robots.clearance import Scene
@@ -49,7 +50,7 @@ def free_motions(
     """Search for the fastest motions of many pairs of poses, and prove them.
 
     Args:
-        scene: bodies that can meet; they are judged with the motions, and do not change them.
+        scene: bodies that can meet; searches keep them apart where the best motion brings them too near.
         pairs: two poses each, at least one pair.
         meshes: intervals of the first searches, and of the motions in the end, even.
 
@@ -159,4 +160,21 @@ def _proved(
             leaf[left] = values[is_optimal]
         for k in left.tolist():
             motions[k] = motion(k)
+    for k in range(len(rows)):
+        if proofs[k].verdict & CONTACTS:
+            one = np.array([k])
+            clear = _clear(questions[rows[k]], tasks.taken(one), unknowns.taken(one))
+            motions[k], proofs[k] = clear or (motions[k], proofs[k])
     return motions, proofs.tolist()
+
+
+def _clear(question: FreeQuestion, tasks: Tasks, unknowns: Unknowns) -> tuple[Spline, MotionProof] | None:
+    # The motion whose bodies are kept apart, one by one, since planes belong to one motion; None without a proof.
+    proof = proved(question, tasks, unknowns)
+    if proof.is_stopped:
+        raise KeyboardInterrupt
+    if not proof.answers.feasible.all():
+        return None
+    several = SeveralSplines(proof.motions)
+    parts = several.bounds, several.durations, question.scene, several.jumps
+    return proof.motions[0], proofs_of(question.problem, *parts, intervals=False)[0]

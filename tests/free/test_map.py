@@ -104,6 +104,25 @@ def test_cells_in_space_are_what_plans_say():
     assert cells[0][1]["clearance"] > 0.0
 
 
+def test_motions_lead_round_obstacles():
+    """The fastest motions without the sphere pass through it, and both targets can be held beside it."""
+    sweep = {
+        "schema": 1,
+        "map": "least-time",
+        "robot": "prototype",
+        "axes": {"x": [-0.4], "y": [-0.3, -0.17], "z": [1.3]},
+        "trajectory": {"family": "free", "from": {"position": [0.4, 0.1, 1.2]}},
+        "limits": {"tension_max": 4.0},
+    }
+    sphere = {"kind": "sphere", "centre": [0.045, -0.05, 0.85], "radius": 0.1}
+    without, among = (compute_sweep(sweep | more) for more in ({}, {"obstacle": [sphere]}))
+    assert not without["verdict"].any()
+    assert not among["verdict"].any()
+    assert (among["clearance"] > 0.0).all()
+    assert (among["duration"] > 1.01 * without["duration"]).all()
+    assert (among["duration"] < 1.5 * without["duration"]).all()
+
+
 @pytest.mark.soak
 def test_platforms_keep_their_orientation():
     turn = [0.995, 0.0, 0.0, 0.09987492177719089]
