@@ -119,21 +119,19 @@ def _clearances(question: FreeQuestion, slacks: PieceSlacks) -> np.ndarray:
 
 def _bent(tasks: Tasks, unknowns: Unknowns, segments: np.ndarray) -> Iterator[Unknowns]:
     # Motions that are bent along some of their segments (s,).
-    along = coordinates(tasks.robot.pattern)[0]
-    start, end = tasks.places[0, 0, 0], tasks.places[0, -1, 1]
-    length = float(np.linalg.norm((end - start)[: len(along)]))
-    bend = tasks.basis.fit @ bulge(tasks.basis.averages)
+    along, chords = coordinates(tasks.robot.pattern)[0], tasks.places[0, :, 1] - tasks.places[0, :, 0]
+    lengths = np.maximum(np.linalg.norm(chords[:, : len(along)], axis=1), NEAR * float(spool_radius(tasks.robot)))
+    bend = BENT * (tasks.basis.fit @ bulge(tasks.basis.averages))[:, None] * (lengths * segments)[:, None, None]
     for wider in WIDER:
-        for way in ways(end - start, along)[1:]:
-            change = wider * BENT * length * bend[:, None] * way * segments[:, None, None]
-            inner = unknowns.inner + change[None, :, OUTER:-OUTER]
+        for directions in list(zip(*(ways(chord, along) for chord in chords), strict=True))[1:]:
+            inner = unknowns.inner + wider * (bend * np.array(directions)[:, None])[None, :, OUTER:-OUTER]
             yield unknowns._replace(inner=inner, duration=SLOWER * unknowns.duration)
 
 
 def _parted(
     question: FreeQuestion, tasks: Tasks, unknowns: Unknowns, least: dict[int, float], near: float
 ) -> tuple[Tasks, Unknowns]:
-    # ClearancePlanes about a motion where clearances are below `near`, m, by the clearances that meetings keep, m.
+    # Planes about a motion where clearances are below `near`, m, by the clearances that meetings keep, m.
     robot = tasks.robot
     scene, size = question.scene or default_scene(robot), float(spool_radius(robot))
     pairs = meetings(robot, scene)

@@ -189,6 +189,28 @@ def test_a_motion_that_does_not_get_clear_is_none(monkeypatch):
             assert len(begun) == (1 if is_clear else contacts.SEARCHES)
 
 
+def test_motions_are_bent_along_the_segments_in_question():
+    """Half-way by a part of the segment's length, to the sides; the ends of all segments stay where they are."""
+    with double_precision():
+        robot = centred(cspr_jax.load_robot("prototype"))[0]
+        problem = Problem(robot, Limits(tension_max=np.full(3, 5.0)), named("A1"))
+        places = np.array([[0.0, 0.0, 1.0], [0.3, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0]])
+        poses = FreePoses(places, None, np.zeros((4, 3)), np.full((4, 3), np.nan), 1.0)
+        tasks = FreeQuestion.of(problem, None, poses, FreeSettings()).tasks(24, 3)
+        line = np.linspace(tasks.places[0, :, 0], tasks.places[0, :, 1], tasks.basis.controls, axis=1)[None]
+        unknowns = started(tasks, line, np.ones((1, 3)))
+        bent = list(contacts._bent(tasks, unknowns, np.array([True, False, True])))
+        before, *after = (tasks.basis.places(tasks.controls(one))[0, ..., 0, :] for one in (unknowns, *bent))
+    middle = [(one - before)[:, 12, 0] for one in after]
+    assert len(bent) == 8
+    for change in middle:
+        assert not change[1].any()
+    lengths = [np.linalg.norm(change, axis=-1) for change in middle]
+    np.testing.assert_allclose([length[0] for length in lengths], [0.35 * 0.3] * 4 + [0.7 * 0.3] * 4, rtol=0.02)
+    np.testing.assert_allclose([length[2] for length in lengths], [0.35 * 0.026] * 4 + [0.7 * 0.026] * 4, rtol=0.02)
+    np.testing.assert_allclose(sum(middle[:4])[0], 0.0, atol=1e-12)
+
+
 def test_nothing_is_bounded_where_bodies_are_apart():
     rng = np.random.default_rng(3)
     with double_precision():
