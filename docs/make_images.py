@@ -132,6 +132,7 @@ IMAGES = {
     "bezier_sequence": Image(
         "Bezier segments through places outside the footprint, the least total time.", 10, command="plan"
     ),
+    "free_obstacle": Image("A free motion over a sphere: path and tensions.", 15, command="plan"),
     "launch": Image("The launch of the paper: path, flight, tensions, velocity, acceleration.", 20, command="plan"),
     "landing": Image(
         "Landings of 10,000 throws with errors of the release and of the cables (the paper's Fig. 15 has 30).",

@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from cspr_jax.free.instants import coordinates
 from cspr_jax.free.poses import quaternions_of
@@ -196,6 +195,8 @@ def _rays(scene: Scene, k: int, positions: np.ndarray, turns: np.ndarray) -> np.
 def _turns(positions: np.ndarray, quaternions: np.ndarray | None) -> np.ndarray:
     if quaternions is None:
         return np.broadcast_to(np.eye(3), (len(positions), 3, 3))
+    from scipy.spatial.transform import Rotation  # takes time, and few motions need it
+
     return Rotation.from_quat(quaternions, scalar_first=True).as_matrix()
 
 
