@@ -27,8 +27,9 @@ from cspr_jax.robots.point_mass import spool_radius
 # Over the size of the robot: clearance up to which bodies are kept apart, clearance that they keep, at least, and by
 # how much more at most each time; step of difference quotients.
 NEAR, APART, MOST, STEP = 0.1, 1e-4, 0.02, 1e-6
-# By how much more than lines motions are bent round what is in their way, how much slower they begin, the softness with
-# which searches from them begin, and weight of barriers and softness with which they go on; how many each has.
+# By how much more than lines motions are bent round what is in their way, those of platforms, whose searches take long,
+# once; how much slower they begin, the softness with which searches from them begin, and weight of barriers and
+# softness with which they go on; how many each has.
 WIDER, SLOWER, SOFTNESS, GO_ON, SEARCHES = (1.0, 2.0), 1.5, 10.0, (1e-3, 1e-1), 4
 
 
@@ -118,10 +119,10 @@ def _clearances(question: FreeQuestion, slacks: PieceSlacks) -> np.ndarray:
 
 def _bent(tasks: Tasks, unknowns: Unknowns, segments: np.ndarray) -> Iterator[Unknowns]:
     # Motions that are bent along some of their segments (s,).
-    along, chords = coordinates(tasks.robot.pattern)[0], tasks.places[0, :, 1] - tasks.places[0, :, 0]
+    (along, about), chords = coordinates(tasks.robot.pattern), tasks.places[0, :, 1] - tasks.places[0, :, 0]
     lengths = np.maximum(np.linalg.norm(chords[:, : len(along)], axis=1), NEAR * float(spool_radius(tasks.robot)))
     bend = BENT * (tasks.basis.fit @ bulge(tasks.basis.averages))[:, None] * (lengths * segments)[:, None, None]
-    for wider in WIDER:
+    for wider in WIDER[:1] if len(about) else WIDER:
         for directions in list(zip(*(ways(chord, along) for chord in chords), strict=True))[1:]:
             inner = unknowns.inner + wider * (bend * np.array(directions)[:, None])[None, :, OUTER:-OUTER]
             yield unknowns._replace(inner=inner, duration=SLOWER * unknowns.duration)
