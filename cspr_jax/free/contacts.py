@@ -78,7 +78,7 @@ def around(
         the task within planes, and the motion; None where no obstacle is in the way, or no search converges.
     """
     is_met, size = _clearances(question, slacks) < 0.0, float(spool_radius(tasks.robot))
-    pairs = meetings(tasks.robot, question.scene or default_scene(tasks.robot))
+    _, pairs = _bodies(question)
     if not any("obstacle" in pairs[k].kind for k in np.flatnonzero(is_met.any(axis=0))):
         return None
     segments = np.any(is_met.reshape(len(tasks.places[0]), -1), axis=1)
@@ -112,9 +112,16 @@ def _clear(
 
 def _clearances(question: FreeQuestion, slacks: PieceSlacks) -> np.ndarray:
     # Lower bounds (n_pieces, n_meetings), m.
-    scene = question.scene or default_scene(question.problem.robot)
+    scene, pairs = _bodies(question)
     last = len(slacks.rows) - int(question.problem.limits.floor is not None and scene.body is not None)
-    return slacks.low[:, last - len(meetings(question.problem.robot, scene)) : last]
+    return slacks.low[:, last - len(pairs) : last]
+
+
+def _bodies(question: FreeQuestion) -> tuple[Scene, tuple[Meeting, ...]]:
+    # The robot among what it can meet, and which of these can meet.
+    robot = question.problem.robot
+    scene = question.scene or default_scene(robot)
+    return scene, meetings(robot, scene)
 
 
 def _bent(tasks: Tasks, unknowns: Unknowns, segments: np.ndarray) -> Iterator[Unknowns]:
@@ -132,9 +139,7 @@ def _parted(
     question: FreeQuestion, tasks: Tasks, unknowns: Unknowns, least: dict[int, float], near: float
 ) -> tuple[Tasks, Unknowns]:
     # Planes about a motion where clearances are below `near`, m, by the clearances that meetings keep, m.
-    robot = tasks.robot
-    scene, size = question.scene or default_scene(robot), float(spool_radius(robot))
-    pairs = meetings(robot, scene)
+    (scene, pairs), size = _bodies(question), float(spool_radius(tasks.robot))
     places = tasks.basis.places(tasks.controls(unknowns))[..., 0, :]
     linear = [_linear(tasks, places, _gap(question, scene, pairs[k])) for k in least]
     values, slopes = np.stack([one[0] for one in linear], axis=-1), np.stack([one[1] for one in linear], axis=-2)
