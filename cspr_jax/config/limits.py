@@ -20,6 +20,9 @@ from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES
 
 # Beyond these bounds squares and cubes of numbers overflow; no robot is near them. As in `robots.point_mass`, with jax.
 LARGEST_LENGTH = 1e6
+# Sizes, times, rates and limits are within these bounds in SI units: beyond, quotients and squares of them vanish or
+# overflow. No robot is near them.
+SMALLEST, LARGEST = 1e-9, 1e9
 MOST_CABLES = 1000
 Coordinate = Annotated[float, Field(ge=-LARGEST_LENGTH, le=LARGEST_LENGTH)]
 Point = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]

@@ -37,6 +37,7 @@ Files, each importing only from those above it:
     uncertain_slacks    slacks of all robots within an uncertainty over blocks of time, from bounds of states
     motion_tolerances   the largest multiple of an uncertainty that a motion with such bounds tolerates
     piece_slacks        slacks of any motion over each of its pieces
+    feeds               proof of largest speeds that hold over some pieces of a motion alone
     proved_answers      answers of motions that give bounds of their states
     judged              motions of families that know neither surroundings nor pulleys, judged with both
     stretching          the least uniform stretching of time that is feasible

@@ -126,6 +126,11 @@ def _joined(parts: list[Part]) -> Part:
 
 
 @partial(jax.jit, compiler_options=compile_options.least())
+def _speeds_kernel(velocity: AffineBounds) -> Part:
+    return jax.vmap(lambda each: _joined([_part(-norm(each.each(lambda x: x[None])))]))(velocity)
+
+
+@partial(jax.jit, compiler_options=compile_options.least())
 def _rates_kernel(robot: AnyRobot, limits: Limits, states: StateBounds) -> tuple[Array, Array]:
     # Bound the smallest slacks: the lower end of a line above a slack is above its smallest value.
     def one(state: StateBounds) -> tuple[Array, Array]:
@@ -267,3 +272,12 @@ def rate_slacks(robot: AnyRobot, limits: Limits, states: StateBounds) -> tuple[n
         (k, n) each: lower bounds, -inf where nothing is known, and upper ones, inf where nothing is known.
     """
     return in_batches(partial(_rates_kernel, robot, limits), states, size=RATES_BATCH)
+
+
+def speed_slacks(states: StateBounds) -> BlockSlacks:
+    """Bounds of the negative speed of the mass centre over k blocks: of its slack, less what is allowed.
+
+    Returns:
+        the bounds, (k, 1) each.
+    """
+    return BlockSlacks(*in_batches(_speeds_kernel, states.velocity, size=RATES_BATCH))

@@ -22,6 +22,7 @@ _WORDS = {
     Verdict.UNDECIDED: "neither proved nor refuted{when}: {needed} {unit}, and {allowed} {unit} is the limit",
     Verdict.UNCERTAINTY: "it stands {allowed} of the uncertainty, {needed} needed",
 }
+_WORDS[Verdict.OVER_FEED] = "the mass centre needs {needed} {unit}{when}, the feed allows {allowed}"
 _WORDS |= dict.fromkeys(
     (row.flag for row in LIMITS if row.of_mass_centre), "the mass centre needs {needed} {unit}{when}, {allowed} allowed"
 )
@@ -35,6 +36,7 @@ _LIMITS = {
     Verdict.CABLE_OVER_ACCELERATION: "the largest acceleration",
     Verdict.TOO_FAST: "the largest speed of the mass centre",
     Verdict.OVER_ACCELERATION: "the largest acceleration of the mass centre",
+    Verdict.OVER_FEED: "the feed",
 }
 _USUAL = "{cable} needs {needed} {unit}{when}, {allowed} allowed"
 

@@ -35,12 +35,15 @@ class MotionProof(NamedTuple):
         proof: of the same criteria.
         scales: (n_criteria,) sizes by which slacks of several criteria are compared, in their units.
         obstacles: their names.
+        feeds: (pieces,) largest speed of the mass centre in each piece of the motion, m/s, inf for none; None: there
+            are none.
     """
 
     criteria: tuple[Criterion, ...]
     proof: TimeProof
     scales: np.ndarray
     obstacles: tuple[str, ...] = ()
+    feeds: np.ndarray | None = None
 
     @property
     def broken(self) -> np.ndarray:
@@ -70,6 +73,31 @@ class MotionProof(NamedTuple):
         """
         chosen = np.array([bool(row.flag & flags) != others for row in self.criteria])
         return float(np.min((side / self.scales if others else side)[chosen], initial=np.inf))
+
+    def with_feeds(self, motion: Any, feeds: np.ndarray | None) -> "MotionProof":
+        """The proof of a motion of pieces that has to keep feeds, too.
+
+        Args:
+            feeds: as of the field.
+
+        Returns:
+            the proof.
+        """
+        if feeds is None or not np.isfinite(feeds).any():
+            return self
+        from cspr_jax.motions.feeds import feed_proof  # only paths of G-code have feeds
+
+        usual, (row, proof) = self.proof, feed_proof(motion, feeds)
+        both = TimeProof(
+            low=np.append(usual.low, proof.low),
+            high=np.append(usual.high, proof.high),
+            when=np.append(usual.when, proof.when),
+            failing=usual.failing + proof.failing,
+            open=usual.open + proof.open,
+            blocks=usual.blocks + proof.blocks,
+        )
+        scales = np.append(self.scales, row.allowed)
+        return self._replace(criteria=(*self.criteria, row), proof=both, scales=scales, feeds=feeds)
 
     @property
     def failing(self) -> np.ndarray:
@@ -156,17 +184,22 @@ def cause_of(case: MotionProof, k: int, frame: Frame) -> Cause:
     return Cause(row.flag.text, row.cables, float(proof.when[k]), needed, allowed, row.unit, obstacle)
 
 
-def proved_answers(problem: Problem, motions: Sequence[Any], scene: Scene | None = None) -> ProvedAnswers:
+def proved_answers(
+    problem: Problem, motions: Sequence[Any], scene: Scene | None = None, feeds: Sequence[np.ndarray | None] = ()
+) -> ProvedAnswers:
     """Answers of motions, by bounds of their states; a motion that gives none is sampled.
 
     Args:
         motions: n of them, from the centroid of the spools, z down.
         scene: bodies that can meet; None: the cables of a platform alone.
+        feeds: for each motion as of `MotionProof`; empty: there are none.
 
     Returns:
         the answers: no numbers of arcs.
     """
     proofs = [(proof_of if hasattr(motion, "bounds") else sampled_proof)(problem, motion, scene) for motion in motions]
+    for i, speeds in enumerate(feeds):
+        proofs[i] = proofs[i].with_feeds(motions[i], speeds)
     answers = answers_of(proofs, np.array([float(motion.duration()) for motion in motions]))
     judge_all_robots(problem, answers, motions, scene)
     return answers

@@ -29,8 +29,8 @@ def path_columns(plan: PlannedMotions) -> dict[str, np.ndarray]:
 
 def _of_section(section: Any, number: int, start: float) -> dict[str, np.ndarray]:
     least, plane = section.least, section.least.plane
-    flags = np.array([0, *(Verdict[name.upper()].value for name, _ in least.names)], FLAGS)
-    cables = np.array([0, *(0 if cable is None else cable + 1 for _, cable in least.names)], np.int16)
+    flags = np.array([0, *(Verdict[name.criterion.upper()].value for name in least.names)], FLAGS)
+    cables = np.array([0, *(0 if name.cable is None else name.cable + 1 for name in least.names)], np.int16)
     # Behind the last node there is no cell.
     binds = np.append(least.binds, least.binds[-1:]) + 1
     segments = section.before + np.append(section.segments, section.segments[-1:]) + 1

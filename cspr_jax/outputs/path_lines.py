@@ -28,9 +28,13 @@ def path_lines(segments: list[dict[str, Any]]) -> list[str]:
     return lines
 
 
+def _named(row: dict[str, Any]) -> str:
+    return f"feed {row['feed']}" if "feed" in row else limit_words(row["criterion"], row["cable"]).removeprefix("the ")
+
+
 def _binding(rows: list[dict[str, Any]]) -> str:
     texts = [
-        f"{limit_words(row['criterion'], row['cable']).removeprefix('the ')} ({_percent(row['share'])})"
+        f"{_named(row)} ({_percent(row['share'])})"
         for row in rows[:MOST_NAMED]
         if row["share"] >= LEAST_NAMED or row is rows[0]
     ]

@@ -14,6 +14,7 @@ from cspr_jax.motions.cause import Cause, limit_words
 from cspr_jax.motions.proved_answers import ProvedAnswers
 from cspr_jax.paths.least_time import LeastTime
 from cspr_jax.paths.refusals import NoMotion
+from cspr_jax.paths.tightening import BindingName
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import Verdict
 
@@ -92,14 +93,29 @@ class SectionAnswer(NamedTuple):
 
 def _binding(parts: Iterable[tuple[LeastTime, np.ndarray]]) -> list[dict[str, Any]]:
     # Tell what binds, the longest first, over cells that take these times.
-    shares, total = dict[tuple[str, int | None], float](), 0.0
+    shares, total = dict[BindingName, float](), 0.0
     for least, times in parts:
         total += float(times.sum())
         for k, name in enumerate(least.names):
             shares[name] = shares.get(name, 0.0) + float(times[least.binds == k].sum())
     order = sorted((name for name in shares if shares[name] > 0.0), key=lambda name: -shares[name])
-    rows = ((name, shares[name] / total) for name in order[:MOST_BINDING])
-    return [{"criterion": flag, "cable": cable, "share": share} for (flag, cable), share in rows]
+    return [
+        {"criterion": name.criterion, "cable": name.cable, "share": shares[name] / total}
+        | ({"feed": name.feed} if name.feed else {})
+        for name in order[:MOST_BINDING]
+    ]
+
+
+def feeds_of(sections: Iterable[SectionAnswer], segment: int) -> np.ndarray:
+    """Feeds of the pieces of a segment's motion.
+
+    Args:
+        sections: all that run through it, in their order.
+
+    Returns:
+        (pieces,) m/s, inf for none.
+    """
+    return np.concatenate([section.least.feed[section.segments == segment] for section in sections])
 
 
 @dataclasses.dataclass(frozen=True)

@@ -49,7 +49,7 @@ def tracks_of(elements: Sequence[Element], corners: Corners = "stop", tolerance:
 
 def _cut(before: Element, after: Element, corners: Corners, tolerance: float) -> float | None:
     # Length that a blend takes off both elements; 0 where the direction goes on, None where the motion stops.
-    if not (before.moves and after.moves):
+    if before.stops or not (before.moves and after.moves):
         return None
     one, other = _end(before), after.nodes(0.0, after.length).first[0]
     angle = float(np.arctan2(np.linalg.norm(np.cross(one, other)), one @ other))

@@ -1,12 +1,13 @@
 """Courses of paths between poses: what a table of a plan says, as tracks with orientations at their marks."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
 from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE, products
-from cspr_jax.config.gcode import read_moves
 from cspr_jax.config.motions.text import read
 from cspr_jax.config.path import PathTable
 from cspr_jax.curves.interpolation import continuous
@@ -57,11 +58,15 @@ class Course(NamedTuple):
         tracks: at least one.
         quaternions: for each the orientations at its marks, (k, 4) unit quaternions; empty: of a point mass.
         is_planar: whether it was read without y.
+        feeds: as of `Section`.
+        notes: what its user should know of a file, in lines.
     """
 
     tracks: list[Track]
     quaternions: list[np.ndarray]
     is_planar: bool = False
+    feeds: Mapping[float, str] = MappingProxyType({})
+    notes: Sequence[str] = ()
 
     def sections(self) -> list[Section]:
         """The tracks with their orientations.
@@ -70,7 +75,8 @@ class Course(NamedTuple):
             the sections.
         """
         units = self.quaternions
-        return [section_of(track, units[i] if units else None) for i, track in enumerate(self.tracks)]
+        sections = [section_of(track, units[i] if units else None) for i, track in enumerate(self.tracks)]
+        return [section._replace(feeds=self.feeds) for section in sections]
 
 
 def course_through(table: PathTable, points: np.ndarray, quaternions: np.ndarray | None) -> Course:
@@ -122,10 +128,13 @@ def course_of(table: PathTable, ends: CourseEnds, folder: Path, axes: FileAxes) 
     if table.kind == "gcode":
         start = None if ends.start is None else ends.start.tolist()
         rule: Corners = "blend" if table.corner == "blend" else "stop"
-        elements = elements_of(read_moves(folder / str(table.file), start))
-        tracks = tracks_of(elements, rule, table.blend_tolerance or 0.0)
+        from cspr_jax.config.gcode import read_program  # only these paths need it
+
+        moves, notes = read_program(folder / str(table.file), start)
+        tracks = tracks_of(elements_of(moves), rule, table.blend_tolerance or 0.0)
         first = ends.first
-        return Course(tracks, [] if first is None else [np.tile(first, (len(track.marks), 1)) for track in tracks])
+        turnings = [] if first is None else [np.tile(first, (len(track.marks), 1)) for track in tracks]
+        return Course(tracks, turnings, feeds={move.speed: move.feed for move in moves}, notes=notes)
     axis = axes.normal if table.normal is None else np.asarray(table.normal)
     angle = 2.0 * np.pi if table.angle is None else table.angle
     start = np.asarray(table.start, float) if ends.start is None else ends.start

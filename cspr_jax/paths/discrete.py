@@ -143,11 +143,10 @@ def discretes(problem: Problem, sections: Sequence[Section], settings: Sequence[
     Returns:
         the sections, without margins.
     """
-    robot, most = problem.robot, problem.limits.speed_max
-    if most is not None:
-        sections = [section._replace(speed=np.minimum(section.speed, most)) for section in sections]
+    robot = problem.robot
+    most = np.inf if problem.limits.speed_max is None else float(problem.limits.speed_max)
     grids = [
-        grid_of(section, each.grid, (each.start_speed == 0.0, each.end_speed == 0.0))
+        grid_of(section, each.grid, (each.start_speed == 0.0, each.end_speed == 0.0), most)
         for section, each in zip(sections, settings, strict=True)
     ]
     sides = side_rows(robot, problem.limits, [section.curve for section in sections], grids)

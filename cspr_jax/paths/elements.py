@@ -36,12 +36,14 @@ class Straight:
         end: (3,) m.
         turn: travelled length of one that only turns on the spot, in place of m; rad.
         speed: largest speed, m/s.
+        stops: whether the motion stops behind it in any case.
     """
 
     start: np.ndarray
     end: np.ndarray
     turn: float = 0.0
     speed: float = np.inf
+    stops: bool = False
 
     @property
     def moves(self) -> bool:
@@ -81,6 +83,7 @@ class Arc:
         angle: by which it turns, by the rule of the right hand, rad; not zero.
         rise: along the axis, from start to end, m.
         speed: largest speed, m/s.
+        stops: whether the motion stops behind it in any case.
     """
 
     centre: np.ndarray
@@ -90,6 +93,7 @@ class Arc:
     rise: float = 0.0
     speed: float = np.inf
     moves: bool = True
+    stops: bool = False
 
     @property
     def length(self) -> float:

@@ -16,7 +16,7 @@ from cspr_jax.paths.jumping import Jumping, PathPace, again, jumping_motions
 from cspr_jax.paths.refusals import NoMotion, refusal
 from cspr_jax.paths.section import Section, SectionSettings
 from cspr_jax.paths.smooth import SectionEnds, Smooth, below_ramps, smooth
-from cspr_jax.paths.tightening import CellSlacks, together
+from cspr_jax.paths.tightening import BindingName, CellSlacks, Trial, together
 from cspr_jax.paths.timed import PathSpeeds, cell_times, distance_from_path, moving, timed
 
 # Rounds of proof and tightening; how often ramps are shortened by half where none of their length exist.
@@ -62,8 +62,9 @@ class LeastTime:
         jumping: duration of the fastest motion without ramps on the same grid, before margins, s.
         ramp_time: of the motion, s; 0 where its accelerations jump.
         deviation: largest distance of the motion from the path at samples, m.
-        names: of the criteria that can bind: name of a flag, cable from 0 on or None.
+        names: of the criteria that can bind.
         binds: (n_cells,) number of the one that binds in each cell; -1: none.
+        feed: (n_cells,) largest speed that the section itself allows, m/s, inf for none.
         plane: path speeds.
         failure: why there is no motion, or None.
     """
@@ -75,8 +76,9 @@ class LeastTime:
     jumping: float
     ramp_time: float
     deviation: float
-    names: tuple[tuple[str, int | None], ...]
+    names: tuple[BindingName, ...]
     binds: np.ndarray
+    feed: np.ndarray
     plane: PhasePlane
     failure: NoMotion | None
 
@@ -128,7 +130,7 @@ def least_time_motions(
 
 def _proved(
     problem: Problem, path: Discrete, start: Jumping, settings: SectionSettings
-) -> Generator[Spline, CellSlacks, tuple[LeastTime, bool]]:
+) -> Generator[Trial, CellSlacks, tuple[LeastTime, bool]]:
     # Tighten the limits on the grid until the motion keeps them everywhere, and tell whether it does. It yields motions
     # and receives the bounds of their slacks.
     jumping, bend, first = start
@@ -145,11 +147,12 @@ def _proved(
             break
         run = slower
         motion = timed(section, path.grid, run)
-        slacks = yield motion
+        slacks = yield Trial(motion, path.grid.feed)
         margins = slacks.grown(margins, weight)
         slower = None if slacks.is_met else _slower(path.with_margins(margins), run, bend, jerk)
     times = np.diff(np.asarray(motion.knots))
     speed = np.sqrt(run.x)
+    names, binds = slacks.binding(path.grid.feed, section.feeds)
     answer = LeastTime(
         motion=motion,
         coordinate=path.grid.nodes,
@@ -158,8 +161,9 @@ def _proved(
         jumping=fastest_time,
         ramp_time=float(np.ptp(np.concatenate([jumping.before, jumping.after])) / jerk),
         deviation=distance_from_path(section, path.grid, run, motion),
-        names=slacks.names,
-        binds=slacks.binding(),
+        names=names,
+        binds=binds,
+        feed=path.grid.feed,
         plane=_plane(path, first, speed),
         failure=None,
     )
@@ -197,6 +201,7 @@ def _without_motion(problem: Problem, path: Discrete, solution: GridSolution) ->
         deviation=distance_from_path(path.section, path.grid, run, motion),
         names=(),
         binds=np.full(len(path.grid.width), -1),
+        feed=path.grid.feed,
         plane=_plane(path, solution, np.full(len(path.grid.nodes), np.nan)),
         failure=refusal(problem, path, solution),
     )

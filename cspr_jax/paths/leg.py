@@ -20,7 +20,7 @@ from cspr_jax.motions.motion import Motion
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import proved_answers
 from cspr_jax.motions.waypoints import Waypoints
-from cspr_jax.paths.answers import PathAnswers, SectionAnswer
+from cspr_jax.paths.answers import PathAnswers, SectionAnswer, feeds_of
 from cspr_jax.paths.courses import Course, CourseEnds, FileAxes, course_of, course_through
 from cspr_jax.paths.least_time import LeastTime, least_time_motion
 from cspr_jax.paths.section import Section, SectionSettings
@@ -85,19 +85,21 @@ class Paths(Leg):
             for segment in range(section.ends[0], section.ends[1] + 1):
                 through[segment].append(section)
         motions = [chained(splines) for splines in parts]
-        answers = proved_answers(problem, motions, scene)
+        feeds = [feeds_of(sections, segment) for segment, sections in enumerate(through)]
+        answers = proved_answers(problem, motions, scene, feeds)
         columns = {field.name: getattr(answers, field.name) for field in dataclasses.fields(answers)}
         paths = PathAnswers(**columns, sections=through)
-        self._notes = paths.notes()
+        self._notes = [*self._notes, *paths.notes()]
         return paths, list(motions)
 
     def warnings(self, problem: Problem) -> list[str]:
-        """Ramps that are shorter than asked for; see `Leg.warnings`."""
+        """Words of files that are skipped, ramps that are shorter than asked for; see `Leg.warnings`."""
         return self._notes
 
     def _rides(self, problem: Problem, z0: float) -> list[Ride]:
-        # Sections of all runs, in the axes of the kernels.
+        # Sections of all runs, in the axes of the kernels; notes of their files.
         stops, rides = self.stops, list[Ride]()
+        self._notes = []
         places = np.array(stops.frame.outward(stops.points(z0)))
         units = None
         if isinstance(problem.robot, PlatformRobot):
@@ -108,6 +110,7 @@ class Paths(Leg):
                 sections = [self._placed(section, course) for section in course.sections()]
             except InputError as error:
                 raise ConfigError(stops.path, f"{self._key(run)}.{error}") from error
+            self._notes += course.notes
             places[run.last] = course.tracks[-1].place[-1]
             if units is not None:
                 units[run.last] = course.quaternions[-1][-1]

@@ -33,10 +33,12 @@ class PathGrid(NamedTuple):
         nodes: (n_cells + 1,) path coordinates, m; there is one at each mark, and where accelerations or speed limits
             jump.
         speed: (n_cells,) largest speed of the mass centre in each cell, m/s, inf for none.
+        feed: (n_cells,) the same where the section itself has it, and not the limits of the robot.
     """
 
     nodes: np.ndarray
     speed: np.ndarray
+    feed: np.ndarray
 
     @property
     def width(self) -> np.ndarray:
@@ -62,13 +64,14 @@ class Places(NamedTuple):
     offset: Any
 
 
-def grid_of(section: Section, count: int, slow: tuple[bool, bool]) -> PathGrid:
+def grid_of(section: Section, count: int, slow: tuple[bool, bool], most: float = np.inf) -> PathGrid:
     """Nodes of a section: close together where it is slow, as instants of a motion that speeds up and slows down are.
 
     Args:
         section: NumPy leaves.
         count: number of cells; more where two such places are closer than nodes.
         slow: whether it begins, and whether it ends, at zero speed.
+        most: largest speed of the mass centre anywhere, m/s.
 
     Returns:
         the nodes.
@@ -83,7 +86,8 @@ def grid_of(section: Section, count: int, slow: tuple[bool, bool]) -> PathGrid:
             nodes[nearest] = place
         else:
             nodes = np.insert(nodes, np.searchsorted(nodes, place), place)
-    return PathGrid(nodes, section.speed[_pieces(knots, 0.5 * (nodes[1:] + nodes[:-1]))])
+    speed = section.speed[_pieces(knots, 0.5 * (nodes[1:] + nodes[:-1]))]
+    return PathGrid(nodes, np.minimum(speed, most), np.where(speed < most, speed, np.inf))
 
 
 def _pieces(knots: np.ndarray, places: np.ndarray) -> np.ndarray:

@@ -98,13 +98,16 @@ def size_of(robot: AnyRobot) -> float:
     return float(np.linalg.norm(np.asarray(robot.platform_points), axis=1).max())
 
 
-def retraced(robot: AnyRobot, motions: Sequence[Motion], cells: int) -> list[Retraced]:
+def retraced(
+    robot: AnyRobot, motions: Sequence[Motion], cells: int, feeds: Sequence[np.ndarray | None] = ()
+) -> list[Retraced]:
     """Paths of motions that go on from each other.
 
     Args:
         robot: centred, z down.
         motions: from the centroid of the spools, z down.
         cells: of the grids on which they will be run along; marks lie closer together than these.
+        feeds: for each motion as of `motions.proved_answers.MotionProof`; empty: there are none.
 
     Returns:
         the paths, from stop to stop; none of motions that stand still.
@@ -117,13 +120,22 @@ def retraced(robot: AnyRobot, motions: Sequence[Motion], cells: int) -> list[Ret
     run: list[SmoothPart] = []
     for part in sequence.parts():
         if run and (run[-1].stops[1] or part.stops[0]):
-            paths.append(_path(sequence, run, cells))
+            paths.append(_path(sequence, run, cells, feeds))
             run = []
         run.append(part)
-    return [*paths, _path(sequence, run, cells)] if run else paths
+    return [*paths, _path(sequence, run, cells, feeds)] if run else paths
 
 
-def _path(motions: MotionSequence, parts: list[SmoothPart], cells: int) -> Retraced:
+def _feed(motions: MotionSequence, part: SmoothPart, feeds: Sequence[np.ndarray | None]) -> float:
+    # Feed in a smooth part, which lies in one piece of its motion.
+    known = feeds[part.motion] if feeds else None
+    if known is None:
+        return np.inf
+    ends = motions.ends(part.motion)
+    return float(known[np.searchsorted(ends, 0.5 * (part.start + part.end), side="right") - 1])
+
+
+def _path(motions: MotionSequence, parts: list[SmoothPart], cells: int, feeds: Sequence[np.ndarray | None]) -> Retraced:
     times = motions.times(parts)
     counts = np.maximum(FEWEST, np.round(PIECES * times / times.sum())).astype(int)
     number = np.repeat(np.arange(len(parts)), counts)
@@ -150,7 +162,7 @@ def _path(motions: MotionSequence, parts: list[SmoothPart], cells: int) -> Retra
         name = f"segment {numbers[0] + 1}"
         raise InputError(name, None, "must move its mass centre where it begins and ends", fault="it turns in place")
     return Retraced(
-        section=Section(curve, np.full(len(curve.knots) - 1, np.inf), marks),
+        section=Section(curve, np.array([_feed(motions, part, feeds) for part in parts])[pieces.number], marks),
         segments=numbers[is_mark],
         speeds=(start, end),
         pace=_pace(motions, parts, pieces, curve),

@@ -1,6 +1,8 @@
 """Sections of paths: curves over the path coordinate s, without corners, made of quintic Hermite pieces."""
 
 import dataclasses
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -24,11 +26,13 @@ class Section(NamedTuple):
             leaves. Its second derivative may jump between pieces.
         speed: (pieces,) largest speed that is allowed there, m/s; inf without one.
         marks: (k,) values of s at which it passes its points, the first 0, the last its length; each is a knot.
+        feeds: such speeds as G-code has them, by their values in m/s.
     """
 
     curve: Spline
     speed: np.ndarray
     marks: np.ndarray
+    feeds: Mapping[float, str] = MappingProxyType({})
 
 
 class SectionSettings(NamedTuple):

@@ -38,7 +38,7 @@ def arc_of(centre: np.ndarray, start: np.ndarray, normal: np.ndarray, angle: flo
 
 
 def elements_of(moves: Sequence[Move]) -> list[Element]:
-    """Lines, arcs and helices of moves.
+    """Lines, arcs and helices of moves, each with a stop behind it where the program pauses.
 
     Args:
         moves: each begins where the one before ends.
@@ -50,8 +50,9 @@ def elements_of(moves: Sequence[Move]) -> list[Element]:
     for move in moves:
         start, end = np.array(move.start), np.array(move.end)
         if move.centre is None:
-            elements.append(Straight(start, end, speed=move.speed))
+            elements.append(Straight(start, end, speed=move.speed, stops=move.stops))
         else:
-            centre = np.array([*move.centre, move.start[2]])
-            elements.append(Arc(centre, start, np.eye(3)[2], move.angle, float(end[2] - start[2]), move.speed))
+            centre, axis = np.roll([*move.centre, move.start[move.normal]], move.normal + 1), np.eye(3)[move.normal]
+            rise = float((end - start)[move.normal])
+            elements.append(Arc(centre, start, axis, move.angle, rise, move.speed, stops=move.stops))
     return elements

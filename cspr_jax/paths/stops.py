@@ -109,6 +109,14 @@ class MotionSequence:
         motion, start, end = (np.array([part[i] for part in parts])[number] for i in range(3))
         return self.rates(motion.astype(int), start + (end - start) * np.clip(share, INSIDE, 1.0 - INSIDE))
 
+    def ends(self, motion: int) -> np.ndarray:
+        """Starts and ends of the pieces of a motion.
+
+        Returns:
+            (pieces + 1,) tau.
+        """
+        return np.concatenate([[0.0], np.asarray(self._motions[motion].breaks()), [1.0]])
+
     def times(self, parts: Sequence[SmoothPart]) -> np.ndarray:
         """Durations of smooth parts.
 

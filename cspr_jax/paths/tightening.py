@@ -1,6 +1,6 @@
 """Limits that a motion along a path misses between the nodes, by proof, and those that bind it."""
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from functools import partial
 from typing import NamedTuple, TypeVar
 
@@ -9,12 +9,13 @@ from scipy.ndimage import maximum_filter1d
 
 from cspr_jax.curves.several import SeveralSplines
 from cspr_jax.curves.spline import Spline
-from cspr_jax.motions.block_slacks import rate_slacks
+from cspr_jax.motions.block_slacks import rate_slacks, speed_slacks
 from cspr_jax.motions.criteria import Criterion, criteria
 from cspr_jax.motions.piece_slacks import Sides, close_bounds
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import TENSIONS
 from cspr_jax.paths.discrete import GridMargins
+from cspr_jax.schema.verdicts import Verdict
 
 # Slack, over its scale, that is left where a limit is met; by what more than is missed, and by how
 # much at least, margins grow; below which a criterion binds.
@@ -26,6 +27,32 @@ HALVINGS = 3
 # Criteria that faster or slower motion changes, by their units.
 SPEEDS, ACCELERATIONS = "m/s", "m/s^2"
 Answer = TypeVar("Answer")
+
+
+class Trial(NamedTuple):
+    """Motion whose slacks are asked for.
+
+    Fields:
+        motion: with a piece a cell.
+        feed: (n_cells,) largest speed that the section itself allows, m/s, inf for none.
+    """
+
+    motion: Spline
+    feed: np.ndarray
+
+
+class BindingName(NamedTuple):
+    """Name of a criterion that can bind.
+
+    Fields:
+        criterion: name of its flag.
+        cable: from 0 on; None: of no single cable.
+        feed: as G-code has it, such as "F6000"; "" of other criteria.
+    """
+
+    criterion: str
+    cable: int | None
+    feed: str = ""
 
 
 class CellSlacks(NamedTuple):
@@ -68,30 +95,36 @@ class CellSlacks(NamedTuple):
         others = (lacking([row.unit == unit for row in self.rows]) for unit in (ACCELERATIONS, SPEEDS))
         return GridMargins(*(old + more for old, more in zip(margins, (tension, *others), strict=True)))
 
-    @property
-    def names(self) -> tuple[tuple[str, int | None], ...]:
-        """Names of the criteria: of the flag, and the cable from 0 on, or None."""
-        return tuple((row.flag.text, row.cables[0] if row.cables else None) for row in self.rows)
-
-    def binding(self) -> np.ndarray:
+    def binding(self, feed: np.ndarray, words: Mapping[float, str]) -> tuple[tuple[BindingName, ...], np.ndarray]:
         """The criterion that binds in each cell.
 
+        Args:
+            feed: (n_cells,) as of the motion.
+            words: of feeds, by their values.
+
         Returns:
-            (n_cells,) number of the criterion that is nearest to its limit; -1 where none binds.
+            names of criteria, each feed one; (n_cells,) number of the one that is nearest to its limit; -1: none binds.
         """
         nearest = self.high.argmin(1)
-        return np.where(self.high[np.arange(len(nearest)), nearest] < BINDING, nearest, -1)
+        names = [BindingName(row.flag.text, row.cables[0] if row.cables else None) for row in self.rows]
+        binds = np.where(self.high[np.arange(len(nearest)), nearest] < BINDING, nearest, -1)
+        if self.rows[-1].flag == Verdict.OVER_FEED:
+            last, (feeds, number) = names.pop(), np.unique(feed, return_inverse=True)
+            binds = np.where(binds == len(names), len(names) + number, binds)
+            names += [last._replace(feed=words.get(speed, f"{speed:g} m/s")) for speed in feeds.tolist()]
+        return tuple(names), binds
 
 
-def cell_slacks(problem: Problem, motions: Sequence[Spline]) -> list[CellSlacks]:
-    """Bounds of the slacks that depend on how fast motions are, over each of their pieces.
+def cell_slacks(problem: Problem, trials: Sequence[Trial]) -> list[CellSlacks]:
+    """Bounds of the slacks that depend on how fast motions are, over each of their pieces; the last is that of feeds.
 
     Args:
-        motions: at least one, of one degree.
+        trials: at least one, of motions of one degree.
 
     Returns:
         the bounds, one set a motion.
     """
+    motions = [trial.motion for trial in trials]
     robot, limits, several = problem.robot, problem.limits, SeveralSplines(motions)
     rows = criteria(robot, limits)
     weight = float(robot.mass * robot.gravity)
@@ -101,18 +134,26 @@ def cell_slacks(problem: Problem, motions: Sequence[Spline]) -> list[CellSlacks]
     counts = [len(each) - 1 for each in knots]
     start, end = (np.concatenate([each[side] for each in knots]) for side in (slice(None, -1), slice(1, None)))
     motion = np.repeat(np.arange(len(motions)), counts)
+    feed = np.concatenate([trial.feed for trial in trials])
+    has_feed = bool(np.isfinite(feed).any())
 
     def bounded(cell: np.ndarray, start: np.ndarray, end: np.ndarray) -> Sides:
         states = several.bounds(motion[cell], start, end, parabolas=robot.pulleys is None)
-        below, above = rate_slacks(robot, limits, states)
-        return below[:, chosen] / scales, above[:, chosen] / scales
+        below, above = (side[:, chosen] / scales for side in rate_slacks(robot, limits, states))
+        if not has_feed:
+            return below, above
+        # The lower end of a line above a slack is above its smallest value.
+        speeds, most = speed_slacks(states), feed[cell, None]
+        sides = 1.0 + speeds.low / most, 1.0 + (speeds.high - np.abs(speeds.high_rise)) / most
+        return np.hstack([below, sides[0]]), np.hstack([above, sides[1]])
 
     low, high = close_bounds(bounded, (start, end), STEP, HALVINGS)
     parts = (np.split(side, np.cumsum(counts)[:-1]) for side in (low, high))
-    return [CellSlacks([rows[k] for k in chosen], *sides) for sides in zip(*parts, strict=True)]
+    named = [rows[k] for k in chosen] + [Criterion(Verdict.OVER_FEED, (), SPEEDS, sense="most")] * has_feed
+    return [CellSlacks(named, *sides) for sides in zip(*parts, strict=True)]
 
 
-def together(problem: Problem, searches: Sequence[Generator[Spline, CellSlacks, Answer]]) -> list[Answer]:
+def together(problem: Problem, searches: Sequence[Generator[Trial, CellSlacks, Answer]]) -> list[Answer]:
     """Results of searches that go on with the bounds of the slacks of their motions, bounded together round by round.
 
     Args:
@@ -122,9 +163,9 @@ def together(problem: Problem, searches: Sequence[Generator[Spline, CellSlacks, 
         what they return.
     """
     answers: dict[int, Answer] = {}
-    motions: dict[int, Spline] = {}
+    motions: dict[int, Trial] = {}
 
-    def resumed(k: int, following: Callable[[], Spline]) -> None:
+    def resumed(k: int, following: Callable[[], Trial]) -> None:
         try:
             motions[k] = following()
         except StopIteration as end:

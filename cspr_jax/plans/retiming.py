@@ -15,7 +15,7 @@ from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.motions.answers import replaced
 from cspr_jax.motions.motion import Motion
 from cspr_jax.motions.proved_answers import ProvedAnswers, proved_answers
-from cspr_jax.paths.answers import PathAnswers
+from cspr_jax.paths.answers import PathAnswers, feeds_of
 from cspr_jax.paths.discrete import FASTER
 from cspr_jax.paths.least_time import LeastTime, least_time_motions
 from cspr_jax.paths.leg import Ride, cut, section_answer
@@ -92,7 +92,7 @@ def retimed(plan: PlannedMotions, grid: int, ramp_time: float, path: Path) -> Pl
     problem = plan.problem
     scene = scene_of(problem.robot, plan.robot_file, plan.frame, plan.keys, path, trajectory=plan.keys)
     try:
-        paths = retraced(problem.robot, motions, grid)
+        paths = retraced(problem.robot, motions, grid, _feeds(plan))
     except InputError as error:
         raise ConfigError(path, f"retime: {error}") from error
     faster = _fastest(plan, paths, grid, ramp_time)
@@ -101,7 +101,7 @@ def retimed(plan: PlannedMotions, grid: int, ramp_time: float, path: Path) -> Pl
         for segment, motion in cut(one.fastest, one.ride):
             parts[segment].append(motion)
     trial = [chained(splines) if splines else motion for splines, motion in zip(parts, motions, strict=True)]
-    proved = proved_answers(problem, trial, scene)
+    proved = proved_answers(problem, trial, scene, _feeds_along(faster, len(motions)))
     moves = np.array([len(splines) > 0 for splines in parts])
     is_better = moves & _is_better(plan, proved, faster)
     answers = _answers(plan, faster, _with_planned(plan, scene, proved, motions, np.flatnonzero(~is_better)), is_better)
@@ -109,6 +109,18 @@ def retimed(plan: PlannedMotions, grid: int, ramp_time: float, path: Path) -> Pl
     lines = _stays(moves & ~is_better) + _jumps(plan, faster, is_better) + _unbounded(plan, faster)
     lines += answers.notes("retime: ramp_time")
     return with_motions(plan, answers, chosen, lines)
+
+
+def _feeds(plan: PlannedMotions) -> list[np.ndarray | None]:
+    # Feeds that the motions of a plan keep.
+    proofs = [getattr(leg.answers, "proof", [None] * len(leg.motions)) for leg in plan.legs]
+    return [getattr(proof, "feeds", None) for each in proofs for proof in each]
+
+
+def _feeds_along(faster: Sequence[_Faster], count: int) -> list[np.ndarray | None]:
+    sections = [section_answer(one.fastest, one.ride) for one in faster]
+    through = [[each for each in sections if (each.segments == i).any()] for i in range(count)]
+    return [feeds_of(each, i) if each else None for i, each in enumerate(through)]
 
 
 def _check(plan: PlannedMotions, motions: list[Motion], path: Path) -> None:
@@ -184,7 +196,8 @@ def _with_planned(
     # Answers with those of motions that stay, whose family has proved what it says is feasible.
     if not len(rows):
         return answers
-    others = proved_answers(plan.problem, [motions[i] for i in rows], scene)
+    feeds = _feeds(plan)
+    others = proved_answers(plan.problem, [motions[i] for i in rows], scene, [feeds[i] for i in rows])
     answers = replaced(answers, rows, others, np.arange(len(rows)))
     answers.verdict[rows] = np.where(plan.is_feasible[rows], 0, answers.verdict[rows])
     return answers

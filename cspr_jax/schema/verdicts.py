@@ -32,6 +32,7 @@ class Verdict(enum.IntFlag):
     UNCERTAINTY = 131072
     TOO_FAST = 262144
     OVER_ACCELERATION = 524288
+    OVER_FEED = 1048576
 
     @property
     def text(self) -> str:
@@ -64,6 +65,7 @@ SENTENCES = {
     Verdict.UNCERTAINTY: "Feasible for the robot as it is described, but not for every robot within its uncertainty.",
     Verdict.TOO_FAST: "The mass centre exceeds its largest speed.",
     Verdict.OVER_ACCELERATION: "The mass centre exceeds its largest acceleration.",
+    Verdict.OVER_FEED: "The mass centre exceeds the feed, the F of G-code.",
 }
 
 

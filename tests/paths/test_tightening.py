@@ -14,7 +14,7 @@ from cspr_jax.motions.problem import Problem
 from cspr_jax.paths.discrete import discretes
 from cspr_jax.paths.jumping import jumping_motions
 from cspr_jax.paths.section import SectionSettings
-from cspr_jax.paths.tightening import cell_slacks
+from cspr_jax.paths.tightening import Trial, cell_slacks
 from cspr_jax.paths.timed import timed
 from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.limits import Limits
@@ -51,7 +51,8 @@ def test_bounds_over_cells_hold_the_smallest_slacks(kind):
             timed(path.section, path.grid, motion.run)
             for path, motion in zip(paths, jumping_motions(paths), strict=True)
         ]
-        together, alone = cell_slacks(problem, motions), [cell_slacks(problem, [motion])[0] for motion in motions]
+        trials = [Trial(motion, np.full(len(motion.knots) - 1, np.inf)) for motion in motions]
+        together, alone = cell_slacks(problem, trials), [cell_slacks(problem, [trial])[0] for trial in trials]
     assert len(motions[0].knots) != len(motions[1].knots) or not np.array_equal(motions[0].knots, motions[1].knots)
     for motion, slacks, same in zip(motions, together, alone, strict=True):
         np.testing.assert_allclose(slacks.low, same.low, rtol=1e-9, atol=1e-12)

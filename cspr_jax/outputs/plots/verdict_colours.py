@@ -22,6 +22,7 @@ REASONS = {
     Verdict.CABLE_OVER_ACCELERATION: ("cable acceleration", "#bd9e39"),
     Verdict.TOO_FAST: ("too fast", "#A05195"),
     Verdict.OVER_ACCELERATION: ("acceleration", "#D9B44A"),
+    Verdict.OVER_FEED: ("feed", "#C77CFF"),
     Verdict.UNCERTAINTY: ("not every robot", "#B3CDE3"),
     Verdict.UNDECIDED: ("undecided", "#F0E442"),
     Verdict.NOT_FINITE: ("not finite", "#000000"),
