@@ -170,10 +170,11 @@ def orientations(table: PathTable, count: int) -> np.ndarray | None:
 
 def _through_own(table: PathTable, ends: CourseEnds, folder: Path, axes: FileAxes) -> Course:
     # Course through points of the table, or of its file, and the poses at its ends.
-    units, is_planar = None, False
+    units, is_planar, notes = None, False, list[str]()
     if table.kind == "csv":
         rows = read(folder / str(table.file), has_times=False).in_axes(axes.z_axis)
         points, units, is_planar = rows.positions, rows.quaternions, rows.is_planar
+        notes = [f"{table.file}: {note}" for note in rows.notes]
         if units is not None:
             units = products(units, axes.turning[None])
     else:
@@ -195,7 +196,7 @@ def _through_own(table: PathTable, ends: CourseEnds, folder: Path, axes: FileAxe
     if units is None and ends.first is not None and ends.last is not None:
         s = np.concatenate([[0.0], np.cumsum(chords(points))])
         units = turn(continuous(np.stack([ends.first, ends.last])), s / s[-1])[0]
-    return course_through(table, points, units)._replace(is_planar=is_planar)
+    return course_through(table, points, units)._replace(is_planar=is_planar, notes=notes)
 
 
 def _check_start(place: np.ndarray, unit: np.ndarray | None, ends: CourseEnds, file: str | None) -> None:

@@ -93,7 +93,7 @@ class Paths(Leg):
         return paths, list(motions)
 
     def warnings(self, problem: Problem) -> list[str]:
-        """Words of files that are skipped, ramps that are shorter than asked for; see `Leg.warnings`."""
+        """Notes of files, ramps that are shorter than asked for; see `Leg.warnings`."""
         return self._notes
 
     def _rides(self, problem: Problem, z0: float) -> list[Ride]:

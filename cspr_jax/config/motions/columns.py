@@ -1,66 +1,39 @@
-"""Columns of a table of a motion: their names, units and directives, and what follows for its samples.
+"""Columns of a table of a motion: what each holds, in which unit, and what follows for its samples.
 
-A unit stands in brackets or parentheses behind a name, `x [mm]`, or in a line `# units: mm, deg, ms`. Further
-lines of this kind are `# interpolation: quintic`, `# ends: periodic` and `# z: up`.
+Units stand behind the names (`config.motions.heads`), in a row of their own, or in a line `# units: mm, deg, ms`.
+Further lines of this kind are `# interpolation: quintic`, `# ends: periodic` and `# z: up`.
 """
 
 import dataclasses
 import re
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
+from cspr_jax.config.motions.heads import (
+    ANGLES,
+    GROUPS,
+    KIND_OF,
+    KINDS,
+    LENGTHS,
+    NAMES,
+    NO_UNIT,
+    TIMES,
+    WRITTEN,
+    Head,
+    kind_of_unit,
+    resolved,
+    unit_of,
+)
 from cspr_jax.config.motions.table import POINTS, Z_AXES
 from cspr_jax.config.suggestions import did_you_mean, nearest
 from cspr_jax.config.wording import either
 from cspr_jax.errors import ConfigError, shown
-from cspr_jax.schema.quantities import TRAJECTORY, columns_of
+from cspr_jax.schema.quantities import TRAJECTORY
 
-LENGTHS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "km": 1000.0}
-TIMES = {"s": 1.0, "ms": 0.001, "us": 1e-6, "min": 60.0}
-ANGLES = {"rad": 1.0, "deg": np.pi / 180.0, "°": np.pi / 180.0, "mrad": 0.001}
-# Kinds of columns: their units of length or angle, and by which power of time these are divided.
-_KINDS = {
-    "time": (TIMES, 0),
-    "length": (LENGTHS, 0),
-    "angle": (ANGLES, 0),
-    "number": ({"1": 1.0}, 0),
-    "speed": (LENGTHS, 1),
-    "acceleration": (LENGTHS, 2),
-    "turning": (ANGLES, 1),
-    "turning change": (ANGLES, 2),
-}
-# Groups of columns; `MotionTable` has a field for each, but for the two that become quaternions.
-GROUPS = {
-    "times": (("t",), "time"),
-    "positions": (("x", "y", "z"), "length"),
-    "quaternions": (("qw", "qx", "qy", "qz"), "number"),
-    "rotations": (("roll", "pitch", "yaw"), "angle"),
-    "tilts": (("tilt_phi", "tilt_theta", "tilt_sigma"), "angle"),
-    "velocities": (("vx", "vy", "vz"), "speed"),
-    "accelerations": (("ax", "ay", "az"), "acceleration"),
-    "angular_velocities": (("wx", "wy", "wz"), "turning"),
-    "angular_accelerations": (("wdx", "wdy", "wdz"), "turning change"),
-}
-NAMES = tuple(name for names, _ in GROUPS.values() for name in names)
-_KIND_OF = {name: kind for names, kind in GROUPS.values() for name in names}
-# The names of this program's own tables.
-_WRITTEN = {
-    "position": "positions",
-    "quaternion": "quaternions",
-    "velocity": "velocities",
-    "acceleration": "accelerations",
-    "omega": "angular_velocities",
-    "omega_dot": "angular_accelerations",
-}
-_SYNONYMS = {"time": "t"} | {
-    head: name
-    for written, group in _WRITTEN.items()
-    for head, name in zip(columns_of(written, len(GROUPS[group][0])), GROUPS[group][0], strict=True)
-}
 # Columns that this program writes beside the motion.
-_BESIDE = re.compile(rf"(?:{'|'.join(sorted(TRAJECTORY.keys() - _WRITTEN.keys() - {'t'}))})(?:_\w+)?|feasible")
-_HEAD = re.compile(r"^(.*?)\s*(?:\[(.*)\]|\((.*)\))?$", re.DOTALL)
+_BESIDE = re.compile(rf"(?:{'|'.join(sorted(TRAJECTORY.keys() - WRITTEN.keys() - {'t'}))})(?:_\w+)?|feasible")
 # Without a header, columns stand in the order of these.
 PLAIN = {
     3: ("t", "x", "z"),
@@ -76,6 +49,8 @@ _VALUES = {
     "z": Z_AXES,
 }
 DIRECTIVES = (*_VALUES, "units")
+MOST_LISTED = 24  # columns in a message
+MOST_SUGGESTIONS = 5  # columns that are not read, each of which gets a line
 
 
 @dataclasses.dataclass(frozen=True)
@@ -88,6 +63,8 @@ class MotionColumns:
         factors: (columns,) from the units of the file to SI.
         is_written: whether this program wrote the table, in which legs meet in two rows of one time.
         notes: lines for the user.
+        is_named: whether anything names the columns.
+        has_time_unit: whether anything says the unit of times.
     """
 
     names: tuple[str, ...]
@@ -95,6 +72,8 @@ class MotionColumns:
     factors: np.ndarray
     is_written: bool
     notes: tuple[str, ...] = ()
+    is_named: bool = True
+    has_time_unit: bool = False
 
     def has(self, group: str) -> bool:
         """Tell whether the table has columns of a group of `GROUPS`.
@@ -139,7 +118,7 @@ def directives(comments: list[tuple[int, str]], path: Path) -> dict[str, str]:
     values: dict[str, str] = {}
     for line, text in comments:
         name, mark, value = (part.strip().lower() for part in text.partition(":"))
-        name = "z" if name == "z_axis" else name
+        name = {"z_axis": "z", "unit": "units"}.get(name, name)
         if not mark or name not in DIRECTIVES:
             continue
         if name != "units" and value not in _VALUES[name]:
@@ -151,70 +130,119 @@ def directives(comments: list[tuple[int, str]], path: Path) -> dict[str, str]:
 
 
 def columns(
-    heads: list[str] | None, count: int, units: str, path: Path, line: int, *, has_times: bool = True
+    heads: list[str] | None,
+    count: int,
+    units: str,
+    path: Path,
+    line: int,
+    *,
+    has_times: bool = True,
+    own_units: dict[int, str] | None = None,
+    notes: Iterable[str] = (),
 ) -> MotionColumns:
     """Columns of a table.
 
     Args:
-        heads: names in its header line; None: it has none.
+        heads: names of its columns; None: nothing names them.
         count: of values in a row.
         units: that its directive names, such as "mm, deg, ms".
         path: named in errors.
-        line: of the header, or of the first row.
+        line: of the names, or of the first row.
         has_times: whether the table is that of a motion, and not of a path.
+        own_units: of a row of units, by the numbers of their columns.
+        notes: lines for the user, with which the columns' own go.
 
     Returns:
         the columns.
 
     Raises:
         ConfigError: missing columns, one that stands twice, units that are unknown, or a number of columns that says
-            nothing without a header.
+            nothing without names.
     """
-    common = _common(units, path)
+    common, plain = _common(units, path), PLAIN if has_times else PLAIN_PATH
+    if heads is None and count not in plain:
+        counts, words = ", ".join(map(str, plain)), "t, x, y, z, ..." if has_times else "x, y, z, ..."
+        raise ConfigError(
+            path, f"line {line}: {count} columns without a header: must be {counts}, or name them: {words}"
+        )
+    parts, placed = ([Head(name, "") for name in plain[count]], {}) if heads is None else taken(heads, has_times)
+    texts = list(plain[count]) if heads is None else heads
+    names, factors = list[str](), list[float]()
+    for column, (name, unit) in enumerate(parts):
+        place, other = f"line {line}, column {column + 1}", (own_units or {}).get(column, "")
+        if name and name in names:
+            raise ConfigError(path, f"{place}: {shown(texts[column])} stands twice: must stand once")
+        if name and not {unit, other}.intersection(NO_UNIT) and unit_of(unit) != unit_of(other):
+            raise ConfigError(path, f"{place}: units {shown(unit)} and {shown(other)}: must be one")
+        names.append(name)
+        factors.append(_factor(name, other if unit in NO_UNIT else unit, common, place, path) if name else 1.0)
+    is_written = "position_x" in texts and "velocity_x" in texts
+    lines = [*notes, *_unread(texts, names)]
+    if placed:
+        words = ", ".join(f"{shown(texts[k])} as {name}" for k, name in placed.items())
+        lines.insert(0, f"columns taken by unit and position: {words}")
     if heads is None:
-        plain = PLAIN if has_times else PLAIN_PATH
-        if count not in plain:
-            counts, words = ", ".join(map(str, plain)), "t, x, y, z, ..." if has_times else "x, y, z, ..."
-            raise ConfigError(
-                path, f"line {line}: {count} columns without a header: must be {counts}, or name them: {words}"
-            )
-        heads = list(plain[count])
-    names, factors, notes = list[str](), list[float](), list[str]()
-    for column, head in enumerate(heads):
-        name, unit = _parted(head)
-        known = name in _KIND_OF
-        if known and name in names:
-            raise ConfigError(path, f"line {line}, column {column + 1}: {shown(head)} stands twice: must stand once")
-        names.append(name if known else "")
-        factors.append(_factor(name, unit, common, f"line {line}, column {column + 1}", path) if known else 1.0)
-        if not known and head and not _BESIDE.fullmatch(head):
-            near = nearest(name, [other for other in NAMES if other not in names])
-            question = f"did you mean {near}? " if near else ""
-            notes.append(f"column {shown(head)} is not read: {question}known: {', '.join(NAMES)}")
-    is_written = "position_x" in heads and "velocity_x" in heads
-    result = MotionColumns(tuple(names), tuple(heads), np.array(factors), is_written, tuple(notes))
+        lines.insert(0, f"no line names its columns: taken as {_described(parts, own_units or {}, common)}")
+    stamps = [k for k, name in enumerate(names) if name == "t"]
+    has_time_unit = any(unit_of(word) in TIMES for word in re.split(r"[,;\s]+", units))
+    has_time_unit |= any({parts[k].unit, (own_units or {}).get(k, "")}.difference(NO_UNIT) for k in stamps)
+    result = MotionColumns(
+        tuple(names), tuple(texts), np.array(factors), is_written, tuple(lines), heads is not None, has_time_unit
+    )
     _check(result, path, line, has_times)
     return result
 
 
-def _parted(head: str) -> tuple[str, str]:
-    parts = _HEAD.match(head.strip().strip("\"'").strip())
-    if parts is None:
-        return head, ""
-    name = parts[1].strip().lower()
-    unit = (parts[2] or parts[3] or "").strip().lower()
-    for ending in (*TIMES, *LENGTHS, *ANGLES):
-        stem = name.removesuffix(f"_{ending}")
-        if stem != name and not unit and _SYNONYMS.get(stem, stem) in _KIND_OF:
-            name, unit = stem, ending
-    return _SYNONYMS.get(name, name), unit
+def taken(heads: list[str], has_times: bool) -> tuple[list[Head], dict[int, str]]:
+    """Names and units of heads; and the names, by the numbers of columns, that units and positions alone give.
+
+    The one column of times has another name, or columns stand in the order of `PLAIN` and all have units.
+    """
+    parts, plain = resolved(heads), (PLAIN if has_times else PLAIN_PATH).get(len(heads), ())
+    names, placed = [part.name for part in parts], dict[int, str]()
+    timed = [k for k, part in enumerate(parts) if not part.name and kind_of_unit(part.unit) == "time"]
+    if has_times and "t" not in names and len(timed) == 1:
+        names[timed[0]] = placed[timed[0]] = "t"
+    free = {k: name for k, name in enumerate(plain) if not names[k]}
+    # A number in a name may be that of a cable.
+    fits = [
+        kind_of_unit(parts[k].unit) == KIND_OF[name] and not re.search(r"\d", heads[k].split("[")[0].split("(")[0])
+        for k, name in free.items()
+    ]
+    if all(fits) and all(k in free or names[k] == name for k, name in enumerate(plain)):
+        placed |= free
+    return [part._replace(name=placed.get(k, part.name)) for k, part in enumerate(parts)], placed
+
+
+def _unread(heads: list[str], names: list[str]) -> list[str]:
+    # Lines about columns that are not read, with suggestions for the first few.
+    unread = [
+        head for head, name in zip(heads, names, strict=True) if not name and head and not _BESIDE.fullmatch(head)
+    ]
+    lines = []
+    for k, head in enumerate(unread[:MOST_SUGGESTIONS]):
+        near = nearest(head.partition("[")[0].strip().lower(), [other for other in NAMES if other not in names])
+        question = f"did you mean {near}? " if near else ""
+        known = f"known: {', '.join(NAMES)}" if not k else "known: as above"
+        lines.append(f"column {shown(head)} is not read: {question}{known}")
+    more = len(unread) - MOST_SUGGESTIONS
+    return lines + ([f"{more} more column{'s are' if more > 1 else ' is'} not read"] if more > 0 else [])
+
+
+def _described(parts: list[Head], own_units: dict[int, str], common: dict[int, str]) -> str:
+    # Names with units, as a note says how columns without names were taken.
+    words = []
+    for k, (name, _) in enumerate(parts):
+        unit = unit_of(own_units.get(k, "")) or common.get(id(KINDS[KIND_OF[name]][0]), "")
+        words.append(f"{name} [{unit}]" if unit else name)
+    return ", ".join(words) + (" (scalar first)" if "qw" in words else "")
 
 
 def _common(units: str, path: Path) -> dict[int, str]:
     # Units of the directive, by the table that each is of.
     common = {id(TIMES): "s", id(LENGTHS): "m", id(ANGLES): "rad"}
     said: set[int] = set()
-    for word in filter(None, re.split(r"[,;\s]+", units)):
+    for word in map(unit_of, filter(None, re.split(r"[,;\s]+", units))):
         table = next((table for table in (LENGTHS, ANGLES, TIMES) if word in table), None)
         if table is None:
             raise ConfigError(path, f"units = {shown(word)}: must be {either((*LENGTHS, *ANGLES, *TIMES))}")
@@ -226,12 +254,12 @@ def _common(units: str, path: Path) -> dict[int, str]:
 
 
 def _factor(name: str, unit: str, common: dict[int, str], place: str, path: Path) -> float:
-    table, power = _KINDS[_KIND_OF[name]]
+    table, power = KINDS[KIND_OF[name]]
     if id(table) not in common:
         return 1.0
-    if not unit:
+    if unit in NO_UNIT:
         return table[common[id(table)]] / TIMES[common[id(TIMES)]] ** power
-    above, _, below = unit.replace("²", "^2").replace(" ", "").partition("/")
+    above, _, below = unit_of(unit).replace(" ", "").partition("/")
     below = below.replace("^", "").removesuffix(str(power)) if power > 1 else below
     if above not in table or bool(below) != bool(power) or (below and below not in TIMES):
         ending = {0: "", 1: "/s", 2: "/s^2"}[power]
@@ -256,10 +284,12 @@ def _check(result: MotionColumns, path: Path, line: int, has_times: bool) -> Non
             if needed:
                 unread = [head for head, name in zip(result.heads, result.names, strict=True) if not name and head]
                 question = did_you_mean(needed[0], unread)
+                plain = (PLAIN if has_times else PLAIN_PATH).get(len(result.heads), ())
+                called = f", which would have to be called {', '.join(plain)}" if plain and unread else ""
                 raise ConfigError(
                     path,
                     f"{place}: no column {needed[0]}: {question}must have {', '.join(names)}, found "
-                    f"{shown(', '.join(result.heads))}",
+                    f"{_listed(result.heads)}{called}",
                 )
     kinds = [group for group in ("quaternions", "rotations", "tilts") if result.has(group)]
     if len(kinds) > 1:
@@ -269,3 +299,9 @@ def _check(result: MotionColumns, path: Path, line: int, has_times: bool) -> Non
         raise ConfigError(path, f"{place}: column ax without vx: accelerations need velocities beside them")
     if not kinds and (result.has("angular_velocities") or result.has("angular_accelerations")):
         raise ConfigError(path, f"{place}: columns of angular rates: must be beside an orientation, such as qw to qz")
+
+
+def _listed(heads: tuple[str, ...]) -> str:
+    # All columns that were found, as far as a line has room.
+    words = ", ".join(shown(head) for head in heads[:MOST_LISTED])
+    return words + (f" and {len(heads) - MOST_LISTED} more" if len(heads) > MOST_LISTED else "")

@@ -7,6 +7,7 @@ from cspr_jax.config.motions.table import MotionTable
 FAR = 30.0  # sizes of the robot; farther motions are probably in other units
 # Motions of so many rows at whole numbers of seconds are probably in milliseconds, or without units.
 MANY = 50
+CLOSER = 100.0  # times closer than others in the median are stamps that nearly repeat
 
 
 def unit_hints(table: MotionTable, base_points: np.ndarray) -> list[str]:
@@ -34,3 +35,14 @@ def unit_hints(table: MotionTable, base_points: np.ndarray) -> list[str]:
             "Then say so: # units: ms"
         )
     return lines
+
+
+def near_repeat(times: np.ndarray) -> tuple[int, float] | None:
+    """Index of the first of two stamps that nearly repeat, and by how much their step is shorter than the median."""
+    steps = np.diff(times)
+    steps = np.where(steps > 0.0, steps, np.inf)
+    if len(steps) < 4:
+        return None
+    i, median = int(np.argmin(steps)), float(np.median(steps))
+    first = int(np.argmax(steps * CLOSER < median))
+    return (first, median / float(steps[first])) if steps[i] * CLOSER < median < np.inf else None

@@ -15,7 +15,11 @@ from pathlib import Path
 import numpy as np
 
 from cspr_jax.config.formats.model import LARGEST_NUMBER
-from cspr_jax.config.motions.columns import MotionColumns, columns, directives
+from cspr_jax.config.motions.columns import MotionColumns
+from cspr_jax.config.motions.heads import TIMES
+from cspr_jax.config.motions.hints import near_repeat
+from cspr_jax.config.motions.preamble import Preamble, cells_of, has_content, is_number, number_of
+from cspr_jax.config.motions.stamps import Stamps, unit_of_stamps
 from cspr_jax.config.motions.table import MotionTable
 from cspr_jax.config.reading import decoded, opened
 from cspr_jax.config.suggestions import look_alike
@@ -30,6 +34,9 @@ OVERLAP = 100
 # Lengths of quaternions that are taken for unit ones, that are normalised with a note, and that are refused beyond.
 UNIT, SHORTEST, LONGEST = 1e-3, 0.5, 2.0
 MEETING = 1e-6  # share of the size of a motion by which its legs may miss each other
+
+_COMMENT_LINE = re.compile(r"^[ \t]*%.*$", re.MULTILINE)
+_EMPTY_LINE = re.compile(r"^[,;\t ]+$", re.MULTILINE)
 
 
 class TooLongError(ConfigError):
@@ -105,28 +112,40 @@ class _Reader:
         self.path, self.has_times = path, has_times
         self.notes: dict[str, None] = {}
         self.previous: np.ndarray | None = None
+        self.preamble = Preamble(path, has_times)
         self.columns: MotionColumns
-        self.directives: dict[str, str] = {}
         self.delimiter: str | None = None
-        self.has_tail = False
-        self.unread_text: dict[int | str, Callable[[str], float]] | None = None  # columns of text, which are not read
+        self.stamps = Stamps()
+        self.is_close = False  # whether a stamp that nearly repeats was told
+        self.converters: dict[int | str, Callable[[str], float]] = {}
 
     def blocks(self) -> Iterator[np.ndarray]:
         # Rows (n, columns) in the units of the file, checked.
-        head: str | None = ""
+        is_above = True
         for line, text in _texts(self.path):
             start, body = line, text
-            if head is not None:
-                head += text
-                if not any(_has_content(row) for row in head.split("\n")):
-                    continue  # comments alone so far
-                start, body = self._begin(head)
-                head = None
+            if not text.strip(" \t,;\n"):
+                continue
+            if is_above:
+                above = self._above(text, line)
+                if above is None:
+                    continue
+                is_above, start, body = False, line + above, text.split("\n", above)[-1]
+                self._begin(body)
             rows = self._numbers(body, start)
             if len(rows):
                 self._check(rows, body, start)
                 self.previous = rows[-1]
                 yield rows
+        if is_above:
+            self.preamble.end()
+
+    def _above(self, text: str, line: int) -> int | None:
+        # Count of the lines above the first row; None: all of them.
+        for k, row in enumerate(text.split("\n")):
+            if not self.preamble.takes(line + k, row):
+                return k
+        return None
 
     def table(self, rows: np.ndarray) -> MotionTable:
         values, names = self.columns.values, ("velocities", "accelerations")
@@ -151,75 +170,88 @@ class _Reader:
             notes=tuple(self.notes),
         )
 
-    def _begin(self, text: str) -> tuple[int, str]:
-        # Read comments and header of the first block; return the number of the next line, and the text from there on.
-        rows = text.split("\n")
-        filled = [number for number, row in enumerate(rows, 1) if _has_content(row)]
-        line = filled[0]
-        content = rows[line - 1].strip()
-        # Comments of this program stand between the names of the columns and the first row.
-        head = rows[: filled[1] - 1] if len(filled) > 1 else rows
-        # Spreadsheets fill them with empty cells.
-        texts = [(number, row.strip(",;\t ").lstrip("# ")) for number, row in enumerate(head, 1) if number != line]
-        self.directives = directives([pair for pair in texts if pair[1]], self.path)
-        self.delimiter = next((mark for mark in ";\t," if mark in content), None)
-        self.has_tail = self.delimiter is not None and content.endswith(self.delimiter)
-        heads = self._cells(content)
-        has_header = not all(_is_number(cell) for cell in heads)
-        names, units = heads if has_header else None, self.directives.get("units", "")
-        self.columns = columns(names, len(heads), units, self.path, line, has_times=self.has_times)
+    def _begin(self, text: str) -> None:
+        # Take over what stands above the rows, and how the first row is to be read.
+        self.columns, self.delimiter = self.preamble.columns, self.preamble.delimiter
+        self.directives = self.preamble.directives
         self.notes |= dict.fromkeys(self.columns.notes)
-        return line + has_header, "\n".join(rows[line - 1 + has_header :])
+        cells = self._cells(text.partition("\n")[0])
+        pairs = zip(self.columns.names, cells, strict=False)
+        self.converters = {k: _zero for k, (name, cell) in enumerate(pairs) if not name and not is_number(cell)}
+        if self.has_times:
+            self._begin_times(cells)
+
+    def _begin_times(self, cells: list[str]) -> None:
+        column = self.columns.names.index("t")
+        cell = cells[column].replace(",", ".") if column < len(cells) else ""
+        unit = None if self.columns.has_time_unit else unit_of_stamps(cell)
+        if unit is not None:
+            factors = self.columns.factors.copy()
+            factors[column] = TIMES[unit]
+            self.columns = dataclasses.replace(self.columns, factors=factors)
+            self.notes[f"times have no unit: taken as stamps since 1970 in {unit}"] = None
+        self.stamps = Stamps(cell)
+        if self.stamps.offset:
+            self.converters[column] = self.stamps.since
 
     def _cells(self, text: str) -> list[str]:
-        text = text.split("#")[0].strip(" \n")
-        if self.has_tail:
-            text = text.removesuffix(self.delimiter or "")
-        cells = [cell.strip().strip('"').strip() for cell in text.split(self.delimiter)]
-        return cells
+        cells = cells_of(text, self.delimiter)
+        spare = min(self.preamble.tail, max(len(cells) - len(self.columns.names), 0))
+        return cells[: len(cells) - spare] if spare and not any(cells[len(cells) - spare :]) else cells
 
     def _numbers(self, text: str, line: int) -> np.ndarray:
-        if self.unread_text is None:
-            sample = next((row for row in text.split("\n") if _has_content(row)), None)
-            if sample is None:
-                return np.empty((0, 0))
-            pairs = list(zip(self.columns.names, self._cells(sample), strict=False))
-            self.unread_text = {k: _zero for k, (name, cell) in enumerate(pairs) if not name and not _is_number(cell)}
         plain = text.replace(",", ".") if self.delimiter in (";", "\t") else text
-        if self.has_tail:
-            plain = re.sub(rf"{re.escape(str(self.delimiter))}[ \t]*$", "", plain, flags=re.MULTILINE)
+        if "%" in plain:
+            plain = _COMMENT_LINE.sub("", plain)
+        if self.delimiter is not None:
+            plain = _EMPTY_LINE.sub("", plain)
+        if self.preamble.tail:
+            mark = re.escape(str(self.delimiter))
+            plain = re.sub(rf"(?:{mark} *){{1,{self.preamble.tail}}}$", "", plain, flags=re.MULTILINE)
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", UserWarning)  # of a block without rows
-                rows = np.loadtxt(
-                    io.StringIO(plain),
-                    delimiter=self.delimiter,
-                    ndmin=2,
-                    quotechar='"',
-                    converters=self.unread_text or None,
-                )
+            rows = self._loaded(plain)
         except ValueError as error:
             self._refuse(text, line)
-            raise ConfigError(self.path, f"its rows cannot be read: {str(error).splitlines()[0]}"[:300]) from error
+            # Columns that are not read may turn to text further down.
+            unread: dict[int | str, Callable[[str], float]] = {
+                k: _zero for k, name in enumerate(self.columns.names) if not name
+            }
+            if len(unread) == len(self.converters.keys() & unread.keys()):
+                raise ConfigError(self.path, f"its rows cannot be read: {str(error).splitlines()[0]}"[:300]) from error
+            self.converters |= unread
+            return self._numbers(text, line)
         if rows.size and rows.shape[1] != len(self.columns.names):
             self._refuse(text, line)
         return rows
 
+    def _loaded(self, plain: str) -> np.ndarray:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of a block without rows
+            return np.loadtxt(
+                io.StringIO(plain),
+                delimiter=self.delimiter,
+                ndmin=2,
+                quotechar='"',
+                converters=self.converters or None,
+                encoding=None,
+            )
+
     def _refuse(self, text: str, line: int) -> None:
         # Raise an error for the first row that is at fault.
         heads = self.columns.heads
-        for number, row in enumerate(text.split("\n"), line):
-            if not _has_content(row):
+        for row_number, row in enumerate(text.split("\n"), line):
+            if not has_content(row):
                 continue
             cells = self._cells(row)
             if len(cells) != len(heads):
                 raise ConfigError(
-                    self.path, f"line {number}: {len(cells)} values: must be {len(heads)}, as in the header"
+                    self.path, f"line {row_number}: {len(cells)} values: must be {len(heads)}, as in the header"
                 )
             for k, (name, cell) in enumerate(zip(self.columns.names, cells, strict=True)):
                 is_split = "," in cell and self.delimiter not in (";", "\t")
-                if name and (is_split or not abs(_number(cell)) <= LARGEST_NUMBER):
-                    place = f"line {number}, column {k + 1}: {name}"
+                number = number_of(cell) if name != "t" else number_of(cell) - float(self.stamps.offset)
+                if name and (is_split or not abs(number) <= LARGEST_NUMBER):
+                    place = f"line {row_number}, column {k + 1}: {name}"
                     odd = ", without a comma" if is_split else look_alike(cell[:100])
                     raise ConfigError(self.path, f"{place} = {shown(cell)}: must be a finite number{odd}")
 
@@ -233,27 +265,50 @@ class _Reader:
         quaternions = self.columns.values("quaternions", rows)
         if quaternions is not None:
             self._check_lengths(quaternions, text, line)
+            if self.previous is None and not self.columns.is_named:
+                self._note_scalar(quaternions)
         for group in ("rotations", "tilts"):
             angles = self.columns.values(group, rows)
             if angles is not None and np.abs(angles).max() > 2.0 * math.pi + 1e-3:
                 reach = np.abs(angles).max()
                 self.notes[f"angles reach {reach:.4g} rad: are they degrees? Then say so: # units: deg"] = None
 
+    def _note_scalar(self, quaternions: np.ndarray) -> None:
+        first, *_, last = np.abs(quaternions).mean(axis=0)
+        if last > first:
+            names = ("t, " if self.has_times else "") + "x, y, z, qx, qy, qz, qw"
+            self.notes[
+                "hint: the last column looks like the scalar part of quaternions, which are taken scalar first: if it "
+                f"is, name the columns: {names}"
+            ] = None
+
     def _check_times(self, chain: np.ndarray, before: int, text: str, line: int) -> None:
-        steps = np.diff(chain[:, self.columns.names.index("t")])
+        column = self.columns.names.index("t")
+        steps = np.diff(chain[:, column])
         late = np.flatnonzero(steps < 0.0 if self.columns.is_written else steps <= 0.0)
         if len(late):
             self._refuse_time(chain, int(late[0]), before, text, line)
+        found = None if self.columns.is_written or self.is_close else near_repeat(chain[:, column])
+        if found is not None:
+            self.is_close, (i, factor) = True, found
+            number, stamp = _line_of(text, line, i + 1 - before), self._stamp(chain[i + 1])
+            self.notes[
+                f"line {number}: hint: t = {stamp} nearly repeats the time before it: the step is {factor:.2g} times "
+                "shorter than others, and what differs between the two rows is a jump: leave out one of them"
+            ] = None
         if self.columns.is_written:
             self._check_joins(chain, steps, before, text, line)
 
     def _refuse_time(self, chain: np.ndarray, i: int, before: int, text: str, line: int) -> None:
         number = _line_of(text, line, i + 1 - before)
-        earlier, later = (float(t) for t in chain[i : i + 2, self.columns.names.index("t")])
+        earlier, later = self._stamp(chain[i]), self._stamp(chain[i + 1])
         words = "times repeat" if earlier == later else "rows are out of order"
         raise ConfigError(
-            self.path, f"line {number}: t = {later!r}: {words}: must be more than {earlier!r}, the time before it"
+            self.path, f"line {number}: t = {later}: {words}: must be more than {earlier}, the time before it"
         )
+
+    def _stamp(self, row: np.ndarray) -> str:
+        return self.stamps.shown(float(row[self.columns.names.index("t")]))
 
     def _check_joins(self, chain: np.ndarray, steps: np.ndarray, before: int, text: str, line: int) -> None:
         # Legs meet in two rows of one time; only their accelerations may differ.
@@ -327,21 +382,6 @@ def _plain(data: bytes, path: Path, line: int) -> str:
     return text
 
 
-def _is_number(cell: str) -> bool:
-    return not math.isnan(_number(cell)) or cell.strip().lower().lstrip("+-") == "nan"
-
-
-def _number(cell: str) -> float:
-    try:
-        return float(cell.replace(",", ".")) if cell.isascii() and "_" not in cell else math.nan
-    except ValueError:
-        return math.nan
-
-
-def _has_content(row: str) -> bool:
-    return bool(row.split("#")[0].strip())
-
-
 def _zero(cell: str) -> float:
     return 0.0
 
@@ -350,7 +390,7 @@ def _line_of(text: str, line: int, row: int) -> int:
     # Number of the line of a row of a block.
     count = -1
     for number, content in enumerate(text.split("\n"), line):
-        count += _has_content(content)
+        count += has_content(content)
         if count == row:
             return number
     return line

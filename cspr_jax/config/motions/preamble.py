@@ -1,0 +1,310 @@
+"""What stands above the rows of a table: names of columns, units, directives and comments, each line looked at once.
+
+Names are a line of their own, or else the last comment above the rows that has a name for each column. Where comments
+speak of columns in another way, a line says so, and rows that they contradict are refused.
+"""
+
+import csv
+import math
+import re
+from pathlib import Path
+
+from cspr_jax.config.motions.columns import PLAIN, PLAIN_PATH, MotionColumns, columns, directives, taken
+from cspr_jax.config.motions.heads import NO_UNIT, is_unit, kind_of_unit, mentioned, units_within
+from cspr_jax.errors import ConfigError, shown
+
+MARKS = ("#", "%")
+SEPARATORS = (";", "\t", ",")
+MOST_COLUMNS = 1000
+LARGEST_COMMENTS = 1 << 18  # letters of comments above the rows
+MOST_HINTS = 3  # lines about comments
+LONGEST_COMMENT = 1 << 16  # letters of one that may name columns
+_SEPARATOR_LINE = re.compile(r"\"?sep=(.)\"?[,;\t ]*", re.IGNORECASE)
+# A word and the unit in brackets behind it, or a unit alone.
+_BLANK_SEPARATED = re.compile(r"[^\s\[(]*\s*\[[^\]]*\]|[^\s\[(]*\s*\([^)]*\)|\S+")
+_COMMENT_BEHIND = re.compile(r"\s#")
+_OF_COLUMNS = re.compile(r"\b(units?|times?|positions?|lengths?|distances?|coordinates?|angles?)\b")
+_PLAIN_NUMBER = re.compile(r"[-+]?[0-9.,]+(e[-+]?[0-9]+)?|[-+]?(nan|inf|infinity)", re.IGNORECASE)
+
+
+class Preamble:
+    """Lines above the rows of a table, fed one after another up to the first row."""
+
+    def __init__(self, path: Path, has_times: bool) -> None:
+        self.path, self.has_times = path, has_times
+        self.delimiter: str | None = None
+        self.tail = 0  # empty cells at the end of each row, as spreadsheets write them
+        self.directives: dict[str, str] = {}
+        self.columns: MotionColumns
+        self._comments: list[tuple[int, str]] = []
+        self._size = 0
+        self._names: tuple[int, str] | None = None
+        self._units: tuple[int, list[str]] | None = None
+
+    def takes(self, line: int, row: str) -> bool:
+        """Take a line; or tell by False that it is the first row, with which the columns are known.
+
+        Raises:
+            ConfigError: columns that are missing, ambiguous or too many.
+        """
+        if is_comment(row):
+            self._size += len(row)
+            if self._size > LARGEST_COMMENTS:
+                raise ConfigError(
+                    self.path, f"line {line}: more than {LARGEST_COMMENTS} letters of comments: must be above fewer"
+                )
+            self._comments.append((line, row.strip(' \t"').rstrip(",;").lstrip("#%! \t")))
+            return True
+        if not has_content(row):
+            return True
+        if self._names is None and self._units is None:
+            return self._first(line, row)
+        if self._units is None and self._is_row_of_units(row):
+            self._units = (line, cells_of(row, self.delimiter))
+            return True
+        self._finish(row)
+        return False
+
+    def end(self) -> None:
+        """Check the names of a table without rows.
+
+        Raises:
+            ConfigError: columns that are missing, ambiguous or too many.
+        """
+        if self._names is not None:
+            self._finish(None)
+
+    def _first(self, line: int, row: str) -> bool:
+        said = _SEPARATOR_LINE.fullmatch(row.strip(" \n"))
+        if said is not None:
+            self.delimiter = said[1]
+            return True
+        cells = cells_of(row, self._delimiter_of(row))
+        while len(cells) > 1 and not cells[-1]:
+            cells.pop()
+        is_row = all(is_number(cell) for cell in cells)
+        if is_row or (any(is_number(cell) for cell in cells) and self._names_row(cells)):
+            self._finish(row, line)
+            return False
+        self._names = (line, row)
+        return True
+
+    def _delimiter_of(self, row: str) -> str | None:
+        if self.delimiter is not None and self.delimiter in row:
+            return self.delimiter
+        return next((mark for mark in SEPARATORS if mark in row), None)
+
+    def _names_row(self, cells: list[str]) -> bool:
+        # Tell whether comments name the columns of a row that has text too, in columns that are not read.
+        _, heads = self._named_by_comment(len(cells))
+        if heads is None:
+            return False
+        parts, _ = taken(heads, self.has_times)
+        return all(is_number(cell) for cell, part in zip(cells, parts, strict=True) if part.name)
+
+    def _is_row_of_units(self, row: str) -> bool:
+        names = self._names[1] if self._names is not None else ""
+        self._set_delimiter(names, row)
+        heads, cells = self._heads(names), cells_of(row, self.delimiter)
+        if len(cells) > len(heads) or any(is_number(cell) and cell not in NO_UNIT for cell in cells):
+            return False
+        return _are_units(cells, [part.name for part in taken(heads, self.has_times)[0]])
+
+    def _set_delimiter(self, names: str | None, row: str | None) -> None:
+        # Rows may have another separator than the names above them.
+        first = names if names is not None else row
+        delimiter = self._delimiter_of(first or "")
+        if names is not None and row is not None and (delimiter is None or delimiter not in row):
+            own = self._delimiter_of(row)
+            if own != delimiter and len(cells_of(row, own)) == len(_split(names, delimiter)):
+                delimiter = own
+        self.delimiter = delimiter
+
+    def _heads(self, names: str) -> list[str]:
+        text = _COMMENT_BEHIND.split(names)[0].strip(" \n")
+        is_inside = self.delimiter is not None and self.delimiter in text
+        return _split(text, self.delimiter if is_inside else _separator_of(text))
+
+    def _finish(self, row: str | None, line: int = 0) -> None:
+        self.directives = directives(self._comments, self.path)
+        names = None if self._names is None else self._names[1]
+        self._set_delimiter(names, row)
+        cells = [] if row is None else cells_of(row, self.delimiter)
+        heads = None if names is None else self._heads(names)
+        empty = _empty_at_end(cells)
+        if heads is not None:
+            line, spare = self._names[0], _empty_at_end(heads)  # type: ignore[index]
+            heads = heads[: len(heads) - spare]
+            # Empty cells of columns with a name are values that are missing.
+            self.tail = max(spare, min(empty, len(cells) - len(heads)))
+        else:
+            self.tail = empty
+        count = len(cells) - self.tail if heads is None else len(heads)
+        if count > MOST_COLUMNS:
+            raise ConfigError(self.path, f"line {line}: {count} columns: must be at most {MOST_COLUMNS}")
+        named, own = line, heads
+        if heads is None:
+            named, own = self._named_by_comment(count)
+        units = {} if self._units is None else dict(enumerate(self._units[1]))
+        units = units or self._commented_units(count, own)
+        notes = self._refuse_contradictions(count, heads is None, own is None, bool(units), own or [])
+        common = self.directives.get("units", "")
+        self.columns = columns(
+            own, count, common, self.path, named or line, has_times=self.has_times, own_units=units, notes=notes
+        )
+
+    def _named_by_comment(self, count: int) -> tuple[int, list[str] | None]:
+        # Number and heads of the last comment that has a name for each column.
+        for line, text in reversed(self._comments):
+            for heads in _readings(text, count):
+                names = {part.name for part in taken(heads, self.has_times)[0]}
+                needed = ("t", "x", "z") if self.has_times else ("x", "z")
+                if names.issuperset(needed) and not _are_units(heads, heads):
+                    return line, heads
+        return 0, None
+
+    def _commented_units(self, count: int, heads: list[str] | None) -> dict[int, str]:
+        # Units of the last comment that has nothing but one for each column, or the names of a header with units.
+        plain = (PLAIN if self.has_times else PLAIN_PATH).get(count, ())
+        names = list(plain) if heads is None else [part.name for part in taken(heads, self.has_times)[0]]
+        if len(names) != count:
+            return {}
+        for _, text in reversed(self._comments):
+            for words in _readings(text, count):
+                if _are_units(words, names):
+                    return dict(enumerate(words))
+                parts = taken(words, self.has_times)[0]
+                if heads is not None and {part.name for part in parts} == set(names):
+                    units = {part.name: part.unit for part in parts}
+                    return {k: units[name] for k, name in enumerate(names)}
+        return {}
+
+    def _refuse_contradictions(
+        self, count: int, is_bare: bool, is_unnamed: bool, has_units: bool, heads: list[str]
+    ) -> list[str]:
+        # Comments that speak of columns or units where nothing says it in a way that is read; notes about others.
+        free = [(line, text) for line, text in self._comments if len(text) <= LONGEST_COMMENT and not _is_said(text)]
+        plain = (PLAIN if self.has_times else PLAIN_PATH).get(count, ())
+        spoken = [(line, text, mentioned(text)) for line, text in free]
+        if is_unnamed:
+            for line, text, names in spoken:
+                if len({*names}) >= 2 and not _in_order(names, plain) and _readings(text, count):
+                    self._refuse_names(line, text, names, plain)
+            everything = [name for _, _, names in spoken for name in names]
+            if len({*everything}) >= 3 and not _in_order(everything, plain):
+                line, text, _ = next(entry for entry in spoken if entry[2])
+                self._refuse_names(line, text, everything, plain)
+        notes = [
+            f"line {line}: hint: a comment speaks of {', '.join(dict.fromkeys(names))}: {shown(text)}"
+            for line, text, names in spoken
+            if names and is_unnamed
+        ][:MOST_HINTS]
+        if has_units or "units" in self.directives or any(kind_of_unit(part.unit) for part in taken(heads, True)[0]):
+            return notes
+        for line, text, names in spoken:
+            units = units_within(text)
+            is_about = bool(names) or _OF_COLUMNS.search(text.lower()) is not None
+            if units and is_unnamed and is_about:
+                raise ConfigError(
+                    self.path,
+                    f"line {line}: a comment speaks of {units[0]}, {shown(text)}: must say units as # units: "
+                    f"{', '.join(dict.fromkeys(units))}, or behind names, as x [{units[0]}]",
+                )
+            if units and (is_bare or is_about) and len(notes) < MOST_HINTS:
+                notes.append(
+                    f"line {line}: hint: a comment speaks of {units[0]}, but columns are taken in s, m and rad"
+                )
+        return notes
+
+    def _refuse_names(self, line: int, text: str, names: list[str], plain: tuple[str, ...]) -> None:
+        words = ", ".join(dict.fromkeys(names))
+        order = f", which would be taken as {', '.join(plain)}" if plain else ""
+        raise ConfigError(
+            self.path,
+            f"line {line}: a comment speaks of columns {words}, {shown(text)}, but names not each of them{order}: must "
+            "be a line with a name for each column",
+        )
+
+
+def is_comment(row: str) -> bool:
+    """Tell whether a line is a comment as a whole, also one that a spreadsheet has quoted."""
+    return row.lstrip(' \t"').startswith(MARKS)
+
+
+def has_content(row: str) -> bool:
+    """Tell whether a line has a cell with content."""
+    return not row.lstrip().startswith("%") and bool(row.split("#")[0].strip(" \t,;\n"))
+
+
+def cells_of(row: str, delimiter: str | None) -> list[str]:
+    """Cells of a row, without quotes."""
+    text = row.split("#")[0].strip(" \n")
+    if '"' in text and delimiter is not None:
+        return [cell.strip() for cell in next(csv.reader([text], delimiter=delimiter, skipinitialspace=True))]
+    return [cell.strip().strip('"').strip() for cell in text.split(delimiter)]
+
+
+def is_number(cell: str) -> bool:
+    """Tell whether a cell is a number, be it none that is finite."""
+    return not math.isnan(number_of(cell)) or cell.strip().lower().lstrip("+-") == "nan"
+
+
+def number_of(cell: str) -> float:
+    """A cell as a number, with a decimal comma too; NaN if it is none."""
+    try:
+        return float(cell.replace(",", ".")) if cell.isascii() and "_" not in cell else math.nan
+    except ValueError:
+        return math.nan
+
+
+def _separator_of(text: str) -> str | None:
+    return next((mark for mark in SEPARATORS if mark in text), None)
+
+
+def _split(text: str, delimiter: str | None) -> list[str]:
+    # Heads; blanks part names, but not a name and its unit.
+    if delimiter is not None:
+        return [cell.strip().strip("\"'").strip() for cell in text.split(delimiter)]
+    return [word.strip().strip("\"'") for word in _BLANK_SEPARATED.findall(text)]
+
+
+def _empty_at_end(cells: list[str]) -> int:
+    count = 0
+    while count < len(cells) - 1 and not cells[-1 - count]:
+        count += 1
+    return count
+
+
+def _readings(text: str, count: int) -> list[list[str]]:
+    # All ways to read a comment as so many words, by its separators, with and without what ends in a colon.
+    if len(text) > LONGEST_COMMENT:
+        return []
+    found = []
+    for body in dict.fromkeys((text, text.partition(":")[2], text.partition("=")[2])):
+        plain = body.strip()
+        if plain[:1] + plain[-1:] in ("[]", "()", "{}") and not any(mark in plain[1:-1] for mark in "[](){}"):
+            plain = plain[1:-1]
+        for delimiter in (*SEPARATORS, "|", None):
+            if delimiter is not None and delimiter not in plain:
+                continue
+            words = _split(plain, delimiter)
+            words = words[: len(words) - _empty_at_end(words)] if len(words) > count else words
+            if len(words) == count and count > 1 and not all(_PLAIN_NUMBER.fullmatch(word) for word in words):
+                found.append(words)
+    return found
+
+
+def _are_units(words: list[str], names: list[str]) -> bool:
+    read = [word for word, name in zip(words, names, strict=False) if name]
+    return any(map(is_unit, read)) and all(is_unit(word) or word.strip("[]()") in NO_UNIT for word in read)
+
+
+def _is_said(text: str) -> bool:
+    # Tell whether a comment is a directive of another kind, such as the units.
+    return text.partition(":")[0].strip().lower() in ("units", "unit", "z", "z_axis", "point", "interpolation", "ends")
+
+
+def _in_order(names: list[str], plain: tuple[str, ...]) -> bool:
+    # Tell whether names stand in the order in which columns without names are taken.
+    left = iter(plain)
+    return all(name in left for name in dict.fromkeys(names))
