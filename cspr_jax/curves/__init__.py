@@ -16,6 +16,7 @@ Files, each importing only from those above it:
     interpolation       cubic, quintic and Hermite curves through samples
     thinned             curves through every second sample
     reading             tables and pieces that were read, curves of SciPy, tables window by window
-    noise               noise of recorded samples, and smoothing
+    noise               noise of recorded samples
+    smoothing           the smoothest curve near them
     files               motions of files and arrays, in the axes of the kernels
 """

@@ -1,16 +1,13 @@
-"""Noise in recorded samples: recognised by their differences, taken off by a smoothing spline."""
+"""Noise in recorded samples, recognised by their differences."""
 
 import dataclasses
 import math
-from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline, make_smoothing_spline
-from scipy.optimize import brentq
+from scipy.interpolate import CubicSpline
 
 from cspr_jax.config.motions.table import MotionTable
 from cspr_jax.curves.interpolation import continuous
-from cspr_jax.errors import InputError
 
 # Rows of the stretches in which noise is estimated, and the most of them.
 STRETCH, STRETCHES = 96, 16
@@ -27,7 +24,6 @@ CLOSE = 0.02  # s; or they follow each other so closely
 DECIMALS = range(9)  # at which files round
 ONE_STEP = 0.1  # share of the third differences that are not 0
 LEAST_ROWS = 32
-POWERS = (-8.0, 14.0)  # of ten, between which the weight of bending is sought
 
 
 @dataclasses.dataclass(frozen=True)
@@ -94,7 +90,7 @@ def noise_of(times: np.ndarray, values: np.ndarray, *, arm: float = 1.0) -> Nois
     starts = np.unique(np.linspace(0, len(times) - STRETCH, STRETCHES).astype(int).clip(min=0))
     spread = max(_deviation(times[i : i + STRETCH], values[i : i + STRETCH]) for i in starts)
     rounding = _rounding(values)
-    is_rounded = rounding / math.sqrt(12.0) > 0.3 * spread and _is_rounded(values, rounding)
+    is_rounded = _is_of_rounding(rounding, spread, values)
     deviation = max(spread, rounding / math.sqrt(12.0) if is_rounded else 0.0)
     way = float(np.ptp(values, axis=0).max())
     if deviation > SCATTER * way and step > CLOSE:
@@ -155,76 +151,11 @@ def _is_rounded(values: np.ndarray, step: float) -> bool:
     return len(changes) > 0 and bool(np.mean(changes == 1.0) >= ONE_STEP)
 
 
-def smoothed(table: MotionTable, deviation: float, *, angle: float | None = None) -> MotionTable:
-    """A table without the noise of its samples: a cubic smoothing spline, which misses them by a standard deviation.
-
-    Of all curves that miss the samples by so much in the root mean square, a smoothing spline has the least second
-    derivative in the mean square (Reinsch, Numerische Mathematik 10, 1967).
-
-    Args:
-        deviation: of each coordinate, m.
-        angle: standard deviation of orientations about each axis, rad; None: `deviation` over 1 m.
-
-    Returns:
-        the smoothed samples, without rates; its notes say what was taken off.
-
-    Raises:
-        InputError: a deviation that is not positive, or more than a straight line misses the samples by; or less than
-            five samples.
-    """
-    angle = deviation if angle is None else angle
-    for key, value in (("smooth", deviation), ("smooth (angle)", angle)):
-        if not 0.0 < value < math.inf:
-            raise InputError(key, value, "a number > 0, the standard deviation of the noise")
-    rows = np.append(True, np.diff(table.times) > 0.0)
-    times = table.times[rows]
-    if len(times) < 5:
-        raise InputError("smooth", deviation, f"absent for {len(times)} samples: must have 5 or more")
-    positions, line = _smooth(times, table.positions[rows], deviation, "positions", "m", 1.0)
-    notes, quaternions = [*table.notes, line], None
-    if table.quaternions is not None:
-        units = continuous(table.quaternions[rows])
-        turned, line = _smooth(times, units, angle / 2.0, "orientations", "rad", 2.0)
-        quaternions = turned / np.linalg.norm(turned, axis=1, keepdims=True)
-        notes.append(line)
-    kind = "cubic" if table.interpolation in (None, "hermite") else table.interpolation
-    rates = dict.fromkeys(("velocities", "accelerations", "angular_velocities", "angular_accelerations"))
-    samples: dict[str, Any] = {"times": times, "positions": positions, "quaternions": quaternions, **rates}
-    return dataclasses.replace(table, **samples, interpolation=kind, notes=tuple(notes))
+def deviation_of(times: np.ndarray, values: np.ndarray) -> float:
+    """Standard deviation of the noise of a short stretch of samples; what rounding leaves is noise too."""
+    spread, step = _deviation(times[:STRETCH], values[:STRETCH]), _rounding(values)
+    return step / math.sqrt(12.0) if _is_of_rounding(step, spread, values) else spread
 
 
-def _smooth(
-    times: np.ndarray, values: np.ndarray, deviation: float, name: str, unit: str, factor: float
-) -> tuple[np.ndarray, str]:
-    # The weight of bending is that at which the spline misses the samples by the deviation; times are in steps.
-    places = (times - times[0]) / float(np.median(np.diff(times)))
-    moved = np.ptp(values, axis=0) > 0.0
-    dims = int(moved.sum())
-
-    def curve(power: float) -> np.ndarray:
-        columns = [
-            make_smoothing_spline(places, column, lam=10.0**power)(places) if is_moved else column
-            for column, is_moved in zip(values.T, moved, strict=True)
-        ]
-        return np.stack(columns, axis=1)
-
-    def miss(power: float) -> float:
-        return math.sqrt(float(((curve(power) - values) ** 2).sum()) / (len(values) * max(dims, 1)))
-
-    low, high = POWERS[0], min(POWERS[1], 4.0 * math.log10(len(values)))
-    most = miss(high)
-    if most <= deviation:
-        raise InputError(
-            "smooth",
-            factor * deviation,
-            f"less than {factor * most:.2g} {unit}, by which a straight line misses the {name}",
-        )
-    is_below = miss(low) < deviation
-    power = float(brentq(lambda power: miss(power) - deviation, low, high, xtol=0.01)) if is_below else low
-    result = curve(power)
-    away = np.linalg.norm(result - values, axis=1) * factor
-    rms = math.sqrt(float(np.mean(away**2)))
-    return (
-        result,
-        f"smoothing moved {name} by {rms:.2g} {unit} in the root mean square, {away.max():.2g} {unit} at most",
-    )
+def _is_of_rounding(step: float, spread: float, values: np.ndarray) -> bool:
+    return step / math.sqrt(12.0) > 0.3 * spread and _is_rounded(values, step)

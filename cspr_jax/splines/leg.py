@@ -12,7 +12,7 @@ from cspr_jax.config.motions.hints import unit_hints
 from cspr_jax.config.motions.table import MotionPieces, MotionTable
 from cspr_jax.curves.files import centre_from, kept_to, moving_ends, placed_inward, reference_of, source_spline
 from cspr_jax.curves.interpolation import interpolated
-from cspr_jax.curves.noise import noise_notes, smoothed
+from cspr_jax.curves.noise import noise_notes
 from cspr_jax.curves.reading import pieces_of
 from cspr_jax.curves.spline import Spline, part
 from cspr_jax.errors import ConfigError, InputError
@@ -124,8 +124,11 @@ class Splines(Leg):
         if isinstance(source, MotionTable):
             lines += [f"hint: {line}" for line in unit_hints(source, np.asarray(self.stops.robot_file.base_points))]
             noise: list[str] = []
-            if self.stops.keys.smooth is not None:
-                source = smoothed(source, self.stops.keys.smooth)
+            keys = self.stops.keys
+            if keys.smooth is not None:
+                from cspr_jax.curves.smoothing import smoothed  # takes time, and few records are noisy
+
+                source = smoothed(source, keys.smooth, interpolation=keys.interpolation, ends=keys.ends)
             elif source.velocities is None:
                 noise = noise_notes(source)
             # Speeds at the ends of a noisy record say nothing.

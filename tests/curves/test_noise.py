@@ -5,7 +5,8 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from cspr_jax.config.motions.table import MotionTable
-from cspr_jax.curves.noise import noise_notes, noise_of, smoothed
+from cspr_jax.curves.noise import noise_notes, noise_of
+from cspr_jax.curves.smoothing import smoothed
 from cspr_jax.errors import InputError
 
 
@@ -132,7 +133,7 @@ def test_smoothing_finds_the_motion():
     [
         (0.0, "smooth = 0.0: must be a number > 0"),
         (np.nan, "smooth"),
-        (9.0, "less than 0.41 m, by which a straight line"),
+        (9.0, "less than 0.41 m, by which rest at one place misses the positions"),
     ],
 )
 def test_smoothing_faults(deviation, line):
