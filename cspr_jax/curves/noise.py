@@ -152,7 +152,15 @@ def _is_rounded(values: np.ndarray, step: float) -> bool:
 
 
 def deviation_of(times: np.ndarray, values: np.ndarray) -> float:
-    """Standard deviation of the noise of a short stretch of samples; what rounding leaves is noise too."""
+    """Standard deviation of the noise of the first samples; what rounding leaves is noise too.
+
+    Args:
+        times: (n,) s, increasing.
+        values: (n, width) samples.
+
+    Returns:
+        the deviation, in their unit.
+    """
     spread, step = _deviation(times[:STRETCH], values[:STRETCH]), _rounding(values)
     return step / math.sqrt(12.0) if _is_of_rounding(step, spread, values) else spread
 

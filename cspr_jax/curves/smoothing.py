@@ -152,29 +152,29 @@ class _Fit:
 
     def moving(self, times: np.ndarray, deviation: float) -> list[bool]:
         """Tell whether the samples move at the start and at the end, so that rest there would be a jolt."""
-        found = _may_move(times, self.values)
+        may_move = _may_move(times, self.values)
         values = self.values[:, self.moved]
         for k in range(2):
-            if found[k]:
-                free = [MOVING if is_moving else REST for is_moving in found]
+            if may_move[k]:
+                free = [MOVING if is_moving else REST for is_moving in may_move]
                 rest = [REST if j == k else condition for j, condition in enumerate(free)]
                 least, most = (
                     self._bending(self._weighed(deviation, self._space(each), values)) for each in (free, rest)
                 )
-                found[k] = most > COSTS * least
-        return found
+                may_move[k] = most > COSTS * least
+        return may_move
 
     def _least(self, deviation: float, conditions: list, values: np.ndarray) -> np.ndarray:
         # A curve that must come to rest in its last step may miss the samples, or bend more than the one through them:
         # then its velocity alone is 0 there.
-        found = self._weighed(deviation, self._space(conditions), values)
+        smoothest = self._weighed(deviation, self._space(conditions), values)
         relaxed = [condition[:1] for condition in conditions]
         if self.degree == 5 or relaxed.count(REST[:1]) != 2 or self.is_periodic:
-            return found
+            return smoothest
         through = self._solved(LOWEST, self._space(relaxed), values)
-        is_within = _rms(self.design @ found - values) <= deviation * (1.0 + TOLERANCE)
-        if is_within and self._bending(found) <= self._bending(through):
-            return found
+        is_within = _rms(self.design @ smoothest - values) <= deviation * (1.0 + TOLERANCE)
+        if is_within and self._bending(smoothest) <= self._bending(through):
+            return smoothest
         return self._weighed(deviation, self._space(relaxed), values)
 
     def _weighed(self, deviation: float, space: csr_array, values: np.ndarray) -> np.ndarray:
@@ -195,11 +195,11 @@ class _Fit:
         weight, design, bending = 10.0**power, self.design @ space, self.bending @ space
         factors = splu((design.T @ design + weight * (bending.T @ bending)).tocsc(), permc_spec="NATURAL")
         middle = values.mean(axis=0) * (self.sign > 0.0)
-        found = np.zeros((space.shape[1], values.shape[1]))
+        solution = np.zeros((space.shape[1], values.shape[1]))
         for _ in range(REFINEMENTS):
-            away = values - middle - design @ found
-            found += factors.solve(design.T @ away - weight * (bending.T @ (bending @ found)))
-        return space @ found + middle
+            away = values - middle - design @ solution
+            solution += factors.solve(design.T @ away - weight * (bending.T @ (bending @ solution)))
+        return space @ solution + middle
 
     def _bending(self, coefficients: np.ndarray) -> float:
         return float(((self.bending @ coefficients) ** 2).sum())
@@ -238,15 +238,15 @@ def _rms(away: np.ndarray) -> float:
 
 def _knots(times: np.ndarray) -> np.ndarray:
     # Indices of samples that are not much closer to each other than others: the rest count as samples alone.
-    least, kept = float(np.median(np.diff(times))) / CLOSER, [0]
+    least, indices = float(np.median(np.diff(times))) / CLOSER, [0]
     if np.diff(times).min() >= least:
         return np.arange(len(times))
     for k in range(1, len(times)):
-        if times[k] - times[kept[-1]] >= least:
-            kept.append(k)
-    if kept[-1] != len(times) - 1:
-        kept[-1] = len(times) - 1
-    return np.array(kept)
+        if times[k] - times[indices[-1]] >= least:
+            indices.append(k)
+    if indices[-1] != len(times) - 1:
+        indices[-1] = len(times) - 1
+    return np.array(indices)
 
 
 def _knot_table(knots: np.ndarray, degree: int, is_periodic: bool) -> np.ndarray:
@@ -259,15 +259,15 @@ def _knot_table(knots: np.ndarray, degree: int, is_periodic: bool) -> np.ndarray
 
 def _derivatives(table: np.ndarray, degree: int, orders: int) -> dict[int, csr_array]:
     # Matrices from coefficients to those of derivatives.
-    found, last = dict[int, csr_array](), csr_array(eye_array(len(table) - degree - 1))
+    matrices, last = dict[int, csr_array](), csr_array(eye_array(len(table) - degree - 1))
     for order in range(1, orders + 1):
         left = degree - order + 1
         inner = table[order:-order]
         factors = left / (inner[left:] - inner[:-left])
         count = len(factors)
         last = csr_array(diags_array([-factors, factors], offsets=[0, 1], shape=(count, count + 1)) @ last)
-        found[order] = last
-    return found
+        matrices[order] = last
+    return matrices
 
 
 def _may_move(times: np.ndarray, values: np.ndarray) -> list[bool]:
@@ -281,12 +281,12 @@ def _moves(times: np.ndarray, values: np.ndarray) -> bool:
     noise, missed = deviation_of(times, values), (0.0, 0.0)
     for count in _COUNTS[: np.searchsorted(_COUNTS, len(times), "right")]:
         powers = (times[:count, None] / times[count - 1]) ** np.arange(5)
-        found = [_missed(powers[:, chosen], values[:count]) for chosen in ([0, 1, 2, 3], [0, 2, 3, 4])]
+        both = [_missed(powers[:, chosen], values[:count]) for chosen in ([0, 1, 2, 3], [0, 2, 3, 4])]
         freedom = (count - 4) * values.shape[1]
         spread = noise**2 * SURE * math.sqrt(2.0 * freedom) + (ROUNDING * float(np.abs(values[:count]).max())) ** 2
-        if count > _COUNTS[0] and min(found) > FITS**2 * noise**2 * freedom + spread:
+        if count > _COUNTS[0] and min(both) > FITS**2 * noise**2 * freedom + spread:
             break
-        missed = found[1], FACTOR * found[0] + spread
+        missed = both[1], FACTOR * both[0] + spread
     return missed[0] > missed[1]
 
 

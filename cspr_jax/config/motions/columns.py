@@ -197,6 +197,12 @@ def taken(heads: list[str], has_times: bool) -> tuple[list[Head], dict[int, str]
     """Names and units of heads; and the names, by the numbers of columns, that units and positions alone give.
 
     The one column of times has another name, or columns stand in the order of `PLAIN` and all have units.
+
+    Args:
+        has_times: whether the table is that of a motion, and not of a path.
+
+    Returns:
+        one for each head, and those names.
     """
     parts, plain = resolved(heads), (PLAIN if has_times else PLAIN_PATH).get(len(heads), ())
     names, placed = [part.name for part in parts], dict[int, str]()

@@ -89,7 +89,11 @@ class Head(NamedTuple):
 
 
 def unit_of(word: str) -> str:
-    """Return a unit as `KINDS` has it: mm for millimetres, m/s^2 for m s^-2."""
+    """A unit in the words of `KINDS`.
+
+    Returns:
+        such as mm for millimetres, m/s^2 for m s^-2.
+    """
     word = word.strip().strip("[]()").strip().lower().replace("²", "^2").replace("**", "^")
     above, _, below = word.partition("/")
     if not below:
@@ -103,43 +107,63 @@ def unit_of(word: str) -> str:
 
 
 def kind_of_unit(unit: str) -> str | None:
-    """Return "time", "length" or "angle" of a plain unit, or None."""
+    """Kind of a plain unit.
+
+    Returns:
+        "time", "length" or "angle"; None: it is none of these.
+    """
     unit = unit_of(unit)
     return next((kind for kind in ("time", "length", "angle") if unit in KINDS[kind][0]), None)
 
 
 def is_unit(word: str) -> bool:
-    """Tell whether a word is a unit of a column, of a rate too."""
+    """Tell whether a word is a unit of a column, of a rate too.
+
+    Returns:
+        True if it is one.
+    """
     above, mark, below = unit_of(word).partition("/")
     return kind_of_unit(above) is not None and (not mark or below.rstrip("2").rstrip("^") in TIMES)
 
 
 def resolved(heads: list[str]) -> list[Head]:
-    """Names and units of heads: exact names first, then those of other programs for groups that have none."""
+    """Names and units of heads: exact names first, then those of other programs for groups that have none.
+
+    Returns:
+        one for each head.
+    """
     parts = [_parted(head) for head in heads]
     names = [_exact(stem) for stem, _ in parts]
-    for group, found in (
+    for group, letters in (
         ("times", [_time(stem) for stem, _ in parts]),
         ("positions", [_lettered(stem, _POSITION_WORDS, _JOINED, "xyz", "") for stem, _ in parts]),
         ("quaternions", [_lettered(stem, _QUATERNION_WORDS, _JOINED_QUATERNION, "wxyz", "q") for stem, _ in parts]),
     ):
-        own = GROUPS[group][0]
-        found = [word if not name else "" for word, name in zip(found, names, strict=True)]
-        is_whole = sorted(filter(None, found)) in (sorted(own), ["x", "z"])
-        if is_whole and not any(name in own for name in names):
-            names = [name or word for word, name in zip(found, names, strict=True)]
+        columns = GROUPS[group][0]
+        matches = [word if not name else "" for word, name in zip(letters, names, strict=True)]
+        is_whole = sorted(filter(None, matches)) in (sorted(columns), ["x", "z"])
+        if is_whole and not any(name in columns for name in names):
+            names = [name or word for word, name in zip(matches, names, strict=True)]
     return [Head(name, unit) for name, (_, unit) in zip(names, parts, strict=True)]
 
 
 def mentioned(text: str) -> list[str]:
-    """Names of columns among the words of a comment, in their order."""
+    """Names of columns among the words of a comment.
+
+    Returns:
+        the names, in their order.
+    """
     words = (word.strip("._") for word in re.findall(r"[^\W\d][\w.]*", text.lower()))
     names = (_exact(word) or _time(word) or _lettered(word, set(), _JOINED, "xyz", "") for word in words)
     return [name for name in names if name]
 
 
 def units_within(text: str) -> list[str]:
-    """Units among the words of a comment, but for those that need none, in their order."""
+    """Units among the words of a comment, but for those that need not be said.
+
+    Returns:
+        the units, in their order.
+    """
     words = re.findall(r"(?<![\w/])(?:[^\W\d_]+|°)(?![\w/])", text.lower())
     units = [unit_of(word) for word in words if word not in ("min", "us")]
     return [unit for unit in units if kind_of_unit(unit) and unit not in ("s", "m", "rad")]
@@ -175,9 +199,9 @@ def _time(stem: str) -> str:
 def _lettered(stem: str, known: set[str], joined: re.Pattern, letters: str, prefix: str) -> str:
     # The letter of an axis in a name such as tx, pos_x, pose.position.x, p_RS_R_x or X-Position.
     words = _words(stem)
-    found = joined.fullmatch(words[0]) if len(words) == 1 else None
-    if found is not None:
-        return prefix + next(filter(None, found.groups()))
+    match = joined.fullmatch(words[0]) if len(words) == 1 else None
+    if match is not None:
+        return prefix + next(filter(None, match.groups()))
     for k in (-1, 0) if len(words) > 1 and known.intersection(words) else ():
         if words[k] in set(letters):
             return prefix + words[k]

@@ -38,7 +38,14 @@ def unit_hints(table: MotionTable, base_points: np.ndarray) -> list[str]:
 
 
 def near_repeat(times: np.ndarray) -> tuple[int, float] | None:
-    """Index of the first of two stamps that nearly repeat, and by how much their step is shorter than the median."""
+    """First two stamps that nearly repeat.
+
+    Args:
+        times: (n,) s.
+
+    Returns:
+        index of the first of the two, and by which factor their step is shorter than the median; None: there are none.
+    """
     steps = np.diff(times)
     steps = np.where(steps > 0.0, steps, np.inf)
     if len(steps) < 4:

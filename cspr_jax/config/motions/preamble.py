@@ -1,4 +1,4 @@
-"""What stands above the rows of a table: names of columns, units, directives and comments, each line looked at once.
+"""Lines above the rows of a table: names of columns, units, directives and comments, each looked at once.
 
 Names are a line of their own, or else the last comment above the rows that has a name for each column. Where comments
 speak of columns in another way, a line says so, and rows that they contradict are refused.
@@ -42,7 +42,10 @@ class Preamble:
         self._units: tuple[int, list[str]] | None = None
 
     def takes(self, line: int, row: str) -> bool:
-        """Take a line; or tell by False that it is the first row, with which the columns are known.
+        """Take a line.
+
+        Returns:
+            False: it is the first row, with which the columns are known.
 
         Raises:
             ConfigError: columns that are missing, ambiguous or too many.
@@ -75,9 +78,9 @@ class Preamble:
             self._finish(None)
 
     def _first(self, line: int, row: str) -> bool:
-        said = _SEPARATOR_LINE.fullmatch(row.strip(" \n"))
-        if said is not None:
-            self.delimiter = said[1]
+        match = _SEPARATOR_LINE.fullmatch(row.strip(" \n"))
+        if match is not None:
+            self.delimiter = match[1]
             return True
         cells = cells_of(row, self._delimiter_of(row))
         while len(cells) > 1 and not cells[-1]:
@@ -115,9 +118,9 @@ class Preamble:
         first = names if names is not None else row
         delimiter = self._delimiter_of(first or "")
         if names is not None and row is not None and (delimiter is None or delimiter not in row):
-            own = self._delimiter_of(row)
-            if own != delimiter and len(cells_of(row, own)) == len(_split(names, delimiter)):
-                delimiter = own
+            other = self._delimiter_of(row)
+            if other != delimiter and len(cells_of(row, other)) == len(_split(names, delimiter)):
+                delimiter = other
         self.delimiter = delimiter
 
     def _heads(self, names: str) -> list[str]:
@@ -142,15 +145,15 @@ class Preamble:
         count = len(cells) - self.tail if heads is None else len(heads)
         if count > MOST_COLUMNS:
             raise ConfigError(self.path, f"line {line}: {count} columns: must be at most {MOST_COLUMNS}")
-        named, own = line, heads
+        named, names_line = line, heads
         if heads is None:
-            named, own = self._named_by_comment(count)
+            named, names_line = self._named_by_comment(count)
         units = {} if self._units is None else dict(enumerate(self._units[1]))
-        units = units or self._commented_units(count, own)
-        notes = self._refuse_contradictions(count, heads is None, own is None, bool(units), own or [])
+        units = units or self._commented_units(count, names_line)
+        notes = self._refuse_contradictions(count, heads is None, names_line is None, bool(units), names_line or [])
         common = self.directives.get("units", "")
         self.columns = columns(
-            own, count, common, self.path, named or line, has_times=self.has_times, own_units=units, notes=notes
+            names_line, count, common, self.path, named or line, has_times=self.has_times, own_units=units, notes=notes
         )
 
     def _named_by_comment(self, count: int) -> tuple[int, list[str] | None]:
@@ -227,17 +230,29 @@ class Preamble:
 
 
 def is_comment(row: str) -> bool:
-    """Tell whether a line is a comment as a whole, also one that a spreadsheet has quoted."""
+    """Tell whether a line is a comment as a whole, also one that a spreadsheet has quoted.
+
+    Returns:
+        True if it is.
+    """
     return row.lstrip(' \t"').startswith(MARKS)
 
 
 def has_content(row: str) -> bool:
-    """Tell whether a line has a cell with content."""
+    """Tell whether a line has a cell with content.
+
+    Returns:
+        True if it has.
+    """
     return not row.lstrip().startswith("%") and bool(row.split("#")[0].strip(" \t,;\n"))
 
 
 def cells_of(row: str, delimiter: str | None) -> list[str]:
-    """Cells of a row, without quotes."""
+    """Cells of a row.
+
+    Returns:
+        the cells, without quotes.
+    """
     text = row.split("#")[0].strip(" \n")
     if '"' in text and delimiter is not None:
         return [cell.strip() for cell in next(csv.reader([text], delimiter=delimiter, skipinitialspace=True))]
@@ -245,12 +260,20 @@ def cells_of(row: str, delimiter: str | None) -> list[str]:
 
 
 def is_number(cell: str) -> bool:
-    """Tell whether a cell is a number, be it none that is finite."""
+    """Tell whether a cell is a number.
+
+    Returns:
+        True if it is, be it one that is not finite.
+    """
     return not math.isnan(number_of(cell)) or cell.strip().lower().lstrip("+-") == "nan"
 
 
 def number_of(cell: str) -> float:
-    """A cell as a number, with a decimal comma too; NaN if it is none."""
+    """A cell as a number.
+
+    Returns:
+        the number, with a decimal comma too; NaN: it is none.
+    """
     try:
         return float(cell.replace(",", ".")) if cell.isascii() and "_" not in cell else math.nan
     except ValueError:
@@ -279,7 +302,7 @@ def _readings(text: str, count: int) -> list[list[str]]:
     # All ways to read a comment as so many words, by its separators, with and without what ends in a colon.
     if len(text) > LONGEST_COMMENT:
         return []
-    found = []
+    readings = []
     for body in dict.fromkeys((text, text.partition(":")[2], text.partition("=")[2])):
         plain = body.strip()
         if plain[:1] + plain[-1:] in ("[]", "()", "{}") and not any(mark in plain[1:-1] for mark in "[](){}"):
@@ -290,8 +313,8 @@ def _readings(text: str, count: int) -> list[list[str]]:
             words = _split(plain, delimiter)
             words = words[: len(words) - _empty_at_end(words)] if len(words) > count else words
             if len(words) == count and count > 1 and not all(_PLAIN_NUMBER.fullmatch(word) for word in words):
-                found.append(words)
-    return found
+                readings.append(words)
+    return readings
 
 
 def _are_units(words: list[str], names: list[str]) -> bool:

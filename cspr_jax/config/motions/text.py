@@ -288,9 +288,9 @@ class _Reader:
         late = np.flatnonzero(steps < 0.0 if self.columns.is_written else steps <= 0.0)
         if len(late):
             self._refuse_time(chain, int(late[0]), before, text, line)
-        found = None if self.columns.is_written or self.is_close else near_repeat(chain[:, column])
-        if found is not None:
-            self.is_close, (i, factor) = True, found
+        repeat = None if self.columns.is_written or self.is_close else near_repeat(chain[:, column])
+        if repeat is not None:
+            self.is_close, (i, factor) = True, repeat
             number, stamp = _line_of(text, line, i + 1 - before), self._stamp(chain[i + 1])
             self.notes[
                 f"line {number}: hint: t = {stamp} nearly repeats the time before it: the step is {factor:.2g} times "
