@@ -292,6 +292,7 @@ ARGUMENTS: dict[str, Rule] = {
     "times": _instants,
     "title": _FLAG,
     "trajectories": integer(-MOST, MOST),
+    "trajectory": _TEXT_OR_NONE,
     "turns": real("a number > 0", (), least=0.0, above=True, largest=MOST, traced=True),
     "values": integer(1, MOST, none=True),
     "velocities": _POINTS_OR_NONE,

@@ -198,6 +198,7 @@ def check(  # noqa: PLR0913
     ends: str | None = None,
     smooth: float | None = None,
     point: str | None = None,
+    trajectory: str | None = None,
     duration: float | None = None,
     limits: Limits | Mapping[str, Any] | None = None,
 ) -> Check:
@@ -218,6 +219,7 @@ def check(  # noqa: PLR0913
         smooth: standard deviation of the noise of positions, m, which a smoothing spline takes off; None: 0.
         point: point of a platform whose positions these are, "mass-centre" or "origin" of its axes; None: as the file
             says, else the mass centre.
+        trajectory: `id` of one of several trajectories that a file of CASPR holds; None: anything else.
         duration: of a function, s; None: anything else.
         limits: override those of the robot, one by one; a dictionary may hold all keys of [limits] of a plan.
 
@@ -228,7 +230,10 @@ def check(  # noqa: PLR0913
         ConfigError: a mistake in a file.
         InputError: samples that make no motion, or an impossible argument.
     """
-    keys = check_keys(robot, limits, interpolation=interpolation, ends=ends, smooth=smooth, point=point)
+    if trajectory is not None and not isinstance(times, str | Path):
+        raise InputError("trajectory", trajectory, "absent but for a file of CASPR")
+    settings = {"interpolation": interpolation, "ends": ends, "smooth": smooth, "point": point}
+    keys = check_keys(robot, limits, trajectory=trajectory, **settings)
     with double_precision():
         if isinstance(times, str | Path):
             return check_file(Path(times), keys)

@@ -29,6 +29,7 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="limits (TOML), with the keys of [limits] of a plan, [[obstacle]] tables, platform_box or platform_hull",
     )
+    parser.add_argument("--trajectory", metavar="ID", help="one of several trajectories that a file of CASPR holds")
     parser.add_argument(
         "--interpolation",
         choices=("cubic", "quintic", "hermite"),
@@ -66,7 +67,7 @@ def _keys(options: argparse.Namespace) -> dict[str, Any]:
 
     if options.smooth is not None and not 0.0 < options.smooth < float("inf"):
         raise ConfigError("--smooth", f"{options.smooth}: must be a number > 0, in m")
-    keys = {name: getattr(options, name) for name in ("interpolation", "ends", "smooth", "point")}
+    keys = {name: getattr(options, name) for name in ("trajectory", "interpolation", "ends", "smooth", "point")}
     keys = {name: value for name, value in keys.items() if value is not None} | {"robot": options.robot}
     if options.limits is not None:
         limits = read_toml(options.limits)

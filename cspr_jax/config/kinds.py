@@ -35,7 +35,8 @@ def refuse_other_kinds(data: dict[str, Any], expected: str, file: object) -> Non
     if any(key in data for key in _MARKS[expected]):
         return
     for kind, marks in _MARKS.items():
-        theirs = [key for key in marks if key in data]
+        # The trajectory of a plan is a name, that of a sweep a table.
+        theirs = [key for key in marks if key in data and not (key == "trajectory" and isinstance(data[key], str))]
         if theirs:
             keys = ", ".join(theirs)
             raise ConfigError(file, f"is a {kind} file (it has {keys}): must be {_EXPECTED[expected]}; {_PLACES[kind]}")

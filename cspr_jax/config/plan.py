@@ -67,6 +67,9 @@ class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys, FreeMotionKeys):
     motion: str | None = Field(
         None, min_length=1, description="spline: file of the whole motion, in place of the poses"
     )
+    trajectory: str | None = Field(
+        None, min_length=1, description="spline: `id` of one of several trajectories that a file of CASPR holds"
+    )
     interpolation: Literal["cubic", "quintic", "hermite"] | None = Field(
         None,
         description='spline: curve through the samples: "cubic" (C2, the default), "quintic" (C4), or "hermite", '
@@ -197,11 +200,14 @@ class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys, FreeMotionKeys):
     @classmethod
     def _of_one_file(cls, data: Any) -> Any:
         # A plan of one file is a plan of two poses, which the file decides.
-        if not isinstance(data, dict) or data.get("motion") is None:
+        if not isinstance(data, dict):
             return data
-        if "pose" in data:
+        keys = {key: data[key] for key in ("motion", "trajectory") if data.get(key) is not None}
+        if "trajectory" in keys and "motion" not in keys:
+            raise fault("trajectory", shown(keys["trajectory"]), "beside motion, the file that holds it")
+        if keys and "pose" in data:
             raise fault("motion", shown(data["motion"]), "absent beside [[pose]] tables: its file has the whole motion")
-        return data | {"pose": [{}, {"motion": data["motion"]}]}
+        return data | {"pose": [{}, keys]} if keys else data
 
     @model_validator(mode="before")
     @classmethod

@@ -66,6 +66,9 @@ class Pose(Table):
         min_length=1,
         description="spline: file of the motion that ends at this pose, in place of poses with times",
     )
+    trajectory: str | None = Field(
+        None, min_length=1, description="spline: `id` of one of several trajectories that a file of CASPR holds"
+    )
     ellipse: EllipseTable | None = Field(
         None,
         description="ellipse: ellipse that is reached at this pose; absent, and not at rest: that of the pose before",

@@ -140,8 +140,8 @@ _ROWS = (
         knows_obstacles=True,
         knows_pulleys=True,
         knows_mass_centre=True,
-        keys=("motion", "interpolation", "ends", "smooth", "stretch", "point"),
-        pose_keys=("motion",),
+        keys=("motion", "trajectory", "interpolation", "ends", "smooth", "stretch", "point"),
+        pose_keys=("motion", "trajectory"),
         end_keys=("time", "velocity", "acceleration"),
     ),
     Family(

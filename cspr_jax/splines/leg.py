@@ -15,7 +15,7 @@ from cspr_jax.curves.interpolation import interpolated
 from cspr_jax.curves.noise import noise_notes
 from cspr_jax.curves.reading import pieces_of
 from cspr_jax.curves.spline import Spline, part
-from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.leg import Leg
 from cspr_jax.motions.motion import Motion, Placed
@@ -36,6 +36,9 @@ class Splines(Leg):
         self._notes: list[str] = []
         self._refuse("arcs", "beta_hat")
         for i, pose in enumerate(stops.poses):
+            if pose.trajectory is not None and pose.motion is None:
+                name = f"{stops.name(i)}.trajectory = {shown(pose.trajectory)}"
+                raise ConfigError(stops.path, f"{name}: must be beside motion, the file that holds it")
             if pose.motion is not None and i:
                 self._check_file(i)
         for first, last in self._runs:
@@ -84,7 +87,7 @@ class Splines(Leg):
         name = stops.poses[i].motion or ""
         source = stops.keys.source(name)
         if source is None:
-            source = read_motion(stops.path.parent / name)
+            source = read_motion(stops.path.parent / name, stops.poses[i].trajectory)
         if isinstance(source, Placed):
             return source.motion
         try:

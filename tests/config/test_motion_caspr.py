@@ -1,6 +1,7 @@
 """Trajectories of CASPR: its laws between points, its joints, and one line for what is not read."""
 
 import itertools
+import json
 import math
 
 import numpy as np
@@ -8,7 +9,9 @@ import pytest
 from scipy.interpolate import BPoly
 from scipy.spatial.transform import Rotation
 
+import cspr_jax
 from config.test_formats import BODIES, PLAIN
+from cspr_jax.cli import main
 from cspr_jax.config.motions import caspr
 from cspr_jax.errors import ConfigError
 
@@ -156,6 +159,55 @@ def test_a_long_turn_is_divided_until_it_fits(tmp_path):
     assert np.abs(values(pieces, pieces.quaternion, times) - expected).max() < 2.0 * caspr.TURN_ERROR
     bend = math.sqrt(np.abs(values(pieces, pieces.quaternion, times, 2)).max())
     assert bend == pytest.approx(np.abs(20.0 * np.gradient(smooth(times), times)).max(), rel=1e-2)
+
+
+def test_turns_and_pieces_have_a_bound(tmp_path):
+    """A file of some hundred kB cannot ask for gigabytes of polynomial pieces."""
+    for joint, far in (("PLANAR_XZ", [0, 0, 3e5]), ("SPATIAL_EULER_XYZ", [0, 0, 0, 0, -3e5, 0])):
+        path = written(tmp_path, element([still("", [0] * len(far)), still(' time="1"', far)]), joint=joint)
+        with pytest.raises(ConfigError, match=r"point 2.q: an angle of 300000 rad: must be at most 300 turns, 1884.96"):
+            caspr.read(path)
+    points = [still(' time="1"' * (k > 0), [0, 0, 1800 * (k % 2)]) for k in range(500)]
+    with pytest.raises(ConfigError, match=r"points: 500 of them: must turn by less .* 100000 polynomial pieces"):
+        caspr.read(written(tmp_path, element(points), joint="PLANAR_XZ"))
+
+
+def test_one_of_several_trajectories_is_judged(tmp_path, capsys):
+    """By `--trajectory`, by the key of plans and of their poses, and from Python; else their names are listed."""
+    ways = {"up": [[0.1, 0, -1.0], [0.1, 0, -0.9]], "down": [[0, 0, -1.0], [0, 0.1, -1.1]]}
+    elements = [
+        element([still(' time="4"' * k, q) for k, q in enumerate(points)], name=name) for name, points in ways.items()
+    ]
+    path = written(tmp_path, *elements, joint="T_XYZ")
+    assert main(["check", str(path), "--robot", "prototype", "--trajectory", "down", "--json"]) == 0
+    shown = json.loads(capsys.readouterr().out)
+    assert shown["feasible"] and shown["duration"] == 4.0
+    plan = 'schema = 1\nrobot = "prototype"\nfamily = "spline"\n'
+    one = f'motion = "{path.name}"\ntrajectory = "down"\n'
+    (tmp_path / "whole.toml").write_text(plan + one)
+    (tmp_path / "poses.toml").write_text(plan + f"[[pose]]\n[[pose]]\n{one}")
+    for name in ("whole.toml", "poses.toml"):
+        motion = cspr_jax.plan(tmp_path / name).motions[0]
+        np.testing.assert_allclose(motion.state(1.0).position[1], -0.1, atol=1e-12)
+    cases = [
+        (["check", str(path), "--robot", "prototype"], 'trajectory = (missing): must be "up" or "down"'),
+        (["check", str(path), "--robot", "prototype", "--trajectory", "dwn"], "did you mean down?"),
+    ]
+    for name, text, line in (
+        ("lone", plan + 'trajectory = "up"\n', "trajectory"),
+        (
+            "pose",
+            plan + '[[pose]]\nposition = [0, 0, 1]\n[[pose]]\ntime = 1.0\nposition = [0, 0, 1]\ntrajectory = "up"\n',
+            "beside motion",
+        ),
+        ("both", plan + f'{one}[[pose]]\n[[pose]]\nmotion = "{path.name}"\n', "absent beside [[pose]]"),
+    ):
+        (tmp_path / f"{name}.toml").write_text(text)
+        cases.append((["plan", str(tmp_path / f"{name}.toml")], line))
+    for words, line in cases:
+        assert main(words) == 2
+        error = capsys.readouterr().err
+        assert line in error and error.count("\n") == 1
 
 
 ONE, TWO = still("", [0] * 6), still(' time="1"', [1] * 6)

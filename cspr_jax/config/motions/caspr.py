@@ -19,11 +19,14 @@ from cspr_jax.config.formats.xml_text import child, number, read_xml, text_of
 from cspr_jax.config.motions.table import MotionPieces
 from cspr_jax.config.suggestions import did_you_mean
 from cspr_jax.config.wording import either
-from cspr_jax.errors import ConfigError, shown
+from cspr_jax.errors import ConfigError, InputError, shown
 
 ENDING = "_trajectories.xml"
 TURN_ERROR = 1e-11  # of the components of quaternions
 MOST_PARTS = 1024  # of a piece
+MOST_PIECES = 100_000  # of a trajectory
+MOST_TURNS = 300  # of a coordinate
+LONGEST_LINE = 600  # letters
 _AVERAGE, _BLEND = "cubic_spline_average_velocity_trajectory", "parabolic_blend_trajectory"
 # Tags of the derivatives that each point of a kind has.
 _KINDS = {
@@ -92,7 +95,11 @@ def read(path: Path, name: str | None = None, bodies: Path | None = None) -> Mot
     position[:, :, coordinates.moves] = table[:, :, : len(coordinates.moves)]
     quaternion = None
     if coordinates.turns:
-        knots, position, quaternion = _turned(coordinates, knots, position, table, law, values[0])
+        _check_turns(values[0][:, len(coordinates.moves) :], path, place)
+        try:
+            knots, position, quaternion = _turned(coordinates, knots, position, table, law, values[0])
+        except InputError as error:
+            raise ConfigError(path, f"{place}: {error}") from error
         quaternion[:, :, 1:] = quaternion[:, :, 1:] @ axes.T
     return MotionPieces(knots, (position + start) @ axes.T, quaternion, "up", "origin")
 
@@ -109,7 +116,8 @@ def _chosen(path: Path, name: str | None) -> Element:
         return tags[0]
     if name is None or name not in elements:
         question = "" if name is None else did_you_mean(name, elements)
-        raise ConfigError(path, f"trajectory = {shown(name)}: {question}must be {either(elements)}"[:600])
+        line = f"trajectory = {shown(name)}: {question}must be {either(elements)}"
+        raise ConfigError(path, line if len(line) <= LONGEST_LINE else f"{line[: LONGEST_LINE - 3]}...")
     return elements[name]
 
 
@@ -156,6 +164,15 @@ def _average(points: list[Element], times: np.ndarray, values: np.ndarray, path:
         _vector(points[k], "q_dot", values.shape[1], path, f"{place}, point {k % len(points) + 1}") for k in (0, -1)
     ]
     return np.vstack([ends[0], (means[1:] + means[:-1]) / 2.0, ends[1]])
+
+
+def _check_turns(angles: np.ndarray, path: Path, place: str) -> None:
+    largest = 2.0 * math.pi * MOST_TURNS
+    far = np.flatnonzero((np.abs(angles) > largest).any(axis=1))
+    if len(far):
+        angle = float(np.abs(angles[far[0]]).max())
+        allowed = f"at most {MOST_TURNS} turns, {largest:.6g} rad"
+        raise ConfigError(path, f"{place}, point {far[0] + 1}.q: an angle of {angle:g} rad: must be {allowed}")
 
 
 def _curves(
@@ -219,9 +236,12 @@ def _turned(
         width = np.repeat(np.diff(knots) / parts, parts)
         curve = _split(half[:, :, None], parts)[:, :, 0]
         pieces, error = _pieces(curve, np.repeat(axis, parts, axis=0), width)
-        if error <= TURN_ERROR or parts >= MOST_PARTS:
+        if error <= TURN_ERROR:
             break
         parts *= 2
+        if parts > MOST_PARTS or parts * len(table) > MOST_PIECES:
+            allowed = f"must turn by less from point to point, so that {MOST_PIECES} polynomial pieces are enough"
+            raise InputError("points", None, allowed, fault=f"{len(values)} of them")
     before = np.repeat(start.as_quat(scalar_first=True), parts, axis=0)[:, None]
     fine = (knots[:-1, None] + np.diff(knots)[:, None] * np.arange(parts) / parts).ravel()
     return np.append(fine, knots[-1]), _split(position, parts), _product(before, pieces)
