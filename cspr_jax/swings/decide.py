@@ -7,6 +7,7 @@ with the largest margin. `platforms.answers` does the same for platforms.
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -18,6 +19,7 @@ from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.tolerances import Tolerated
+from cspr_jax.robots.limits import NO_LIMITS
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.swings import criteria, hypocycloid
@@ -25,15 +27,18 @@ from cspr_jax.swings.criteria import BASIC
 from cspr_jax.swings.enclosures import tolerated_by_point_masses
 from cspr_jax.swings.hypocycloid import Segment
 from cspr_jax.swings.limit_sieve import LimitSieve
-from cspr_jax.swings.margins import margins
+from cspr_jax.swings.margins import each_margin, margins
 from cspr_jax.swings.parities import pick, rows_of
 from cspr_jax.swings.proof import SMALLEST_MARGIN, first_look, prove
 from cspr_jax.swings.refusals import refusals, unavoidable
+from cspr_jax.swings.sieve import upper_bounds
 
 # Segments computed at a time where little is computed for each.
 BATCH = 4096
 # Candidates whose margins differ by less are equally good; the first of them is reported.
 TIE = 1e-9
+# Samples of the second, denser sieve, multiples of 4. Segments that it takes at a time: few need it.
+SAMPLES_PER_ARC, MOST_SAMPLES, DENSE_BATCH = 32, 1024, 512
 
 
 @persistent_jit
@@ -233,26 +238,60 @@ def _best(
     measure: Callable,
 ) -> tuple[np.ndarray, np.ndarray]:
     # Return the fixed number of arcs, else the one with the largest margin, over the cables alone or over all criteria,
-    # and its slacks; upper bounds say where to look next.
-    def margin(slack: np.ndarray, rows) -> np.ndarray:
-        return np.where(by_cables[rows], slack[:, :BASIC].min(1), slack.min(1))
+    # and its slacks. Where the cables alone choose, limits are measured only for what is chosen.
+    tried, slack = fixed.copy(), np.empty((len(fixed), len(criteria.flags(problem.limits))))
+    free = np.flatnonzero((fixed == 0) & ~by_cables)
+    if len(free):
+        tried[free], slack[free] = _largest_margins(problem, rows_of(parities, free), upper[free], measure)
+    free = np.flatnonzero((fixed == 0) & by_cables)
+    if len(free):
+        without_limits = problem._replace(limits=NO_LIMITS)
+        tried[free], _ = _largest_margins(without_limits, rows_of(parities, free), upper[free], measure)
+        # None of them is feasible, so each criterion is refined at once.
+        slack[free] = each_margin(problem, pick(parities, free, tried[free]), tried[free])
+    chosen = np.flatnonzero(fixed > 0)
+    if len(chosen):
+        slack[chosen] = measure(problem, pick(parities, chosen, tried[chosen]), tried[chosen])
+    return tried, slack
 
-    tried = np.where(fixed > 0, fixed, np.argmax(upper, axis=1) + 1)
-    slack = measure(problem, pick(parities, np.arange(len(fixed)), tried), tried)
-    best = margin(slack, slice(None))
-    rest = np.where(fixed[:, None] > 0, -np.inf, upper)
-    rest[np.arange(len(rest)), tried - 1] = -np.inf
+
+def _largest_margins(
+    problem: Problem, parities: dict[int, Segment], upper: np.ndarray, measure: Callable
+) -> tuple[np.ndarray, np.ndarray]:
+    # Return the numbers of arcs with the largest margins, and their slacks; upper bounds say where to look next.
+    upper = np.fmin(upper, _denser_upper_bounds(problem, parities, upper.shape[1]))
+    tried = np.argmax(upper, axis=1) + 1
+    slack = measure(problem, pick(parities, np.arange(len(tried)), tried), tried)
+    best = np.nan_to_num(slack.min(1), nan=-np.finfo(float).max)
+    upper[np.arange(len(tried)), tried - 1] = -np.inf
     while True:
-        rows = np.flatnonzero(rest.max(1) > np.where(np.isnan(best), -np.inf, best) + TIE * (1.0 + np.abs(best)))
+        is_open = upper > _improvement(best)[:, None]
+        rows = np.flatnonzero(is_open.any(1))
         if not len(rows):
             return tried, slack
-        arcs = np.argmax(rest[rows], axis=1) + 1
-        candidate = measure(problem, pick(parities, rows, arcs), arcs)
-        rest[rows, arcs - 1] = -np.inf
-        reached = margin(candidate, rows)
-        better = reached > best[rows]
-        tried[rows[better]], slack[rows[better]] = arcs[better], candidate[better]
-        best[rows[better]] = reached[better]
+        # The next ones of each segment, as many as fit into a batch, which takes as long whatever it holds.
+        order = np.argsort(-upper[rows], axis=1, kind="stable")[:, : max(BATCH // len(rows), 1)]
+        owner, turn = np.nonzero(np.take_along_axis(is_open[rows], order, axis=1))
+        segment, arcs = rows[owner], order[owner, turn] + 1
+        candidate, bound = measure(problem, pick(parities, segment, arcs), arcs), upper[segment, arcs - 1]
+        upper[segment, arcs - 1] = -np.inf
+        for rank in range(order.shape[1]):
+            # As if they came one by one: what else is in a batch must not decide between equals.
+            due = np.flatnonzero((turn == rank) & (bound > _improvement(best)[segment]))
+            due = due[candidate[due].min(1) > best[segment[due]]]
+            row = segment[due]
+            tried[row], slack[row], best[row] = arcs[due], candidate[due], candidate[due].min(1)
+
+
+def _improvement(best: np.ndarray) -> np.ndarray:
+    return best + TIE * (1.0 + np.abs(best))
+
+
+def _denser_upper_bounds(problem: Problem, parities: dict[int, Segment], max_arcs: int) -> np.ndarray:
+    # The first sieve has a sample an arc or two, which bounds the margins of many arcs loosely.
+    samples = min(SAMPLES_PER_ARC * max_arcs, MOST_SAMPLES)
+    kernel = partial(upper_bounds, max_arcs=max_arcs, samples=samples)
+    return in_batches(lambda pair: kernel(problem.amplitude, *pair), (parities[0], parities[1]), size=DENSE_BATCH)
 
 
 def _tolerated(problem: Problem, segments: Segment, arcs: np.ndarray, rows: np.ndarray) -> Tolerated:

@@ -61,13 +61,24 @@ class LimitSieve:
             self._see(*upcoming(self._unseen, open_rows))
 
     def _see(self, rows: np.ndarray, arcs: np.ndarray) -> None:
-        lowest, near = in_batches(
-            partial(_lowest, self._problem), (pick(self._parities, rows, arcs), arcs.astype(float)), size=BATCH
-        )
-        broken = lowest < -FAR * near[:, None]
-        self.broken[rows, arcs - 1, BASIC:] = broken
+        broken = broken_at_samples(self._problem, pick(self._parities, rows, arcs), arcs)
+        self.broken[rows, arcs - 1] = broken
         self._unseen[rows, arcs - 1] = False
         self.alive[rows, arcs - 1] &= ~broken.any(1)
+
+
+def broken_at_samples(problem: Problem, segments: Segment, arcs: np.ndarray) -> np.ndarray:
+    """Limits that some sample breaks by more than rounding; a quick refutation.
+
+    Args:
+        segments: leaves (n, ...), of the parity of `arcs`; float64.
+        arcs: (n,) number of arcs, 1 or more.
+
+    Returns:
+        (n, n_criteria); False of what is no limit.
+    """
+    lowest, near = in_batches(partial(_lowest, problem), (segments, np.asarray(arcs, float)), size=BATCH)
+    return np.concatenate([np.zeros((len(lowest), BASIC), bool), lowest < -FAR * near[:, None]], axis=1)
 
 
 def upcoming(candidates: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -186,22 +186,32 @@ def margins(problem: Problem, segments: Segment, arcs: np.ndarray) -> np.ndarray
     Returns:
         (n, n_criteria) in the order of `criteria.flags`; NaN where the motion is not finite.
     """
-    table = blocks(problem.amplitude, int(np.max(arcs)))
     sizes = counts(problem.robot, problem.limits)
     if len(sizes) == BASIC or len(arcs) <= SMALL:
-        return _each(problem, segments, arcs, table)
+        return each_margin(problem, segments, arcs)
+    table = blocks(problem.amplitude, int(np.max(arcs)))
     both = sum(sizes[:BASIC]), sum(sizes[BASIC:])
     least = smallest_values(Functions(smooth_slacks, both), problem, segments, arcs, table)
     smallest = np.repeat(least, [BASIC, len(sizes) - BASIC], axis=1)
     unclear = np.flatnonzero(~(np.isfinite(least) & (least > 0.0)).all(1))
     if len(unclear):
         part, numbers = jax.tree.map(lambda leaf: np.asarray(leaf)[unclear], (segments, np.asarray(arcs)))
-        smallest[unclear] = _each(problem, part, numbers, table)
+        smallest[unclear] = each_margin(problem, part, numbers)
     return smallest
 
 
-def _each(problem: Problem, segments: Segment, arcs: np.ndarray, table) -> np.ndarray:
+def each_margin(problem: Problem, segments: Segment, arcs: np.ndarray) -> np.ndarray:
+    """Smallest slack of each criterion along each segment, each refined by itself, as `margins` may not do.
+
+    Args:
+        segments: leaves (n, ...), of the parity of `arcs`.
+        arcs: (n,) number of arcs, 1 or more.
+
+    Returns:
+        (n, n_criteria); NaN where the motion is not finite.
+    """
     # The smallest over the cables has kinks, each cable's own slack has none.
+    table = blocks(problem.amplitude, int(np.max(arcs)))
     functions = Functions(smooth_slacks, counts(problem.robot, problem.limits))
     smallest = smallest_values(functions, problem, segments, arcs, table)
     # A compiled minimum may pass over NaN; a function without a finite minimum has none.

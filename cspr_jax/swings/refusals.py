@@ -9,7 +9,7 @@ from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.limits import NO_LIMITS
 from cspr_jax.swings.criteria import BASIC, flags
 from cspr_jax.swings.hypocycloid import Segment
-from cspr_jax.swings.limit_sieve import upcoming
+from cspr_jax.swings.limit_sieve import broken_at_samples, upcoming
 from cspr_jax.swings.parities import pick
 from cspr_jax.swings.proof import SMALLEST_MARGIN, first_look, is_met_at_samples, prove
 
@@ -83,7 +83,7 @@ def unavoidable(problem: Problem, parities: dict[int, Segment], upper: np.ndarra
     Args:
         parities: the segments for even (key 0) and odd (key 1) numbers of arcs, leaves (n, ...).
         upper: (n, max_arcs) -inf at numbers of arcs that are out of the question.
-        suspects: (n, n_criteria) criteria to be tested, each broken by some number of arcs.
+        suspects: (n, n_criteria) limits to be tested, each broken by some number of arcs.
 
     Returns:
         (n, n_criteria) which of them every number of arcs breaks: proved.
@@ -93,6 +93,11 @@ def unavoidable(problem: Problem, parities: dict[int, Segment], upper: np.ndarra
         rows = np.flatnonzero(suspects.any(1) & left.any(1))
         if not len(rows):
             return suspects
-        arcs = np.argmax(left[rows], axis=1) + 1
+        rows, arcs = upcoming(left, rows)
         left[rows, arcs - 1] = False
-        suspects[rows] &= ~is_met_at_samples(problem, pick(parities, rows, arcs), arcs)
+        broken = broken_at_samples(problem, pick(parities, rows, arcs), arcs)
+        unclear = np.flatnonzero((suspects[rows] & ~broken).any(1))
+        if len(unclear):
+            index, number = rows[unclear], arcs[unclear]
+            broken[unclear] = ~is_met_at_samples(problem, pick(parities, index, number), number)
+        np.logical_and.at(suspects, rows, broken)

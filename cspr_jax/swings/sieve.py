@@ -105,19 +105,20 @@ def smallest_sampled(amplitude: Amplitude, segments: Segment, arcs: np.ndarray, 
     return row_by_row(one, (jnp.asarray(arcs, dtype), sample_table(amplitude, arcs, tau, dtype)))
 
 
-@persistent_jit(static_argnames="max_arcs")
-def upper_bounds(amplitude: Amplitude, even: Segment, odd: Segment, *, max_arcs: int) -> Array:
+@persistent_jit(static_argnames=("max_arcs", "samples"))
+def upper_bounds(amplitude: Amplitude, even: Segment, odd: Segment, *, max_arcs: int, samples: int = SAMPLES) -> Array:
     """Upper bounds of the margin of segments, for every number of arcs; rounding is allowed for.
 
     Args:
         even: the segments for even numbers of arcs, leaves (n, ...).
         odd: the segments for odd numbers of arcs, leaves (n, ...).
         max_arcs: largest number of arcs.
+        samples: how many; a multiple of 4.
 
     Returns:
         (n, max_arcs): column p - 1 for p arcs.
     """
-    tau = (np.arange(SAMPLES) + 0.5) / SAMPLES
+    tau = (np.arange(samples) + 0.5) / samples
     numbers = np.arange(1, max_arcs + 1)
     dtype = even.rate.dtype
     bounds = jnp.zeros((max_arcs, len(even.rate)), dtype)

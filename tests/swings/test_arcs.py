@@ -14,7 +14,9 @@ from cspr_jax.motions.problem import Problem
 from cspr_jax.robots import point_mass
 from cspr_jax.robots.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.swings import margins
 from cspr_jax.swings.arcs import minimum_arcs
+from cspr_jax.swings.margins import smallest_values
 
 Z0 = 1.7
 BASE = equilateral(0.26)
@@ -98,6 +100,26 @@ def test_without_arcs_the_best_candidate_is_reported():
         hub = np.array([0.0, 0.0, Z0])
         duration = oracle.motion(starts[i], ends[i], hub, 9.81, int(found.tried_arcs[i]), 0.0)[0]
         assert found.duration[i] == pytest.approx(duration)
+
+
+def test_cables_choose_what_is_shown_without_limits(monkeypatch):
+    """Where the cables refuse a cell, limits change nothing of what is shown, and few candidates are refined."""
+    ends, wide = random_points(32, 30, far=4.5, deep=3.5, high=1.0)[1], {"base": equilateral(1.7), "z0": 1.2}
+    starts = np.tile([0.0, 0.0, 1.2], (len(ends), 1))
+    plain = answer(starts, ends, **wide)
+    refined = []
+
+    def counted(functions, problem, segments, arcs, table):
+        refined.append(len(arcs))
+        return smallest_values(functions, problem, segments, arcs, table)
+
+    monkeypatch.setattr(margins, "smallest_values", counted)
+    found = answer(starts, ends, limits_of("floor", 4.0), **wide)
+    by_cables = np.flatnonzero((plain.arcs == 0) & (found.arcs == 0))
+    assert len(by_cables) > 5
+    assert np.array_equal(found.tried_arcs[by_cables], plain.tried_arcs[by_cables])
+    np.testing.assert_allclose(found.margin[by_cables], plain.margin[by_cables], rtol=0, atol=1e-9)
+    assert sum(refined) < 5 * len(starts)  # of 30 numbers of arcs
 
 
 def test_fixed_and_largest_numbers_of_arcs():
