@@ -6,11 +6,16 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.errors import InputError
-from cspr_jax.schema.meanings import CELL_SIDES
+from cspr_jax.schema.meanings import CELL_SIDES, OPEN_CONDITIONS
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.result import Result
 
 _, INSIDE, OUTSIDE = range(len(CELL_SIDES))
+# What leaves cells open, as lines of text have it.
+OPEN_WORDS = {name: f"inside at the centre, {name} not proved" for name in OPEN_CONDITIONS} | {
+    "boundary": "cut by the boundary",
+    "outside": "outside at the centre, not proved",
+}
 LEVEL, POLAR = ("x", "y", "z"), ("radius", "azimuth", "z")
 
 
@@ -28,6 +33,8 @@ class WorkspaceVolume:
         most: (...) volume of all cells except those proved outside as a whole.
         proved_fraction: (...) part of the grid whose side is proved.
         undecided_fraction: (...) part of the grid whose points are undecided.
+        open_fractions: (...) part of the grid whose cells are not proved, for each of their reasons (`cell_open`); none
+            where nothing was to be proved.
     """
 
     axes: dict[str, np.ndarray]
@@ -38,6 +45,7 @@ class WorkspaceVolume:
     most: np.ndarray
     proved_fraction: np.ndarray
     undecided_fraction: np.ndarray
+    open_fractions: dict[str, np.ndarray] = dataclasses.field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """The volume as plain numbers.
@@ -45,11 +53,13 @@ class WorkspaceVolume:
         Returns:
             numbers and nested lists by field, as `cspr volume --json` prints them.
         """
-        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        axes = {name: points.tolist() for name, points in self.axes.items()}
-        return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in values.items()} | {
-            "axes": axes
-        }
+
+        def plain(value: Any) -> Any:
+            if isinstance(value, dict):
+                return {name: plain(part) for name, part in value.items()}
+            return value.tolist() if isinstance(value, np.ndarray) else value
+
+        return {field.name: plain(getattr(self, field.name)) for field in dataclasses.fields(self)}
 
     def lines(self) -> list[str]:
         """The volume as lines of text.
@@ -68,6 +78,10 @@ class WorkspaceVolume:
                     f"; proved between {self.least[place]:.6g} and {self.most[place]:.6g}, "
                     f"{100.0 * self.proved_fraction[place]:.4g} % of the grid"
                 )
+            parts = [(values[place], OPEN_WORDS[name]) for name, values in self.open_fractions.items()]
+            words = ", ".join(f"{100.0 * part:.3g} % {word}" for part, word in sorted(parts)[::-1] if part > 0.0)
+            if words:
+                text += f"; open: {words}"
             if self.undecided_fraction[place] > 0.0:
                 text += f"; {100.0 * self.undecided_fraction[place]:.4g} % of the grid undecided"
             texts.append(f"{at}: {text}" if at else text)
@@ -110,6 +124,10 @@ def volume_of(result: Result) -> WorkspaceVolume:
     def volume(chosen: np.ndarray) -> np.ndarray:
         return np.asarray((chosen * weights).sum(axis=over))
 
+    open_fractions = {}
+    if "cell_open" in result.data:
+        reason = placed("cell_open")
+        open_fractions = {name: volume(reason == k) / total for k, name in enumerate(OPEN_CONDITIONS) if k}
     return WorkspaceVolume(
         axes={names[i]: result.axes[names[i]] for i in others if names[i] not in axes},
         units="m" if count == 1 else f"m{count}",
@@ -119,6 +137,7 @@ def volume_of(result: Result) -> WorkspaceVolume:
         most=total - volume(side == OUTSIDE),
         proved_fraction=volume(side != 0) / total,
         undecided_fraction=volume(verdict == Verdict.UNDECIDED) / total,
+        open_fractions=open_fractions,
     )
 
 

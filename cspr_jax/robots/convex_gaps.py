@@ -34,7 +34,7 @@ class Solid(NamedTuple):
         faces: (n_faces, 3) corners of triangles, counterclockwise as seen from outside; (0, 3) of a segment.
     """
 
-    corners: AffineBounds
+    corners: Any
     edges: Any
     faces: Any
 
@@ -51,9 +51,15 @@ class FacePlanes(NamedTuple):
     offsets: Any
 
 
-class _Features(NamedTuple):
-    # The nearest features of two bodies: kind (0 edges, 1 a corner of the first and a face of the second, 2 the other
-    # way round), and the numbers of both.
+class Features(NamedTuple):
+    """The nearest features of two bodies.
+
+    Fields:
+        kind: 0: edges; 1: a corner of the first and a face of the second; 2: the other way round.
+        first: number of that of the first body.
+        second: likewise.
+    """
+
     kind: Any
     first: Any
     second: Any
@@ -83,13 +89,13 @@ def clearance_bounds(first: Solid, second: Solid) -> tuple[Array, Array]:
         the distance, m.
     """
     corners = first.corners.middle, second.corners.middle
-    features = _nearest_features(*corners, first, second)
-    line = turning(lambda p, q: _direction(p, q, first, second, features), first.corners, second.corners)
+    features = nearest_features(*corners, first, second)
+    line = turning(lambda p, q: parting_direction(p, q, first, second, features), first.corners, second.corners)
     between = second.corners.each(lambda x: x[None]) - first.corners.each(lambda x: x[:, None])
     low = along(line, between.each(lambda x: x.reshape(-1, 3)))
     place, other = (
         dot(body.corners.each(jnp.transpose), weights[None])
-        for body, weights in zip((first, second), _weights(*corners, first, second, features), strict=True)
+        for body, weights in zip((first, second), nearest_weights(*corners, first, second, features), strict=True)
     )
     return low, distance_bound(place, other)
 
@@ -148,15 +154,15 @@ def depth_bound(body: Solid, planes: FacePlanes) -> Array:
         () upper bound of the signed distance, m; inf where the bodies are not proved to meet.
     """
     start, end = (body.corners.each(lambda x, k=k: x[body.edges[:, k]]) for k in range(2))
-    part = _inside(start.middle, end.middle, planes)[:, None]
+    part = inner_fractions(start.middle, end.middle, planes)[:, None]
     points = start * (1.0 - part) + end * part
     heights = dot(points.each(lambda x: x[:, None]), planes.normals[None]) - planes.offsets[None]
     least = jnp.min(jnp.max(heights.high(), axis=1))
     return jnp.where(least < 0.0, least, jnp.inf)
 
 
-def _inside(start: Array, end: Array, planes: FacePlanes) -> Array:
-    # Share of each edge at which the middle of its part behind all planes lies, or would lie.
+def inner_fractions(start: Array, end: Array, planes: FacePlanes) -> Array:
+    """Share of each edge at which the middle of its part behind all planes lies, or would lie, (n_edges,)."""
     high, low = (points @ planes.normals.T - planes.offsets[None] for points in (start, end))
     meet = high / jnp.where(high == low, 1.0, high - low)
     first = jnp.max(jnp.where(low < high, meet, 0.0), axis=1)
@@ -190,9 +196,10 @@ def _unit(vectors: Array) -> Array:
     return vectors / jnp.sqrt(jnp.maximum(jnp.sum(vectors**2, axis=-1, keepdims=True), TINY))
 
 
-def _nearest_features(p: Array, q: Array, first: Solid, second: Solid) -> _Features:
+def nearest_features(p: Array, q: Array, first: Solid, second: Solid) -> Features:
+    """The nearest features of two bodies with corners p and q, whose edges and faces are those of the solids."""
     if len(first.edges) == len(second.edges) == 1:
-        return _Features(0, 0, 0)
+        return Features(0, 0, 0)
     (a, u), (b, v) = _ends(p, first.edges), _ends(q, second.edges)
     a, u, b, v = a[:, None], u[:, None], b[None], v[None]
     s, t = nearest(a, u, b, v)
@@ -209,10 +216,10 @@ def _nearest_features(p: Array, q: Array, first: Solid, second: Solid) -> _Featu
         jnp.stack([place // part.shape[1], place % part.shape[1]]) for part, place in zip(parts, places, strict=True)
     ]
     kinds = jnp.asarray([0] + [1] * bool(len(second.faces)) + [2] * bool(len(first.faces)))
-    return _Features(kinds[best], *jnp.stack(numbers)[best])
+    return Features(kinds[best], *jnp.stack(numbers)[best])
 
 
-def _edges_at(features: _Features, first: Solid, second: Solid) -> list[Array]:
+def _edges_at(features: Features, first: Solid, second: Solid) -> list[Array]:
     # Corners of the two edges that are the nearest ones; of other features any edges.
     chosen = (first, features.first), (second, features.second)
     return [
@@ -221,8 +228,8 @@ def _edges_at(features: _Features, first: Solid, second: Solid) -> list[Array]:
     ]
 
 
-def _direction(p: Array, q: Array, first: Solid, second: Solid, features: _Features) -> Array:
-    # Unit vector from the first body to the second along the shortest way between them.
+def parting_direction(p: Array, q: Array, first: Solid, second: Solid, features: Features) -> Array:
+    """Unit vector (3,) from the first body to the second along the shortest way between them."""
     one, two = _edges_at(features, first, second)
     (a, u), (b, v) = _ends(p, one), _ends(q, two)
     s, t = nearest(a, u, b, v)
@@ -242,8 +249,8 @@ def _direction(p: Array, q: Array, first: Solid, second: Solid, features: _Featu
     return way
 
 
-def _weights(p: Array, q: Array, first: Solid, second: Solid, features: _Features) -> tuple[Array, Array]:
-    # Weights of corners, which make the nearest points.
+def nearest_weights(p: Array, q: Array, first: Solid, second: Solid, features: Features) -> tuple[Array, Array]:
+    """Weights of the corners of both, (m,) each, which make the nearest points."""
     one, two = _edges_at(features, first, second)
     s, t = nearest(*_ends(p, one), *_ends(q, two))
 

@@ -63,6 +63,24 @@ def cell_sides(_: Mapping[str, Any]) -> tuple[str, ...]:
     return CELL_SIDES
 
 
+OPEN_CONDITIONS = (
+    *("decided", "boundary", "tensions", "closure", "clearances"),
+    *("floor", "cable lengths", "cable speeds", "outside"),
+)
+
+
+def open_conditions(_: Mapping[str, Any]) -> tuple[str, ...]:
+    """What leaves a cell open: its boundary, or the proof of a condition.
+
+    Args:
+        _: settings of a sweep; the words are the same for all.
+
+    Returns:
+        the words of 0, 1, 2, ...
+    """
+    return OPEN_CONDITIONS
+
+
 NEAREST_BODIES = ("none", "two cables", "cable and obstacle", "cable and platform", "platform and obstacle")
 
 
@@ -85,6 +103,7 @@ MEANINGS: dict[str, Callable[[Mapping[str, Any]], tuple[str, ...]]] = {
     "line-bounds": line_bounds,
     "slack-cables": slack_cables,
     "cell-sides": cell_sides,
+    "open-conditions": open_conditions,
     "nearest-bodies": nearest_bodies,
 }
 

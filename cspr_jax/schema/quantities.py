@@ -745,6 +745,17 @@ QUANTITIES = {
             meanings="cell-sides",
         ),
         Quantity(
+            "cell_open",
+            "1",
+            "what leaves the whole cell open",
+            "Why `cell_side` is 0. 1: positions on both sides, or on the boundary, were found in the cell; 2 to 7: the "
+            "centre is inside, and tensions, closure, clearances, floor, lengths or speeds of cables are not proved to "
+            "hold in the whole cell; 8: the centre is outside, which is not proved of the whole cell; 0: the side is "
+            "proved, or not requested.",
+            "int16",
+            meanings="open-conditions",
+        ),
+        Quantity(
             "orientation_fraction",
             "1",
             "part of the orientations",

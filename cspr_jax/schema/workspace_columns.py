@@ -5,7 +5,7 @@ AMONG_OBSTACLES = ("nearest_bodies", "clearance_cables", "clearance_obstacles")
 LIMITED = ("floor_margin", "length_margin", "speed_margin")
 MORE_OF_WORKSPACES = (
     *AMONG_OBSTACLES,
-    *("clearance_platform", *LIMITED, "capacity_margin"),
+    *("clearance_platform", *LIMITED, "capacity_margin", "cell_open"),
 )
 _SUPPLIED = ("workspace.conditions.static", "workspace.conditions.wrench-feasible")
 _FREE = "workspace.conditions.interference-free"
@@ -20,7 +20,7 @@ ONLY_WITH = (
     (("floor_margin",), ("limits.floor",)),
     (("length_margin",), ("limits.cable_length_max",)),
     (("speed_margin",), ("workspace.speed", "workspace.angular_speed")),
-    (("cell_side",), ("workspace.prove",)),
+    (("cell_side", "cell_open"), ("workspace.prove",)),
     (("orientation_fraction",), ("workspace.orientations",)),
 )
 OF_SHAPES = ("nearest_bodies", "clearance_cables", "clearance_platform")
@@ -32,4 +32,5 @@ STORED_WITH = (
     ("workspace.platform_box", OF_SHAPES),
     ("workspace.platform_hull", OF_SHAPES),
     ("workspace.capacity_length", ("capacity_margin",)),
+    ("workspace.prove", ("cell_open",)),
 )

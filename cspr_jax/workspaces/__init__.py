@@ -21,15 +21,17 @@ Files, each importing only from those above it:
     exact                   margins of single poses by singular values
     kernels                 compiled margins of many poses
     search                  margins and verdicts of many poses
+    shifts                  how far cables move within a cell
     cells                   boxes of positions, and bounds over them
     inside_cells            cells in which tensions stay within limits at every position
     outside_cells           cells in which no tensions within limits suffice at any position
     cell_proofs             proofs of many cells
-    shifts                  how far cables move within a cell
+    contact_cells           clearances over cells
     clearances              clearances of robots at rest
     speeds                  speeds of cables
     whole_cells             cells of maps, halved where they stay open
     rest_poses              all conditions together, and sets of orientations
+    rest_cells              all conditions together over cells
     acceleration_search     feasible accelerations at many places
     sensitivities           sensitivities to errors of the cable lengths
     map                     maps of workspaces

@@ -1,5 +1,7 @@
 """Proofs of cells at one orientation, without halving: that they lie wholly inside a workspace, or wholly outside."""
 
+import dataclasses
+
 import numpy as np
 
 from cspr_jax.arithmetic import lanes
@@ -9,11 +11,12 @@ from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot, across_line
 from cspr_jax.robots.tension_rules import distributions
 from cspr_jax.robots.wrench_sets import spanning
-from cspr_jax.workspaces.cells import Cells, cells_about
+from cspr_jax.workspaces.cells import cells_about
 from cspr_jax.workspaces.inside_cells import least_margins
 from cspr_jax.workspaces.outside_cells import are_beyond, are_one_sided
 from cspr_jax.workspaces.questions import CLOSURE
 from cspr_jax.workspaces.search import WorkspaceSearch
+from cspr_jax.workspaces.shifts import leaving_points, shifts
 from cspr_jax.workspaces.worst_cocircuits import worst_cocircuits
 
 # Cells that are proved at a time, so that their arrays fit a cache; poses whose cocircuits are compared at a time.
@@ -27,13 +30,19 @@ class CellProofs:
     """Proofs of cells at one orientation, without halving."""
 
     def __init__(self, robot: AnyRobot, search: WorkspaceSearch, quaternion: np.ndarray) -> None:
-        """Prepare the proofs of the requirement of a search, for its robot, which has no pulleys."""
+        """Prepare the proofs of the requirement of a search, for its robot."""
+        self._robot, self._quaternion = robot, quaternion
         self._requirement, self._is_closure = search.requirement, search.requirement.condition == CLOSURE
         self._unbounded = tuple(np.isinf(search.requirement.high).tolist())
-        self._exits, self._forces = _geometry(robot, quaternion, search.unit)
+        self._arms, self._forces = _geometry(robot, quaternion, search.unit)
         # The required wrenches are the same at every place, for the robot does not turn.
         required = search.required(np.zeros(3), quaternion)
-        self._wrenches, self._is_finite = required.corners, not required.ellipsoids
+        self._wrenches, self._enclosing = required.corners, required.enclosing.corners
+        self._boxed = None
+        if required.ellipsoids:
+            # Margins of all wrenches of the boxes about the ellipsoids.
+            loads = search.requirement.wrenches.enclosing
+            self._boxed = WorkspaceSearch(robot, dataclasses.replace(search.requirement, wrenches=loads))
         self._subsets = spanning(robot.n_cables, robot.dof)
 
     def matrices(self, positions: np.ndarray) -> np.ndarray:
@@ -45,7 +54,10 @@ class CellProofs:
         Returns:
             (n, dof, n_cables), moments over a length.
         """
-        rays = self._exits - positions[:, None]
+        return self._matrices(positions, self._exits(positions))
+
+    def _matrices(self, positions: np.ndarray, exits: np.ndarray) -> np.ndarray:
+        rays = exits - positions[:, None]
         units = rays / np.linalg.norm(rays, axis=2, keepdims=True)
         return np.einsum("nik,kmi->nmi", units, self._forces)
 
@@ -59,23 +71,24 @@ class CellProofs:
 
         Returns:
             (n,) distance that tensions keep from their limits at every position, N, or -inf; for wrench closure a
-            number that is positive where closure is proved in the whole cell. For ellipsoids of wrenches nothing is
-            proved.
+            number that is positive where closure is proved in the whole cell. In place of ellipsoids of wrenches the
+            boxes about them count.
         """
-        if not (self._is_finite or self._is_closure):
-            return np.full(len(positions), -np.inf)
-        units, count = self.matrices(positions), self._exits.shape[0]
-        low, high, loads = self._requirement.low, self._requirement.high, self._wrenches
+        exits, moves = self._exits(positions), self._moves(positions, half)
+        units, count = self._matrices(positions, exits), len(self._arms)
+        low, high, loads = self._requirement.low, self._requirement.high, self._enclosing
+        if self._boxed is not None:
+            margin = self._boxed(positions, np.tile(self._quaternion, (len(positions), 1))).margin
         if self._is_closure:  # tensions without a wrench
             low, high, loads = np.zeros(count), np.full(count, np.inf), np.zeros((1, units.shape[1]))
             room = np.ones((1, 1))
         else:
             size = (np.abs(loads).max() + np.abs(low).max()) or 1.0
-            room = KEPT * np.where(np.isfinite(margin), margin, size)[:, None]
+            room = KEPT * np.where(np.isfinite(margin), np.maximum(margin, 0.0), size)[:, None]
         tensions = [_tensions(units, load, low + room, high - room) for load in loads]
 
         def part(chosen):
-            cells = self._cells(positions[chosen], half[chosen])
+            cells = cells_about(positions[chosen], half[chosen], exits[chosen], self._forces, moves[chosen])
             each = zip(tensions, loads, strict=True)
             return np.min([least_margins(cells, x[chosen], load, low, high) for x, load in each], axis=0)
 
@@ -99,11 +112,12 @@ class CellProofs:
             loads, unbounded = self._wrenches, self._unbounded
             return worst_cocircuits(matrices, loads, low, finite, condition=condition, unbounded=unbounded)
 
-        worst = in_batches(kernel, self.matrices(positions), size=BATCH)
+        exits, moves = self._exits(positions), self._moves(positions, half)
+        worst = in_batches(kernel, self._matrices(positions, exits), size=BATCH)
         held, loads = self._subsets[worst.subset], self._wrenches[worst.load]
 
         def proved(chosen, normals, held):
-            cells = self._cells(positions[chosen], half[chosen])
+            cells = cells_about(positions[chosen], half[chosen], exits[chosen], self._forces, moves[chosen])
             if self._is_closure:
                 return are_one_sided(cells, normals, held)
             return are_beyond(cells, normals, held, loads[chosen], low, high)
@@ -116,8 +130,17 @@ class CellProofs:
 
         return np.concatenate(in_parts(part, len(positions), PART))
 
-    def _cells(self, positions: np.ndarray, half: np.ndarray) -> Cells:
-        return cells_about(positions, half, self._exits, self._forces)
+    def _exits(self, positions: np.ndarray) -> np.ndarray:
+        # Points at which cables leave, less the arms of their attachment points, (n, n_cables, 3).
+        return leaving_points(self._robot, positions, self._quaternion) - self._arms
+
+    def _moves(self, positions: np.ndarray, half: np.ndarray) -> np.ndarray:
+        # How far exits move, (n, n_cables); infinite where an attachment point might be within its pulley.
+        if self._robot.pulleys is None:
+            return np.zeros((len(positions), len(self._arms)))
+        turns = np.tile(self._quaternion, (len(positions), 1))
+        moved = shifts(self._robot, positions, turns, np.linalg.norm(half, axis=1))
+        return np.where(moved.free > 0.0, moved.exits[:, None], np.inf)
 
 
 def _tensions(units: np.ndarray, wrench: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -127,14 +150,14 @@ def _tensions(units: np.ndarray, wrench: np.ndarray, low: np.ndarray, high: np.n
 
 
 def _geometry(robot: AnyRobot, quaternion: np.ndarray, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Base points less arms, (n_cables, 3) m; (3, dof, n_cables) wrenches of unit forces at the attachment points."""
+    """Arms of the attachment points, (n_cables, 3) m; (3, dof, n_cables) wrenches of unit forces at these points."""
     row, count = PATTERNS[robot.pattern], robot.n_cables
-    base, axes = np.asarray(robot.base_points), np.eye(3)
+    axes = np.eye(3)
     forces = np.repeat(axes[list(row.forces)].T[..., None], count, axis=2)
     if not isinstance(robot, PlatformRobot):
-        return base, forces / unit[:, None]
+        return np.zeros((count, 3)), forces / unit[:, None]
     rotation = np.array([[float(x) for x in line] for line in lanes.rotation_matrix(tuple(quaternion))])
     arms = np.asarray(robot.platform_points) @ rotation.T
     moments = np.cross(arms, axes[:, None])  # (3, n_cables, 3)
     directions = rotation @ np.asarray(across_line(robot)) if row.along_line else axes[:, list(row.moments)]
-    return base - arms, np.concatenate([forces, (moments @ directions).transpose(0, 2, 1)], axis=1) / unit[:, None]
+    return arms, np.concatenate([forces, (moments @ directions).transpose(0, 2, 1)], axis=1) / unit[:, None]

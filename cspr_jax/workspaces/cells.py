@@ -9,7 +9,8 @@ sizes and |x_k| <= 1,
     Z(p) = Z0 - sum_k x_k N_k,        N_k = H_k [A_1 e_k, ..., A_n e_k],
 
 and a solution with a fixed basis is a power series in x. `inside_cells` and `outside_cells` keep its terms of first and
-second order and bound the rest by norms.
+second order and bound the rest by norms. Behind a pulley e_i moves with p, by no more than is known: within the cell it
+stays at its value at the centre, and the rest counts like rounding of the columns and of the lengths.
 
 Arrays are (cells, ...); coefficients of first order in x have one axis of length 3, those of second order two.
 """
@@ -34,7 +35,8 @@ class Cells(NamedTuple):
         steps: (n, n_cables, 3) products of unit vectors of the cables with the half sizes, by which lengths fall, m.
         lengths: (n, n_cables) L_i at the centres, m.
         radius: (n,) from centre to corner, m.
-        rounding: (n, n_cables) bound of the rounding of a column of Z, m.
+        rounding: (n, n_cables) bound of the rounding of a column of Z, and of what moves of exits change in it, m.
+        moves: (n, n_cables) how far exits move within the cells, m; 0 without pulleys.
     """
 
     matrices: np.ndarray
@@ -44,11 +46,12 @@ class Cells(NamedTuple):
     lengths: np.ndarray
     radius: np.ndarray
     rounding: np.ndarray
+    moves: np.ndarray
 
     @property
     def shortest(self) -> np.ndarray:
         """Lower bound of the lengths over the cells, (n, n_cables), m; not positive where nothing is known."""
-        return (self.lengths - self.radius[:, None]) * (1.0 - ROUNDING) - self.rounding
+        return (self.lengths - self.radius[:, None]) * (1.0 - ROUNDING) - self.rounding - self.moves
 
     def take(self, chosen: np.ndarray) -> "Cells":
         """Some of the cells.
@@ -62,15 +65,18 @@ class Cells(NamedTuple):
         return Cells(*(values[chosen] for values in self))
 
 
-def cells_about(centres: np.ndarray, half: np.ndarray, exits: np.ndarray, wrenches: np.ndarray) -> Cells:
+def cells_about(
+    centres: np.ndarray, half: np.ndarray, exits: np.ndarray, wrenches: np.ndarray, moves: np.ndarray
+) -> Cells:
     """Cells about centres.
 
     Args:
         centres: (n, 3) m.
         half: (n, 3) half sizes, m.
-        exits: (n_cables, 3) e_i, m.
+        exits: (n, n_cables, 3) e_i at the centres, m.
         wrenches: (3, m, n_cables) wrenches of unit forces along the axes at the attachment points, moments over a
             length.
+        moves: (n, n_cables) how far e_i moves from there within the cells, m.
 
     Returns:
         the cells.
@@ -80,10 +86,10 @@ def cells_about(centres: np.ndarray, half: np.ndarray, exits: np.ndarray, wrench
     with np.errstate(divide="ignore", invalid="ignore"):
         steps = rays * half[:, None] / lengths[..., None]
     matrices = (rays.transpose(0, 2, 1)[:, :, None] * wrenches).sum(1)
-    spans = np.linalg.norm(exits, axis=1) + np.linalg.norm(centres, axis=1)[:, None]
-    rounding = ROUNDING * np.sqrt((wrenches**2).sum((0, 1))) * spans
+    spans = np.linalg.norm(exits, axis=2) + np.linalg.norm(centres, axis=1)[:, None]
+    rounding = np.sqrt((wrenches**2).sum((0, 1))) * (ROUNDING * spans + moves)
     changes = half[:, :, None, None] * wrenches
-    return Cells(matrices, changes, rays, steps, lengths, np.linalg.norm(half, axis=1), rounding)
+    return Cells(matrices, changes, rays, steps, lengths, np.linalg.norm(half, axis=1), rounding, moves)
 
 
 def reach(linear: np.ndarray) -> np.ndarray:

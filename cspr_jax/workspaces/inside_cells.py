@@ -130,9 +130,11 @@ def _tension_range(
     quadratic = relative[..., None, None] * way.quadratic - weights[..., None, None] * mixed
     rest = weights * (shortening * second + (lengths + shortening) * way.rest)
     middle = lengths * densities
+    rest = rest + cells.moves * np.maximum(np.abs(lowest), np.abs(highest))
     least = middle - reach(linear) + least_quadratic(quadratic) - rest
     most = middle + reach(linear) - least_quadratic(-quadratic) + rest
     radius = cells.radius[:, None]
-    least = np.where(lowest >= 0.0, np.maximum(least, cells.shortest * lowest), (lengths + radius) * lowest)
-    most = np.minimum(most + 0.5 * radius**2 / cells.shortest * highest, (lengths + radius) * highest)
+    longest = lengths + radius + cells.moves
+    least = np.where(lowest >= 0.0, np.maximum(least, cells.shortest * lowest), longest * lowest)
+    most = np.minimum(most + 0.5 * radius**2 / cells.shortest * highest, longest * highest)
     return least, np.where(highest >= 0.0, most, 0.0)

@@ -24,6 +24,7 @@ from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.quantities import TILT_TORSION
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.workspaces.questions import FEASIBLE, check_cables, required_wrenches, requirement
+from cspr_jax.workspaces.rest_cells import RestCells
 from cspr_jax.workspaces.rest_poses import MARGINS, OrientationSet, RestPoses, over_orientations
 from cspr_jax.workspaces.search import WorkspaceSearch
 from cspr_jax.workspaces.speeds import CableSpeeds, cable_speeds
@@ -151,7 +152,7 @@ class WorkspaceMap(GridMap):
         if self._samples is not None:
             kind: OrientationSet = "total" if self._workspace.orientations in ("total", "dextrous") else "inclusion"
             set_answers = over_orientations(self._poses, places, self._samples, self._volume, kind)
-            return set_answers | {"cell_side": np.zeros(len(places), np.int16)}
+            return set_answers | dict.fromkeys(("cell_side", "cell_open"), np.zeros(len(places), np.int16))
         quaternions = np.repeat(self._quaternion, len(places), axis=0)
         if any(name in cells for name in TILT_TORSION):
             angles = np.stack([cells.get(name, np.zeros(len(places))) for name in TILT_TORSION], axis=1)
@@ -159,10 +160,11 @@ class WorkspaceMap(GridMap):
                 angles[:, 0] = 0.5 * math.pi
             quaternions = products(self._frame.turned_quaternions(from_tilt_torsion(angles)), quaternions)
         answers = self._poses(places, quaternions)
-        sides = np.zeros(len(places), np.int16)
+        sides, reasons = np.zeros((2, len(places)), np.int16)
         if self._workspace.prove:
-            sides = self._poses.sides(places, self._half_sizes(cells), self._quaternion[0])
-        return answers | {"orientation_fraction": (answers["verdict"] == 0).astype(float), "cell_side": sides}
+            sides, reasons = RestCells(self._poses, self._quaternion[0])(places, self._half_sizes(cells))
+        fraction = (answers["verdict"] == 0).astype(float)
+        return answers | {"orientation_fraction": fraction, "cell_side": sides, "cell_open": reasons}
 
     def _half_sizes(self, cells: dict[str, np.ndarray]) -> np.ndarray:
         # Return half sizes (n, 3) of the cells: half of the distance to the farther neighbour along each axis.

@@ -184,7 +184,7 @@ def least_slacks(cells: Cells, products: Products, limits: np.ndarray) -> np.nda
     bent = quadratic + linear[..., :, None] * steps[..., None, :]
     bends = products.quadratic[:, -1] - (limits[..., None, None] * bent).sum(1)
     shift, radius = reach(steps), cells.radius[:, None]
-    curved = radius**2 * cells.lengths / cells.shortest**3
+    curved = radius**2 * cells.lengths / cells.shortest**3 + cells.moves * cells.lengths / cells.shortest**2
     cable_rests = products.rest[:, :-1]
     most = np.abs(value) + reach(linear) + second + cable_rests
     rest = cable_rests * (1.0 + shift) + second * shift + most * curved

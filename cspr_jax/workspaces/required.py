@@ -56,6 +56,14 @@ class RequiredWrenches:
         signs = itertools.product(*[(-1.0, 1.0) if size else (0.0,) for size in half])
         return np.concatenate([self.points + np.array(sign) * half for sign in signs])
 
+    @property
+    def enclosing(self) -> "RequiredWrenches":
+        """Wrenches that include all of these, with a box about each ellipsoid in its place."""
+        if not self.ellipsoids:
+            return self
+        box = sum(self.ellipsoids) if self.box is None else self.box + sum(self.ellipsoids)
+        return dataclasses.replace(self, box=np.asarray(box), ellipsoids=())
+
     def supports(self, normals: np.ndarray) -> np.ndarray:
         """Largest products of normals with the wrenches.
 

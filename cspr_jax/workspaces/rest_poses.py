@@ -16,9 +16,7 @@ from cspr_jax.workspaces.clearances import at_rest, flags, nearest_bodies
 from cspr_jax.workspaces.geometry import mass_centres
 from cspr_jax.workspaces.questions import CLOSURE
 from cspr_jax.workspaces.search import WorkspaceSearch
-from cspr_jax.workspaces.shifts import shifts
 from cspr_jax.workspaces.speeds import CableSpeeds
-from cspr_jax.workspaces.whole_cells import WorkspaceCells
 
 CLEARANCES = {"clearance_cables": "cables", "clearance_obstacles": "obstacles", "clearance_platform": "platform"}
 MARGINS = (
@@ -27,8 +25,6 @@ MARGINS = (
 )
 NEAREST = "nearest_bodies"
 BATCH = 4096
-# Rounding of distances, m: far above what coordinates below 1e6 m have, far below what anybody measures.
-CLOSE = 1e-9
 # Poses that are answered at a time, where each place has many orientations.
 AT_ONCE = 1 << 19
 
@@ -82,55 +78,17 @@ class RestPoses:
             columns |= {"clearance": distances.clearance, NEAREST: nearest_bodies(self.around, distances)}
             columns |= {name: getattr(distances, of) for name, of in CLEARANCES.items()}
             verdict |= flags(distances)
-        for name, flag, slack in self._limited(origins, quaternions):
+        for name, flag, slack in self.limited(origins, quaternions):
             verdict |= np.where((slack < 0.0).any(1), flag, 0).astype(FLAGS)
             columns[name] = slack.min(1)
         return {"verdict": conjunction(verdict), **columns}
-
-    def sides(self, origins: np.ndarray, half: np.ndarray, quaternion: np.ndarray) -> np.ndarray:
-        """Tell which cells, at one orientation, are proved to lie wholly on one side of the workspace.
-
-        While a robot moves by a distance without turning, its heights and the lengths of its cables change by no more
-        than this distance; distances and speeds of cables change as `workspaces.shifts` says.
-
-        Args:
-            origins: (n, 3) of the platform frame at the centres of the cells, kernels' coordinates, m.
-            half: (n, 3) half sizes of the cells, m.
-            quaternion: (4,) unit quaternion, scalar first.
-
-        Returns:
-            (n,) 0: neither side is proved; 1: inside; 2: outside, as in `schema.meanings.CELL_SIDES`.
-        """
-        quaternions = np.repeat(quaternion[None], len(origins), axis=0)
-        places, reach = mass_centres(self.robot, origins, quaternions), np.linalg.norm(half, axis=1)
-        inside, outside = np.ones(len(origins), bool), np.zeros(len(origins), bool)
-        for search in self.searches.values():
-            cells, answers = WorkspaceCells(self.robot, search.requirement), search(places, quaternions)
-            held, lost = cells(places, half, quaternion, answers)
-            inside, outside = inside & held, outside | lost
-        moved = shifts(self.robot, places, quaternions, reach)
-        if self.robot.pulleys is not None:
-            # An attachment point within a pulley has no free cable.
-            inside &= (moved.free > 0.0).all(1)
-        slacks = list[tuple[np.ndarray, np.ndarray]]()
-        if self.around is not None:
-            distances = at_rest(self.robot, self.around, places, quaternions)
-            slacks += [(getattr(distances, of)[:, None], getattr(moved, of)[:, None]) for of in ("cables", "obstacles")]
-            inside &= (distances.platform > moved.near_platform(self.around) + CLOSE) & ~distances.is_open
-            outside |= distances.platform < -moved.platform - CLOSE
-        changes = {} if self.speeds is None else {"speed_margin": self.speeds.changes(moved)}
-        slacks += [(slack, changes.get(name, reach[:, None])) for name, _, slack in self._limited(origins, quaternions)]
-        for slack, change in slacks:
-            inside &= (slack > change + CLOSE).all(1)
-            outside |= (slack < -change - CLOSE).any(1)
-        return np.where(inside, 1, np.where(outside, 2, 0)).astype(np.int16)
 
     def _lengths(self, places: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
         poses = places, quaternions
         return in_batches(lambda x: geometry.cable_lengths(self.robot, *x), poses, size=BATCH)
 
-    def _limited(self, origins: np.ndarray, quaternions: np.ndarray) -> Iterator[tuple[str, Verdict, np.ndarray]]:
-        # Yield the quantity, the flag and the slack (n, k) of each limit.
+    def limited(self, origins: np.ndarray, quaternions: np.ndarray) -> Iterator[tuple[str, Verdict, np.ndarray]]:
+        """The quantity, the flag and the slack (n, k) of each limit, at poses as `__call__` takes them."""
         places = mass_centres(self.robot, origins, quaternions)
         if self.limits.floor is not None:
             yield "floor_margin", Verdict.BELOW_FLOOR, float(self.limits.floor) - places[:, 2:]

@@ -1,23 +1,6 @@
 """Bounds of how far cables move and turn while a robot moves within a cell without turning. Arrays in, answers out.
 
-A cable is a segment from its exit E to its attachment point A. While the robot moves by at most h, A does too, and E
-moves by at most D, which is 0 without a pulley. A point (1 - s) E + s A of the cable moves by at most (1 - s) D + s h;
-relative to the platform by at most (1 - s) (D + h), and relative to the point at t of another cable by at most
-(1 - s) D + (1 - t) D + |s - t| h. The largest values, at s and t of 0 and 1, bound how distances change:
-
-    cable and obstacle       max(D, h)
-    platform and obstacle    h
-    two cables               max(2 D, D + h)
-    cable and platform       D + h
-
-The last bound also holds if a length next to A is left out of the cable: for each point of the cable at a distance r
-from A, the point that is at the same distance afterwards, or the end of the cable if that is nearer to A, is no farther
-away than E moves relative to the platform.
-
-If a cable is attached in or on the shape of its platform, which is convex, the signed distance from the shape grows
-along the cable from where it is positive. So if it is positive at the distance r from A, where the part that is not
-left out begins, it is the least there, and changes by no more than r times the change of the unit vector.
-
+A cable is a segment from its exit E to its attachment point. While the robot moves by at most h, that point does too.
 On its pulley of radius r, E moves along the cable by r / f of the distance that A moves across the cable in the plane
 of the pulley, where f is the free length; and with this plane by at most 2 r / w of the distance that A moves out of
 it, where w is the distance of A from the swivel axis (`robots.pulleys`). Wherever A goes, E stays within a band of
@@ -31,8 +14,6 @@ import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.robots.cables import AnyRobot
-from cspr_jax.robots.clearance import Scene
-from cspr_jax.robots.shapes import is_within
 from cspr_jax.workspaces import geometry
 
 BATCH = 4096
@@ -54,32 +35,6 @@ class Shifts(NamedTuple):
     exits: np.ndarray
     units: np.ndarray
     free: np.ndarray
-
-    @property
-    def cables(self) -> np.ndarray:
-        """Change of distances between two cables, (n,) m."""
-        return self.exits + np.maximum(self.exits, self.robot)
-
-    @property
-    def obstacles(self) -> np.ndarray:
-        """Change of distances of cables and platform from obstacles, (n,) m."""
-        return np.maximum(self.exits, self.robot)
-
-    @property
-    def platform(self) -> np.ndarray:
-        """Change of distances of cables from their own platform, (n,) m."""
-        return self.exits + self.robot
-
-    def near_platform(self, around: Scene) -> np.ndarray:
-        """Fall of positive distances of cables from their own platform.
-
-        Returns:
-            (n,) m.
-        """
-        whole = self.platform[:, None]
-        is_held = is_within(around.body, around.platform_points) if around.body is not None else np.zeros(1, bool)
-        near = np.where(is_held & (self.free >= around.leave), np.minimum(around.leave * self.units, whole), whole)
-        return near.max(1)
 
 
 def shifts(robot: AnyRobot, positions: np.ndarray, quaternions: np.ndarray, reach: np.ndarray) -> Shifts:
@@ -110,6 +65,19 @@ def shifts(robot: AnyRobot, positions: np.ndarray, quaternions: np.ndarray, reac
         exits = most * np.fmax(radius / free, 2.0 * radius / wide)
     exits = np.where(radius > 0.0, np.fmin(exits, BAND * radius), 0.0)
     return Shifts(reach, exits.max(1), _unit_changes(most, np.minimum(free, wide)), free)
+
+
+def leaving_points(robot: AnyRobot, positions: np.ndarray, quaternion: np.ndarray) -> np.ndarray:
+    """Points at which cables leave at one orientation (4,): their base points, or where they leave their pulleys.
+
+    Returns:
+        (n, n_cables, 3) m.
+    """
+    pulleys = robot.pulleys
+    if pulleys is None:
+        return np.broadcast_to(np.asarray(robot.base_points), (len(positions), robot.n_cables, 3))
+    poses = positions, np.tile(quaternion, (len(positions), 1))
+    return in_batches(lambda x: geometry.exit_points(robot, pulleys, *x), poses, size=BATCH)
 
 
 def _unit_changes(reach: np.ndarray, length: np.ndarray) -> np.ndarray:

@@ -1,6 +1,7 @@
 """Cells of maps of workspaces: boxes of positions that lie wholly inside a workspace, or wholly outside of it."""
 
 import itertools
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -18,11 +19,80 @@ DEPTH = 1
 ROUND = 65536
 
 
+class CellConditions(Protocol):
+    """Conditions on positions, each of which can be proved to hold in whole cells, or one of which to fail."""
+
+    def at(self, positions: np.ndarray) -> np.ndarray:
+        """Sides of positions (n, 3): (n,) 1 strictly inside, -1 strictly outside, else 0."""
+
+    def proved(
+        self, positions: np.ndarray, half: np.ndarray, sides: np.ndarray, held: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Proofs of cells without halving.
+
+        Args:
+            positions: (n, 3) centres, m.
+            half: (n, 3) half sizes, m.
+            sides: (n,) of the centres.
+            held: (n, n_conditions) conditions that hold in the whole cell already.
+
+        Returns:
+            (n, n_conditions) conditions that hold in the whole cell; (n,) whether one is broken at each position.
+        """
+
+
+class CellSides(NamedTuple):
+    """What is proved of cells.
+
+    Fields:
+        proved: (n,) whether the cell lies wholly on the side of its centre.
+        held: (n, n_conditions) conditions that are proved to hold in the whole cell.
+        mixed: (n,) whether the cell has positions on two sides.
+    """
+
+    proved: np.ndarray
+    held: np.ndarray
+    mixed: np.ndarray
+
+
+def proved_sides(
+    conditions: CellConditions, positions: np.ndarray, half: np.ndarray, sides: np.ndarray, held: np.ndarray, depth: int
+) -> CellSides:
+    """Tell which cells lie wholly on the side of their centres, open ones halved as often as `depth` allows.
+
+    Args:
+        sides: (n,) of the centres; 0 proves nothing.
+        held: (n, n_conditions) conditions that hold in the whole cell.
+    """
+    held, is_broken = conditions.proved(positions, half, sides, held)
+    found = CellSides(np.where(sides > 0, held.all(1), is_broken & (sides < 0)), held, np.zeros(len(sides), bool))
+    left = np.flatnonzero(~found.proved & (sides != 0))
+    if depth == 0 or len(left) == 0 or not half.any():
+        return found
+    corners = np.array(list(itertools.product(*[(-0.5, 0.5) if size else (0.0,) for size in half.max(0)])))
+    inner = positions[left, None] + corners * half[left, None]
+    part_sides = conditions.at(inner.reshape(-1, 3)).reshape(inner.shape[:2])
+    found.mixed[left] = (part_sides == -sides[left, None]).any(1)
+    # Only cells whose parts all have their centres on the same side can be proved.
+    agreeing = (part_sides == sides[left, None]).all(1)
+    if agreeing.any():
+        halved, count = left[agreeing], len(corners)
+        halves, own_sides, own_held = (np.repeat(values[halved], count, axis=0) for values in (0.5 * half, sides, held))
+        parts = proved_sides(conditions, inner[agreeing].reshape(-1, 3), halves, own_sides, own_held, depth - 1)
+        shape = len(halved), count
+        found.proved[halved], found.mixed[halved] = (
+            parts.proved.reshape(shape).all(1),
+            parts.mixed.reshape(shape).any(1),
+        )
+        found.held[halved] = parts.held.reshape(*shape, -1).all(1)
+    return found
+
+
 class WorkspaceCells:
     """Proofs that whole cells of a robot lie inside or outside a workspace.
 
     In a cell that is proved inside, the robot meets the requirement at each position; in a cell that is proved outside,
-    at none. Both allow for rounding. Nothing is proved for robots with pulleys.
+    at none. Both allow for rounding.
     """
 
     def __init__(self, robot: AnyRobot, requirement: Requirement) -> None:
@@ -50,51 +120,46 @@ class WorkspaceCells:
         Returns:
             (n,) whether each cell is proved inside; (n,) whether it is proved outside.
         """
-        side = _sides(answers)
+        side = sides_of(answers)
         proved = np.zeros(len(positions), bool)
         chosen = np.flatnonzero(side)
-        if len(chosen) and self._robot.pulleys is None:
+        if len(chosen):
             quaternion = np.array(IDENTITY) if quaternion is None else np.asarray(quaternion)
             sizes = np.broadcast_to(np.asarray(half, float), positions.shape)[chosen]
             with double_precision():
-                proofs = CellProofs(self._robot, self._search, quaternion)
+                condition = _Condition(CellProofs(self._robot, self._search, quaternion), self._search, quaternion)
                 for first in range(0, len(chosen), ROUND):
                     rows = slice(first, first + ROUND)
                     numbers = chosen[rows]
-                    cells = positions[numbers], sizes[rows], side[numbers], answers.margin[numbers]
-                    proved[numbers] = self._proved(proofs, quaternion, *cells, depth)
+                    open_cells = side[numbers], np.zeros((len(numbers), 1), bool)
+                    found = proved_sides(condition, positions[numbers], sizes[rows], *open_cells, depth)
+                    proved[numbers] = found.proved
         return proved & (side > 0), proved & (side < 0)
 
-    def _proved(self, proofs, quaternion, centres, half, side, margin, depth) -> np.ndarray:
-        """Tell whether cells lie wholly on the side of their centres, halved as often as `depth` allows."""
-        is_proved = np.zeros(len(centres), bool)
-        inside, outside = np.flatnonzero(side > 0), np.flatnonzero(side < 0)
+
+class _Condition:
+    # One condition on the cables, at one orientation.
+
+    def __init__(self, proofs: CellProofs, search: WorkspaceSearch, quaternion: np.ndarray) -> None:
+        self._proofs, self._search, self._quaternion = proofs, search, quaternion
+
+    def _answers(self, positions: np.ndarray) -> WorkspaceAnswers:
+        return self._search(positions, np.tile(self._quaternion, (len(positions), 1)))
+
+    def at(self, positions: np.ndarray) -> np.ndarray:
+        return sides_of(self._answers(positions))
+
+    def proved(self, positions, half, sides, held) -> tuple[np.ndarray, np.ndarray]:
+        held, is_broken = held.copy(), np.zeros(len(positions), bool)
+        inside, outside = np.flatnonzero(sides > 0), np.flatnonzero(sides < 0)
         if len(inside):
-            is_proved[inside] = proofs.least_margins(centres[inside], half[inside], margin[inside]) > 0.0
+            margin = self._answers(positions[inside]).margin
+            held[inside, 0] = self._proofs.least_margins(positions[inside], half[inside], margin) > 0.0
         if len(outside):
-            is_proved[outside] = proofs.outside(centres[outside], half[outside])
-        left = np.flatnonzero(~is_proved)
-        if depth == 0 or len(left) == 0 or not half.any():
-            return is_proved
-        corners = np.array(list(itertools.product(*[(-0.5, 0.5) if size else (0.0,) for size in half.max(0)])))
-        # Only cells whose parts all have their centres on the same side can be proved.
-        inner = centres[left, None] + corners * half[left, None]
-        sides, margins = self._centres(inner.reshape(-1, 3), quaternion)
-        sides, margins = (values.reshape(inner.shape[:2]) for values in (sides, margins))
-        agreeing = (sides == side[left, None]).all(1)
-        if agreeing.any():
-            halved, count = left[agreeing], len(corners)
-            halves, part_sides = (np.repeat(values[halved], count, axis=0) for values in (0.5 * half, side))
-            cells = inner[agreeing].reshape(-1, 3), halves, part_sides, margins[agreeing].ravel()
-            parts = self._proved(proofs, quaternion, *cells, depth - 1)
-            is_proved[halved] = parts.reshape(-1, count).all(1)
-        return is_proved
-
-    def _centres(self, positions: np.ndarray, quaternion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        answers = self._search(positions, np.tile(quaternion, (len(positions), 1)))
-        return _sides(answers), answers.margin
+            is_broken[outside] = self._proofs.outside(positions[outside], half[outside])
+        return held, is_broken
 
 
-def _sides(answers: WorkspaceAnswers) -> np.ndarray:
-    # Return 1 strictly inside, -1 strictly outside, else 0.
+def sides_of(answers: WorkspaceAnswers) -> np.ndarray:
+    """Sides of poses: (n,) 1 strictly inside, -1 strictly outside, else 0."""
     return np.where(answers.verdict == 0, 1, np.where(answers.verdict == Verdict.WRENCH_INFEASIBLE, -1, 0))

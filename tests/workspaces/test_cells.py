@@ -18,7 +18,13 @@ def drawn_cells(rng, count, components, cables):
     half = rng.uniform(0.0, 1.0, (count, 3)) * 10.0 ** rng.uniform(-3.0, -0.3, (count, 1))
     half *= rng.random((count, 3)) < 0.6
     centres = 0.5 * rng.normal(size=(count, 3))
-    return centres, half, exits, forces, cells_about(centres, half, exits, forces)
+    return centres, half, exits, forces, cells_of(centres, half, exits, forces)
+
+
+def cells_of(centres, half, exits, forces):
+    """Cells of cables that leave at fixed points."""
+    shape = len(centres), len(exits)
+    return cells_about(centres, half, np.broadcast_to(exits, (*shape, 3)), forces, np.zeros(shape))
 
 
 def columns(exits, forces, place):
@@ -130,7 +136,7 @@ def test_nothing_is_known_where_a_cable_may_have_no_length():
     forces = np.repeat(np.eye(3)[..., None], 7, axis=2)
     normal, low, high = np.array([[0.0, 0.0, 1.0]]), np.zeros(7), np.full(7, np.inf)
     for size, is_known in ((0.05, True), (0.25, False)):
-        cells = cells_about(np.zeros((1, 3)), np.full((1, 3), size), exits, forces)
+        cells = cells_of(np.zeros((1, 3)), np.full((1, 3), size), exits, forces)
         tensions = np.full((1, 7), 1.0)
         wrench = cells.matrices[0] @ (1.0 / cells.lengths[0])
         assert np.isfinite(tension_bounds(cells, tensions, wrench, low, high)[0]).all() == is_known

@@ -179,6 +179,9 @@ def test_whole_cells_and_the_volume_of_a_prism(tmp_path):
     assert abs(polar.volume - 4.0) <= polar.error < 0.3
     code, out, _ = cspr("volume", path)
     assert code == 0 and out.startswith("2") and "m3" in out and "proved between" in out
+    assert "open:" in out and "% cut by the boundary" in out and len(out.splitlines()) == 1
+    is_open = sum(found.open_fractions.values())
+    assert is_open == pytest.approx(1.0 - found.proved_fraction) and found.open_fractions["boundary"] > 0.0
     assert cspr("volume", tmp_path / "fine.toml")[0] != 0
 
 

@@ -18,7 +18,7 @@ from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.workspaces import geometry
 from cspr_jax.workspaces.cell_proofs import CellProofs
 from cspr_jax.workspaces.geometry import mass_centres
-from cspr_jax.workspaces.questions import CONDITIONS, requirement
+from cspr_jax.workspaces.questions import CONDITIONS, required_wrenches, requirement
 from cspr_jax.workspaces.required import RequiredWrenches
 from cspr_jax.workspaces.search import WorkspaceSearch
 from cspr_jax.workspaces.whole_cells import WorkspaceCells
@@ -224,16 +224,59 @@ def test_a_set_of_wrenches_needs_every_one():
     assert (outside <= beyond).all() and outside.sum() > 0.8 * beyond.sum() > 10
 
 
-def test_pulleys_and_a_base_point_in_the_cell_prove_nothing(prism):
+def test_a_base_point_or_a_pulley_in_the_cell_proves_nothing(prism):
     search, cells = prism
     place = np.array([[1.9, 0.9, 0.3]])
     assert not np.any(cells(place, np.full(3, 0.5), None, answered(search, place), depth=0))
     spools = [[-2.0, -1.0, 0.0], [2.0, -1.0, 0.0], [2.0, 1.0, 0.0], [-2.0, 1.0, 0.0]]
-    wound = with_cables(cspr_jax.point_mass(spools, mass=2.0), pulley_radius=0.05)
-    search, cells, _, _ = given(wound, "static")
-    place = np.array([[0.0, 0.0, 2.0]])
+    search, cells, _, _ = given(with_cables(cspr_jax.point_mass(spools, mass=2.0), pulley_radius=0.3), "static")
+    place = np.array([[1.2, 0.5, 0.6]])
     answers = answered(search, place)
-    assert answers.verdict[0] == 0 and not np.any(cells(place, np.zeros(3), None, answers))
+    assert answers.verdict[0] == 0 and not np.any(cells(place, np.full(3, 0.5), None, answers, depth=0))
+
+
+def agree_with_samples(search, cells, frame, places, half, samples, rng):
+    """Proved cells beside samples of them: shares of cells proved inside, outside, and of those not contradicted."""
+    answers = answered(search, places)
+    inside, outside = cells(places, half, None, answers)
+    steps = np.concatenate(
+        [np.tile(CORNERS, (len(places), 1, 1)), rng.uniform(-1.0, 1.0, (len(places), samples, 3))], 1
+    )
+    spots = (places[:, None] + steps * half[:, None]).reshape(-1, 3)
+    seen = answered(search, spots).verdict.reshape(len(places), -1)
+    assert (seen[inside] == 0).all() and (seen[outside] != 0).all()
+    whole = (seen == 0).all(1) | (seen != 0).all(1)
+    return inside.sum(), outside.sum(), whole.sum()
+
+
+@pytest.mark.parametrize(
+    ("radius", "count", "samples"), [(0.05, 60, 8), pytest.param(0.1, 5000, 100, marks=pytest.mark.soak)]
+)
+def test_cells_of_robots_with_pulleys(radius, count, samples):
+    """Of a point mass on four cables: exits move with it, and most cells are proved all the same."""
+    spools = [[-2.0, -1.0, 0.0], [2.0, -1.0, 0.0], [2.0, 1.0, 0.0], [-2.0, 1.0, 0.0]]
+    robot = with_cables(cspr_jax.point_mass(spools, mass=2.0), pulley_radius=radius)
+    search, cells, _, frame = given(robot, "wrench-feasible", Limits(tension_min=1.0, tension_max=30.0))
+    rng = np.random.default_rng(6)
+    places = np.array([3.0, 2.0, 0.7]) * rng.uniform(-1.0, 1.0, (count, 3)) + np.array([0.0, 0.0, 1.8])
+    half = rng.uniform(0.0, 0.12, (count, 3))
+    inside, outside, whole = agree_with_samples(search, cells, frame, places, half, samples, rng)
+    assert inside > 5 and outside > 5 and inside + outside > 0.7 * whole
+
+
+def test_a_ball_of_accelerations_is_proved_by_the_box_about_it():
+    spools = np.array([[-2.0, -1.0, 2.0], [2.0, -1.0, 2.0], [2.0, 1.0, 2.0], [-2.0, 1.0, 2.0]])
+    robot = cspr_jax.point_mass(spools, mass=1.0, z_axis="up")
+    limits, rng = Limits(tension_min=1.0, tension_max=60.0), np.random.default_rng(7)
+    own, frame = centred(robot)
+    required = required_wrenches(own, frame, acceleration=1.0)
+    with double_precision():
+        asked = requirement(own, "wrench-feasible", limits, required)
+        search, cells = WorkspaceSearch(own, asked), WorkspaceCells(own, asked)
+    places = np.asarray(frame.inward(rng.uniform([-2.5, -1.5, 0.0], [2.5, 1.5, 1.5], (60, 3))))
+    half = rng.uniform(0.0, 0.1, (60, 3))
+    inside, outside, whole = agree_with_samples(search, cells, frame, places, half, 8, rng)
+    assert inside > 5 and outside > 5 and inside + outside > 0.6 * whole
 
 
 def whole_cells(name, condition, size, count, turn=NONE):
