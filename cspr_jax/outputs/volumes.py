@@ -11,7 +11,7 @@ from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.result import Result
 
 _, INSIDE, OUTSIDE = range(len(CELL_SIDES))
-# What leaves cells open, as lines of text have it.
+# Reasons why cells are open, in lines of text.
 OPEN_WORDS = {name: f"inside at the centre, {name} not proved" for name in OPEN_CONDITIONS} | {
     "boundary": "cut by the boundary",
     "outside": "outside at the centre, not proved",

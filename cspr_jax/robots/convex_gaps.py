@@ -162,7 +162,15 @@ def depth_bound(body: Solid, planes: FacePlanes) -> Array:
 
 
 def inner_fractions(start: Array, end: Array, planes: FacePlanes) -> Array:
-    """Share of each edge at which the middle of its part behind all planes lies, or would lie, (n_edges,)."""
+    """Points of edges in the middle of their parts behind all planes.
+
+    Args:
+        start: (n_edges, 3) m.
+        end: (n_edges, 3) m.
+
+    Returns:
+        (n_edges,) fractions of the edges at which these points lie, or would lie.
+    """
     high, low = (points @ planes.normals.T - planes.offsets[None] for points in (start, end))
     meet = high / jnp.where(high == low, 1.0, high - low)
     first = jnp.max(jnp.where(low < high, meet, 0.0), axis=1)
@@ -197,7 +205,17 @@ def _unit(vectors: Array) -> Array:
 
 
 def nearest_features(p: Array, q: Array, first: Solid, second: Solid) -> Features:
-    """The nearest features of two bodies with corners p and q, whose edges and faces are those of the solids."""
+    """Find the nearest features of two bodies.
+
+    Args:
+        p: (m, 3) corners of the first, m.
+        q: (k, 3) corners of the second, m.
+        first: its edges and faces.
+        second: likewise.
+
+    Returns:
+        the features.
+    """
     if len(first.edges) == len(second.edges) == 1:
         return Features(0, 0, 0)
     (a, u), (b, v) = _ends(p, first.edges), _ends(q, second.edges)
@@ -229,7 +247,18 @@ def _edges_at(features: Features, first: Solid, second: Solid) -> list[Array]:
 
 
 def parting_direction(p: Array, q: Array, first: Solid, second: Solid, features: Features) -> Array:
-    """Unit vector (3,) from the first body to the second along the shortest way between them."""
+    """Direction from the first body to the second along the shortest way between them.
+
+    Args:
+        p: (m, 3) corners of the first, m.
+        q: (k, 3) corners of the second, m.
+        first: its edges and faces.
+        second: likewise.
+        features: their nearest ones.
+
+    Returns:
+        (3,) unit vector.
+    """
     one, two = _edges_at(features, first, second)
     (a, u), (b, v) = _ends(p, one), _ends(q, two)
     s, t = nearest(a, u, b, v)
@@ -250,7 +279,18 @@ def parting_direction(p: Array, q: Array, first: Solid, second: Solid, features:
 
 
 def nearest_weights(p: Array, q: Array, first: Solid, second: Solid, features: Features) -> tuple[Array, Array]:
-    """Weights of the corners of both, (m,) each, which make the nearest points."""
+    """Weights of corners, which make the nearest points.
+
+    Args:
+        p: (m, 3) corners of the first, m.
+        q: (k, 3) corners of the second, m.
+        first: its edges and faces.
+        second: likewise.
+        features: their nearest ones.
+
+    Returns:
+        (m,) and (k,).
+    """
     one, two = _edges_at(features, first, second)
     s, t = nearest(*_ends(p, one), *_ends(q, two))
 

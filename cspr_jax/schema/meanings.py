@@ -70,7 +70,7 @@ OPEN_CONDITIONS = (
 
 
 def open_conditions(_: Mapping[str, Any]) -> tuple[str, ...]:
-    """What leaves a cell open: its boundary, or the proof of a condition.
+    """Reasons why a cell is open: the boundary, or a condition that is not proved.
 
     Args:
         _: settings of a sweep; the words are the same for all.

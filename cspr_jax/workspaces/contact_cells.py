@@ -69,7 +69,7 @@ class CellPoints(NamedTuple):
         )
 
 
-class _Cell(NamedTuple):
+class _CellLanes(NamedTuple):
     # Position (3,) and half sizes (3,); exits of the cables (n_cables, 3), and how far they move (n_cables,), m.
     position: Any
     half: Any
@@ -102,7 +102,7 @@ def clearance_bounds(
     bodies, rotation = bodies_of(robot, scene), np.asarray(matrix(jnp.asarray(quaternion)))
     body = None if bodies.body is None else _rotated(bodies.body, rotation)
     turned = bodies._replace(points=bodies.points @ rotation.T, body=body)
-    low, high = in_batches(partial(_kernel, turned), _Cell(positions, half, exits, shifts), size=BATCH)
+    low, high = in_batches(partial(_kernel, turned), _CellLanes(positions, half, exits, shifts), size=BATCH)
     return np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high)
 
 
@@ -112,11 +112,11 @@ def _rotated(shape: Shape, rotation: np.ndarray) -> Shape:
 
 
 @partial(jax.jit, compiler_options=compile_options.least())
-def _kernel(bodies: Bodies, cells: _Cell) -> Range:
+def _kernel(bodies: Bodies, cells: _CellLanes) -> Range:
     return jax.vmap(partial(_of_cell, bodies))(cells)
 
 
-def _of_cell(bodies: Bodies, cell: _Cell) -> Range:
+def _of_cell(bodies: Bodies, cell: _CellLanes) -> Range:
     count, moved = len(bodies.points), jnp.diag(cell.half)
     slope = jnp.broadcast_to(jnp.stack([jnp.zeros((3, 3)), moved]), (count, 2, 3, 3))
     middle = jnp.stack([cell.exits, cell.position[None] + bodies.points], axis=1)
@@ -130,13 +130,13 @@ def _of_cell(bodies: Bodies, cell: _Cell) -> Range:
     low, high = _from_obstacles(bodies, cables, lambda points: Solid(points, *SEGMENT))
     parts.append((low - bodies.radii[None], high - bodies.radii[None]))
     if bodies.body is not None:
-        own = bodies.body
-        parts.append(_from_platform(bodies, own, cell))
-        moving = jnp.broadcast_to(moved, (len(own.corners), 3, 3))
-        placed = CellPoints(own.corners + cell.position[None], moving, jnp.zeros(len(own.corners)))
-        planes = FacePlanes(own.planes.normals, own.planes.offsets + own.planes.normals @ cell.position)
+        shape = bodies.body
+        parts.append(_from_platform(bodies, shape, cell))
+        moving = jnp.broadcast_to(moved, (len(shape.corners), 3, 3))
+        placed = CellPoints(shape.corners + cell.position[None], moving, jnp.zeros(len(shape.corners)))
+        planes = FacePlanes(shape.planes.normals, shape.planes.offsets + shape.planes.normals @ cell.position)
         solids = jax.tree.map(lambda leaf: leaf[None], placed)
-        parts.append(_from_obstacles(bodies, solids, lambda points: Solid(points, own.edges, own.faces), planes))
+        parts.append(_from_obstacles(bodies, solids, lambda points: Solid(points, shape.edges, shape.faces), planes))
     low, high = (jnp.min(jnp.concatenate([side.ravel() for side in sides])) for sides in zip(*parts, strict=True))
     allowance = ROUNDING * (bodies.size + jnp.max(jnp.abs(cell.position)))
     return low - allowance, high + allowance
@@ -227,7 +227,7 @@ def _seen(corners: Array, platform: CellPoints) -> CellPoints:
     return CellPoints(corners, slope, jnp.zeros(len(corners)))
 
 
-def _from_platform(bodies: Bodies, own: Shape, cell: _Cell) -> Range:
+def _from_platform(bodies: Bodies, shape: Shape, cell: _CellLanes) -> Range:
     # Seen from the platform its shape and the attachment points do not move.
     ray, moved = cell.exits - cell.position[None] - bodies.points, -jnp.diag(cell.half)
     length, reach = jnp.sqrt(jnp.sum(ray**2, axis=1)), jnp.sqrt(jnp.sum(cell.half**2)) + cell.shifts
@@ -242,8 +242,8 @@ def _from_platform(bodies: Bodies, own: Shape, cell: _Cell) -> Range:
     )
 
     def one(cable: CellPoints) -> Range:
-        low, high = _gap(Solid(cable, *SEGMENT), Solid(_fixed(own.corners), own.edges, own.faces))
-        return low, jnp.minimum(high, _depth(Solid(cable, *SEGMENT), own.planes))
+        low, high = _gap(Solid(cable, *SEGMENT), Solid(_fixed(shape.corners), shape.edges, shape.faces))
+        return low, jnp.minimum(high, _depth(Solid(cable, *SEGMENT), shape.planes))
 
     low, high = jax.vmap(one)(ends)
     # A cable that may be as short as the part that is left out is not judged.

@@ -56,14 +56,14 @@ class RestCells:
                 rows = slice(first, first + ROUND)
                 centres = self.at(origins[rows])
                 held = np.zeros((len(centres), len(numbers)), bool)
-                found = proved_sides(self, origins[rows], half[rows], centres, held, DEPTH)
-                sides[rows] = np.where(found.proved, np.where(centres > 0, 1, 2), 0)
-                # Of several conditions the first one.
-                open_condition = numbers[np.argmin(found.held, axis=1)]
-                is_border = found.mixed | (centres == 0)
+                result = proved_sides(self, origins[rows], half[rows], centres, held, DEPTH)
+                sides[rows] = np.where(result.proved, np.where(centres > 0, 1, 2), 0)
+                # The first of several conditions.
+                open_condition = numbers[np.argmin(result.held, axis=1)]
+                is_border = result.mixed | (centres == 0)
                 reason = np.where(is_border, OPEN_CONDITIONS.index("boundary"), open_condition)
                 outside = OPEN_CONDITIONS.index("outside")
-                reasons[rows] = np.where(found.proved, 0, np.where(is_border | (centres > 0), reason, outside))
+                reasons[rows] = np.where(result.proved, 0, np.where(is_border | (centres > 0), reason, outside))
         return sides, reasons
 
     def _turns(self, count: int) -> np.ndarray:

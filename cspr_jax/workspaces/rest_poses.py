@@ -88,7 +88,15 @@ class RestPoses:
         return in_batches(lambda x: geometry.cable_lengths(self.robot, *x), poses, size=BATCH)
 
     def limited(self, origins: np.ndarray, quaternions: np.ndarray) -> Iterator[tuple[str, Verdict, np.ndarray]]:
-        """The quantity, the flag and the slack (n, k) of each limit, at poses as `__call__` takes them."""
+        """Slacks of the limits.
+
+        Args:
+            origins: (n, 3) as `__call__` takes them, m.
+            quaternions: (n, 4) unit quaternions, scalar first.
+
+        Returns:
+            for each limit its quantity, its flag and its slacks (n, k).
+        """
         places = mass_centres(self.robot, origins, quaternions)
         if self.limits.floor is not None:
             yield "floor_margin", Verdict.BELOW_FLOOR, float(self.limits.floor) - places[:, 2:]

@@ -68,7 +68,11 @@ def shifts(robot: AnyRobot, positions: np.ndarray, quaternions: np.ndarray, reac
 
 
 def leaving_points(robot: AnyRobot, positions: np.ndarray, quaternion: np.ndarray) -> np.ndarray:
-    """Points at which cables leave at one orientation (4,): their base points, or where they leave their pulleys.
+    """Points at which cables leave: their base points, or points of their pulleys.
+
+    Args:
+        positions: (n, 3) of the mass centre, or of the joint, m.
+        quaternion: (4,) unit quaternion of all positions, scalar first.
 
     Returns:
         (n, n_cables, 3) m.

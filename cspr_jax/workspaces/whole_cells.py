@@ -23,12 +23,19 @@ class CellConditions(Protocol):
     """Conditions on positions, each of which can be proved to hold in whole cells, or one of which to fail."""
 
     def at(self, positions: np.ndarray) -> np.ndarray:
-        """Sides of positions (n, 3): (n,) 1 strictly inside, -1 strictly outside, else 0."""
+        """Sides of positions.
+
+        Args:
+            positions: (n, 3) m.
+
+        Returns:
+            (n,) 1 strictly inside, -1 strictly outside, else 0.
+        """
 
     def proved(
         self, positions: np.ndarray, half: np.ndarray, sides: np.ndarray, held: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Proofs of cells without halving.
+        """Prove conditions over cells, without halving.
 
         Args:
             positions: (n, 3) centres, m.
@@ -42,7 +49,7 @@ class CellConditions(Protocol):
 
 
 class CellSides(NamedTuple):
-    """What is proved of cells.
+    """Results of proofs of cells.
 
     Fields:
         proved: (n,) whether the cell lies wholly on the side of its centre.
@@ -61,18 +68,24 @@ def proved_sides(
     """Tell which cells lie wholly on the side of their centres, open ones halved as often as `depth` allows.
 
     Args:
+        positions: (n, 3) centres, m.
+        half: (n, 3) half sizes, m.
         sides: (n,) of the centres; 0 proves nothing.
         held: (n, n_conditions) conditions that hold in the whole cell.
+        depth: how often open cells are halved along each axis.
+
+    Returns:
+        the results.
     """
     held, is_broken = conditions.proved(positions, half, sides, held)
-    found = CellSides(np.where(sides > 0, held.all(1), is_broken & (sides < 0)), held, np.zeros(len(sides), bool))
-    left = np.flatnonzero(~found.proved & (sides != 0))
+    result = CellSides(np.where(sides > 0, held.all(1), is_broken & (sides < 0)), held, np.zeros(len(sides), bool))
+    left = np.flatnonzero(~result.proved & (sides != 0))
     if depth == 0 or len(left) == 0 or not half.any():
-        return found
+        return result
     corners = np.array(list(itertools.product(*[(-0.5, 0.5) if size else (0.0,) for size in half.max(0)])))
     inner = positions[left, None] + corners * half[left, None]
     part_sides = conditions.at(inner.reshape(-1, 3)).reshape(inner.shape[:2])
-    found.mixed[left] = (part_sides == -sides[left, None]).any(1)
+    result.mixed[left] = (part_sides == -sides[left, None]).any(1)
     # Only cells whose parts all have their centres on the same side can be proved.
     agreeing = (part_sides == sides[left, None]).all(1)
     if agreeing.any():
@@ -80,12 +93,12 @@ def proved_sides(
         halves, own_sides, own_held = (np.repeat(values[halved], count, axis=0) for values in (0.5 * half, sides, held))
         parts = proved_sides(conditions, inner[agreeing].reshape(-1, 3), halves, own_sides, own_held, depth - 1)
         shape = len(halved), count
-        found.proved[halved], found.mixed[halved] = (
+        result.proved[halved], result.mixed[halved] = (
             parts.proved.reshape(shape).all(1),
             parts.mixed.reshape(shape).any(1),
         )
-        found.held[halved] = parts.held.reshape(*shape, -1).all(1)
-    return found
+        result.held[halved] = parts.held.reshape(*shape, -1).all(1)
+    return result
 
 
 class WorkspaceCells:
@@ -132,8 +145,8 @@ class WorkspaceCells:
                     rows = slice(first, first + ROUND)
                     numbers = chosen[rows]
                     open_cells = side[numbers], np.zeros((len(numbers), 1), bool)
-                    found = proved_sides(condition, positions[numbers], sizes[rows], *open_cells, depth)
-                    proved[numbers] = found.proved
+                    result = proved_sides(condition, positions[numbers], sizes[rows], *open_cells, depth)
+                    proved[numbers] = result.proved
         return proved & (side > 0), proved & (side < 0)
 
 
@@ -161,5 +174,9 @@ class _Condition:
 
 
 def sides_of(answers: WorkspaceAnswers) -> np.ndarray:
-    """Sides of poses: (n,) 1 strictly inside, -1 strictly outside, else 0."""
+    """Sides of poses.
+
+    Returns:
+        (n,) 1 strictly inside, -1 strictly outside, else 0.
+    """
     return np.where(answers.verdict == 0, 1, np.where(answers.verdict == Verdict.WRENCH_INFEASIBLE, -1, 0))
