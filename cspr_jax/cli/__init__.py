@@ -103,6 +103,8 @@ def _unexpected(error: Exception) -> int:
     with contextlib.suppress(OSError, ValueError):
         sys.stderr.write("".join(f"{printable(line)}\n" for line in traceback.format_exc().splitlines()))
         sys.stderr.write(f"cspr {__version__}: internal error; please report it with the lines above and your file\n")
+        if compile_cache.set_aside(""):
+            sys.stderr.write("cspr: kept compiled code, which may be at fault, is removed: run the command once more\n")
     return int(ExitCode.INTERNAL)
 
 

@@ -2,13 +2,17 @@
 
 jax writes an entry straight to its name, and never again: a run that is killed then would leave half an entry for ever.
 So each run has a folder of its own, with links to all whole entries (copies, where the disk has no links), and hands
-its new ones over when it ends. Kept entries bear a checksum in their names: an entry that was damaged is removed before
-jax sees it. Entries are code that is executed: a folder in which others can place some is refused.
+its new ones over when it ends. Kept entries bear a checksum of name and content in their names: one that was damaged,
+or lies under another's name, is removed before jax sees it; one that cannot be used gives way to what is compiled then.
+Entries are code that is executed: a folder in which others can place some is refused.
 """
 
 import atexit
+import builtins
 import contextlib
+import dataclasses
 import errno
+import hashlib
 import importlib.util
 import os
 import re
@@ -25,17 +29,34 @@ from pathlib import Path
 # Entries kept, the newest ones; one is a kernel for one shape, some 0.1 to 1 MB, or its program, a tenth of that.
 LARGEST = 512
 LARGEST_ENTRY = 1 << 28  # bytes
+LARGEST_CODE = 1 << 28  # bytes, not compressed
+# zlib packs zeros so many times; entries that are smaller than that cannot be too large.
+_DENSEST = 1032
+_STEP, _ZSTD = 1 << 20, b"\x28\xb5\x2f\xfd"
+_FORMER_LENGTH = 8  # of checksums of versions before 0.3
 # With a largest size, jax notes beside each entry when it was used last.
 MAX_SIZE = "JAX_COMPILATION_CACHE_MAX_SIZE"
 _ENTRY, _USED = "-cache", "-atime"
 _OWN, _MARK = "run", "~"
-_TROUBLE = re.compile(r"Error (reading|writing) persistent compilation cache entry")
-# This list holds the function that hands over the entries of this process, if there is one.
-_pending: list[Callable[[], None]] = []
+_TROUBLE = re.compile(r"Error (reading|writing) persistent compilation cache entry for '(.*?)': ((\w+).*)", re.DOTALL)
 # Environment variable with the folder of the programs of `persistent_jit`: that of this run.
 PROGRAMS = "CSPR_PROGRAMS"
 # Whatever the umask says, others write into none of our folders.
 PRIVATE = 0o700
+
+
+@dataclasses.dataclass
+class _Run:
+    # Entries of former runs that this one has taken: the kept file, and by what the file of this run is known again.
+    whole: Path
+    folder: Path
+    process: int
+    taken: dict[str, tuple[Path, tuple[int, int]]] = dataclasses.field(default_factory=dict)
+    unusable: set[str] = dataclasses.field(default_factory=set)
+
+
+# The run of this process, if it has one.
+_pending: list[_Run] = []
 
 
 def opened(folder: Path, warn: Callable[[str], None]) -> Path:
@@ -59,17 +80,12 @@ def opened(folder: Path, warn: Callable[[str], None]) -> Path:
     _remove_leftovers(folder)
     shutil.rmtree(run_folder, ignore_errors=True)  # of a process of the same number
     run_folder.mkdir(mode=PRIVATE)
-    damaged = _take(whole, run_folder)
+    run = _Run(whole, run_folder, os.getpid())
+    damaged = _take(run)
     if damaged:
         entries = "a damaged entry" if damaged == 1 else f"{damaged} damaged entries"
         warn(f"{folder}: {entries} of compiled code removed; it is compiled again")
-    process = os.getpid()
-
-    def at_end() -> None:
-        if os.getpid() == process:  # not in a forked child
-            _hand_over(whole, run_folder)
-
-    _pending.append(at_end)
+    _pending.append(run)
     _quiet(folder, warn)
     return run_folder
 
@@ -132,10 +148,10 @@ def largest_size() -> int:
         return -1
 
 
-def _take(whole: Path, run_folder: Path) -> int:
+def _take(run: _Run) -> int:
     # Bring entries into the folder of this run; return the number of damaged ones, which are removed.
     damaged, is_bounded = 0, largest_size() >= 0
-    for entry in whole.iterdir():
+    for entry in run.whole.iterdir():
         name, _, checksum = entry.name.rpartition(_MARK)
         try:
             data = plain_bytes(entry)
@@ -144,17 +160,25 @@ def _take(whole: Path, run_folder: Path) -> int:
         except OSError:
             data, checksum = b"", "unreadable"
         with contextlib.suppress(OSError):
-            if name.endswith(_USED):  # which versions before 0.2 kept
+            if name.endswith(_USED) or len(checksum) == _FORMER_LENGTH:  # which earlier versions kept
                 entry.unlink()
-            elif checksum != _checksum(data):
+            elif checksum != checksum_of(name, data) or _is_too_large(data):
                 entry.unlink()
                 damaged += 1
             else:
-                _place(entry, data, run_folder / name)
+                target = run.folder / name
+                _place(entry, data, target)
+                run.taken[name] = entry, _mark_of(target)
                 if is_bounded and name.endswith(_ENTRY):
-                    used = run_folder / f"{name.removesuffix(_ENTRY)}{_USED}"
+                    used = run.folder / f"{name.removesuffix(_ENTRY)}{_USED}"
                     used.write_bytes(entry.stat().st_mtime_ns.to_bytes(8, "little"))
     return damaged
+
+
+def _mark_of(path: Path) -> tuple[int, int]:
+    # It differs once another file has been put in its place.
+    status = path.lstat()
+    return status.st_ino, status.st_mtime_ns
 
 
 def _place(entry: Path, data: bytes, target: Path) -> None:
@@ -172,7 +196,33 @@ def _place(entry: Path, data: bytes, target: Path) -> None:
 def hand_over() -> None:
     """Hand over the code that this process has compiled; later calls do nothing."""
     while _pending:
-        _pending.pop()()
+        run = _pending.pop()
+        if os.getpid() == run.process:  # not in a forked child
+            with contextlib.suppress(OSError):
+                _hand_over(run)
+            shutil.rmtree(run.folder, ignore_errors=True)
+
+
+def set_aside(beginning: str) -> int:
+    """Forget kept entries that cannot be used: what is compiled now takes their place.
+
+    Args:
+        beginning: of their names.
+
+    Returns:
+        how many there were.
+    """
+    count = 0
+    for run in _pending:
+        names = {name for name in run.taken if name.startswith(beginning)} - run.unusable
+        run.unusable |= names
+        count += len(names)
+        for name in names:
+            target = run.folder / name
+            with contextlib.suppress(OSError):
+                if _mark_of(target) == run.taken[name][1]:  # jax, too, leaves alone what is there
+                    target.unlink()
+    return count
 
 
 def _quiet(folder: Path, warn: Callable[[str], None]) -> None:
@@ -184,15 +234,24 @@ def _quiet(folder: Path, warn: Callable[[str], None]) -> None:
         if match is None:
             usual(message, category, filename, lineno, file, line)
             return
-        if match[1] == "writing":
+        action, name, reason, kind = match.groups()
+        ending = "what is missing is compiled each time"
+        if action == "writing":
             _write_no_more()
+        elif not _is_of_system(kind) and set_aside(f"{name}-"):
+            ending = "it is removed and compiled again"
         if not warned.is_set():
             warned.set()
-            action = "kept" if match[1] == "writing" else "read"
-            reason = str(message).partition("': ")[2]
-            warn(f"{folder}: compiled code cannot be {action}: {reason}; what is missing is compiled each time")
+            verb = "kept" if action == "writing" else "read"
+            warn(f"{folder}: compiled code cannot be {verb}: {reason.partition(chr(10))[0]}; {ending}")
 
     warnings.showwarning = show
+
+
+def _is_of_system(kind: str) -> bool:
+    # Such an error says nothing of the entry.
+    error = getattr(builtins, kind, None)
+    return isinstance(error, type) and issubclass(error, OSError | MemoryError)
 
 
 def _write_no_more() -> None:
@@ -201,39 +260,94 @@ def _write_no_more() -> None:
         jax.config.update("jax_persistent_cache_min_compile_time_secs", 1e9)
 
 
-def _hand_over(whole: Path, run_folder: Path) -> None:
-    with contextlib.suppress(OSError):
-        known = {entry.name.rpartition(_MARK)[0] for entry in whole.iterdir()}
-        for entry in run_folder.iterdir():
-            is_ours = not entry.name.endswith(_USED) and not entry.name.startswith(".")  # jax's times, and its lock
-            if is_ours and entry.name not in known and _is_whole(data := plain_bytes(entry)):
-                entry.replace(whole / f"{entry.name}{_MARK}{_checksum(data)}")
-        entries = sorted(whole.iterdir(), key=lambda entry: entry.lstat().st_mtime, reverse=True)
-        most, size = largest_size(), 0
-        for i, entry in enumerate(entries):
-            size += entry.lstat().st_size
-            if i >= LARGEST or 0 <= most < size:
-                entry.unlink(missing_ok=True)
-    shutil.rmtree(run_folder, ignore_errors=True)
+def _hand_over(run: _Run) -> None:
+    for name in run.unusable:
+        run.taken.pop(name)[0].unlink(missing_ok=True)
+    kept = {entry.name.rpartition(_MARK)[0] for entry in run.whole.iterdir()}
+    for entry in run.folder.iterdir():
+        if entry.name.endswith(_USED) or entry.name.startswith("."):  # jax's times, and its lock
+            continue
+        with contextlib.suppress(OSError):
+            before, mark = run.taken.get(entry.name, (None, None))
+            if entry.name in kept and (before is None or _mark_of(entry) == mark):
+                continue
+            data = plain_bytes(entry)
+            if _is_whole(data):
+                if before is not None:
+                    before.unlink(missing_ok=True)
+                entry.replace(run.whole / f"{entry.name}{_MARK}{checksum_of(entry.name, data)}")
+    _trim(run.whole)
 
 
-def _checksum(data: bytes) -> str:
-    return f"{zlib.crc32(data):08x}"
+def _trim(whole: Path) -> None:
+    # Other runs may do the same.
+    sizes = {}
+    for entry in whole.iterdir():
+        with contextlib.suppress(FileNotFoundError):
+            status = entry.lstat()
+            sizes[entry] = status.st_mtime, status.st_size
+    most, size = largest_size(), 0
+    for i, entry in enumerate(sorted(sizes, key=lambda entry: sizes[entry], reverse=True)):
+        size += sizes[entry][1]
+        if i >= LARGEST or 0 <= most < size:
+            entry.unlink(missing_ok=True)
+
+
+def checksum_of(name: str, data: bytes) -> str:
+    """Checksum in the name of a kept entry.
+
+    Args:
+        name: of the entry, without the checksum: equal content under another name has another one.
+
+    Returns:
+        16 hexadecimal digits.
+    """
+    return hashlib.sha256(os.fsencode(name) + b"\0" + data).hexdigest()[:16]
+
+
+def inflated(data: bytes, most: int) -> bytes:
+    """Content of what zlib has packed, if it is all there and no larger than it may be.
+
+    Args:
+        most: largest size of the content, bytes.
+
+    Returns:
+        the content.
+
+    Raises:
+        ValueError: it is not all there, is larger, or something else.
+    """
+    reader = zlib.decompressobj()
+    try:
+        content = reader.decompress(data, most)
+    except zlib.error as error:
+        raise ValueError(str(error)) from error
+    if not reader.eof:
+        raise ValueError("it is not whole, or too large")
+    return content
 
 
 def _is_whole(data: bytes) -> bool:
     # A full disk, or the end of the process, may have left half of it.
-    if data[:1] == b"\x78":  # zlib's
-        reader = zlib.decompressobj()
-        try:
-            reader.decompress(data)
-        except zlib.error:
-            return False
-        return reader.eof
+    if data[:1] == b"x":  # zlib's
+        return _is_whole_zlib(data)
     for module in ("compression.zstd", "zstandard"):
         if (zstd := sys.modules.get(module)) is not None:
             return _is_whole_zstd(zstd, data)
     return bool(data)
+
+
+def _is_whole_zlib(data: bytes) -> bool:
+    reader, size = zlib.decompressobj(), 0
+    try:
+        while not reader.eof and size <= LARGEST_CODE:
+            part = reader.decompress(data, _STEP)
+            data, size = reader.unconsumed_tail, size + len(part)
+            if not part and not data:
+                break
+    except zlib.error:
+        return False
+    return reader.eof and size <= LARGEST_CODE
 
 
 def _is_whole_zstd(zstd, data: bytes) -> bool:
@@ -246,6 +360,21 @@ def _is_whole_zstd(zstd, data: bytes) -> bool:
     except zstd.ZstdError:
         return False
     return bool(reader.eof)
+
+
+def _is_too_large(data: bytes) -> bool:
+    # jax would inflate it at one go.
+    if data.startswith(_ZSTD):
+        return _size_of_zstd(data) > LARGEST_CODE
+    return len(data) > LARGEST_CODE // _DENSEST and not _is_whole(data)
+
+
+def _size_of_zstd(data: bytes) -> int:
+    # Of the content, as the head of its frame says it (RFC 8878, 3.1.1.1); 0 where it does not.
+    head = data[len(_ZSTD)] if len(data) > len(_ZSTD) else 0
+    is_single, width = head >> 5 & 1, (head >> 5 & 1, 2, 4, 8)[head >> 6]
+    start = len(_ZSTD) + 2 - is_single + (0, 1, 2, 4)[head & 3]
+    return int.from_bytes(data[start : start + width], "little") + (256 if width == 2 else 0)
 
 
 def _remove_leftovers(folder: Path) -> None:

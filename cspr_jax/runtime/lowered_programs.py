@@ -81,8 +81,11 @@ def _primitive() -> Primitive:
 
     def operations(context: Any, *values: Any, program: LoweredProgram) -> Any:
         whole = context.module_context
-        module = mlir.ir.Module.parse(program.code, context=whole.context)
-        name = mlir.merge_mlir_modules(whole.module, program.name, module, dst_symtab=whole.symbol_table)
+        try:
+            module = mlir.ir.Module.parse(program.code, context=whole.context)
+            name = mlir.merge_mlir_modules(whole.module, program.name, module, dst_symtab=whole.symbol_table)
+        except mlir.ir.MLIRError as error:
+            raise ValueError("the program cannot be parsed") from error
         types = [mlir.aval_to_ir_type(whole, result) for result in context.avals_out]
         return func.CallOp(types, mlir.ir.FlatSymbolRefAttr.get(name), values).results
 

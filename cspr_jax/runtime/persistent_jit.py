@@ -19,7 +19,7 @@ import threading
 import zlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import jax
 import jaxlib.version
@@ -44,7 +44,8 @@ _SETTINGS = (
 _APART = ("jax_compilation_cache", "jax_persistent_cache", "jax_log", "jax_raise_persistent")
 # A program that cannot be written, read or called; then jax traces the function, as ever.
 _TROUBLE = (Undescribed, ImportError, OSError, ValueError, TypeError, LookupError, AttributeError, RuntimeError)
-_UNREADABLE = (*_TROUBLE, struct.error, zlib.error)
+_UNREADABLE = (*_TROUBLE, struct.error)
+LARGEST_PROGRAM = 1 << 26  # bytes, not compressed
 Function = TypeVar("Function", bound=Callable)
 
 
@@ -85,6 +86,13 @@ def persistent_jit(
     return call
 
 
+class _Program(NamedTuple):
+    # A function of arrays, the structure of its result, and the name of the file that it was read from, if it was.
+    call: Callable
+    tree: Any
+    file: str | None
+
+
 class _Programs:
     # Programs of one function, by all that they depend on within this process.
 
@@ -92,7 +100,7 @@ class _Programs:
         self._function, self._static, self._options = function, static, options
         self._signature = inspect.signature(function)
         self._lock = threading.RLock()
-        self._programs: dict[Any, tuple[Callable, Any] | None] = {}
+        self._programs: dict[Any, _Program | None] = {}
 
     def result(self, arguments: tuple, keywords: dict[str, Any]) -> Any:
         bound = self._signature.bind(*arguments, **keywords).arguments
@@ -101,21 +109,34 @@ class _Programs:
         shapes = tuple([_shape(leaf) for leaf in leaves])
         typed = tuple([(name, type(value), value) for name, value in static.items()])
         key = (tree, shapes, typed, tuple([getattr(jax.config, name) for name in _SETTINGS]))
+        make = functools.partial(self._made, leaves, tree, shapes, static)
         if key not in self._programs:
             with self._lock:  # another thread may be making it
                 if key not in self._programs:
-                    self._programs[key] = self._made(leaves, tree, shapes, static)
+                    self._programs[key] = make()
         program = self._programs[key]
+        try:
+            return self._called(program, leaves)
+        except _TROUBLE:
+            if program is None or program.file is None:
+                self._programs[key] = None
+                raise
+        # What was read cannot be used, or its compiled code cannot.
+        with self._lock:
+            if self._programs[key] is program:
+                compile_cache.set_aside(program.file)
+                compile_cache.set_aside(f"jit_{self._function.__name__}-")
+                self._programs[key] = make(is_anew=True)
+        return self._called(self._programs[key], leaves)
+
+    def _called(self, program: _Program | None, leaves: list) -> Any:
         if program is None:
             raise Undescribed(self._function.__name__)
-        call, tree = program
-        try:
-            return jax.tree.unflatten(tree, call(*leaves))
-        except _TROUBLE:
-            self._programs[key] = None
-            raise
+        return jax.tree.unflatten(program.tree, program.call(*leaves))
 
-    def _made(self, leaves: list, tree: Any, shapes: tuple, static: dict[str, Any]) -> tuple[Callable, Any] | None:
+    def _made(
+        self, leaves: list, tree: Any, shapes: tuple, static: dict[str, Any], *, is_anew: bool = False
+    ) -> _Program | None:
         is_wanted = jax.config.jax_enable_compilation_cache  # type: ignore[attr-defined]
         if not is_wanted or jax.default_backend() != "cpu" or jax.device_count() != 1:
             return None
@@ -123,12 +144,14 @@ class _Programs:
             words = [_name(self._function), described(static), described_tree(tree), _written(shapes), _settings()]
             key = json.dumps([_FORMAT, *_versions(), _sources(), *words])
             path = Path(os.environ[PROGRAMS]) / f"{self._function.__name__}-{hashlib.sha256(key.encode()).hexdigest()}"
-            stored = _read(path, key)
-            if stored is None:
-                stored = self._lowered(leaves, tree, static)
-                with contextlib.suppress(OSError):
-                    _write(path, key, *stored)
-            return self._compiled(*stored)
+            stored = None if is_anew else _read(path, key)
+            if stored is not None:
+                with contextlib.suppress(*_UNREADABLE):
+                    return _Program(*self._compiled(*stored), path.name)
+            stored = self._lowered(leaves, tree, static)
+            with contextlib.suppress(OSError):
+                _write(path, key, *stored)
+            return _Program(*self._compiled(*stored), None)
         except _UNREADABLE:
             return None
 
@@ -207,7 +230,7 @@ def _sources() -> str:
 def _read(path: Path, key: str) -> tuple[Any, bytes] | None:
     # None where it is not there, or is not whole, or is another one's; then it is made again.
     try:
-        data = zlib.decompress(compile_cache.plain_bytes(path))
+        data = compile_cache.inflated(compile_cache.plain_bytes(path), LARGEST_PROGRAM)
         checksum, _, content = data.partition(b"\n")
         if checksum != hashlib.sha256(content).hexdigest().encode():
             return None

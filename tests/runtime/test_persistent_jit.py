@@ -1,5 +1,6 @@
 """Programs that persist from run to run: bit for bit what jax.jit gives, and made again whenever anything differs."""
 
+import hashlib
 import json
 import os
 import subprocess
@@ -15,6 +16,7 @@ import pytest
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.motions import amplitudes
 from cspr_jax.motions.platform_kind import PlatformMotionKind
+from cspr_jax.runtime import compile_cache
 from cspr_jax.runtime import persistent_jit as programs
 from cspr_jax.runtime.compile_cache import PROGRAMS
 from cspr_jax.runtime.program_keys import Undescribed, described, described_tree, tree_of
@@ -72,7 +74,8 @@ def test_a_second_process_traces_nothing_and_gives_the_same_bits(tmp_path):
     assert plain[0] and first[0] == plain[0] and second[0] == 0
     assert plain[1] == first[1] == second[1]
     (entry,) = tmp_path.glob("*/whole/derivatives-*")  # bears a checksum in its name, as compiled code does
-    assert entry.name.rpartition("~")[2] == f"{zlib.crc32(entry.read_bytes()):08x}"
+    name, _, checksum = entry.name.rpartition("~")
+    assert checksum == compile_cache.checksum_of(name, entry.read_bytes())
     assert not entry.stat().st_mode & 0o022 or entry.parent.stat().st_mode & 0o777 == 0o700
 
 
@@ -138,6 +141,55 @@ def test_a_program_that_is_not_whole_or_another_ones_is_made_again(folder):
         path.unlink()
         path.write_bytes(fault)
         assert called(3) and not called(3)
+
+
+def _with(data, *, code=None, description=None):
+    # A file as `_write` makes it, with right sums and the right key.
+    head, _, program = zlib.decompress(data).partition(b"\n")[2].partition(b"\n")
+    key, before = json.loads(head)
+    content = json.dumps([key, before if description is None else description(before)]).encode() + b"\n"
+    content += program if code is None else code(program)
+    return zlib.compress(hashlib.sha256(content).hexdigest().encode() + b"\n" + content)
+
+
+FAULTS = {
+    "no code": {"code": lambda code: b"no code"},
+    "half": {"code": lambda code: code[: len(code) // 2]},
+    "empty": {"code": lambda code: b""},
+    "more results": {"description": lambda parts: [*parts[:2], parts[2] * 2]},
+    "other shapes": {"description": lambda parts: [*parts[:2], [[[3], "<f8"]]]},
+    "no shapes": {"description": lambda parts: [*parts[:2], [[[-1], "x"]]]},
+    "other tree": {"description": lambda parts: [["builtins:list", None, ["leaf", "leaf"]], *parts[1:]]},
+    "no tree": {"description": lambda parts: [["os:nothing", None, []], *parts[1:]]},
+    "nothing": {"description": lambda parts: []},
+    "numbers": {"description": lambda parts: 3},
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_program_with_right_sums_that_cannot_be_used_is_made_again(folder, fault):
+    """Once: what takes its place is used by the next run."""
+
+    def called():
+        compiled, traces = of_package(lambda x: x * 3.0)
+        np.testing.assert_array_equal(compiled(TAU), TAU * 3.0)
+        return bool(traces)
+
+    assert called()
+    (path,) = folder.iterdir()
+    path.write_bytes(_with(path.read_bytes(), **FAULTS[fault]))
+    assert called() and not called()
+
+
+def test_a_program_that_grows_without_bound_is_made_again(folder, monkeypatch):
+    compiled, traces = of_package(lambda x: x * 3.0)
+    compiled(TAU)
+    (path,) = folder.iterdir()
+    path.write_bytes(_with(path.read_bytes(), code=lambda code: code + bytes(1 << 20)))
+    monkeypatch.setattr(programs, "LARGEST_PROGRAM", 1 << 19)
+    again, traces = of_package(lambda x: x * 3.0)
+    np.testing.assert_array_equal(again(TAU), TAU * 3.0)
+    assert traces
 
 
 def test_damage_does_not_reach_what_others_link_to(folder):

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import types
+import warnings
 import zlib
 from contextlib import nullcontext
 from pathlib import Path
@@ -147,6 +148,10 @@ def test_commands_set_it_before_they_import_jax(tmp_path, words):
     assert Path(seen.splitlines()[-1]).is_relative_to(kept)
 
 
+def kept_name(name, data):
+    return f"{name}~{compile_cache.checksum_of(name, data)}"
+
+
 KEEP = """
 import resource, sys
 from cspr_jax.cli.command import warn
@@ -260,7 +265,7 @@ def test_what_killed_runs_left_is_swept(tmp_path, monkeypatch):
         place.mkdir()
         (place / "entry").write_text("half")
     (tmp_path / "whole").mkdir()
-    (tmp_path / "whole" / f"known~{zlib.crc32(b'whole'):08x}").write_text("whole")
+    (tmp_path / "whole" / kept_name("known", b"whole")).write_text("whole")
     monkeypatch.setattr(compile_cache, "_quiet", lambda *_: None)
     lines = []
     own = compile_cache.opened(tmp_path, lines.append)
@@ -280,7 +285,7 @@ def entries(tmp_path, monkeypatch):
     folder.chmod(0o700)
     for name in ("one-cache", "two-cache"):
         data = zlib.compress(name.encode())
-        (folder / "whole" / f"{name}~{zlib.crc32(data):08x}").write_bytes(data)
+        (folder / "whole" / kept_name(name, data)).write_bytes(data)
     monkeypatch.setattr(compile_cache, "_quiet", lambda *_: None)
     monkeypatch.setattr(compile_cache, "_pending", [])
     lines: list[str] = []
@@ -359,6 +364,125 @@ def test_pipes_and_links_in_the_folder_hold_up_nobody(entries, tmp_path):
     compile_cache.hand_over()
     names = {entry.name.partition("~")[0] for entry in entries.whole.iterdir()}
     assert {"one-cache", "two-cache"} <= names and "pipe-cache" not in names and not own.exists()
+
+
+def test_an_entry_under_the_name_of_another_is_removed(entries):
+    """With the checksum of its own name, or that of versions before, which did not know the name."""
+    one, two = (next(entries.whole.glob(f"{name}-cache~*")) for name in ("one", "two"))
+    (entries.whole / f"three-cache~{one.name.partition('~')[2]}").write_bytes(one.read_bytes())
+    (entries.whole / f"four-cache~{zlib.crc32(one.read_bytes()):08x}").write_bytes(one.read_bytes())
+    content = two.read_bytes()
+    two.write_bytes(one.read_bytes())
+    own, lines = entries.opened()
+    assert [entry.name for entry in own.iterdir()] == ["one-cache"]
+    assert len(lines) == 1 and "2 damaged entries" in lines[0] and len(list(entries.whole.iterdir())) == 1
+    (own / "two-cache").write_bytes(content)
+    compile_cache.hand_over()
+    assert two.read_bytes() == content
+
+
+def test_an_entry_that_cannot_be_used_gives_way(entries):
+    """Of the entries of a function, all: jax does not say which one it could not read."""
+    own, _ = entries.opened()
+    assert compile_cache.set_aside("one-") == 1 == compile_cache.set_aside("two-ca")
+    assert not list(own.iterdir()) and not compile_cache.set_aside("")
+    (own / "one-cache").write_bytes(zlib.compress(b"anew"))
+    compile_cache.hand_over()
+    (entry,) = entries.whole.iterdir()
+    assert entry.name == kept_name("one-cache", zlib.compress(b"anew"))
+
+
+@pytest.mark.parametrize("is_program", [False, True])
+def test_an_entry_that_is_replaced_is_handed_over(entries, is_program):
+    own, _ = entries.opened()
+    fresh = own / "fresh"
+    fresh.write_bytes(zlib.compress(b"anew"))
+    fresh.replace(own / ("two-cache" if is_program else "three-cache"))
+    compile_cache.hand_over()
+    kept = {entry.name for entry in entries.whole.iterdir()}
+    names = ("one-cache", "two-cache") if is_program else ("one-cache", "three-cache", "two-cache")
+    assert {name.partition("~")[0] for name in kept} == {*names} and len(kept) == len(names)
+
+
+def test_entries_that_grow_without_bound_are_removed(entries, monkeypatch):
+    """Packed zeros, and a frame of zstd that says what it holds; small entries are not inflated."""
+    monkeypatch.setattr(compile_cache, "LARGEST_CODE", 1 << 21)
+    bomb, fits = zlib.compress(bytes(3 << 20), 9), zlib.compress(bytes(2 << 20), 9)
+    frames = [b"\x28\xb5\x2f\xfd\xa0" + size.to_bytes(4, "little") for size in (1 << 20, 1 << 22)]
+    for name, data in zip(("bomb", "fits", "frame", "large"), (bomb, fits, *frames), strict=True):
+        (entries.whole / kept_name(f"{name}-cache", data)).write_bytes(data)
+    own, lines = entries.opened()
+    names = ["fits-cache", "frame-cache", "one-cache", "two-cache"]
+    assert sorted(entry.name for entry in own.iterdir()) == names and "2 damaged entries" in lines[0]
+    (own / "new-cache").write_bytes(bomb)
+    compile_cache.hand_over()
+    assert sorted(entry.name.partition("~")[0] for entry in entries.whole.iterdir()) == names
+    with pytest.raises(ValueError, match="too large"):
+        compile_cache.inflated(bomb, 1 << 21)
+    assert len(compile_cache.inflated(fits, 1 << 21)) == 2 << 20
+
+
+def test_what_jax_cannot_read_is_removed_unless_the_system_is_to_blame(entries, monkeypatch):
+    shown, line = [], "Error reading persistent compilation cache entry for 'one': {}: because"
+    monkeypatch.undo()  # of what the fixture leaves out
+    monkeypatch.setattr(compile_cache, "_pending", [])
+    monkeypatch.setattr(warnings, "showwarning", lambda *words: shown.append(words))
+    lines: list[str] = []
+    own = compile_cache.opened(entries.folder, lines.append)
+    for kind in ("PermissionError", "MemoryError", "JaxRuntimeError", "error"):
+        warnings.showwarning(line.format(kind), UserWarning, "jax", 1)
+        assert (own / "one-cache").exists() is (kind in ("PermissionError", "MemoryError"))
+    assert (own / "two-cache").exists() and len(lines) == 1 and not shown
+
+
+@pytest.mark.thorough
+def test_entries_that_are_not_code_are_made_again_once(tmp_path):
+    """With right checksums: jax finds out. One line and the same answer; the next run has nothing to say."""
+    code = KEEP.format(before="")
+    first, _ = lines_told(with_known_flags(tmp_path), code)
+    (whole,) = tmp_path.glob("*/whole")
+    names = sorted(entry.name.partition("~")[0] for entry in whole.iterdir())
+    for fault in (zlib.compress(b"\0\0\0\0no code"), b"no code"):
+        for entry in list(whole.iterdir()):
+            entry.unlink()
+            name = entry.name.partition("~")[0]
+            (whole / kept_name(name, fault)).write_bytes(fault)
+        answer, lines = lines_told(tmp_path, code)
+        assert answer == first and len(lines) == 1 and "it is removed and compiled again" in lines[0]
+        assert lines_told(tmp_path, code) == (first, [])
+        assert sorted(entry.name.partition("~")[0] for entry in whole.iterdir()) == names
+
+
+MANY = """
+import os, sys, zlib
+from pathlib import Path
+from cspr_jax.runtime import compile_cache
+lines = []
+for turn in range({turns}):
+    own = compile_cache.opened(Path({folder!r}), lines.append)
+    for k in range(3):
+        path = own / f"entry{{(os.getpid() + turn + k) % 40}}-cache"
+        if not path.exists():
+            path.write_bytes(zlib.compress(path.name.encode() * 1000))
+    assert all(zlib.decompress(path.read_bytes()) == path.name.encode() * 1000 for path in own.iterdir())
+    if turn % 3 == 0:
+        compile_cache.set_aside(f"entry{{turn % 40}}-")
+    compile_cache.hand_over()
+print(lines)
+"""
+
+
+@pytest.mark.parametrize(("count", "turns"), [(4, 10), pytest.param(20, 100, marks=pytest.mark.thorough)])
+def test_many_processes_share_one_folder(tmp_path, monkeypatch, count, turns):
+    """While others take, hand over, trim and remove entries, each sees whole ones alone."""
+    tmp_path.chmod(0o700)
+    code = MANY.format(folder=str(tmp_path), turns=turns)
+    words = [sys.executable, "-c", code]
+    running = [subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, text=True) for _ in range(count)]
+    assert [process.communicate(timeout=300)[0] for process in running] == ["[]\n"] * count
+    kept = list((tmp_path / "whole").iterdir())
+    assert kept and all(entry.name == kept_name(entry.name.partition("~")[0], entry.read_bytes()) for entry in kept)
+    assert not list(tmp_path.glob("run-*"))
 
 
 @pytest.mark.parametrize("record", ["pipe", "deep", "large", "list"])
