@@ -46,6 +46,7 @@ _MODULES = {
     "list_tables": "api.published",
     "load_robot": "api.robots",
     "make_problem": "api.motions",
+    "merge": "api.sweeps",
     "minimum_arcs": "api.searches",
     "minimum_oscillations": "api.searches",
     "minimum_pose_arcs": "api.platform_searches",

@@ -51,6 +51,7 @@ from cspr_jax.api.searches import minimum_arcs as minimum_arcs
 from cspr_jax.api.searches import minimum_oscillations as minimum_oscillations
 from cspr_jax.api.sweeps import compute_sweep as compute_sweep
 from cspr_jax.api.sweeps import keep_compiled_code as keep_compiled_code
+from cspr_jax.api.sweeps import merge as merge
 from cspr_jax.api.sweeps import open_result as open_result
 from cspr_jax.api.sweeps import run as run
 from cspr_jax.api.sweeps import status as status

@@ -6,7 +6,7 @@ import functools
 import sys
 import tempfile
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -56,7 +56,8 @@ class Job:
     scheduler: str | None = None
 
     def __post_init__(self) -> None:
-        """Refuse a wrong number of workers."""
+        """Refuse a wrong number of workers, and tiles that the sweep does not have."""
+        check_tiles(self.options.tiles, len(self.sweep.grid.tiling))
         check_count(self.workers)
         if self.scheduler is not None and self.workers not in (1, None):
             raise ConfigError("--workers", f"{self.workers}: cannot be combined with --scheduler")
@@ -146,6 +147,7 @@ def run(
     scheduler: str | None = None,
     prune: bool = False,
     accept_environment_change: bool = False,
+    tiles: tuple[int, int] | None = None,
     on_tile: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Compute a sweep into an HDF5 result; tiles that an earlier run has finished are kept.
@@ -159,10 +161,12 @@ def run(
         scheduler: address of a dask.distributed scheduler, whose workers compute instead.
         prune: whether to remove the files of finished tiles once the result is complete.
         accept_environment_change: whether to resume although version, machine or libraries have changed.
+        tiles: first and end of the tiles to compute, for jobs that each have a directory, which `merge` joins; None:
+            all.
         on_tile: called after each tile with the numbers of finished and of all cells.
 
     Returns:
-        the path of the result.
+        the path of the result; of the directory, where only some tiles were asked for.
 
     Raises:
         ConfigError: a mistake in the sweep, or too little space on the disk.
@@ -175,10 +179,54 @@ def run(
     hooks = engine.Hooks(warn=lambda line: warnings.warn(line, stacklevel=2))
     if on_tile is not None:
         hooks.on_tile = on_tile
-    options = engine.Options(accept_environment_change, prune, tuple(sys.argv))
+    asked = None if tiles is None else (int(tiles[0]), int(tiles[1]))
+    options = engine.Options(accept_environment_change, prune, tuple(sys.argv), asked)
     place = run_directory(sweep) if directory is None else Path(directory)
     job = Job(sweep, place, options, hooks, workers, scheduler)
     return job.finished() or job.go()
+
+
+def check_tiles(tiles: tuple[int, int] | None, count: int) -> None:
+    """Refuse a range of tiles that a sweep does not have; its end may lie beyond the last one.
+
+    Raises:
+        ConfigError: it is empty, or begins beyond the last tile.
+    """
+    if tiles is not None and not 0 <= tiles[0] < min(tiles[1], count):
+        raise ConfigError("--tiles", f"{tiles[0]}:{tiles[1]}: must be FIRST:END within the {count} tiles, such as 0:8")
+
+
+@checked
+def merge(paths: Sequence[str | Path], directory: str | Path, *, accept_environment_change: bool = False) -> Path:
+    """Join maps into one result: parts of one map (`run(..., tiles=...)`), or maps that differ in one axis.
+
+    Args:
+        paths: run directories and results; where they overlap, their cells must agree.
+        directory: run directory of the joined map; it can be verified, drawn and reported like any other.
+        accept_environment_change: whether to join what different versions or machines have computed.
+
+    Returns:
+        the path of the result.
+
+    Raises:
+        RefusedError: the maps do not fit together, or cells are missing; a line for each reason.
+        StoreError: a file cannot be read or written.
+    """
+    return merged(paths, Path(directory), engine.Options(accept_environment_change, command=tuple(sys.argv)))
+
+
+def merged(
+    paths: Sequence[str | Path], directory: Path, options: engine.Options, hooks: engine.Hooks | None = None
+) -> Path:
+    """As `merge`, with the options and hooks of a run."""
+    from cspr_jax.sweep.merging import Merged, read_part
+
+    places = [Path(path) for path in paths]
+    if any(path.resolve() in (directory.resolve(), *directory.resolve().parents) for path in places if path.exists()):
+        raise ConfigError("-o", f"{directory}: must be another directory than those that are joined")
+    tiles = Merged([read_part(path) for path in places], accept_environment_change=options.accept_environment_change)
+    run = engine.Run(tiles.sweep, directory, options, hooks or engine.Hooks())
+    return run.finished() or run.go(tiles).result
 
 
 @checked

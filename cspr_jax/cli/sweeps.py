@@ -1,4 +1,4 @@
-"""Commands about sweeps and their runs: run, status, verify, volume."""
+"""Commands about sweeps and their runs: run, merge, status, verify, volume."""
 
 import argparse
 import datetime
@@ -46,8 +46,22 @@ def _add_run(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--prune", action="store_true", help="remove the files of finished tiles once the result is complete"
     )
+    parser.add_argument(
+        "--tiles",
+        type=_tiles,
+        metavar="FIRST:END",
+        help="compute only these tiles, such as 0:8: jobs with a directory each, which cspr merge joins",
+    )
     add_all_errors(parser)
     add_device(parser, usual="a GPU if jax finds one, for large maps by formulas; cpu for others")
+
+
+def _tiles(text: str) -> tuple[int, int]:
+    first, _, end = text.partition(":")
+    try:
+        return int(first), int(end)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text}: must be FIRST:END, such as 0:8") from error
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -60,7 +74,7 @@ def _run(options: argparse.Namespace) -> int:
     if options.scheduler is not None:
         surroundings.quiet_scheduler()
     directory = options.output or sweeps.run_directory(sweep)
-    choices = engine.Options(options.accept_environment_change, options.prune, tuple(sys.argv))
+    choices = engine.Options(options.accept_environment_change, options.prune, tuple(sys.argv), options.tiles)
     with stop_signals(warn) as stop, progress() as on_tile:
         hooks = engine.Hooks(stop, on_tile, warn=warn)
         job = sweeps.Job(sweep, directory, choices, hooks, options.workers, options.scheduler)
@@ -69,6 +83,28 @@ def _run(options: argparse.Namespace) -> int:
             path = job.go(lambda: prepare_jax(options, prefers_cpu=sweep.prefers_cpu))
         else:
             print_line("already finished; nothing was computed")
+    print_path(path)
+    return ExitCode.DONE
+
+
+def _add_merge(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("paths", type=Path, nargs="+", metavar="PATH", help="run directory, or result")
+    add_output(parser, "run directory of the joined map", metavar="DIR", required=True)
+    parser.add_argument(
+        "--accept-environment-change",
+        action="store_true",
+        help="join although versions, machines or libraries differ",
+    )
+
+
+def _merge(options: argparse.Namespace) -> int:
+    from cspr_jax.api import sweeps
+    from cspr_jax.sweep import engine
+
+    choices = engine.Options(options.accept_environment_change, command=tuple(sys.argv))
+    with stop_signals(warn) as stop, progress() as on_tile:
+        hooks = engine.Hooks(stop, on_tile, warn=warn)
+        path = sweeps.merged(options.paths, options.output, choices, hooks)
     print_path(path)
     return ExitCode.DONE
 
@@ -155,6 +191,7 @@ def _volume(options: argparse.Namespace) -> int:
 
 COMMANDS = (
     Command("run", "compute a sweep file into an HDF5 result, whose path is the last line printed", _add_run, _run),
+    Command("merge", "join maps: tiles of one map computed apart, or maps that differ in one axis", _add_merge, _merge),
     Command("status", "say how far a run has come, without changing it", _add_status, _status),
     Command("verify", "reread and check all files of a run, or a result or motion file", _add_verify, _verify),
     Command(

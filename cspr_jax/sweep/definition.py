@@ -138,6 +138,31 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
     return Sweep(path, kind, keys, robot, Grid(axes, tile), store, settings, text, types)
 
 
+def sweep_of_settings(settings: dict[str, Any], file: Path, text: str = "") -> Sweep:
+    """The sweep that a run has recorded, whatever has become of its file.
+
+    Args:
+        settings: resolved, as a record or a result holds them.
+        file: named in errors; gives the name of the result.
+        text: of the sweep file, which a run keeps.
+
+    Raises:
+        ConfigError: this version cannot read them.
+    """
+    keys = checked(SweepFile, {key: value for key, value in settings.items() if key != "dimensions"}, file)
+    robot, kind = (
+        checked(RobotFile, settings["robot"], file, at="robot"),
+        MAP_KINDS[keys.map].of(keys.trajectory.family),
+    )
+    over_orientations = _orientation_axes(keys) if kind.is_over_orientations else {}
+    given = {name: axis_points(getattr(keys.axes, name)) for name in settings["axes"]}
+    axes = {name: (given | over_orientations)[name] for name in settings["dimensions"]}
+    check_points(given, file)
+    run = settings["run"]
+    types = {name: dtype_of(name, keys.run.dtype) for name in run["store"]}
+    return Sweep(file, kind, keys, robot, Grid(axes, tuple(run["tile"])), list(run["store"]), settings, text, types)
+
+
 def _usual(kind: MapKind, keys: SweepFile, robot: RobotFile) -> list[str]:
     # These quantities are stored where the file does not name any.
     more = [names for key, names in kind.stored_with if is_given(keys, key)]

@@ -35,11 +35,13 @@ class Options:
         accept_environment_change: whether shards of another environment may be mixed in.
         prune: whether shards are removed once the result is complete.
         command: words of the command, for run.json.
+        tiles: first and end of the tiles that are computed now; None: all.
     """
 
     accept_environment_change: bool = False
     prune: bool = False
     command: tuple[str, ...] = ()
+    tiles: tuple[int, int] | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,7 +49,7 @@ class Outcome:
     """Outcome of a run.
 
     Fields:
-        result: path of the finished file.
+        result: path of the finished file; of the directory, where only some tiles were asked for.
         computed: number of tiles computed now.
         reused: number of tiles found finished.
     """
@@ -157,6 +159,9 @@ class Run:
             whole_tiles = self._verified(digest(environment))
             self._folder.note("started", command=list(self._options.command), kept=len(whole_tiles))
             computed = self._compute(executor, whole_tiles, record)
+            if len(whole_tiles) + computed < len(self._tiling):
+                self._folder.note("finished", computed=computed)
+                return Outcome(self._folder.path, computed, len(whole_tiles))
             self._consolidate(record)
             self._folder.note("finished", computed=computed)
             if self._options.prune:
@@ -194,7 +199,8 @@ class Run:
         self._hooks.on_tile(done, self._sweep.grid.size)
         finished = set(whole_tiles)
         self._hooks.stop.busy = True
-        missing = [index for index in range(len(self._tiling)) if index not in finished]
+        first, end = self._options.tiles or (0, len(self._tiling))
+        missing = [index for index in range(first, min(end, len(self._tiling))) if index not in finished]
         with contextlib.closing(_as_generator(executor.tiles(missing, self._hooks.stop))) as tiles:
             for computed in tiles:
                 if not self._options.accept_environment_change:
@@ -208,7 +214,7 @@ class Run:
                 done += self._cells(index)
                 self._folder.note("tile", index=index)
                 self._hooks.on_tile(done, self._sweep.grid.size)
-        if len(finished) < len(self._tiling):
+        if not finished.issuperset(missing):
             self._stopped(len(finished))
         return len(missing)
 

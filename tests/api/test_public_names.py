@@ -22,6 +22,7 @@ __all__ = ["folder"]  # a fixture
 
 FUNCTIONS = {
     "run": ("run", "compute_sweep"),
+    "merge": ("merge",),
     "status": ("status",),
     "verify": ("verify",),
     "volume": ("workspace_volume",),
@@ -62,6 +63,7 @@ def test_every_command_has_its_function():
         known = {parameter for function in functions for parameter in inspect.signature(function).parameters}
         own = NAMES | {
             "run": {"output": "directory"},
+            "merge": {"output": "directory"},
             "plan": {"output": "path", "mjcf": "path", "animate": "path"},
             "check": {"output": "path", "mjcf": "path", "animate": "path", "motion": "times", "slower": "slower"},
         }.get(name, {})

@@ -1,0 +1,251 @@
+"""Join of maps: parts of one map, computed apart, or maps that differ in the points of one axis.
+
+The joined map is a run like any other, whose tiles are read instead of computed: it is published, checked and resumed
+by `sweep.engine`. Parts of one map keep their identity, and give the bytes that one run would have given.
+"""
+
+import copy
+import dataclasses
+import math
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cspr_jax.errors import InputError, RefusedError, StoreError, printable
+from cspr_jax.schema.identity import differences, digest
+from cspr_jax.schema.tiles import Tiling
+from cspr_jax.store.disk import Disk
+from cspr_jax.store.documents import plain_json
+from cspr_jax.store.folder import RunFolder
+from cspr_jax.store.isolated import Reader
+from cspr_jax.store.record import read_record
+from cspr_jax.store.result import open_result
+from cspr_jax.store.seal import DamagedError
+from cspr_jax.store.shards import Shard
+from cspr_jax.sweep.definition import Sweep, sweep_of_settings
+from cspr_jax.sweep.signals import Stop
+from cspr_jax.sweep.work import Computed
+
+# Equal cells of two maps may differ by rounding: their batches have other shapes.
+_SAME = {"float64": 1e-6, "float32": 1e-3}
+_NEAR_ZERO = 1e-9
+
+
+@dataclasses.dataclass(frozen=True)
+class Part:
+    """A map, or the tiles of one that are finished.
+
+    Fields:
+        path: as it was named.
+        sweep: of the map.
+        environment: that computed it.
+        data: quantities over the whole grid.
+        present: cells that are finished, of the shape of the grid.
+        shards: of finished tiles, by index, without their values; a result has none.
+    """
+
+    path: Path
+    sweep: Sweep
+    environment: dict[str, Any]
+    data: dict[str, np.ndarray]
+    present: np.ndarray
+    shards: dict[int, Shard]
+
+
+def read_part(path: Path) -> Part:
+    """A part from a run directory, or from a result.
+
+    Raises:
+        StoreError: it is neither, or damaged.
+    """
+    return _run_part(path) if path.is_dir() else _result_part(path, path)
+
+
+def _run_part(path: Path) -> Part:
+    try:
+        record = read_record(path / "run.json")
+    except DamagedError as error:
+        raise StoreError(printable(f"{path}: is no whole run directory: {error}")) from error
+    sweep = sweep_of_settings(record.settings, path / record.source["file"], record.source["text"])
+    folder, tiling = RunFolder(path, sweep.name, Disk()), sweep.grid.tiling
+    if sweep.identity != record.identity:
+        raise RefusedError(printable(f"{path}: was begun by an earlier version: run it again"))
+    data = {name: np.zeros(sweep.grid.shape, kind) for name, kind in sweep.types.items()}
+    present, shards = np.zeros(sweep.grid.shape, bool), dict[int, Shard]()
+    with Reader() as reader:
+        for index in range(len(tiling)):
+            if not os.path.lexists(folder.shard(index)):
+                continue
+            try:
+                shard = reader.shard(folder.shard(index), sweep.layout, index, tiling.extent(index))
+            except DamagedError as error:
+                raise StoreError(printable(f"{folder.shard(index)}: {error}: run the sweep again")) from error
+            for name, values in shard.values.items():
+                data[name][tiling.place(index)] = values
+            present[tiling.place(index)] = True
+            shards[index] = dataclasses.replace(shard, values={})
+    if not present.all() and folder.result.is_file():  # its shards were pruned
+        return _result_part(path, folder.result)
+    return Part(path, sweep, record.environment, data, present, shards)
+
+
+def _result_part(path: Path, file: Path) -> Part:
+    result = open_result(file)
+    if not result.is_map:
+        raise StoreError(printable(f"{file}: is a motion: must be a map"))
+    sweep = sweep_of_settings(result.settings, file)
+    if sweep.identity != result.attributes.get("identity"):
+        raise RefusedError(printable(f"{file}: was computed by an earlier version, or joined elsewhere: run it again"))
+    try:
+        environment = plain_json(result.attributes.get("environment_settings", "{}"))
+    except DamagedError as error:
+        raise StoreError(printable(f"{file}: its environment: {error}")) from error
+    data = {name: result.data[name] for name in sweep.store}
+    return Part(path, sweep, environment, data, np.ones(sweep.grid.shape, bool), {})
+
+
+class Merged:
+    """Tiles of a joined map, for `sweep.engine.Run`.
+
+    Args:
+        parts: two or more.
+        accept_environment_change: whether they may come from different environments.
+
+    Fields:
+        sweep: of the joined map.
+
+    Raises:
+        RefusedError: parts that do not fit together, with a line for each reason; or cells that are missing.
+    """
+
+    def __init__(self, parts: Sequence[Part], *, accept_environment_change: bool = False) -> None:
+        """Join in memory; nothing is written."""
+        _refuse_conflicts(parts, accept_environment_change)
+        self._parts = parts
+        self.sweep, tiling = _joined(parts), None
+        axes = self.sweep.grid.axes
+        self._owner = np.full(self.sweep.grid.shape, -1, np.int32)
+        self._data = {name: np.zeros(self.sweep.grid.shape, kind) for name, kind in self.sweep.types.items()}
+        for number, part in enumerate(parts):
+            cells = np.ix_(*(np.searchsorted(axes[name], points) for name, points in part.sweep.grid.axes.items()))
+            if part.sweep.identity == self.sweep.identity:
+                cells = np.ix_(*(np.arange(n) for n in self.sweep.grid.shape))
+            self._take(number, part, cells)
+        tiling = self.sweep.grid.tiling
+        missing = [index for index, place in enumerate(tiling) if (self._owner[place] < 0).any()]
+        if missing:
+            raise RefusedError(_missing_line(missing, tiling))
+
+    def _take(self, number: int, part: Part, cells: tuple[np.ndarray, ...]) -> None:
+        owner = self._owner[cells]
+        both = part.present & (owner >= 0)
+        for name, values in part.data.items() if both.any() else ():
+            differing = both & ~_agree(self._data[name][cells], values)
+            if differing.any():
+                others = self._parts[owner[differing][0]].path
+                raise RefusedError(
+                    printable(f"{part.path}: {name}: {differing.sum()} cells differ from those of {others}: must agree")
+                )
+        new = part.present & (owner < 0)
+        for name, values in part.data.items():
+            self._data[name][cells] = np.where(new, values, self._data[name][cells])
+        self._owner[cells] = np.where(new, number, owner)
+
+    def environment(self) -> dict[str, Any]:
+        """Environment of the first part."""
+        return self._parts[0].environment
+
+    def tiles(self, indices: Iterable[int], stop: Stop) -> Iterator[Computed]:
+        """The tiles, in order.
+
+        Args:
+            stop: when it is set, no other tile is begun.
+
+        Yields:
+            the tiles.
+        """
+        for index in indices:
+            if stop:
+                return
+            yield Computed(self._shard(index), self.environment())
+
+    def _shard(self, index: int) -> Shard:
+        place = self.sweep.grid.tiling.place(index)
+        values = {name: np.ascontiguousarray(data[place]) for name, data in self._data.items()}
+        for part in self._parts:
+            if part.sweep.identity == self.sweep.identity and index in part.shards:
+                return dataclasses.replace(part.shards[index], values=values)
+        owners = sorted({digest(self._parts[number].environment) for number in np.unique(self._owner[place])})
+        near_zero = int((np.abs(values["margin"]) < _NEAR_ZERO).sum()) if "margin" in values else 0
+        return Shard(index, owners[0] if len(owners) == 1 else digest(owners), near_zero, values)
+
+
+def _refuse_conflicts(parts: Sequence[Part], accept: bool) -> None:
+    if len(parts) < 2:
+        raise InputError("merge", len(parts), "two run directories or results, or more")
+    first, lines = parts[0], list[str]()
+    free = set(_free_axes(parts))
+    if len(free) > 1:
+        lines.append(f"axes {', '.join(sorted(free))} differ: must be one of them at most")
+    for part in parts[1:]:
+        found = differences(_fixed(part.sweep.settings, free), _fixed(first.sweep.settings, free))
+        if part.sweep.grid.axes.keys() != first.sweep.grid.axes.keys():
+            found = found or ["axes differ"]
+        lines += [f"{part.path}: {line} ({first.path}): must be equal" for line in found]
+        if not accept:
+            found = differences(part.environment, first.environment)
+            lines += [f"{part.path}: {line}: --accept-environment-change joins them" for line in found]
+    if lines:
+        raise RefusedError(*(printable(line) for line in lines))
+
+
+def _free_axes(parts: Sequence[Part]) -> list[str]:
+    # Axes of which some part has other points than the first.
+    first = parts[0].sweep.grid.axes
+    return [
+        name
+        for name, points in first.items()
+        if any(not np.array_equal(points, part.sweep.grid.axes.get(name, points)) for part in parts)
+    ]
+
+
+def _fixed(settings: dict[str, Any], free: set[str]) -> dict[str, Any]:
+    # What parts must share. Other words for equal points are no difference, nor is the shape of the tiles.
+    axes = [name for name in settings["axes"] if name not in free]
+    return settings | {"axes": axes, "run": {key: value for key, value in settings["run"].items() if key != "tile"}}
+
+
+def _joined(parts: Sequence[Part]) -> Sweep:
+    first = parts[0].sweep
+    free = _free_axes(parts)
+    if not free:
+        return first
+    (axis,) = free
+    settings = copy.deepcopy(first.settings)
+    points = np.unique(np.concatenate([part.sweep.grid.axes[axis] for part in parts]))
+    settings["axes"][axis] = points.tolist()
+    shape = [len(points) if name == axis else len(values) for name, values in first.grid.axes.items()]
+    settings["run"]["tile"] = [min(tile, length) for tile, length in zip(first.grid.tile, shape, strict=True)]
+    return sweep_of_settings(settings, first.file, first.text)
+
+
+def _agree(values: np.ndarray, others: np.ndarray) -> np.ndarray:
+    if values.dtype.kind != "f":
+        return values == others
+    same = _SAME[values.dtype.name]
+    return np.isclose(values, others, rtol=same, atol=same, equal_nan=True)
+
+
+def _missing_line(missing: list[int], tiling: Tiling) -> str:
+    # Such as "tiles 3:5, 8:9 of 12".
+    starts = [index for index in missing if index - 1 not in missing]
+    ends = [index + 1 for index in missing if index + 1 not in missing]
+    ranges = ", ".join(f"{start}:{end}" for start, end in zip(starts[:8], ends, strict=False))
+    more = ", ..." if len(starts) > 8 else ""
+    cells = sum(math.prod(tiling.extent(index)) for index in missing)
+    return (
+        f"tiles {ranges}{more} of {len(tiling)} ({cells:,} cells) are in none of them: cspr run --tiles computes them"
+    )
