@@ -166,7 +166,7 @@ def run(
         on_tile: called after each tile with the numbers of finished and of all cells.
 
     Returns:
-        the path of the result; of the directory, where only some tiles were asked for.
+        the path of the result; of the directory, where only some tiles were tile_range for.
 
     Raises:
         ConfigError: a mistake in the sweep, or too little space on the disk.
@@ -179,8 +179,8 @@ def run(
     hooks = engine.Hooks(warn=lambda line: warnings.warn(line, stacklevel=2))
     if on_tile is not None:
         hooks.on_tile = on_tile
-    asked = None if tiles is None else (int(tiles[0]), int(tiles[1]))
-    options = engine.Options(accept_environment_change, prune, tuple(sys.argv), asked)
+    tile_range = None if tiles is None else (int(tiles[0]), int(tiles[1]))
+    options = engine.Options(accept_environment_change, prune, tuple(sys.argv), tile_range)
     place = run_directory(sweep) if directory is None else Path(directory)
     job = Job(sweep, place, options, hooks, workers, scheduler)
     return job.finished() or job.go()
@@ -218,7 +218,11 @@ def merge(paths: Sequence[str | Path], directory: str | Path, *, accept_environm
 def merged(
     paths: Sequence[str | Path], directory: Path, options: engine.Options, hooks: engine.Hooks | None = None
 ) -> Path:
-    """As `merge`, with the options and hooks of a run."""
+    """As `merge`, with the options and hooks of a run.
+
+    Returns:
+        the path of the result.
+    """
     from cspr_jax.sweep.merging import Merged, read_part
 
     places = [Path(path) for path in paths]

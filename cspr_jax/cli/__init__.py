@@ -83,7 +83,7 @@ def _answered(options: argparse.Namespace, prompt: Prompt) -> int:
         return int(error.exit_code)
     except KeyboardInterrupt:
         prompt.tell()
-        return int(ExitCode.INTERRUPTED)
+        return int(prompt.code)
     except BrokenPipeError:
         _close_output()  # its reader has gone; there is nobody left to tell
         return int(ExitCode.DONE)

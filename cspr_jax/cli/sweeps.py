@@ -125,6 +125,7 @@ def _status(options: argparse.Namespace) -> int:
     cells = f"{state['cells_done']:,} of {state['cells']:,} cells, {state['shards']} of {state['tiles']} tiles"
     for line in (
         f"{state['directory']}: {state['sweep']}, identity {state['identity'][:12]}",
+        f"  {state['state_text']}",
         f"  {share:.0f} % done: {cells}",
         *_pace(state),
         f"  result: {state['result'] or 'not yet'}",

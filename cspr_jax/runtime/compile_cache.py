@@ -46,7 +46,7 @@ PRIVATE = 0o700
 
 
 @dataclasses.dataclass
-class _Run:
+class _KeptEntries:
     # Entries of former runs that this one has taken: the kept file, and by what the file of this run is known again.
     whole: Path
     folder: Path
@@ -56,7 +56,7 @@ class _Run:
 
 
 # The run of this process, if it has one.
-_pending: list[_Run] = []
+_pending: list[_KeptEntries] = []
 
 
 def opened(folder: Path, warn: Callable[[str], None]) -> Path:
@@ -80,7 +80,7 @@ def opened(folder: Path, warn: Callable[[str], None]) -> Path:
     _remove_leftovers(folder)
     shutil.rmtree(run_folder, ignore_errors=True)  # of a process of the same number
     run_folder.mkdir(mode=PRIVATE)
-    run = _Run(whole, run_folder, os.getpid())
+    run = _KeptEntries(whole, run_folder, os.getpid())
     damaged = _take(run)
     if damaged:
         entries = "a damaged entry" if damaged == 1 else f"{damaged} damaged entries"
@@ -148,7 +148,7 @@ def largest_size() -> int:
         return -1
 
 
-def _take(run: _Run) -> int:
+def _take(run: _KeptEntries) -> int:
     # Bring entries into the folder of this run; return the number of damaged ones, which are removed.
     damaged, is_bounded = 0, largest_size() >= 0
     for entry in run.whole.iterdir():
@@ -260,16 +260,16 @@ def _write_no_more() -> None:
         jax.config.update("jax_persistent_cache_min_compile_time_secs", 1e9)
 
 
-def _hand_over(run: _Run) -> None:
+def _hand_over(run: _KeptEntries) -> None:
     for name in run.unusable:
         run.taken.pop(name)[0].unlink(missing_ok=True)
-    kept = {entry.name.rpartition(_MARK)[0] for entry in run.whole.iterdir()}
+    names = {entry.name.rpartition(_MARK)[0] for entry in run.whole.iterdir()}
     for entry in run.folder.iterdir():
         if entry.name.endswith(_USED) or entry.name.startswith("."):  # jax's times, and its lock
             continue
         with contextlib.suppress(OSError):
             before, mark = run.taken.get(entry.name, (None, None))
-            if entry.name in kept and (before is None or _mark_of(entry) == mark):
+            if entry.name in names and (before is None or _mark_of(entry) == mark):
                 continue
             data = plain_bytes(entry)
             if _is_whole(data):
@@ -370,7 +370,7 @@ def _is_too_large(data: bytes) -> bool:
 
 
 def _size_of_zstd(data: bytes) -> int:
-    # Of the content, as the head of its frame says it (RFC 8878, 3.1.1.1); 0 where it does not.
+    # The head of a frame says the size of its content (RFC 8878, 3.1.1.1), or not: 0.
     head = data[len(_ZSTD)] if len(data) > len(_ZSTD) else 0
     is_single, width = head >> 5 & 1, (head >> 5 & 1, 2, 4, 8)[head >> 6]
     start = len(_ZSTD) + 2 - is_single + (0, 1, 2, 4)[head & 3]

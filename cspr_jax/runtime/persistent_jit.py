@@ -121,7 +121,7 @@ class _Programs:
             if program is None or program.file is None:
                 self._programs[key] = None
                 raise
-        # What was read cannot be used, or its compiled code cannot.
+        # The program that was read cannot be used, or its compiled code cannot.
         with self._lock:
             if self._programs[key] is program:
                 compile_cache.set_aside(program.file)

@@ -90,7 +90,7 @@ class RunFolder:
             raise refusal(path, error) from error
         try:
             try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                _lock(file)
             except BlockingIOError as error:
                 holder = os.pread(file, 200, 0).decode("utf-8", "replace").strip() or "another process"
                 line = f"{self.path}: is being written by {holder}; wait for it or stop it"
@@ -108,6 +108,28 @@ class RunFolder:
         finally:
             self._held = None
             os.close(file)
+
+    def is_held(self) -> bool | None:
+        """Tell whether a process holds the lock at the moment; nothing is written.
+
+        Returns:
+            None where it cannot be told.
+        """
+        try:
+            file = os.open(self.lock, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY)
+        except FileNotFoundError:
+            return False
+        except OSError:
+            return None
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        except OSError:
+            return None
+        finally:
+            os.close(file)
+        return False
 
     def check_held(self) -> None:
         """Refuse to write on where the lock is no longer this process's, or a folder of the run leads elsewhere.
@@ -190,11 +212,21 @@ class RunFolder:
             StoreError: the disk or the folder refuses.
         """
         time_stamp = time.strftime("%Y-%m-%dT%H:%M:%S%z", time.localtime())
-        line = json.dumps({"time": time_stamp, "event": event, "pid": os.getpid(), **fields})
+        seconds = round(time.time(), 3)
+        line = json.dumps({"time": time_stamp, "event": event, "pid": os.getpid(), "seconds": seconds, **fields})
         try:
             self.disk.append(self.log, (line + "\n").encode())
         except OSError as error:
             raise refusal(self.log, error) from error
+
+
+def _lock(file: int) -> None:
+    # Whoever asks whether somebody runs holds the lock for a moment.
+    for _ in range(5):
+        with contextlib.suppress(BlockingIOError):
+            return fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        time.sleep(0.02)
+    return fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def _is_file(path: Path) -> bool:

@@ -8,13 +8,14 @@ import contextlib
 import errno
 import os
 import secrets
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from cspr_jax.errors import StoreError, printable
 from cspr_jax.store.disk import USUAL, Disk, write_all
 
 # Endings of unfinished files: of this version, and of earlier ones, which named their process.
+LONGEST_NAME = 255  # bytes, of whatever disk
 PART = r"\.(?:[0-9a-f]{12}|\d+)\.part"
 
 
@@ -34,23 +35,19 @@ def check_place(path: Path | None) -> None:
         path: of the file; None: none is to be written.
 
     Raises:
-        StoreError: its folder does not exist or takes no files, or it is a folder itself.
+        StoreError: its folder does not exist or takes no files, its name is too long, or it is a folder itself.
     """
     if path is None:
         return
-    number = next(
-        (
-            number
-            for number, is_so in (
-                (errno.EISDIR, path.is_dir()),
-                (errno.ENOENT, not path.parent.exists()),
-                (errno.ENOTDIR, not path.parent.is_dir()),
-                (errno.EACCES, not os.access(path.parent, os.W_OK | os.X_OK)),
-            )
-            if is_so
-        ),
-        None,
+    is_long = len(os.fsencode(part_of(path).name)) > LONGEST_NAME
+    faults: tuple[tuple[int, Callable[[], bool]], ...] = (
+        (errno.ENAMETOOLONG, lambda: is_long),
+        (errno.EISDIR, path.is_dir),
+        (errno.ENOENT, lambda: not path.parent.exists()),
+        (errno.ENOTDIR, lambda: not path.parent.is_dir()),
+        (errno.EACCES, lambda: not os.access(path.parent, os.W_OK | os.X_OK)),
     )
+    number = next((number for number, is_so in faults if is_so()), None)
     if number is not None:
         raise refusal(path, OSError(number, os.strerror(number)))
 

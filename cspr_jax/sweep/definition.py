@@ -146,6 +146,9 @@ def sweep_of_settings(settings: dict[str, Any], file: Path, text: str = "") -> S
         file: named in errors; gives the name of the result.
         text: of the sweep file, which a run keeps.
 
+    Returns:
+        the sweep.
+
     Raises:
         ConfigError: this version cannot read them.
     """
@@ -155,9 +158,9 @@ def sweep_of_settings(settings: dict[str, Any], file: Path, text: str = "") -> S
         MAP_KINDS[keys.map].of(keys.trajectory.family),
     )
     over_orientations = _orientation_axes(keys) if kind.is_over_orientations else {}
-    given = {name: axis_points(getattr(keys.axes, name)) for name in settings["axes"]}
-    axes = {name: (given | over_orientations)[name] for name in settings["dimensions"]}
-    check_points(given, file)
+    file_axes = {name: axis_points(getattr(keys.axes, name)) for name in settings["axes"]}
+    axes = {name: (file_axes | over_orientations)[name] for name in settings["dimensions"]}
+    check_points(file_axes, file)
     run = settings["run"]
     types = {name: dtype_of(name, keys.run.dtype) for name in run["store"]}
     return Sweep(file, kind, keys, robot, Grid(axes, tuple(run["tile"])), list(run["store"]), settings, text, types)

@@ -2,11 +2,14 @@
 
 import collections
 import contextlib
+import math
 import pickle
+import socket
 import time
+import urllib.parse
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
-from typing import Any
+from typing import Any, cast
 
 from cspr_jax.errors import ConfigError, RefusedError, ResourceError, StoppedError
 from cspr_jax.schema.identity import differences
@@ -18,6 +21,8 @@ from cspr_jax.sweep.tile import compute_tile
 from cspr_jax.sweep.work import Computed
 
 SECONDS_TO_CONNECT = 20
+# A scheduler whose machine takes no connection, or that was lost and does not come back, is given up after these.
+SECONDS_TO_REACH, SECONDS_FOR_REFUSAL, SECONDS_LOST = 3.5, 1.0, 3.0
 # A cluster's queue may let workers wait; people are told after the first of these.
 SECONDS_FOR_WORKERS = (5, 900)
 # How long a wish to stop may go unseen.
@@ -59,7 +64,8 @@ class Scheduler:
             ) from error
         self._address, self._accept, self._warn = address, accept_environment_change, warn
         try:
-            self._client = distributed.Client(address, timeout=SECONDS_TO_CONNECT)
+            seconds = SECONDS_TO_CONNECT if _is_reached(address) else SECONDS_FOR_REFUSAL
+            self._client = distributed.Client(address, timeout=seconds)
         except ValueError as error:
             raise ConfigError("--scheduler", f"{address}: must be an address such as tcp://host:8786") from error
         except (TypeError, RuntimeError) as error:  # tls:// without certificates; encryption required, but tcp://
@@ -138,10 +144,15 @@ class Scheduler:
         from distributed import KilledWorker, wait
 
         waiting, running, has_warned = collections.deque(indices), set[Any](), False
+        lost = _Lost(self._client)
         try:
             while running or (waiting and not stop):
+                if lost.is_so():
+                    raise ConnectionError
                 # Workers come and go: as many as there are now decide how much is in flight.
-                threads = sum(self._client.nthreads().values())
+                threads = self._threads()
+                if threads is None:
+                    continue
                 if not threads and stop:
                     return
                 if not threads and not has_warned:
@@ -165,7 +176,43 @@ class Scheduler:
                 "workers died again and again at one tile, perhaps for want of memory: run.tile must be smaller"
             ) from error
 
+    def _threads(self) -> int | None:
+        # None where the scheduler does not answer now: it may be busy, or lost.
+        if self._client.status != "running":
+            time.sleep(POLL_SECONDS)
+            return None
+        try:
+            counts = self._client.sync(cast(Any, self._client.scheduler).ncores, callback_timeout=SECONDS_LOST)
+        except OSError:
+            return None
+        return sum(counts.values())
+
     def close(self) -> None:
         """Leave the scheduler; tiles in flight there are given up."""
         with contextlib.suppress(OSError, TimeoutError):
-            self._client.close()
+            self._client.close(timeout=SECONDS_LOST)
+
+
+class _Lost:
+    # Tells whether the connection is lost, and has been for some time: dask tries to make it again.
+
+    def __init__(self, client: Any) -> None:
+        self._client, self._since = client, math.inf
+
+    def is_so(self) -> bool:
+        instant = time.monotonic()
+        self._since = math.inf if self._client.status == "running" else min(self._since, instant)
+        return instant - self._since > SECONDS_LOST or self._client.status == "closed"
+
+
+def _is_reached(address: str) -> bool:
+    # dask tries again and again, for as long as a slow scheduler may take to answer; it also says what an address is.
+    place = urllib.parse.urlsplit(address if "://" in address else f"tcp://{address}")
+    try:
+        if place.scheme in ("tcp", "tls") and place.hostname and place.port is not None:
+            socket.create_connection((place.hostname, place.port), SECONDS_TO_REACH).close()
+    except OSError:
+        return False
+    except ValueError:  # its port is none
+        return True
+    return True

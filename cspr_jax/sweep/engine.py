@@ -198,7 +198,7 @@ class Run:
         done = sum(self._cells(index) for index in whole_tiles)
         self._hooks.on_tile(done, self._sweep.grid.size)
         finished = set(whole_tiles)
-        self._hooks.stop.busy = True
+        self._hooks.stop.busy, self._hooks.stop.note = True, self._note_stop
         first, end = self._options.tiles or (0, len(self._tiling))
         missing = [index for index in range(first, min(end, len(self._tiling))) if index not in finished]
         with contextlib.closing(_as_generator(executor.tiles(missing, self._hooks.stop))) as tiles:
@@ -221,8 +221,15 @@ class Run:
     def _cells(self, index: int) -> int:
         return math.prod(self._tiling.extent(index))
 
+    def _note_stop(self) -> None:
+        code = self._hooks.stop.code
+        with contextlib.suppress(StoreError):  # people read it, no decision does
+            by = {ExitCode.TERMINATED: "SIGTERM", ExitCode.INTERRUPTED: "Ctrl-C"}.get(code) if code else None
+            self._folder.note("stopped", by=by)
+
     def _stopped(self, finished: int) -> None:
         code = self._hooks.stop.code
+        self._note_stop()
         line = f"{self._folder.path}: {finished} of {len(self._tiling)} tiles are kept; run it again to go on"
         if code is None:
             raise StoreError(line)

@@ -5,6 +5,7 @@ import datetime
 import functools
 import math
 import os
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.errors import StoreError, printable
+from cspr_jax.runtime.progress import Pace
 from cspr_jax.schema.tiles import Tiling
 from cspr_jax.store.consolidation import Content
 from cspr_jax.store.disk import Disk
@@ -32,7 +34,8 @@ def status(directory: Path) -> dict[str, Any]:
 
     Returns:
         plain values: "identity", "tiles", "shards", "quarantined", "unfinished", "result", "last" (of log.jsonl),
-        "cells", "cells_done", "cells_per_second" and "seconds_left" (None where unknown).
+        "cells", "cells_done", "cells_per_second" and "seconds_left" (None where unknown), "state" ("finished",
+        "running", "stopped", "killed" or "unknown") and "state_text", the same in words.
 
     Raises:
         StoreError: no run directory.
@@ -43,7 +46,9 @@ def status(directory: Path) -> dict[str, Any]:
     there = [index for index in range(len(tiling)) if file_size(folder.shard(index)) >= 0]
     cells, done = math.prod(tiling.shape), sum(math.prod(tiling.extent(index)) for index in there)
     result, entries = file_size(folder.result) >= 0, _entries(folder.log)
-    done, rate = cells if result else done, _rate(entries, tiling)
+    done, time_now = cells if result else done, time.time()
+    pace = _pace(entries, tiling, done, time_now)
+    state, words = ("finished", "finished") if result else _state(folder.is_held(), entries, time_now)
     return {
         "schema": 1,
         "directory": str(directory),
@@ -57,8 +62,10 @@ def status(directory: Path) -> dict[str, Any]:
         "last": entries[0] if entries else None,
         "cells": cells,
         "cells_done": done,
-        "cells_per_second": rate,
-        "seconds_left": (cells - done) / rate if rate else None,
+        "cells_per_second": pace.rate,
+        "seconds_left": _left(pace, cells - done, time_now if state == "running" else None),
+        "state": state,
+        "state_text": words,
     }
 
 
@@ -200,20 +207,58 @@ def _entries(log: Path) -> list[dict[str, Any]]:
     return entries
 
 
-def _rate(entries: list[dict[str, Any]], tiling: Tiling) -> float | None:
-    # Cells a second of the process that wrote last, the newest entry first. Its first tile holds the time of compiling.
-    times, cells = list[datetime.datetime](), 0
+def _seconds(entry: dict[str, Any]) -> float | None:
+    # The time of an entry; earlier versions wrote no more than the time of day.
+    seconds = entry.get("seconds")
+    if isinstance(seconds, int | float):
+        return float(seconds)
+    with contextlib.suppress(ValueError):
+        return datetime.datetime.strptime(entry["time"], "%Y-%m-%dT%H:%M:%S%z").timestamp()
+    return None
+
+
+def _pace(entries: list[dict[str, Any]], tiling: Tiling, done: int, time_now: float) -> Pace:
+    # As the process that wrote last knows it, from its log, the newest entry first.
+    events = list[tuple[float, int]]()
     for entry in entries:
-        if entry["event"] != "tile":
-            if entry["event"] == "started":
-                break
-            continue
-        index = entry.get("index")
-        if not isinstance(index, int) or not 0 <= index < len(tiling):
-            continue
-        with contextlib.suppress(ValueError):
-            times.append(datetime.datetime.strptime(entry["time"], "%Y-%m-%dT%H:%M:%S%z"))
-            cells += math.prod(tiling.extent(index))
-            first = math.prod(tiling.extent(index))
-    seconds = (times[0] - times[-1]).total_seconds() if times else 0.0
-    return (cells - first) / seconds if seconds > 0.0 else None
+        seconds, index = _seconds(entry), entry.get("index")
+        if entry["event"] == "started" and seconds is not None:
+            events.append((seconds, 0))
+            break
+        if entry["event"] == "tile" and seconds is not None and isinstance(index, int) and 0 <= index < len(tiling):
+            events.append((seconds, math.prod(tiling.extent(index))))
+    clock = [time_now]
+    pace, cells = Pace(lambda: clock[0]), done - sum(count for _, count in events)
+    for seconds, count in reversed(events):
+        clock[0], cells = seconds, cells + count
+        pace.advance(cells, math.prod(tiling.shape))
+    clock[0] = time_now
+    return pace
+
+
+def _left(pace: Pace, cells: int, time_now: float | None) -> float | None:
+    # Time goes on while a process computes.
+    if pace.rate is None or pace.ends is None:
+        return None
+    return cells / pace.rate if time_now is None else max(pace.ends - time_now, 0.0)
+
+
+def _state(is_held: bool | None, entries: list[dict[str, Any]], time_now: float) -> tuple[str, str]:
+    # A word, and words for people.
+    last = entries[0] if entries else None
+    if is_held is None:
+        return "unknown", "whether it runs cannot be told here: its disk has no locks"
+    if is_held:
+        seconds = None if last is None else _seconds(last)
+        if last is None or seconds is None:
+            return "running", "running"
+        ago = datetime.timedelta(seconds=round(max(time_now - seconds, 0.0)))
+        what = "last tile" if last["event"] == "tile" else f"before the first tile, {last['event']}"
+        return "running", f"running, {what} {ago} ago"
+    if last is not None and last["event"] == "stopped":
+        by = f" by {last['by']}" if last.get("by") in ("SIGTERM", "Ctrl-C") else ""
+        return "stopped", f"stopped{by} at {last['time']}: run again to resume"
+    if last is not None and last["event"] == "finished":
+        return "stopped", f"the tiles that were asked for are there since {last['time']}: run again for the others"
+    at = f" after {last['time']}" if last is not None else ""
+    return "killed", f"killed{at}: run again to resume"

@@ -58,6 +58,9 @@ class Part:
 def read_part(path: Path) -> Part:
     """A part from a run directory, or from a result.
 
+    Returns:
+        the part.
+
     Raises:
         StoreError: it is neither, or damaged.
     """
@@ -191,13 +194,13 @@ def _refuse_conflicts(parts: Sequence[Part], accept: bool) -> None:
     if len(free) > 1:
         lines.append(f"axes {', '.join(sorted(free))} differ: must be one of them at most")
     for part in parts[1:]:
-        found = differences(_fixed(part.sweep.settings, free), _fixed(first.sweep.settings, free))
+        conflicts = differences(_fixed(part.sweep.settings, free), _fixed(first.sweep.settings, free))
         if part.sweep.grid.axes.keys() != first.sweep.grid.axes.keys():
-            found = found or ["axes differ"]
-        lines += [f"{part.path}: {line} ({first.path}): must be equal" for line in found]
+            conflicts = conflicts or ["axes differ"]
+        lines += [f"{part.path}: {line} ({first.path}): must be equal" for line in conflicts]
         if not accept:
-            found = differences(part.environment, first.environment)
-            lines += [f"{part.path}: {line}: --accept-environment-change joins them" for line in found]
+            conflicts = differences(part.environment, first.environment)
+            lines += [f"{part.path}: {line}: --accept-environment-change joins them" for line in conflicts]
     if lines:
         raise RefusedError(*(printable(line) for line in lines))
 
@@ -213,7 +216,7 @@ def _free_axes(parts: Sequence[Part]) -> list[str]:
 
 
 def _fixed(settings: dict[str, Any], free: set[str]) -> dict[str, Any]:
-    # What parts must share. Other words for equal points are no difference, nor is the shape of the tiles.
+    # Parts must share these. Other words for equal points are no difference, nor is the shape of the tiles.
     axes = [name for name in settings["axes"] if name not in free]
     return settings | {"axes": axes, "run": {key: value for key, value in settings["run"].items() if key != "tile"}}
 

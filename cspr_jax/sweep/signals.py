@@ -33,6 +33,7 @@ class Stop:
         code: exit code of the signal, or None.
         busy: whether something is in progress that is to be finished.
         at_once: called before the process ends at a second signal.
+        note: likewise, to leave word in a log.
         tell: called with a line for people when somebody has asked.
     """
 
@@ -41,6 +42,7 @@ class Stop:
         self.code: ExitCode | None = None
         self.busy = False
         self.at_once: Callable[[], None] = lambda: None
+        self.note: Callable[[], None] = lambda: None
         self.tell: Callable[[str], None] = lambda line: None
 
     def __bool__(self) -> bool:
@@ -58,6 +60,8 @@ class Stop:
 
     def end(self, code: ExitCode) -> None:
         """End the process now."""
+        self.code = code
+        self.note()
         self.at_once()
         signal_name = "SIGTERM: " if code is ExitCode.TERMINATED else ""
         line = f"cspr: {signal_name}stopped at once; finished tiles are kept, run it again to go on\n"
@@ -102,15 +106,16 @@ def stop_signals(tell: Callable[[str], None] = lambda line: None) -> Iterator[St
 
 
 class Prompt:
-    """Answer to Ctrl-C while nothing has to be finished.
+    """Answer to Ctrl-C and SIGTERM while nothing has to be finished.
 
     Fields:
         told: whether people know that it was noticed.
+        code: exit code of the signal.
     """
 
     def __init__(self) -> None:
         """Nobody pressed it yet."""
-        self.told, self._lock = False, threading.Lock()
+        self.told, self.code, self._lock = False, ExitCode.INTERRUPTED, threading.Lock()
 
     def tell(self) -> None:
         """Say that it was noticed, once."""
@@ -118,21 +123,22 @@ class Prompt:
             before, self.told = self.told, True
         if not before:
             with contextlib.suppress(OSError, ValueError):  # nobody may be there to be told
-                sys.stderr.write("cspr: interrupted; nothing half-written is left\n")
+                signal_name = "SIGTERM: stopped" if self.code is ExitCode.TERMINATED else "interrupted"
+                sys.stderr.write(f"cspr: {signal_name}; nothing half-written is left\n")
                 sys.stderr.flush()
 
 
 @contextlib.contextmanager
 def prompt_end(last: Callable[[], None] | None = None) -> Iterator[Prompt]:
-    """Say at once that Ctrl-C was noticed, and end the process where KeyboardInterrupt does not do so soon.
+    """Say at once that Ctrl-C or SIGTERM was noticed, and end the process where KeyboardInterrupt does not do so soon.
 
     Files get their names only when they are whole, so nothing half-written is left.
 
     Args:
-        last: called before the process ends with the block, where Ctrl-C was pressed; None: the process goes on.
+        last: called before the process ends with the block, where a signal came; None: the process goes on.
 
     Yields:
-        whether it was pressed.
+        the answer.
     """
     prompt, pressed, over = Prompt(), threading.Event(), threading.Event()
     if threading.current_thread() is not threading.main_thread():
@@ -141,26 +147,30 @@ def prompt_end(last: Callable[[], None] | None = None) -> Iterator[Prompt]:
 
     def end_unless_over() -> None:
         if not over.wait(GRACE_SECONDS):
-            _end(ExitCode.INTERRUPTED)
+            _end(prompt.code)
 
     def on_signal(number: int) -> None:
-        del number
+        prompt.code = CODES[signal.Signals(number)]
         if pressed.is_set():
-            _end(ExitCode.INTERRUPTED)
+            _end(prompt.code)
         pressed.set()
         prompt.tell()
         threading.Thread(target=end_unless_over, daemon=True).start()
 
+    before = signal.getsignal(signal.SIGTERM)
+    if before is signal.SIG_DFL:  # else somebody has decided
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        with _watched((signal.SIGINT,), on_signal):
+        with _watched(CODES, on_signal):
             yield prompt
     finally:
+        signal.signal(signal.SIGTERM, before)
         if last is not None and pressed.is_set():
             # Other threads may be compiling still: the usual end would wait for them, or take from them what they use.
             with contextlib.suppress(OSError, ValueError):
                 sys.stdout.flush()
             last()
-            _end(ExitCode.INTERRUPTED)
+            _end(prompt.code)
         over.set()
 
 

@@ -18,6 +18,10 @@ CASES = [
 ]
 
 
+NAME = "n" * 251 + ".csv"
+CASES += [("plan", "work.toml", "-o", NAME), ("check", "work.csv", "--robot", "prototype", "-o", NAME)]
+
+
 @pytest.mark.parametrize("words", CASES, ids=" ".join)
 def test_a_place_that_takes_no_file(tmp_path, monkeypatch, words):
     monkeypatch.chdir(tmp_path)

@@ -62,12 +62,18 @@ def started():
         process.communicate()
 
 
-@pytest.mark.thorough
-def test_ctrl_c_where_nothing_must_be_finished(started):
+@pytest.mark.parametrize(
+    ("number", "word", "code"),
+    [
+        pytest.param(signal.SIGINT, "interrupted", 130, marks=pytest.mark.thorough),
+        (signal.SIGTERM, "SIGTERM: stopped", 143),
+    ],
+)
+def test_signals_where_nothing_must_be_finished(started, number, word, code):
     process = started("robots")
-    process.send_signal(signal.SIGINT)
-    assert process.stderr.readline() == "cspr: interrupted; nothing half-written is left\n"
-    assert process.wait(timeout=5) == 130 and process.stderr.read() == ""
+    process.send_signal(number)
+    assert process.stderr.readline() == f"cspr: {word}; nothing half-written is left\n"
+    assert process.wait(timeout=5) == code and process.stderr.read() == ""
 
 
 @pytest.mark.parametrize(

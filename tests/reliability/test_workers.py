@@ -9,11 +9,13 @@ import os
 import pickle
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import threading
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import psutil
@@ -22,7 +24,10 @@ from distributed import LocalCluster
 from support import toy
 from support.commands import cspr
 
+import cspr_jax
+from cspr_jax.errors import ResourceError
 from cspr_jax.schema.map_kinds import registered
+from cspr_jax.sweep import distributed as workers_of_dask
 from cspr_jax.sweep.definition import read_sweep
 from cspr_jax.sweep.distributed import Scheduler
 from cspr_jax.sweep.signals import Stop
@@ -150,6 +155,40 @@ CLUSTER = """from distributed import LocalCluster
 cluster = LocalCluster(1, processes=False, threads_per_worker=1, dashboard_address=None, protocol="tcp")
 print(cluster.scheduler_address, flush=True)
 input()"""
+
+
+def test_a_scheduler_that_is_not_there_is_told_at_once(toys, tmp_path, monkeypatch):
+    """dask itself would try again for as long as a slow scheduler may take."""
+    import distributed
+
+    seconds = []
+
+    def refused(address, timeout):
+        seconds.append(timeout)
+        raise TimeoutError
+
+    monkeypatch.setattr(distributed, "Client", refused)
+    with socket.socket() as place:  # nobody listens there
+        place.bind(("127.0.0.1", 0))
+        for address in ("tcp://127.0.0.1:{}", "127.0.0.1:{}", "tls://localhost:{}"):
+            address = address.format(place.getsockname()[1])
+            with pytest.raises(ResourceError, match=f"--scheduler {address}: no scheduler answers"):
+                cspr_jax.run(toys[0], tmp_path / "run", scheduler=address)
+    assert seconds == [1.0] * 3
+
+
+@pytest.mark.parametrize("status", ["connecting", "closed"])
+def test_a_connection_that_stays_lost_is_given_up(monkeypatch, status):
+    clock, client = [0.0], SimpleNamespace(status="running")
+    monkeypatch.setattr(workers_of_dask.time, "monotonic", lambda: clock[0])
+    lost = workers_of_dask._Lost(client)
+    for at, state, is_lost in ((0, "running", False), (5, status, status == "closed"), (7, status, status == "closed")):
+        clock[0], client.status = at, state
+        assert lost.is_so() is is_lost
+    clock[0] = 9
+    assert lost.is_so()
+    client.status = "running"
+    assert not lost.is_so()
 
 
 def test_a_scheduler_dies(toys, tmp_path):

@@ -12,7 +12,7 @@ import cspr_jax
 from cspr_jax.cli import main
 from cspr_jax.errors import ConfigError, RefusedError, StoreError
 from cspr_jax.schema.map_kinds import registered
-from cspr_jax.sweep.definition import read_sweep, sweep_of_settings
+from cspr_jax.sweep.definition import sweep_of_settings
 from cspr_jax.sweep.engine import Options, Run
 from cspr_jax.sweep.merging import Merged, read_part
 
@@ -129,7 +129,7 @@ def test_cells_that_do_not_agree_are_refused(tmp_path, kind):
     with pytest.raises(RefusedError, match=r"a: toy_distance: 1 cells differ from those of .*a: must agree"):
         Merged([part, dataclasses.replace(part, data=data)])
     here = part.environment | {"jax": "0.0"}
-    with pytest.raises(RefusedError, match='jax = "0.0" here, .* --accept-environment-change joins them'):
+    with pytest.raises(RefusedError, match=r'jax = "0.0" here, .* --accept-environment-change joins them'):
         Merged([part, dataclasses.replace(part, environment=here)])
     Merged([part, dataclasses.replace(part, environment=here)], accept_environment_change=True)
 
@@ -140,7 +140,7 @@ def test_what_is_no_map_is_refused(tmp_path, kind):
     for path in (tmp_path / "empty", tmp_path / "none"):
         with pytest.raises(StoreError, match=path.name):
             cspr_jax.merge([file, path], tmp_path / "joined")
-    with pytest.raises(ConfigError, match="-o: .*: must be another directory"):
+    with pytest.raises(ConfigError, match=r"-o: .*: must be another directory"):
         cspr_jax.merge([file.parent, file], file.parent)
     with pytest.raises(ValueError, match="two run directories or results"):
         cspr_jax.merge([file], tmp_path / "joined")
