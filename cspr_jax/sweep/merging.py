@@ -128,7 +128,7 @@ class Merged:
         """Join in memory; nothing is written."""
         _refuse_conflicts(parts, accept_environment_change)
         self._parts = parts
-        self.sweep, tiling = _joined(parts), None
+        self.sweep = _joined(parts)
         axes = self.sweep.grid.axes
         self._owner = np.full(self.sweep.grid.shape, -1, np.int32)
         self._data = {name: np.zeros(self.sweep.grid.shape, kind) for name, kind in self.sweep.types.items()}
@@ -158,7 +158,11 @@ class Merged:
         self._owner[cells] = np.where(new, number, owner)
 
     def environment(self) -> dict[str, Any]:
-        """Environment of the first part."""
+        """Environment of the joined map.
+
+        Returns:
+            the environment of the first part.
+        """
         return self._parts[0].environment
 
     def tiles(self, indices: Iterable[int], stop: Stop) -> Iterator[Computed]:
