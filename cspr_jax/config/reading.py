@@ -4,6 +4,7 @@ import codecs
 import contextlib
 import os
 import re
+import sys
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -171,7 +172,24 @@ def parse_toml(text: str, path: Path) -> dict[str, Any]:
     except RecursionError as error:
         raise ConfigError(path, "is not TOML: nested too deeply") from error
     except ValueError as error:
+        refuse_long_numbers(text, path)
         raise ConfigError(path, f"is not TOML: {error}{look_alike_before(text, _stop(text, str(error)))}") from error
+
+
+def refuse_long_numbers(text: str, path: Path) -> None:
+    """Refuse whole numbers of more digits than Python reads.
+
+    Args:
+        path: named in errors.
+
+    Raises:
+        ConfigError: there is one.
+    """
+    most = sys.get_int_max_str_digits()
+    number = re.search(rf"[0-9](?:_?[0-9]){{{most},}}", text) if most else None
+    if number is not None:
+        line, digits = text.count("\n", 0, number.start()) + 1, len(number[0].replace("_", ""))
+        raise ConfigError(path, f"line {line}: a number of {digits} digits: must have at most {most}")
 
 
 def _stop(text: str, message: str) -> int:

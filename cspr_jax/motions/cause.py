@@ -9,6 +9,7 @@ from cspr_jax.schema.verdicts import Verdict
 
 # Digits that a number has at least, and at most where fewer do not tell it from another one.
 DIGITS, MOST_DIGITS = 3, 12
+ON_PLANE = 1e-9  # m; a height above the spools that says nothing
 # By flag: what the motion does, in words; {cable} is "cable 1", or "cables 1 and 3".
 _WORDS = {
     Verdict.SLACK_CABLE: "{cable} has {needed} {unit}{when}, at least {allowed} needed",
@@ -82,16 +83,19 @@ class Cause:
         flag, numbers = Verdict[self.criterion.upper()], " and ".join(str(k + 1) for k in self.cables)
         if not math.isfinite(self.needed) and flag not in (Verdict.SINGULAR, Verdict.CABLE_PLATFORM):
             return flag.text.replace("_", " ")
+        when = f" at t = {self.t:.2f} s" if math.isfinite(self.t) else ""
+        if flag is Verdict.ABOVE_SPOOLS and not -self.needed > ON_PLANE:
+            return f"on the plane of the spools{when}"
         needed, allowed = _told_apart(self.needed, self.allowed)
         return _WORDS.get(flag, _USUAL).format(
             cable=f"cable{'s' if len(self.cables) > 1 else ''} {numbers}",
             needed=needed,
             allowed=allowed,
-            missed=f"{-self.needed:.{DIGITS}g}",
+            missed=f"{max(0.0, -self.needed):.{DIGITS}g}",
             body=f"cable {numbers}" if numbers else "the platform",
             obstacle=self.obstacle or "an obstacle",
             unit=self.unit.replace("^2", "²"),
-            when=f" at t = {self.t:.2f} s" if math.isfinite(self.t) else "",
+            when=when,
         )
 
 

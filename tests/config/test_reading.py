@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cspr_jax.api.imports import import_robot
 from cspr_jax.cli import main
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import checked, read_toml
@@ -298,3 +299,13 @@ def test_only_one_line_config_errors_escape(tmp_path, monkeypatch, good, read):
 
     check()
     assert all(any(kind in text for text in outcomes) for kind in ("unknown key", "must be", "is missing", "not TOML"))
+
+
+def test_numbers_of_thousands_of_digits(tmp_path):
+    """In words of this program, not in those of Python's limit."""
+    number = "1" * 5000
+    (tmp_path / "plan.toml").write_text(f"schema = 1\nsamples = {number}\n")
+    (tmp_path / "robot.json").write_text(f'{{"name": "one",\n "mass": {number}}}')
+    for name, read in (("plan.toml", read_toml), ("robot.json", import_robot)):
+        with pytest.raises(ConfigError, match=rf"{name}: line 2: a number of 5000 digits: must have at most 4300$"):
+            read(tmp_path / name)

@@ -14,7 +14,7 @@ import numpy as np
 
 from cspr_jax.config.formats import model
 from cspr_jax.config.formats.model import Body, Cable
-from cspr_jax.config.reading import look_alike_before, read_text
+from cspr_jax.config.reading import look_alike_before, read_text, refuse_long_numbers
 from cspr_jax.config.suggestions import look_alike
 from cspr_jax.config.wording import either
 from cspr_jax.errors import ConfigError, shown
@@ -91,6 +91,7 @@ def _read(path: Path, parse: Callable[[str], Any], kind: str) -> Body:
     except RecursionError as error:
         raise ConfigError(path, f"is not {kind} that is read here: nested too deeply") from error
     except ValueError as error:
+        refuse_long_numbers(text, path)
         raise ConfigError(path, f"is not {kind}: {error}") from error
     data = data["robot"] if isinstance(data, dict) and set(data) == {"robot"} else data
     return _body(_Table(data, "the file", path), path)
