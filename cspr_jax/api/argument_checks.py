@@ -142,6 +142,10 @@ _ROBOT = kind_of(
     has=("base_points", "n_cables", "limits", "pattern"),
 )
 _ROBOT_OR_NAME = kind_of("a robot, the name of one, or its file", str, os.PathLike, has=("base_points", "limits"))
+_ROBOT_NAME_OR_NONE = kind_of(
+    "a robot, the name of one, its file, or None", str, os.PathLike, none=True, has=("base_points", "limits")
+)
+_Z_AXIS = word("down", "up")
 _MANY_POINTS = real("None, or finite numbers of shape (k, n, 3)", (ANY, ANY, 3), none=True)
 _ENDS = word("rest", "natural", "periodic")
 _PLAN = ("answers", "points", "robot_file")  # attributes of a plan
@@ -348,9 +352,13 @@ OF_FUNCTIONS: dict[str, Rule] = {
     "platform_motion.beta_hat": real("two finite numbers", (2,), traced=True),
     "platform_motion.orientations": real("two unit quaternions, scalar first", (2, 4), traced=True),
     "platform_motion.z0": _ONE_DEPTH,
+    "plot.robot": _ROBOT_NAME_OR_NONE,
+    "plot.z_axis": _Z_AXIS,
     "replay.given": kind_of("a plan, its file, or a dictionary of that", str, os.PathLike, Mapping, has=_PLAN),
     "report.given": kind_of("a result, a plan, or the path of one", str, os.PathLike, has=("to_xarray",)),
     "report.output": _PATH,
+    "report.robot": _ROBOT_NAME_OR_NONE,
+    "report.z_axis": _Z_AXIS,
     "retime.plan": kind_of("a plan, or a check", has=("feasible", "to_table")),
     "merge.directory": _PATH,
     "run.tiles": real("two integers, first and end, or None", (2,), none=True),

@@ -2,19 +2,23 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
 
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.outputs.plots.draw import drawn
-from cspr_jax.outputs.plots.motion_source import with_plan
-from cspr_jax.outputs.plots.selection import result_at
+from cspr_jax.outputs.plots.motion_source import completed
+from cspr_jax.outputs.plots.selection import is_own_motion, result_at
 from cspr_jax.outputs.plots.style import Style, in_style, laid_out, rendered, style_of
 from cspr_jax.runtime.stages import stage
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.publishing import check_place, publish
 from cspr_jax.store.result import Result, open_result
+
+if TYPE_CHECKING:
+    from cspr_jax.robots.cables import AnyRobot
 
 
 @checked
@@ -34,6 +38,8 @@ def plot(  # noqa: PLR0913
     preset: str | None = None,
     title: bool = True,
     plan: str | Path | None = None,
+    robot: "AnyRobot | str | Path | None" = None,
+    z_axis: str | None = None,
     output: str | Path | None = None,
 ) -> Figure:
     """Draw one result, or several in one picture: maps as lines, workspaces as outlines, motions over time.
@@ -57,6 +63,8 @@ def plot(  # noqa: PLR0913
         preset: "column", 8.5 cm wide, or "page", 17.5 cm, of a paper; the height follows. None: neither.
         title: whether titles are drawn; a motion that is not proved feasible is marked in any case.
         plan: plan file of motions in CSV, which keep neither robot nor limits; None: none.
+        robot: in its place the robot of motions in CSV, as for `check`; None: none.
+        z_axis: or only where z points in them, "up" or "down"; None: as robot and plan say, else where it seems to.
         output: picture to write; its ending selects the format. None: nothing is written.
 
     Returns:
@@ -73,10 +81,9 @@ def plot(  # noqa: PLR0913
     check_place(None if output is None else Path(output))
     stage("reading")
     files = [one if isinstance(one, Result) else result_at(Path(one)) for one in sources]
-    loaded = [one if isinstance(one, Result) else open_result(one) for one in files]
     names = [f"result {i + 1}" if isinstance(one, Result) else str(one) for i, one in enumerate(files)]
-    if plan is not None:
-        loaded = [with_plan(one, name, Path(plan)) for one, name in zip(loaded, names, strict=True)]
+    beside = given_beside(plan, robot, z_axis)
+    loaded = [_opened(one, name, beside) for one, name in zip(files, names, strict=True)]
 
     def draw() -> Figure:
         given_at = None if at is None else dict(at)
@@ -86,6 +93,34 @@ def plot(  # noqa: PLR0913
         )
 
     return finished(draw, names[0], style, output)
+
+
+def given_beside(plan: str | Path | None, robot: "AnyRobot | str | Path | None", z_axis: str | None) -> dict[str, Any]:
+    """What is given beside motions in CSV.
+
+    Returns:
+        arguments of `outputs.plots.motion_source.completed`.
+
+    Raises:
+        ConfigError: two of them.
+    """
+    given = [f"--{name}" for name, value in (("plan", plan), ("robot", robot), ("z-axis", z_axis)) if value is not None]
+    if len(given) > 1:
+        raise ConfigError(given[1], f"must be absent with {given[0]}, which says it")
+    keys = None
+    if robot is not None:
+        from cspr_jax.api.check_keys import check_keys  # it needs jax, as no other picture does
+
+        keys = check_keys(robot, None)
+    return {"plan": None if plan is None else Path(plan), "robot": keys, "z_axis": z_axis}
+
+
+def _opened(source: Path | Result, name: str, beside: dict[str, Any]) -> Result:
+    if isinstance(source, Result) or beside["robot"] is None or not is_own_motion(source):
+        return completed(source if isinstance(source, Result) else open_result(source), name, **beside)
+    from cspr_jax.api.checks import check_file  # likewise
+
+    return check_file(source, beside["robot"], outputs=["-o"]).plan.to_result()
 
 
 def names_of(axes: str | Sequence[str]) -> list[str]:

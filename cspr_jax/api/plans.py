@@ -16,10 +16,12 @@ from cspr_jax.motions.landings import LaunchErrors, Scatter
 from cspr_jax.motions.launch_outcome import LaunchOutcome
 from cspr_jax.outputs import motion_files, plan_report
 from cspr_jax.outputs.mujoco_motion import STEP
+from cspr_jax.outputs.path_columns import path_columns
 from cspr_jax.plans import planning
 from cspr_jax.schema import labelled
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.publishing import publish
+from cspr_jax.store.result import Result, motion_result
 
 if TYPE_CHECKING:
     import xarray
@@ -138,6 +140,20 @@ class Plan(planning.PlannedMotions):
             raise ConfigError(path, str(error)) from error
         publish(Disk(), path, data)
         return path
+
+    def to_result(self) -> Result:
+        """The motion as `open_result` gives it of a motion file, to be drawn.
+
+        Returns:
+            rows and segments.
+
+        Raises:
+            StoreError: numbers that no motion file has.
+        """
+        with double_precision():
+            columns = motion_files.rows(self) | motion_files.segments(self) | self.outcome_columns
+            columns |= motion_files.failures(self) | path_columns(self)
+            return motion_result(motion_files.attributes(self), columns)
 
     def to_dict(self) -> dict[str, Any]:
         """The plan as plain values, for JSON.

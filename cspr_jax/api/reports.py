@@ -8,7 +8,8 @@ import numpy as np
 
 from cspr_jax.api import plans
 from cspr_jax.api.argument_checks import checked
-from cspr_jax.api.pictures import names_of
+from cspr_jax.api.checks import check_file
+from cspr_jax.api.pictures import given_beside, names_of
 from cspr_jax.api.plans import Plan
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import ConfigError, InputError
@@ -16,13 +17,14 @@ from cspr_jax.outputs import motion_files
 from cspr_jax.outputs.path_columns import path_columns
 from cspr_jax.outputs.plots.fitting import shortened
 from cspr_jax.outputs.plots.labels import heading, robot_name, value
-from cspr_jax.outputs.plots.motion_source import keeps_plan, robot_and_plan, with_plan
+from cspr_jax.outputs.plots.motion_source import completed, keeps_plan, robot_and_plan
 from cspr_jax.outputs.plots.pages.maps import map_content, order_of
 from cspr_jax.outputs.plots.pages.motions import MOST_ROWS, motion_content
 from cspr_jax.outputs.plots.pages.page import page_of
 from cspr_jax.outputs.plots.pages.telling import telling
-from cspr_jax.outputs.plots.selection import nearest, result_at
+from cspr_jax.outputs.plots.selection import is_own_motion, nearest, result_at
 from cspr_jax.plans.cell_plan import cell_plan
+from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.store.disk import Disk
@@ -43,6 +45,8 @@ def report(
     quantity: str | None = None,
     best: str | Sequence[str] = (),
     plan: str | Path | None = None,
+    robot: AnyRobot | str | Path | None = None,
+    z_axis: str | None = None,
 ) -> list[str]:
     """Write a page to explore a map, or a plan, in a browser: one file that needs no network.
 
@@ -59,6 +63,8 @@ def report(
         quantity: map: quantity to show first; None: the main quantity of its kind of map.
         best: map: axes of which each cell shows the best point, such as "z0", as in `plot`.
         plan: plan file of a motion in CSV, which keeps neither robot nor limits; None: none.
+        robot: in its place the robot of a motion in CSV, as for `check`; None: none.
+        z_axis: or only where z points in it, "up" or "down"; None: as robot and plan say, else where it seems to.
 
     Returns:
         warnings, one line each.
@@ -74,11 +80,13 @@ def report(
     if not 0 <= trajectories <= MOST:
         raise ConfigError("--trajectories", f"{trajectories}: must be an integer from 0 to {MOST}")
     try:
-        loaded = _loaded(given)
-        if plan is not None:
-            if not isinstance(loaded, Result):
-                raise InputError("--plan", str(plan), "absent but with a motion in CSV")
-            loaded = with_plan(loaded, str(given), Path(plan))
+        beside = given_beside(plan, robot, z_axis)
+        loaded = _loaded(given, beside["robot"])
+        if isinstance(loaded, Result):
+            loaded = completed(loaded, str(given), **beside)
+        elif not _is_own(given, beside["robot"]) and any(value is not None for value in beside.values()):
+            option = next(name for name, value in beside.items() if value is not None)
+            raise InputError(f"--{option.replace('_', '-')}", "given", "absent but with a motion in CSV")
         if isinstance(loaded, Result) and loaded.is_map:
             shown = loaded.best(*names_of(best))
             title, content, warnings = _of_map(shown, trajectories, cells, quantity)
@@ -95,10 +103,18 @@ def report(
     return warnings
 
 
-def _loaded(source: str | Path | Result | Plan) -> Result | Plan:
+def _is_own(source: str | Path | Result | Plan, keys: dict[str, Any] | None) -> bool:
+    # A motion of the user's own, and its robot.
+    is_file = keys is not None and not isinstance(source, Result | Plan) and Path(source).suffix != ".toml"
+    return is_file and is_own_motion(Path(source))
+
+
+def _loaded(source: str | Path | Result | Plan, keys: dict[str, Any] | None) -> Result | Plan:
     if isinstance(source, Result | Plan):
         return source
     path = Path(source)
+    if _is_own(source, keys):
+        return check_file(path, keys, outputs=["-o"]).plan
     if path.suffix == ".toml":
         return plans.plan(path)
     stage("reading")

@@ -15,8 +15,8 @@ def _plot(options: argparse.Namespace) -> int:
 
     at = selection.places(options.at)
     results = [selection.result_at(path) for path in options.result]
-    if options.quantity == ACCELERATION:  # the one picture that is computed
-        prepare_jax(options)
+    if options.quantity == ACCELERATION or options.robot is not None:  # the pictures that are computed
+        prepare_jax(options, quick=options.quantity != ACCELERATION)
     output = options.output or results[0].with_suffix(".png")
     if not output.suffix:
         raise ConfigError("-o", f"{output}: must end in .png, .pdf, .svg or another picture format")
@@ -33,6 +33,8 @@ def _plot(options: argparse.Namespace) -> int:
         "preset",
         "title",
         "plan",
+        "robot",
+        "z_axis",
     )
     with waiting():
         plot(results, at=at, output=output, **{name: getattr(options, name) for name in names})
@@ -74,7 +76,9 @@ def _report(options: argparse.Namespace) -> int:
         prepare_jax(options, quick=True)
         from cspr_jax.api.reports import report
 
-        choices = {name: getattr(options, name) for name in ("trajectories", "quantity", "best", "plan")}
+        choices = {
+            name: getattr(options, name) for name in ("trajectories", "quantity", "best", "plan", "robot", "z_axis")
+        }
         warnings = report(source, output, cells=cells, **choices)
     for line in warnings:
         warn(line)

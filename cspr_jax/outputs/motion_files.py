@@ -168,7 +168,7 @@ def write_rows(plan: PlannedMotions, path: Path, *, rate: float | None = None) -
         raise ConfigError(path, "not written: the best candidate's motion is not finite; see its verdict")
     if path.suffix == ".csv":
         feasible = None if plan.feasible else _feasible_rows(plan, columns["t"])
-        publish(Disk(), path, _csv(columns, feasible, plan.robot_file.z_axis).encode())
+        publish(Disk(), path, _csv(columns, feasible).encode())
     else:
         _write_hdf5(plan, path, columns)
 
@@ -181,15 +181,14 @@ def _feasible_rows(plan: PlannedMotions, t: np.ndarray) -> np.ndarray:
     return good[before] & good[after]
 
 
-def _csv(columns: dict[str, np.ndarray], feasible: np.ndarray | None, z_axis: str) -> str:
+def _csv(columns: dict[str, np.ndarray], feasible: np.ndarray | None) -> str:
+    # One line of names and numbers, which every program reads; axes and units are those of the robot file.
     heads = [head for name, values in columns.items() for head in columns_of(name, values[0].size)]
     table = np.column_stack(list(columns.values()))
     last = [[]] * len(table) if feasible is None else [[int(flag)] for flag in feasible]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(heads if feasible is None else [*heads, "feasible"])
-    # Many programs take the first line for the names of the columns, and skip comments below it.
-    text.write(f"# z: {z_axis}\n# units: m rad s\n")
     writer.writerows([[repr(float(value)) for value in row] + flag for row, flag in zip(table, last, strict=True)])
     return text.getvalue()
 

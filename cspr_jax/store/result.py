@@ -168,6 +168,25 @@ def open_result(path: Path) -> Result:
     return Result(axes, data, units, labels, attributes, settings)
 
 
+def motion_result(attributes: dict[str, Any], arrays: dict[str, np.ndarray]) -> Result:
+    """A motion that was computed, as it would be read from a motion file.
+
+    Args:
+        arrays: by the names of `schema.quantities.EVERY`.
+
+    Returns:
+        the motion.
+
+    Raises:
+        StoreError: numbers that no motion file has.
+    """
+    try:
+        axes, data = _motion(attributes, dict(sorted(arrays.items())), keeps_robot=True)
+    except DamagedError as error:
+        raise StoreError(f"the motion cannot be drawn: {error}") from error
+    return Result(axes, data, *_described(None, [*axes, *data]), attributes, {})
+
+
 def _content(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     with Reader() as reader:
         return reader.result(path)

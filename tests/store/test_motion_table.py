@@ -2,6 +2,7 @@
 
 import json
 import re
+from csv import DictReader
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import StoreError
 from cspr_jax.outputs.plots.motion_source import robot_and_plan
 from cspr_jax.outputs.plots.robot_along import moving
+from cspr_jax.schema.quantities import TRAJECTORY
 
 PLATFORM = """schema = 1
 robot = "cogiro"
@@ -56,11 +58,106 @@ def test_columns_come_back_as_they_were(folder):
 
 
 def test_other_tools_read_the_same_table(folder):
-    """The first line names the columns, and comments below it say units and axes."""
-    lines = (folder / "motion.csv").read_text().splitlines()
-    assert lines[0].startswith("t,position_x") and lines[1:3] == ["# z: down", "# units: m rad s"]
-    own = np.genfromtxt(folder / "motion.csv", delimiter=",", names=True)
-    np.testing.assert_array_equal(own["tension_2"], cspr_jax.open_result(folder / "motion.csv").data["tension"][:, 1])
+    """One line of names and then numbers: no reader needs an option beyond the comma."""
+    path, result = folder / "motion.csv", cspr_jax.open_result(folder / "motion.csv")
+    table = np.column_stack([result.axes["t"], *(result.data[name] for name in TRAJECTORY if name in result.data)])
+    np.testing.assert_array_equal(np.loadtxt(path, delimiter=",", skiprows=1, comments=None), table)
+    np.testing.assert_array_equal(
+        np.genfromtxt(path, delimiter=",", names=True)["tension_2"], result.data["tension"][:, 1]
+    )
+    with path.open(newline="") as file:
+        np.testing.assert_array_equal(
+            [[float(row["t"]), *map(float, list(row.values())[1:])] for row in DictReader(file)], table
+        )
+    frame = pytest.importorskip("pandas").read_csv(path)
+    assert list(frame)[:2] == ["t", "position_x"]
+    np.testing.assert_array_equal(frame.to_numpy(float), table)
+
+
+UP = """schema = 1
+family = "quintic"
+samples = 40
+[robot]
+name = "lab triangle"
+base_points = [[0.0, 0.0, 4.0], [3.0, 0.0, 4.0], [1.5, 2.6, 4.0]]
+mass = 1.5
+z_axis = "up"
+[[pose]]
+position = [1.5, 0.9, 2.0]
+[[pose]]
+position = [1.6, 0.8, 1.7]
+"""
+
+
+@pytest.fixture(scope="module")
+def upward(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("upward")
+    assert plan(folder, UP, "-o", str(folder / "motion.csv"))[0] == 0
+    (folder / "robot.toml").write_text("\n".join(UP.split("[robot]\n")[1].split("[[pose]]")[0].splitlines()))
+    return folder
+
+
+def is_inverted(path, **given):
+    figure = cspr_jax.plot(path, **given)
+    panel = next(axes for axes in figure.axes if axes.get_ylabel() == "z (m)")
+    return panel.yaxis_inverted(), figure.get_suptitle()
+
+
+def test_where_z_points(folder, upward):
+    """The work of the cables tells it; robot, plan or an option do; so does a comment of an earlier version."""
+    down, up = folder / "motion.csv", upward / "motion.csv"
+    assert "#" not in up.read_text() and cspr_jax.open_result(up).attributes["z_axis"] == "up"
+    assert is_inverted(down)[0] and not is_inverted(up)[0] and "z axis up" in is_inverted(up)[1]
+    assert is_inverted(up, z_axis="down")[0] and not is_inverted(up, robot=upward / "robot.toml")[0]
+    head, *rows = up.read_text().splitlines(keepends=True)
+    earlier = upward / "earlier.csv"
+    for axis in ("up", "down"):
+        earlier.write_text("".join([head, f"# z: {axis}\n# units: m rad s\n", *rows]))
+        result = cspr_jax.open_result(earlier)
+        assert result.attributes["z_axis"] == axis and len(result.axes["t"]) == len(rows)
+    earlier.write_text("".join([head, "# z: left\n", *rows]))
+    with pytest.raises(StoreError, match="z_axis = "):
+        cspr_jax.open_result(earlier)
+
+
+def test_a_level_motion_does_not_tell(upward):
+    head, *rows = upward.joinpath("motion.csv").read_text().splitlines()
+    names, level = head.split(","), upward / "level.csv"
+    cells = [row.split(",") for row in rows]
+    for row in cells:
+        row[names.index("velocity_z")] = "0.0"
+    level.write_text("\n".join([head, *map(",".join, cells)]) + "\n")
+    assert "z_axis" not in cspr_jax.open_result(level).attributes
+    assert "not known" in is_inverted(level)[1]
+
+
+def test_the_robot_beside_a_table(upward, capsys):
+    """Its axes, its spools and its limits are drawn; one whose cables are others is refused."""
+    table, robot = str(upward / "motion.csv"), str(upward / "robot.toml")
+    for command, output in (("plot", "summary.svg"), ("report", "page.html")):
+        more = ["--quantity", "summary"] if command == "plot" else []
+        assert main([command, table, "--robot", robot, *more, "-o", str(upward / output)]) == 0
+        assert "lab triangle" in (upward / output).read_text()
+        for words, said in (
+            (["--robot", "prototype"], "is not that of"),
+            (["--robot", "nobody"], 'robot = "nobody"'),
+            (["--robot", robot, "--z-axis", "up"], "--z-axis: must be absent with --robot"),
+        ):
+            assert main([command, table, *words, "-o", str(upward / f"no{output}")]) == 2
+            error = capsys.readouterr().err
+            assert said in error and error.count("\n") == 1 and not (upward / f"no{output}").exists()
+
+
+def test_a_motion_of_the_users_own_is_drawn_with_its_robot(upward, capsys):
+    own, robot = upward / "own.csv", str(upward / "robot.toml")
+    own.write_text("t,x,y,z\n0,1.5,0.9,2\n1,1.55,0.85,1.9\n2,1.6,0.8,1.7\n")
+    assert main(["plot", str(own), "-o", str(upward / "no.svg")]) == 4
+    assert "needs its robot, --robot" in capsys.readouterr().err
+    assert main(["report", str(own), "--robot", robot, "-o", str(upward / "own.html")]) == 0
+    inverted, title = is_inverted(own, robot=robot)
+    assert not inverted and title.startswith("lab triangle")
+    tension = cspr_jax.check(robot, own).plan.to_result().data["tension"]
+    np.testing.assert_array_equal(tension, cspr_jax.check(robot, own).plan.rows()["tension"])
 
 
 def test_a_table_is_verified(folder, capsys):

@@ -87,7 +87,8 @@ def motion_figure(result: Result) -> Figure:
     for name in {"orientation", "tension", *more} & drawn.keys():
         _mark_intervals(drawn[name], result, is_named=name == "tension")
     place = "" if z0 is None else f"z0 = {float(z0):.4g} m, "
-    figure.suptitle(f"{robot_name(result)}: {place}z axis {result.attributes.get('z_axis', 'down')}{doubt(result)}")
+    axis = result.attributes.get("z_axis", "not known, see --robot")
+    figure.suptitle(f"{robot_name(result)}: {place}z axis {axis}{doubt(result)}")
     return figure
 
 

@@ -3,14 +3,18 @@
 import dataclasses
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from cspr_jax.config.equivalents import as_moved
-from cspr_jax.config.plan import PlanFile, kept_plan, read_plan
+from cspr_jax.config.mappings import text_of
+from cspr_jax.config.motions.table import Z_AXES
+from cspr_jax.config.plan import PlanFile, kept_plan, plan_keys, read_plan
 from cspr_jax.config.reading import checked, read_text
 from cspr_jax.config.robot import RobotFile, resolve_robot
-from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.config.wording import either
+from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.outputs.plots.robot_along import moving
 from cspr_jax.schema.families import FAMILIES
 from cspr_jax.schema.identity import canonical_json
@@ -29,6 +33,35 @@ def keeps_plan(result: Result) -> bool:
     return bool(result.attributes.get("robot_settings") and result.attributes.get("plan"))
 
 
+def completed(
+    result: Result, file: str, *, plan: Path | None, robot: dict[str, Any] | None, z_axis: str | None
+) -> Result:
+    """A motion in CSV, which keeps neither robot nor axes, with what is given of these beside it.
+
+    Args:
+        file: its name, for errors.
+        plan: plan file.
+        robot: keys of a plan that takes the motion from its file, its robot among them.
+        z_axis: where z points, "up" or "down"; at most one of the three is given.
+
+    Returns:
+        the motion; itself where nothing is given.
+
+    Raises:
+        ConfigError: a mistake in it, or a motion that keeps its own.
+    """
+    if plan is not None:
+        return with_plan(result, file, plan)
+    if robot is not None:
+        return with_robot(result, file, robot)
+    if z_axis is None:
+        return result
+    _refuse_kept("--z-axis", z_axis, result, file)
+    if z_axis not in Z_AXES:
+        raise ConfigError("--z-axis", f"{shown(z_axis)}: must be {either(Z_AXES)}")
+    return dataclasses.replace(result, attributes=result.attributes | {"z_axis": z_axis})
+
+
 def with_plan(result: Result, file: str, path: Path) -> Result:
     """A motion without robot and plan, with those of a plan file.
 
@@ -41,26 +74,56 @@ def with_plan(result: Result, file: str, path: Path) -> Result:
     Raises:
         ConfigError: a mistake in the plan, a motion that has a plan or is a map, or one of another robot.
     """
-    if result.is_map or keeps_plan(result):
-        raise ConfigError("--plan", f"{path}: cannot be combined with {file}, which keeps what it was made of")
+    _refuse_kept("--plan", str(path), result, file)
     text = read_text(path)
     keys = read_plan(text, path)
     robot_file = as_moved(resolve_robot(keys.robot, path, path.parent), [FAMILIES[name].legs for name in keys.families])
-    _check_cables(result, file, robot_file, path)
+    others = {"family": keys.family} | ({"z0": keys.z0} if isinstance(keys.z0, float) else {})
+    return _with_robot_file(result, file, robot_file, path, others | {"plan": text})
+
+
+def with_robot(result: Result, file: str, keys: dict[str, Any]) -> Result:
+    """A motion without robot and plan, with a robot, as a plan that takes the motion from its file.
+
+    Args:
+        file: its name, for errors.
+        keys: of such a plan, its robot among them.
+
+    Returns:
+        the motion, with the attributes that an HDF5 file keeps.
+
+    Raises:
+        ConfigError: a mistake in the robot, a motion that has one or is a map, or one of another robot.
+    """
+    robot = keys["robot"]
+    _refuse_kept("--robot", robot if isinstance(robot, str) else robot["name"], result, file)
+    plan = plan_keys(keys, "--robot")
+    robot_file = resolve_robot(plan.robot, "--robot", Path())
+    # The cables of a platform that only translates are those of its pairs.
+    robot_file = robot_file.equivalent() if "tension_each" in result.data else robot_file
+    return _with_robot_file(result, file, robot_file, "--robot", {"plan": text_of(keys)})
+
+
+def _refuse_kept(option: str, given: str, result: Result, file: str) -> None:
+    if result.is_map or keeps_plan(result):
+        raise ConfigError(option, f"{given}: cannot be combined with {file}, which keeps what it was made of")
+
+
+def _with_robot_file(
+    result: Result, file: str, robot_file: RobotFile, source: object, others: dict[str, Any]
+) -> Result:
+    _check_cables(result, file, robot_file, source)
     attributes = {
         "robot": robot_file.name,
         "robot_settings": canonical_json(robot_file.settings),
-        "plan": text,
-        "family": keys.family,
         "base_points": np.asarray(robot_file.base_points, float),
         "mass": robot_file.mass,
         "z_axis": robot_file.z_axis,
-        **({"z0": keys.z0} if isinstance(keys.z0, float) else {}),
     }
-    return dataclasses.replace(result, attributes=result.attributes | attributes)
+    return dataclasses.replace(result, attributes=result.attributes | attributes | others)
 
 
-def _check_cables(result: Result, file: str, robot_file: RobotFile, path: Path) -> None:
+def _check_cables(result: Result, file: str, robot_file: RobotFile, path: object) -> None:
     # The lengths must be those of this robot in these poses; for cables over pulleys only their number is known.
     count = result.data["tension"].shape[1]
     if len(robot_file.base_points) != count:
@@ -94,7 +157,7 @@ def robot_and_plan(result: Result, file: str, quantity: str) -> tuple[RobotFile,
     """
     if not keeps_plan(result):
         fault = f'"{quantity}" of a motion that keeps no robot and no plan'
-        allowed = "must have its plan beside it, --plan FILE.toml, or be an HDF5 file of `cspr plan -o`"
+        allowed = "must have its plan, --plan FILE.toml, or its robot, --robot, or be an HDF5 file of `cspr plan -o`"
         raise InputError("--quantity", quantity, allowed, fault=fault)
     settings, text = (str(result.attributes[name]) for name in ("robot_settings", "plan"))
     # The settings were checked when the file was read.

@@ -66,6 +66,8 @@ def add_motion_plan(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--plan", type=Path, metavar="FILE", help="plan file of a motion in CSV, which keeps neither robot nor limits"
     )
+    parser.add_argument("--robot", help="or only its robot, whose axes its z is in: a catalogue name, or a robot file")
+    parser.add_argument("--z-axis", choices=("up", "down"), help="or only where z points in a motion in CSV")
 
 
 def add_look(parser: argparse.ArgumentParser) -> None:

@@ -11,6 +11,7 @@ from cspr_jax.store.result import Result
 
 # A value that is asked for and a point of an axis are the same but for rounding.
 SAME = 1e-9
+LONGEST_NAMES = 64  # letters of a first line that tell whose table it is
 
 
 def result_at(path: Path) -> Path:
@@ -30,6 +31,18 @@ def result_at(path: Path) -> Path:
     from cspr_jax.sweep.inspection import result_in  # only a directory needs it
 
     return result_in(path)
+
+
+def is_own_motion(path: Path) -> bool:
+    """Tell whether a file is a motion of a user's own, and not one of this program's files.
+
+    Returns:
+        true for a table of samples in text, and for trajectories of CASPR.
+    """
+    if path.suffix.lower() in (".h5", ".hdf5", ".nc") or not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return not file.readline(LONGEST_NAMES).removeprefix(b"\xef\xbb\xbf").startswith(b"t,position_x,")
 
 
 def places(words: list[str], option: str = "--at") -> dict[str, float]:
