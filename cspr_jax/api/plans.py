@@ -129,7 +129,8 @@ class Plan(planning.PlannedMotions):
             raise ConfigError(path, "not written, since a segment is not proved feasible (anyway=True writes it)")
         if not np.isfinite(length):
             raise ConfigError(path, "not written: the best candidate's motion is not finite; see its verdict")
-        title = f"{self.robot_file.name}: {length:.4g} s" + ("" if self.feasible else ", NOT PROVED FEASIBLE")
+        point = ", positions of the origin of the platform's axes" if self.is_at_origin else ""
+        title = f"{self.robot_file.name}: {length:.4g} s{point}" + ("" if self.feasible else ", NOT PROVED FEASIBLE")
         try:
             with double_precision():
                 columns = motion_files.rows(self, rate=max(2.0 * RATES[0], 400.0 / length))

@@ -42,6 +42,7 @@ class Leg(abc.ABC):
     """
 
     step: ClassVar[int] = 0
+    point: str | None = None  # whose positions the files of the leg have, where they say it
 
     def __init__(self, stops: Waypoints) -> None:
         """Keep the poses; a family refuses what it cannot join."""

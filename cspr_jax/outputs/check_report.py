@@ -8,7 +8,7 @@ import numpy as np
 from cspr_jax.curves.spline import Spline
 from cspr_jax.motions.criteria import Criterion
 from cspr_jax.motions.proved_answers import MotionProof, ProvedAnswers
-from cspr_jax.outputs.plan_report import finite, verdict_text
+from cspr_jax.outputs.plan_report import axes_text, finite, verdict_text
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.runtime.terminal import cell
 from cspr_jax.schema.verdicts import Verdict
@@ -72,6 +72,7 @@ def check_object(plan: PlannedMotions) -> dict[str, Any]:
         "cable_acceleration_max": float(demands.acceleration_max[0]),
         "z_lowest": float(demands.lowest[0]),
         "demands": {QUANTITIES[flag][0]: row for flag, row in _demands(plan, case).items()},
+        "point": plan.point if plan.robot_file.is_platform else None,
         "interpolation": getattr(_motion(plan) or plan.keys, "interpolation", "function"),
         "ends": getattr(_motion(plan) or plan.keys, "ends", "") or None,
         "blocks": case.proof.blocks,
@@ -133,7 +134,7 @@ def check_lines(plan: PlannedMotions) -> list[str]:
     """
     answers, case = plan.answers, shown_proof(plan)
     duration = float(answers.duration[0])
-    lines = [f"{plan.robot_file.name}: motion of {duration:.6g} s, {_taken_as(plan)}; z {plan.robot_file.z_axis}"]
+    lines = [f"{plan.robot_file.name}: motion of {duration:.6g} s, {_taken_as(plan)}; {axes_text(plan)}"]
     lines += _retimed(plan)
     if plan.feasible:
         text = "feasible: every criterion is proved to hold at every instant"

@@ -19,6 +19,7 @@ from cspr_jax.motions.acceleration_sets import along
 from cspr_jax.motions.motion import Motion, common_shape, outward
 from cspr_jax.motions.proved_answers import united
 from cspr_jax.outputs.path_columns import path_columns
+from cspr_jax.outputs.platform_poses import at_origin
 from cspr_jax.plans.causes import cause_columns
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.robots import cables
@@ -88,8 +89,9 @@ def rows(plan: PlannedMotions, *, rate: float | None = None) -> dict[str, np.nda
     Returns:
         "t" (n,) s and the other names of `schema.quantities.TRAJECTORY`, (n, 3), (n, 4) or (n, n_cables), in the plan's
         axes; "tension_residual" (n,) only of redundant cables, "quaternion", "omega" and "omega_dot" only for a
-        platform, "tension_each" (n, 6) only for one that only translates, "tension_couple" only for four spools at the
-        corners of a level rectangle, "path_acceleration" only where all segments are straight lines.
+        platform, "mass_centre" only for one whose poses are those of its own axes, "tension_each" (n, 6) only for one
+        that only translates, "tension_couple" only for four spools at the corners of a level rectangle,
+        "path_acceleration" only where all segments are straight lines.
 
     Raises:
         ConfigError: a rate that is no number > 0, or too many rows.
@@ -113,7 +115,7 @@ def rows(plan: PlannedMotions, *, rate: float | None = None) -> dict[str, np.nda
             if i == len(plan.answers.duration) - 1:
                 tau = np.append(tau, 1.0)
         taus.append(tau)
-    return rows_at(plan, taus)
+    return at_origin(plan, rows_at(plan, taus))
 
 
 def rows_at(plan: PlannedMotions, taus: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
@@ -213,6 +215,8 @@ def _write_hdf5(plan: PlannedMotions, path: Path, columns: dict[str, np.ndarray]
         for name, values in columns.items():
             data: h5py.Dataset = file[name] if name == "t" else file.create_dataset(name, data=values)
             describe(data, TRAJECTORY[name])
+            if plan.is_at_origin and name in ("position", "velocity", "acceleration"):
+                set_attributes(data, {"long_name": f"{name} of the origin of the platform's axes"})
             if name != "t":
                 data.dims[0].attach_scale(file["t"])
             if name in ACROSS:
@@ -275,6 +279,7 @@ def attributes(plan: PlannedMotions) -> dict[str, Any]:
         "base_points": np.asarray(robot_file.base_points),
         "mass": robot_file.mass,
         "z_axis": robot_file.z_axis,
+        **({"point": plan.point} if robot_file.is_platform else {}),
         **({"z0": float(plan.z0)} if np.isfinite(plan.z0) else {}),
     }
 

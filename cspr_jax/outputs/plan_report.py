@@ -31,12 +31,23 @@ def plan_object(plan: PlannedMotions) -> dict[str, Any]:
         "amplitude": plan.problem.amplitude.name if plan.keys.takes_amplitude else None,
         "z0": plan.z0,
         "z_axis": plan.robot_file.z_axis,
+        "point": plan.point if plan.robot_file.is_platform else None,
         "gravity": float(plan.problem.robot.gravity),
         "segments": segments,
         "total_duration": float(plan.answers.duration.sum()),
         "feasible": plan.feasible,
     }
     return finite(fields | {outcome.key: outcome.to_dict() for outcome in plan.outcomes})
+
+
+def axes_text(plan: PlannedMotions) -> str:
+    """Axes and point of the positions that files of a plan hold.
+
+    Returns:
+        the words.
+    """
+    point = "; files hold the positions of the origin of the platform's axes" if plan.is_at_origin else ""
+    return f"z {plan.robot_file.z_axis}{point}"
 
 
 def verdict_text(verdict: int, feasible: bool) -> str:
@@ -279,7 +290,7 @@ def _two_digits(name: str) -> Column:
 
 def _caption(plan: PlannedMotions) -> str:
     time = float(plan.answers.duration.sum())
-    total = f"total {f'{time:.2f} s' if math.isfinite(time) else 'time unknown'}; z {plan.robot_file.z_axis}"
+    total = f"total {f'{time:.2f} s' if math.isfinite(time) else 'time unknown'}; {axes_text(plan)}"
     numbered = not plan.feasible and (plan.answers.tried_arcs > 0).any()
     pairs = plan.robot_file.pairs
     if pairs is not None:

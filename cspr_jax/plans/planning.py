@@ -27,6 +27,7 @@ from cspr_jax.plans.causes import Cause, causes
 from cspr_jax.plans.choices import best_amplitude, chosen_depth, nearly_resting
 from cspr_jax.plans.sequence import PlanLegs
 from cspr_jax.robots.limits import NO_LIMITS
+from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.point_mass import spool_radius
 from cspr_jax.robots.tension_rule_table import TENSION_RULES
 from cspr_jax.robots.wrench_sets import tension_range
@@ -56,6 +57,7 @@ class PlannedMotions:
         causes: of the n segments, why each is not feasible, the worst cause first.
         warnings: what its user should know, one line each.
         text: of the plan file; empty for a plan that has none.
+        point: of the platform whose poses files and pictures of the plan hold, one of `config.motions.table.POINTS`.
     """
 
     robot_file: RobotFile
@@ -70,6 +72,13 @@ class PlannedMotions:
     causes: tuple[tuple[Cause, ...], ...] = ()
     warnings: tuple[str, ...] = ()
     text: str = ""
+    point: str = "mass-centre"
+
+    @property
+    def is_at_origin(self) -> bool:
+        """Tell whether what is written of the plan are poses of the platform's own axes; joints are their origin."""
+        row = PATTERNS[self.robot_file.own_pattern]
+        return self.point == "origin" and row.is_body and not row.is_jointed
 
     @cached_property
     def answers(self) -> Answers:
@@ -176,7 +185,14 @@ def plan_of(keys: PlanFile, path: Path) -> PlannedMotions:
         outcomes=_outcomes(problem, sequence, legs, extremes),
         causes=why,
         warnings=tuple(dict.fromkeys(lines)),
+        point=_point(keys, sequence),
     )
+
+
+def _point(keys: PlanFile, sequence: PlanLegs) -> str:
+    # The point that the plan names, else that of its files, if it is the same of all.
+    points = {leg.point for leg in sequence.legs}
+    return keys.point or (points.pop() if len(points) == 1 else None) or "mass-centre"
 
 
 def with_motions(plan: PlannedMotions, answers: Answers, motions: list[Motion], lines: list[str]) -> PlannedMotions:

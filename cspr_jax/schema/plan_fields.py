@@ -6,6 +6,10 @@ WHOLE = {
     "family": ("", "Trajectory family of the plan."),
     "amplitude": ("", "Amplitude function; null for families that have a law of their own."),
     "z0": ("m", "Depth of P0 below the centroid of the spools, given or chosen; null without P0."),
+    "point": (
+        "",
+        '"mass-centre" or "origin": point of the platform whose poses files of the plan hold; null of a point mass.',
+    ),
     "z_axis": ("", '"down" or "up", as in the robot file; all coordinates are in its axes.'),
     "gravity": ("m s-2", "Gravity."),
     "segments": ("", "One object for each segment, below."),

@@ -193,6 +193,13 @@ TRAJECTORY = {
             "Acceleration along a straight line: the least that is feasible at that place, that of the motion, and the "
             "largest that is feasible; infinite where nothing bounds it.",
         ),
+        Quantity(
+            "mass_centre",
+            "m",
+            "position of the mass centre",
+            'Motions with point = "origin": position of the mass centre (x, y, z). `position`, `velocity` and '
+            "`acceleration` are then those of the origin of the platform's axes, and `quaternion` turns these axes.",
+        ),
     )
 }
 # A motion file holds these for each segment of its plan, and `TRAJECTORY` for each of its rows over time.
@@ -313,7 +320,7 @@ OTHER_DIMS = {
 }
 # Second dimensions of the quantities over time, and the parts along them.
 ACROSS = {
-    **dict.fromkeys(("position", "velocity", "acceleration", "omega", "omega_dot"), "axis"),
+    **dict.fromkeys(("position", "velocity", "acceleration", "omega", "omega_dot", "mass_centre"), "axis"),
     "quaternion": "component",
     **dict.fromkeys(("length", "rate", "tension"), "cable"),
     "tension_each": "each",

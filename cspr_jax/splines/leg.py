@@ -34,6 +34,7 @@ class Splines(Leg):
         """Refuse poses without times, and keys of other families."""
         super().__init__(stops)
         self._notes: list[str] = []
+        self._points: set[str] = set()
         self._refuse("arcs", "beta_hat")
         for i, pose in enumerate(stops.poses):
             if pose.trajectory is not None and pose.motion is None:
@@ -119,6 +120,8 @@ class Splines(Leg):
                 f"{name}: hint: positions are taken as those of the mass centre, {centre.tolist()} m from the origin "
                 'of the platform\'s axes; if they are those of the origin, say point = "origin"'
             )
+        self._points.add(point or "mass-centre")
+        self.point = point if len(self._points) == 1 else None
         return point or "mass-centre"
 
     def _cleaned(self, name: str, source: Any) -> Any:

@@ -65,7 +65,7 @@ def _samples(path: Path) -> MotionTable:
         raise ConfigError(path, str(error).removeprefix(f"{printable(path)}: ")) from error
     if "position" not in result.data or len(result.axes.get("t", ())) < 2:
         raise ConfigError(path, "is a map, or a plan without a motion: must be a motion of `cspr plan -o`")
-    data = result.data
+    data, point = result.data, "origin" if "mass_centre" in result.data else "mass-centre"
     return MotionTable(
         result.axes["t"],
         data["position"],
@@ -76,6 +76,6 @@ def _samples(path: Path) -> MotionTable:
         data.get("omega_dot"),
         interpolation="hermite" if "velocity" in data else None,
         z_axis=result.attributes.get("z_axis"),
-        point="mass-centre",
-        from_reference=True,
+        point=point,
+        from_reference=point == "mass-centre",
     )

@@ -53,6 +53,8 @@ def read_table(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
             raise DamagedError(f"{FEASIBLE} holds another number than 0 and 1")
         attributes[FEASIBLE] = int(flags.all())
     arrays = {name: np.ascontiguousarray(table[:, place]) for name, place in places.items()}
+    if "mass_centre" in arrays:
+        attributes["point"] = "origin"
     z_axis = _axis_in(comments) or _vertical(arrays)
     return attributes | ({"z_axis": z_axis} if z_axis else {}), arrays
 

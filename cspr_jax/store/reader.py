@@ -42,7 +42,7 @@ _MARKS = (b"axis", b"cable", b"component", b"each", b"couple", b"bound", b"level
 _LONG = ("settings", "environment_settings", "plan", "robot_settings")
 _TEXTS = (
     *("Conventions", "title", "map", "identity", "z_axis", "robot", "software", "environment", "environments"),
-    *("content_sha256", "family"),
+    *("content_sha256", "family", "point"),
 )
 _INTEGERS, _NUMBERS = ("schema", "cells_near_zero", "mixed", "feasible"), ("mass", "z0", "proved")
 

@@ -88,6 +88,8 @@ def is_good(function: str, key: str, kind: str) -> bool:
         return parameter.default is None or (function, key) in NONE
     if kind == "string" and function in ("check", "check_many", "least_time_paths"):
         return key == "robot" or (function, key) == ("check", "times")
+    if kind == "string" and function in ("plot", "report") and key in ("robot", "z_axis"):
+        return key == "robot"
     return kind == "string" and key in TEXTS | PATHS
 
 

@@ -75,6 +75,11 @@ class MotionColumns:
     is_named: bool = True
     has_time_unit: bool = False
 
+    @property
+    def written_point(self) -> str | None:
+        """Point whose positions a table of this program has, which adds those of the mass centre to the origin's."""
+        return None if not self.is_written else "origin" if "mass_centre_x" in self.heads else "mass-centre"
+
     def has(self, group: str) -> bool:
         """Tell whether the table has columns of a group of `GROUPS`.
 

@@ -164,8 +164,8 @@ class _Reader:
             interpolation=self.directives.get("interpolation") or ("hermite" if self.columns.is_written else None),
             ends=self.directives.get("ends"),
             z_axis=self.directives.get("z"),
-            point=self.directives.get("point", "mass-centre" if self.columns.is_written else None),
-            from_reference=self.columns.is_written,
+            point=self.directives.get("point", self.columns.written_point),
+            from_reference=self.columns.written_point == "mass-centre",
             is_planar="y" not in self.columns.names,
             notes=tuple(self.notes),
         )

@@ -88,8 +88,20 @@ def motion_figure(result: Result) -> Figure:
         _mark_intervals(drawn[name], result, is_named=name == "tension")
     place = "" if z0 is None else f"z0 = {float(z0):.4g} m, "
     axis = result.attributes.get("z_axis", "not known, see --robot")
-    figure.suptitle(f"{robot_name(result)}: {place}z axis {axis}{doubt(result)}")
+    figure.suptitle(f"{robot_name(result)}: {place}z axis {axis}{point_words(result.data)}{doubt(result)}")
     return figure
+
+
+def point_words(columns: Mapping[str, Any]) -> str:
+    """Words for the point of a platform whose positions are shown, where it is not the mass centre.
+
+    Args:
+        columns: of the motion.
+
+    Returns:
+        the words behind a comma, or none.
+    """
+    return ", positions of the origin of the platform's axes" if "mass_centre" in columns else ""
 
 
 SHORT = {"smallest allowed": "at least", "largest allowed": "at most"}

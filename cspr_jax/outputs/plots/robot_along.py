@@ -52,11 +52,12 @@ def moving(
         return Moving(np.empty((0, 3)), position, nothing, np.empty((len(rows), 0, 2, 3)), nothing)
     base = np.asarray(robot_file.base_points, float)
     body = np.zeros_like(base) if robot_file.platform_points is None else np.asarray(robot_file.platform_points, float)
-    if robot_file.centre_of_mass is not None:  # whose position a motion holds
-        body = body - np.asarray(robot_file.centre_of_mass, float)
+    # A motion holds the positions of the mass centre, unless it says that they are those of the axes' origin.
+    centre = np.zeros(3) if "mass_centre" in columns else np.asarray(robot_file.centre_of_mass or [0.0] * 3, float)
+    body = body - centre
     edges, rotations = np.empty((0, 2, 3)), np.eye(3)[None]
     if quaternion is not None:
-        edges = _edges(robot_file, keys, body)
+        edges = _edges(robot_file, keys, body, centre)
         rotations = np.array([rotation_matrix(one) for one in np.asarray(quaternion)[rows]])
     # These points turn with the platform, at each row.
     attached, corners = (
@@ -65,10 +66,10 @@ def moving(
     return Moving(base, position, attached, cable_ways(robot_file, attached), corners)
 
 
-def _edges(robot_file: RobotFile, keys: PlanFile | None, attached: np.ndarray) -> np.ndarray:
-    # Edges (n, 2, 3) of the platform, from its mass centre.
+def _edges(robot_file: RobotFile, keys: PlanFile | None, attached: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    # Edges (n, 2, 3) of the platform, from the point whose positions the motion holds.
     points = robot_file.platform_points or ()
-    shape = None if keys is None else keys.body(robot_file.centre_of_mass or (0.0, 0.0, 0.0), points)
+    shape = None if keys is None else keys.body(centre.tolist(), points)
     if isinstance(shape, Hull):
         return shape.edges
     return hull_of(attached if shape is None else points_of(shape))[1]

@@ -10,7 +10,7 @@ from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.outputs.plots.fitting import legend_above
 from cspr_jax.outputs.plots.labels import cable_names, line_look, robot_name
-from cspr_jax.outputs.plots.motion import FAILS, boundaries, doubt, draw_limits, shade_failing
+from cspr_jax.outputs.plots.motion import FAILS, boundaries, doubt, draw_limits, point_words, shade_failing
 from cspr_jax.outputs.plots.robot_along import limits_of
 from cspr_jax.outputs.plots.tensions import draw_tensions, extremes
 from cspr_jax.outputs.plots.trajectory import draw_trajectory, legend_of
@@ -52,7 +52,8 @@ def summary_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> Fig
         # Its letters get smaller where the picture is narrow.
         bbox: Any = (0.0, 0.0, 1.0, 1.0)
         table.table(cells, colLabels=HEADS, cellLoc="center", edges="horizontal", bbox=bbox, colWidths=WIDTHS)
-    figure.suptitle(f"{robot_name(result)}: {result.axes['t'][-1]:.4g} s\n{extremes(result)}{doubt(result)}")
+    words = f"{result.axes['t'][-1]:.4g} s{point_words(result.data)}\n{extremes(result)}{doubt(result)}"
+    figure.suptitle(f"{robot_name(result)}: {words}")
     return figure
 
 

@@ -15,7 +15,7 @@ from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.outputs.plots.bodies_in_space import draw_bodies
 from cspr_jax.outputs.plots.labels import COLOURS, robot_name
-from cspr_jax.outputs.plots.motion import doubt
+from cspr_jax.outputs.plots.motion import doubt, point_words
 from cspr_jax.outputs.plots.obstacles import AREA, points_of
 from cspr_jax.outputs.plots.robot_along import moving
 from cspr_jax.outputs.plots.scene import colours_of_tension, set_space, shape_of
@@ -47,7 +47,9 @@ def trajectory_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> 
     panel = figure.add_subplot(projection="3d", computed_zorder=False)
     draw_trajectory(figure, panel, result, robot_file, keys)
     figure.legend(*legend_of(result, keys), loc="outside lower center", ncols=6)
-    figure.suptitle(f"{robot_name(result)}: trajectory, {result.axes['t'][-1]:.4g} s{doubt(result)}")
+    figure.suptitle(
+        f"{robot_name(result)}: trajectory, {result.axes['t'][-1]:.4g} s{point_words(result.data)}{doubt(result)}"
+    )
     return figure
 
 

@@ -11,6 +11,7 @@ from cspr_jax.motions.cause import limit_words
 from cspr_jax.outputs.plots.bodies_in_space import lines_on
 from cspr_jax.outputs.plots.fitting import shortened
 from cspr_jax.outputs.plots.labels import WRITTEN, cable_names
+from cspr_jax.outputs.plots.motion import point_words
 from cspr_jax.outputs.plots.obstacles import points_of
 from cspr_jax.outputs.plots.pages.packing import packed
 from cspr_jax.outputs.plots.robot_along import limits_of, moving
@@ -57,6 +58,7 @@ def motion_content(
         "title": title,
         "facts": [
             *_facts(np.asarray(columns["t"]), segments, robot_file, keys),
+            *([("path", point_words(columns).removeprefix(", "))] if point_words(columns) else []),
             *_bounds(columns),
             *_failures(columns),
         ],

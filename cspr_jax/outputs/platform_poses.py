@@ -1,0 +1,37 @@
+"""Poses of a platform's own axes, of their origin and of how they turn, in place of those of its mass centre."""
+
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cspr_jax.arithmetic.rotations import products
+from cspr_jax.build.robots import build_robot
+from cspr_jax.curves.files import reference_of
+from cspr_jax.plans.planning import PlannedMotions
+
+
+def at_origin(plan: PlannedMotions, columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Rows of a plan whose point is the origin of the platform's axes, of that point and of these axes.
+
+    Args:
+        columns: rows of the mass centre, by the names of `schema.quantities.TRAJECTORY`, in the axes of the robot file;
+            orientations count from the reference orientation.
+
+    Returns:
+        the rows, with the mass centre as a column of its own; of other plans as they are.
+    """
+    if not plan.is_at_origin:
+        return columns
+    reference = plan.frame.turned_quaternions(reference_of(build_robot(plan.robot_file, plan.keys, Path("plan"))))
+    quaternion = products(columns["quaternion"], reference[None])
+    centre = np.asarray(plan.robot_file.centre_of_mass or [0.0] * 3)
+    arm = Rotation.from_quat(np.roll(quaternion, -1, axis=1)).apply(centre)
+    speed, omega = np.cross(columns["omega"], arm), columns["omega"]
+    moved = {
+        "position": columns["position"] - arm,
+        "velocity": columns["velocity"] - speed,
+        "acceleration": columns["acceleration"] - np.cross(columns["omega_dot"], arm) - np.cross(omega, speed),
+        "quaternion": quaternion,
+    }
+    return columns | moved | {"mass_centre": columns["position"]}
