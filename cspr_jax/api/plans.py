@@ -14,7 +14,7 @@ from cspr_jax.config.plan import plan_keys
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.motions.landings import LaunchErrors, Scatter
 from cspr_jax.motions.launch_outcome import LaunchOutcome
-from cspr_jax.outputs import motion_files, plan_report
+from cspr_jax.outputs import motion_files, motion_json, plan_report
 from cspr_jax.outputs.mujoco_motion import STEP
 from cspr_jax.outputs.path_columns import path_columns
 from cspr_jax.plans import planning
@@ -52,11 +52,27 @@ class Plan(planning.PlannedMotions):
             return motion_files.rows(self, rate=rate)
 
     @checked
+    def rows_to_dict(self, rate: float | None = None) -> dict[str, Any]:
+        """The motion as rows over time, as plain values for JSON.
+
+        Args:
+            rate: as for `rows`.
+
+        Returns:
+            "units" and "rows", each by the names of `rows`; None in place of what is not finite.
+
+        Raises:
+            ConfigError: as `rows`.
+        """
+        with double_precision():
+            return motion_json.rows_object(self, rate)
+
+    @checked
     def save(self, path: str | Path, rate: float | None = None, anyway: bool = False) -> Path:
         """Write the motion.
 
         Args:
-            path: file to write, .csv or .h5; an existing file is replaced.
+            path: file to write, .csv, .h5 or .json; an existing file is replaced.
             rate: as for `rows`.
             anyway: whether to write a plan that is not feasible, too; the file says so.
 
@@ -68,12 +84,13 @@ class Plan(planning.PlannedMotions):
             StoreError: a file cannot be written.
         """
         path = Path(path)
-        if path.suffix not in (".csv", ".h5"):
-            raise ConfigError(path, "must end in .csv or .h5")
+        if path.suffix not in (".csv", ".h5", ".json"):
+            raise ConfigError(path, "must end in .csv, .h5 or .json")
         if not (self.feasible or anyway):
             raise ConfigError(path, "not written, since a segment is not proved feasible (anyway=True writes it)")
         with double_precision():
-            motion_files.write_rows(self, path, rate=rate)
+            write = motion_json.write_json if path.suffix == ".json" else motion_files.write_rows
+            write(self, path, rate=rate)
         return path
 
     @checked

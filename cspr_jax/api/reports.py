@@ -127,7 +127,9 @@ def _of_motion(motion: Result | Plan, name: str) -> tuple[str, dict[str, Any], l
     else:
         robot_file, keys = robot_and_plan(motion, name, "report") if keeps_plan(motion) else (None, None)
         robot, columns = robot_name(motion), motion.axes | motion.data
-        content = motion_content("motion", columns, motion.data, robot_file, keys)
+        content = motion_content(
+            "motion", columns, motion.data, robot_file, keys, motion.attributes.get("z_axis", "down")
+        )
         feasible = bool(motion.attributes.get("feasible", 1))
     doubt = "" if feasible else "not proved feasible"
     page: dict[str, Any] = {

@@ -15,7 +15,16 @@ from cspr_jax.cli.command import (
     print_table,
     warn,
 )
-from cspr_jax.cli.plans import add_files, add_retime, check_files, retime_settings, retimed, write_files
+from cspr_jax.cli.plans import (
+    add_files,
+    add_retime,
+    check_files,
+    print_last_step,
+    retime_settings,
+    retimed,
+    rows_beside,
+    write_files,
+)
 from cspr_jax.errors import ConfigError, ExitCode
 from cspr_jax.runtime.progress import waiting
 
@@ -99,6 +108,7 @@ def _check(options: argparse.Namespace) -> int:
             "--animate": options.animate,
             "--slower": options.slower,
             "--retime": options.retime,
+            "--rate": options.json and options.rate,
         }
         check = checks.check_file(options.motion, keys, outputs=[name for name, value in outputs.items() if value])
         slower = check.slower() if options.slower and not check.feasible else None
@@ -109,14 +119,15 @@ def _check(options: argparse.Namespace) -> int:
     try:
         write_files(shown.plan, options)
     finally:
-        _print(options, check, slower, faster)
+        _print(options, check, slower, faster, shown)
     return ExitCode.DONE if shown.feasible else ExitCode.NOT_FEASIBLE
 
 
-def _print(options: argparse.Namespace, check: Any, slower: Any, faster: Any) -> None:
+def _print(options: argparse.Namespace, check: Any, slower: Any, faster: Any, shown: Any) -> None:
     if options.json:
         others = {"slower": slower, "retimed": faster}
-        print_json(check.to_dict() | {name: other.to_dict() for name, other in others.items() if other is not None})
+        tables = {name: other.to_dict() for name, other in others.items() if other is not None}
+        print_json(check.to_dict() | tables | rows_beside(shown.plan, options))
         return
     for line in check.lines():
         print_line(line)
@@ -130,6 +141,7 @@ def _print(options: argparse.Namespace, check: Any, slower: Any, faster: Any) ->
         for line in faster.lines():
             print_line(line)
         print_table(faster.to_table())
+    print_last_step(shown.plan, options)
 
 
 COMMANDS = (

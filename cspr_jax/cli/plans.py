@@ -1,6 +1,7 @@
 """Commands about sequences of poses: plan, and replay, which plays one in MuJoCo."""
 
 import argparse
+import math
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,8 @@ from cspr_jax.outputs.plots.options import add_look
 from cspr_jax.runtime.progress import waiting
 from cspr_jax.store.publishing import check_place
 
+ENDINGS = (".csv", ".h5", ".json")
+SAME_TICK = 1e-6  # of a step, by which the end of a motion may miss the grid of its rows
 _STEP = "longest step of MuJoCo, s (default 0.0005)"
 
 
@@ -83,9 +86,14 @@ def add_files(parser: argparse.ArgumentParser, usual_rows: str, anyway: str) -> 
         usual_rows: number of rows without --rate, in words.
         anyway: help of the option that writes what is not feasible.
     """
-    add_output(parser, "write the motion to FILE.csv or FILE.h5", metavar="FILE")
+    add_output(parser, "write the motion to FILE.csv, FILE.h5 or FILE.json", metavar="FILE")
     parser.add_argument("--anyway", action="store_true", help=anyway)
-    parser.add_argument("--rate", type=float, metavar="HZ", help=f"rows of -o per second (default: {usual_rows})")
+    parser.add_argument(
+        "--rate",
+        type=float,
+        metavar="HZ",
+        help=f"rows of -o per second (default: {usual_rows}); without -o, --json has them",
+    )
     parser.add_argument(
         "--mjcf",
         type=Path,
@@ -106,8 +114,10 @@ def check_files(options: argparse.Namespace) -> None:
         ConfigError: an ending, a number or a combination that is not allowed.
         StoreError: a folder that does not exist.
     """
-    if options.output is not None and options.output.suffix not in (".csv", ".h5"):
-        raise ConfigError("-o", f"{options.output}: must end in .csv or .h5")
+    if options.output is not None and options.output.suffix not in ENDINGS:
+        raise ConfigError("-o", f"{options.output}: must end in .csv, .h5 or .json")
+    if options.rate is not None and options.output is None and not options.json:
+        raise ConfigError("--rate", "must be absent without -o or --json")
     if options.rate is not None and not 0.0 < options.rate < float("inf"):
         raise ConfigError("--rate", f"{options.rate}: must be a number > 0, in Hz")
     if options.mjcf is not None and options.mjcf.suffix != ".xml":
@@ -123,8 +133,9 @@ def check_files(options: argparse.Namespace) -> None:
     if options.step is not None and options.mjcf is None:
         raise ConfigError("--step", "must be absent without --mjcf")
     _check_step(options)
-    if options.anyway and options.output is None and options.mjcf is None and options.animate is None:
-        raise ConfigError("--anyway", "must be absent without -o, --mjcf or --animate")
+    has_rows = options.json and options.rate is not None
+    if options.anyway and not has_rows and options.output is options.mjcf is options.animate is None:
+        raise ConfigError("--anyway", "must be absent without -o, --mjcf, --animate, or --json with --rate")
     for path in (options.output, options.mjcf, options.animate):
         check_place(path)
 
@@ -158,7 +169,11 @@ def _plan(options: argparse.Namespace) -> int:
     try:
         write_files(plan, options)
     finally:
-        print_json(plan.to_dict()) if options.json else print_table(plan.to_table())
+        if options.json:
+            print_json(plan.to_dict() | rows_beside(plan, options))
+        else:
+            print_table(plan.to_table())
+            print_last_step(plan, options)
     return ExitCode.DONE if plan.feasible else ExitCode.NOT_FEASIBLE
 
 
@@ -182,6 +197,27 @@ def retimed(plan: Any, settings: dict[str, Any]) -> Any:
     return plan
 
 
+def rows_beside(plan: Any, options: argparse.Namespace) -> dict[str, Any]:
+    """The rows that --rate asks for without -o; of a motion that is not feasible only with --anyway.
+
+    Args:
+        plan: `api.plans.Plan`.
+
+    Returns:
+        "rows" and their "units", unless -o has them, and "last_step", s, between the last two; nothing without --rate.
+    """
+    if options.rate is None:
+        return {}
+    step = last_step(plan, options.rate)
+    of_step = {"last_step": step if math.isfinite(step) else None}
+    if options.output is not None:
+        return of_step
+    if not (plan.feasible or options.anyway):
+        warn("rows: left out, since a segment is not proved feasible (--anyway gives them)")
+        return of_step | {"rows": None}
+    return plan.rows_to_dict(options.rate) | of_step
+
+
 def write_files(plan: Any, options: argparse.Namespace) -> None:
     """Write the files that options name; a motion that is not feasible only with --anyway.
 
@@ -203,6 +239,35 @@ def write_files(plan: Any, options: argparse.Namespace) -> None:
                 warn(f"{path}: not proved feasible; the file says so")
         else:
             warn(f"{path}: not written, since a segment is not proved feasible (--anyway writes it)")
+
+
+def last_step(plan: Any, rate: float | None) -> float:
+    """Time between the last two rows: the end of a motion is a row, on the grid of the others or not.
+
+    Args:
+        plan: `api.plans.Plan`.
+        rate: of --rate, or None.
+
+    Returns:
+        s; NaN without a rate or a motion.
+    """
+    length = float(plan.answers.duration.sum())
+    if rate is None or not math.isfinite(length):
+        return math.nan
+    steps = math.ceil(length * rate - SAME_TICK) - 1
+    return length - max(steps, 0) / rate
+
+
+def print_last_step(plan: Any, options: argparse.Namespace) -> None:
+    """Say so where the last row of a written file is off the grid of the others.
+
+    Args:
+        plan: `api.plans.Plan`.
+    """
+    step = last_step(plan, options.rate)
+    if options.output is not None and (plan.feasible or options.anyway) and step < (1.0 - SAME_TICK) / options.rate:
+        end = float(plan.answers.duration.sum())
+        print_line(f"{options.output}: the last row is the end, t = {end:.9g} s, {step:.6g} s after the one before it")
 
 
 def _add_replay(parser: argparse.ArgumentParser) -> None:

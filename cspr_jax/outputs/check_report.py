@@ -8,7 +8,7 @@ import numpy as np
 from cspr_jax.curves.spline import Spline
 from cspr_jax.motions.criteria import Criterion
 from cspr_jax.motions.proved_answers import MotionProof, ProvedAnswers
-from cspr_jax.outputs.plan_report import axes_text, finite, verdict_text
+from cspr_jax.outputs.plan_report import axes_text, finite, retimed_words, verdict_text
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.runtime.terminal import cell
 from cspr_jax.schema.verdicts import Verdict
@@ -113,12 +113,19 @@ def _demands(plan: PlannedMotions, case: MotionProof) -> dict[Verdict, dict[str,
             "value": value,
             "bound": bound,
             "allowed": allowed,
+            "sense": _sense(plan, rows[k]),
             "unit": rows[k].unit,
             "cable": rows[k].cables[0] if rows[k].cables else None,
             **({"cables": list(rows[k].cables)} if len(rows[k].cables) > 1 else {}),
             "t": float(case.proof.when[k]),
         }
     return table
+
+
+def _sense(plan: PlannedMotions, row: Criterion) -> str:
+    # In the axes of the robot file: a floor bounds depths from above, and so heights from below.
+    is_height = row.flag == Verdict.BELOW_FLOOR and plan.robot_file.z_axis == "up"
+    return "at least" if (row.sense == "least") is not is_height else "at most"
 
 
 def _bound(case: MotionProof, k: int) -> tuple[float, float]:
@@ -154,8 +161,8 @@ def _retimed(plan: PlannedMotions) -> list[str]:
     if not details.get("retimed"):
         return []
     bound = "" if math.isnan(details["gap"]) else f"; none takes less than {details['lower_bound']:.6g} s"
-    text = f"retimed: {details['planned_duration']:.6g} s before, {100.0 * details['gain']:.1f} % less{bound}"
-    return [f"{text}; {details['path_deviation']:.1g} m from its path"]
+    text = retimed_words(details["planned_duration"], float(plan.answers.duration[0]))
+    return [f"{text}{bound}; {details['path_deviation']:.1g} m from its path"]
 
 
 def _motion(plan: PlannedMotions) -> Any:
@@ -196,17 +203,13 @@ def check_table(plan: PlannedMotions):
     for head in heads:
         table.add_column(cell(head), justify="left" if head in ("", "unit") else "right")
     for flag, row in _demands(plan, case).items():
-        sign = "≥" if _row(case, flag).sense == "least" else "≤"
+        sign = "≥" if row["sense"] == "at least" else "≤"
         numbers = row.get("cables", [] if row["cable"] is None else [row["cable"]])
         cable = ", ".join(str(number + 1) for number in numbers) or "-"
         values = [_digits(row["value"]), f"{sign} {_digits(row['bound'])}", f"{sign} {_digits(row['allowed'])}"]
         unit = row["unit"].replace("^2", "²")
         table.add_row(*(cell(text) for text in (QUANTITIES[flag][1], *values, unit, cable, f"{row['t']:.4f}")))
     return table
-
-
-def _row(case: MotionProof, flag: Verdict) -> Criterion:
-    return next(row for row in case.criteria if row.flag == flag)
 
 
 def _digits(value: float) -> str:

@@ -29,6 +29,7 @@ from cspr_jax.schema.identity import canonical_json
 from cspr_jax.schema.quantities import (
     ACROSS,
     EVERY,
+    MARGIN_UNITS,
     OTHER_DIMS,
     PARTS,
     SEGMENTS,
@@ -299,6 +300,7 @@ def segments(plan: PlannedMotions) -> dict[str, np.ndarray]:
         "segment_tried_arcs": answers.tried_arcs,
         "segment_verdict": answers.verdict,
         "segment_margin": answers.margin,
+        "segment_margin_unit": [MARGIN_UNITS.index(plan.margin_unit(i)) for i in range(len(ends))],
         **cause_columns(plan.causes),
     }
     return {

@@ -79,7 +79,6 @@ _OF_SOME = (
     "least_duration",
     "control_points",
     "taut_durations",
-    "margin_unit",
     "failing",
     "frequency",
     "frequency_intervals",
@@ -129,7 +128,7 @@ def _segment_object(plan: PlannedMotions, i: int) -> dict[str, Any]:
         "cable_acceleration_max": float(demands.acceleration_max[i]),
         "samples": int(demands.samples[i]),
     }
-    return fields | dict.fromkeys(_OF_SOME) | plan.details(i)
+    return fields | dict.fromkeys(_OF_SOME) | plan.details(i) | {"margin_unit": plan.margin_unit(i)}
 
 
 def _tension_margin(plan: PlannedMotions, i: int) -> float | None:
@@ -200,6 +199,7 @@ def _numbers(segments: list[dict[str, Any]]) -> dict[str, Column]:
     proved = all(segment["margin_unit"] == "N" for segment in segments)
     retimed = all(segment["planned_duration"] is not None for segment in segments)
     columns = _times() if lines else _durations() if beziers else _counts(swings)
+    columns = _with_units(columns, list(dict.fromkeys(segment["margin_unit"] for segment in segments)))
     if proved:
         columns = _proved({} if not any(segment["tried_arcs"] for segment in segments) else columns)
     if any(segment["sections"] is not None or segment["objective"] is not None for segment in segments):
@@ -229,8 +229,20 @@ def _times() -> dict[str, Column]:
         "acceleration (s)": _of("acceleration_time", ".4f"),
         "T (s)": _of("duration", ".4f"),
         "least (s)": _of("least_duration", ".4f"),
-        "margin (m/s²)": _two_digits("margin"),
+        "margin": _two_digits("margin"),
     }
+
+
+def _with_units(columns: dict[str, Column], units: list[str]) -> dict[str, Column]:
+    # The unit of margins stands above them, or beside each where segments have several.
+    margin = columns["margin"]
+    if len(units) == 1:
+        return {f"margin ({_written(units[0])})" if name == "margin" else name: row for name, row in columns.items()}
+    return columns | {"margin": lambda segment: f"{margin(segment)} {_written(segment['margin_unit'])}"}
+
+
+def _written(unit: str) -> str:
+    return unit.replace("^2", "²")
 
 
 def _durations() -> dict[str, Column]:
@@ -297,7 +309,25 @@ def _caption(plan: PlannedMotions) -> str:
         named = ", ".join("-".join(map(str, pair)) for pair in (pairs.cables + 1).tolist())
         total += f"; tensions of the pairs of cables {named}"
     note = "; in brackets: none found, the numbers are those of the motion that comes nearest" if numbered else ""
-    return f"{total}{note}{_causes(plan)}"
+    planned = [plan.details(i).get("planned_duration", math.nan) for i in range(len(plan.answers.duration))]
+    retimed = f"\n{retimed_words(sum(planned), time)}" if math.isfinite(sum(planned) + time) else ""
+    return f"{total}{note}{retimed}{_causes(plan)}"
+
+
+def retimed_words(before: float, after: float) -> str:
+    """What running along a path again has made of its duration.
+
+    Args:
+        before: planned duration, s.
+        after: duration now, s.
+
+    Returns:
+        such as "retimed: 8 s -> 9.4 s (17 % longer)".
+    """
+    change = after / before - 1.0
+    digits = 0 if abs(change) >= 0.1 else 1
+    words = f"{100.0 * abs(change):.{digits}f} % {'longer' if change > 0.0 else 'shorter'}"
+    return f"retimed: {before:.6g} s -> {after:.6g} s ({words if abs(change) >= 5e-4 else 'as long'})"
 
 
 def _causes(plan: PlannedMotions) -> str:

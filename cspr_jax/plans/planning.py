@@ -103,6 +103,18 @@ class PlannedMotions:
             i -= len(leg.motions)
         raise IndexError(i)
 
+    def margin_unit(self, i: int) -> str:
+        """Unit of the margin of a segment.
+
+        Args:
+            i: number of the segment.
+
+        Returns:
+            "N", "m/s^2", or "1" of margins that are 1 at rest.
+        """
+        of_family = "m/s^2" if FAMILIES[self.keys.family_of(i)].is_line else "1"
+        return self.details(i).get("margin_unit") or of_family
+
     @property
     def motions(self) -> list[Placed]:
         """Motions of the n segments, in the axes of the robot file."""

@@ -95,7 +95,7 @@ SEGMENT = {
     "taut_durations": ("s", "Bezier segments: intervals of durations with all cables taut; null: without end."),
     "margin_unit": (
         "",
-        'Unit of `margin` and `margin_bound` where it is not "1": "N" of splines and over pulleys; null elsewhere.',
+        'Unit of `margin` and `margin_bound`: "m/s^2" of lines, "N" of splines and over pulleys, "1" elsewhere.',
     ),
     "failing": (
         "s",
@@ -228,7 +228,8 @@ CHECK = {
     "demands": (
         "",
         "By limit or condition: `value` of the worst cable, `bound` that is proved for all, what is `allowed`, `unit`, "
-        "`cable` (from 0 on; null: none) and `t`, s.",
+        '`cable` (from 0 on; null: none), `t`, s, and `sense`: "at least" or "at most" what is allowed, in the axes of '
+        "the robot file.",
     ),
     "on_limit": (
         "",

@@ -142,6 +142,8 @@ MARGIN = (
     "or smallest depth below the spools over z0, whichever is less; platforms on more cables: distance that all "
     "tensions can keep from their limits, over the weight per cable."
 )
+# Units of margins by their numbers in motion files.
+MARGIN_UNITS = ("1", "N", "m/s^2")
 TRAJECTORY = {
     q.name: q
     for q in (
@@ -225,6 +227,9 @@ SEGMENTS = {
         ),
         Quantity("segment_verdict", "1", "verdict", f"Bit flags of the verdict{HOW}; 0: feasible.", "uint32"),
         Quantity("segment_margin", "1", "margin", MARGIN),
+        Quantity(
+            "segment_margin_unit", "1", "unit of the margin", "Unit of `segment_margin`: 0: 1, 1: N, 2: m/s^2.", "int16"
+        ),
         Quantity("segment_cause", "1", "cause", "Verdict flag of the worst cause; 0: no cause.", "uint32"),
         Quantity(
             "segment_cause_cable",

@@ -22,11 +22,13 @@ def test_plans(folder, capsys):
     data["samples"], data["robot"] = np.int64(30), Path("mine.toml")
     plan, same_plan = cspr_jax.plan("plan.toml"), cspr_jax.plan(data)
     printed = strict_json(cspr(capsys, "plan", "plan.toml", "--json", "-o", "told.h5", "--rate", 20))
+    last_step = printed.pop("last_step")
     assert plan.to_dict() == same_plan.to_dict() == printed and plan.feasible
     assert plan.text == PLAN and json.loads(same_plan.text)["samples"] == 30
     assert plan.save("mine.h5", 20.0) == Path("mine.h5")
     same(values("mine.h5"), values("told.h5"))
     rows = plan.rows(20.0)
+    assert last_step == pytest.approx(rows["t"][-1] - rows["t"][-2], abs=1e-12)
     assert {name: rows[name].dtype for name in rows} == dict.fromkeys(rows, np.dtype("float64"))
     assert len(plan.rows()["t"]) == 60
     same(rows, {name: values("told.h5")[name] for name in rows})

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.outputs.plots.fitting import shortened
+from cspr_jax.schema.quantities import MARGIN_UNITS
 from cspr_jax.store.result import Result
 
 # Axes whose names in files are no words.
@@ -55,6 +56,21 @@ def cable_names(columns: Mapping[str, np.ndarray]) -> list[str]:
     """
     word = "pair" if "tension_each" in columns else "cable"
     return [f"{word} {k + 1}" for k in range(columns["tension"].shape[1])]
+
+
+def margin_unit(segments: Mapping[str, np.ndarray], i: int) -> str:
+    """Unit of the margin of a segment as pictures show it.
+
+    Args:
+        segments: by the names of `schema.quantities.SEGMENTS`; files of earlier versions do not say it.
+        i: number of the segment.
+
+    Returns:
+        the unit; empty where it is 1, or not known.
+    """
+    codes = segments.get("segment_margin_unit", ())
+    unit = MARGIN_UNITS[int(codes[i])] if len(codes) and 0 <= codes[i] < len(MARGIN_UNITS) else "1"
+    return "" if unit == "1" else unit.replace("^2", "²")
 
 
 def robot_name(result: Result) -> str:

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.outputs.plots.fitting import legend_above
-from cspr_jax.outputs.plots.labels import cable_names, line_look, robot_name
+from cspr_jax.outputs.plots.labels import cable_names, line_look, margin_unit, robot_name
 from cspr_jax.outputs.plots.motion import FAILS, boundaries, doubt, draw_limits, point_words, shade_failing
 from cspr_jax.outputs.plots.robot_along import limits_of
 from cspr_jax.outputs.plots.tensions import draw_tensions, extremes
@@ -83,7 +83,10 @@ def _cells(result: Result) -> list[list[str]]:
         number = f"{k + 1}" if count <= SEGMENTS else f"{k + 1} of {count}"
         # Lines, Bezier segments and splines have no arcs; a swing that is not feasible has no feasible number.
         arcs_text = f"{arcs}" if arcs else "none" if data["segment_tried_arcs"][k] else "-"
-        cells.append([number, arcs_text, f"{duration:.4g}", margin, _verdict(data["segment_verdict"][k])])
+        unit = margin_unit(data, k) if margin != "none" else ""
+        cells.append(
+            [number, arcs_text, f"{duration:.4g}", f"{margin} {unit}".strip(), _verdict(data["segment_verdict"][k])]
+        )
     return cells
 
 

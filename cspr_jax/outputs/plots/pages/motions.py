@@ -10,7 +10,7 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.motions.cause import limit_words
 from cspr_jax.outputs.plots.bodies_in_space import lines_on
 from cspr_jax.outputs.plots.fitting import shortened
-from cspr_jax.outputs.plots.labels import WRITTEN, cable_names
+from cspr_jax.outputs.plots.labels import WRITTEN, cable_names, margin_unit
 from cspr_jax.outputs.plots.motion import point_words
 from cspr_jax.outputs.plots.obstacles import points_of
 from cspr_jax.outputs.plots.pages.packing import packed
@@ -39,6 +39,7 @@ def motion_content(
     segments: Mapping[str, np.ndarray],
     robot_file: RobotFile | None,
     keys: PlanFile | None,
+    z_axis: str = "down",
 ) -> dict[str, Any]:
     """Content of the page of a motion.
 
@@ -48,6 +49,7 @@ def motion_content(
         segments: by the names of `schema.quantities.SEGMENTS`.
         robot_file: the robot whose cables have these tensions; None: the file does not keep it.
         keys: the plan, for limits, obstacles and the shape of the platform; None: the file does not keep it.
+        z_axis: where z points, of a file that does not keep its robot.
 
     Returns:
         plain values, for JSON.
@@ -62,7 +64,7 @@ def motion_content(
             *_bounds(columns),
             *_failures(columns),
         ],
-        "isDown": robot_file is None or robot_file.z_axis == "down",
+        "isDown": (z_axis if robot_file is None else robot_file.z_axis) == "down",
         "count": len(rows),
         "cables": cable_names(columns),
         "base": np.round(robot.base, 9).tolist(),
@@ -187,6 +189,7 @@ def _segments(segments: Mapping[str, np.ndarray]) -> list[dict[str, Any]]:
                 "end": end,
                 "arcs": int(segments["segment_tried_arcs"][i]),
                 "margin": _number(segments["segment_margin"][i]),
+                "marginUnit": margin_unit(segments, i),
                 "isFeasible": int(segments["segment_arcs"][i]) > 0 or code == 0,
                 "verdict": ": ".join(filter(None, (words, cause_text(segments, i)))),
                 "colour": colour,
