@@ -135,7 +135,7 @@ def check_files(options: argparse.Namespace) -> None:
     _check_step(options)
     has_rows = options.json and options.rate is not None
     if options.anyway and not has_rows and options.output is options.mjcf is options.animate is None:
-        raise ConfigError("--anyway", "must be absent without -o, --mjcf, --animate, or --json with --rate")
+        raise ConfigError("--anyway", "must be absent without -o, --mjcf or --animate")
     for path in (options.output, options.mjcf, options.animate):
         check_place(path)
 
@@ -264,8 +264,8 @@ def print_last_step(plan: Any, options: argparse.Namespace) -> None:
     Args:
         plan: `api.plans.Plan`.
     """
-    step = last_step(plan, options.rate)
-    if options.output is not None and (plan.feasible or options.anyway) and step < (1.0 - SAME_TICK) / options.rate:
+    step, is_written = last_step(plan, options.rate), plan.feasible or options.anyway
+    if options.output is not None and is_written and step * (options.rate or 0.0) < 1.0 - SAME_TICK:
         end = float(plan.answers.duration.sum())
         print_line(f"{options.output}: the last row is the end, t = {end:.9g} s, {step:.6g} s after the one before it")
 

@@ -87,6 +87,7 @@ def test_rows_of_what_is_not_feasible(own):
 
 def test_the_last_row_is_on_the_grid_or_said(own):
     words = ["check", own / "own.csv", "--robot", own / "robot.toml", "-o", own / "out.csv", "--rate"]
+    assert "the last row" not in cspr(*words[:-1])[1]
     for rate, is_said in ((5, False), (7.3, True)):
         out, t = cspr(*words, rate)[1], np.loadtxt(own / "out.csv", delimiter=",", skiprows=1)[:, 0]
         assert (f"{t[-1] - t[-2]:.6g} s after the one before" in out) is is_said
