@@ -105,15 +105,16 @@ def report(
 
 def _is_own(source: str | Path | Result | Plan, keys: dict[str, Any] | None) -> bool:
     # A motion of the user's own, and its robot.
-    is_file = keys is not None and not isinstance(source, Result | Plan) and Path(source).suffix != ".toml"
-    return is_file and is_own_motion(Path(source))
+    if keys is None or isinstance(source, Result | Plan) or Path(source).suffix == ".toml":
+        return False
+    return is_own_motion(Path(source))
 
 
 def _loaded(source: str | Path | Result | Plan, keys: dict[str, Any] | None) -> Result | Plan:
     if isinstance(source, Result | Plan):
         return source
     path = Path(source)
-    if _is_own(source, keys):
+    if keys is not None and _is_own(source, keys):
         return check_file(path, keys, outputs=["-o"]).plan
     if path.suffix == ".toml":
         return plans.plan(path)

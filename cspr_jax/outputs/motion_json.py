@@ -43,7 +43,8 @@ def write_json(plan: PlannedMotions, path: Path, *, rate: float | None = None) -
         ConfigError: too many rows, or a motion that is not finite.
         StoreError: the disk or the folder refuses.
     """
-    fields = rows_object(plan, rate) if np.isfinite(plan.answers.duration).all() else {"rows": {"t": [None]}}
+    is_motion = np.isfinite(plan.answers.duration).all()
+    fields: dict[str, Any] = rows_object(plan, rate) if is_motion else {"rows": {"t": [None]}}
     if any(None in np.ravel(values) for name, values in fields["rows"].items() if name not in OPEN):
         raise ConfigError(path, "not written: the best candidate's motion is not finite; see its verdict")
     known = attributes(plan)
