@@ -82,7 +82,7 @@ def plot(  # noqa: PLR0913
     stage("reading")
     files = [one if isinstance(one, Result) else result_at(Path(one)) for one in sources]
     names = [f"result {i + 1}" if isinstance(one, Result) else str(one) for i, one in enumerate(files)]
-    beside = given_beside(plan, robot, z_axis)
+    beside = sources_beside(plan, robot, z_axis)
     loaded = [_opened(one, name, beside) for one, name in zip(files, names, strict=True)]
 
     def draw() -> Figure:
@@ -95,8 +95,10 @@ def plot(  # noqa: PLR0913
     return finished(draw, names[0], style, output)
 
 
-def given_beside(plan: str | Path | None, robot: "AnyRobot | str | Path | None", z_axis: str | None) -> dict[str, Any]:
-    """What is given beside motions in CSV.
+def sources_beside(
+    plan: str | Path | None, robot: "AnyRobot | str | Path | None", z_axis: str | None
+) -> dict[str, Any]:
+    """Robot, plan or axes beside motions in CSV.
 
     Returns:
         arguments of `outputs.plots.motion_source.completed`.
@@ -104,9 +106,10 @@ def given_beside(plan: str | Path | None, robot: "AnyRobot | str | Path | None",
     Raises:
         ConfigError: two of them.
     """
-    given = [f"--{name}" for name, value in (("plan", plan), ("robot", robot), ("z-axis", z_axis)) if value is not None]
-    if len(given) > 1:
-        raise ConfigError(given[1], f"must be absent with {given[0]}, which says it")
+    sources = {"--plan": plan, "--robot": robot, "--z-axis": z_axis}
+    options = [option for option, value in sources.items() if value is not None]
+    if len(options) > 1:
+        raise ConfigError(options[1], f"must be absent with {options[0]}, which says it")
     keys = None
     if robot is not None:
         from cspr_jax.api.check_keys import check_keys  # it needs jax, as no other picture does

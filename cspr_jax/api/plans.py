@@ -14,17 +14,17 @@ from cspr_jax.config.plan import plan_keys
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.motions.landings import LaunchErrors, Scatter
 from cspr_jax.motions.launch_outcome import LaunchOutcome
-from cspr_jax.outputs import motion_files, motion_json, plan_report
+from cspr_jax.outputs import motion_files, plan_report
 from cspr_jax.outputs.mujoco_motion import STEP
-from cspr_jax.outputs.path_columns import path_columns
 from cspr_jax.plans import planning
 from cspr_jax.schema import labelled
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.publishing import publish
-from cspr_jax.store.result import Result, motion_result
 
 if TYPE_CHECKING:
     import xarray
+
+    from cspr_jax.store.result import Result
 
 # Errors name this in place of a file where there is none; paths are relative to the current folder.
 NAME = Path("plan")
@@ -64,6 +64,8 @@ class Plan(planning.PlannedMotions):
         Raises:
             ConfigError: as `rows`.
         """
+        from cspr_jax.outputs import motion_json  # likewise
+
         with double_precision():
             return motion_json.rows_object(self, rate)
 
@@ -85,9 +87,11 @@ class Plan(planning.PlannedMotions):
         """
         path = Path(path)
         if path.suffix not in (".csv", ".h5", ".json"):
-            raise ConfigError(path, "must end in .csv, .h5 or .json")
+            raise ConfigError(path, "must end in .csv or .h5 or .json")
         if not (self.feasible or anyway):
             raise ConfigError(path, "not written, since a segment is not proved feasible (anyway=True writes it)")
+        from cspr_jax.outputs import motion_json  # only some plans are written so
+
         with double_precision():
             write = motion_json.write_json if path.suffix == ".json" else motion_files.write_rows
             write(self, path, rate=rate)
@@ -159,7 +163,7 @@ class Plan(planning.PlannedMotions):
         publish(Disk(), path, data)
         return path
 
-    def to_result(self) -> Result:
+    def to_result(self) -> "Result":
         """The motion as `open_result` gives it of a motion file, to be drawn.
 
         Returns:
@@ -168,6 +172,9 @@ class Plan(planning.PlannedMotions):
         Raises:
             StoreError: numbers that no motion file has.
         """
+        from cspr_jax.outputs.path_columns import path_columns  # plans load no results
+        from cspr_jax.store.result import motion_result
+
         with double_precision():
             columns = motion_files.rows(self) | motion_files.segments(self) | self.outcome_columns
             columns |= motion_files.failures(self) | path_columns(self)

@@ -9,7 +9,7 @@ import numpy as np
 from cspr_jax.api import plans
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.checks import check_file
-from cspr_jax.api.pictures import given_beside, names_of
+from cspr_jax.api.pictures import names_of, sources_beside
 from cspr_jax.api.plans import Plan
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import ConfigError, InputError
@@ -80,7 +80,7 @@ def report(
     if not 0 <= trajectories <= MOST:
         raise ConfigError("--trajectories", f"{trajectories}: must be an integer from 0 to {MOST}")
     try:
-        beside = given_beside(plan, robot, z_axis)
+        beside = sources_beside(plan, robot, z_axis)
         loaded = _loaded(given, beside["robot"])
         if isinstance(loaded, Result):
             loaded = completed(loaded, str(given), **beside)

@@ -115,7 +115,7 @@ def check_files(options: argparse.Namespace) -> None:
         StoreError: a folder that does not exist.
     """
     if options.output is not None and options.output.suffix not in ENDINGS:
-        raise ConfigError("-o", f"{options.output}: must end in .csv, .h5 or .json")
+        raise ConfigError("-o", f"{options.output}: must end in .csv or .h5 or .json")
     if options.rate is not None and options.output is None and not options.json:
         raise ConfigError("--rate", "must be absent without -o or --json")
     if options.rate is not None and not 0.0 < options.rate < float("inf"):

@@ -19,7 +19,6 @@ from cspr_jax.motions.acceleration_sets import along
 from cspr_jax.motions.motion import Motion, common_shape, outward
 from cspr_jax.motions.proved_answers import united
 from cspr_jax.outputs.path_columns import path_columns
-from cspr_jax.outputs.platform_poses import at_origin
 from cspr_jax.plans.causes import cause_columns
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.robots import cables
@@ -116,7 +115,12 @@ def rows(plan: PlannedMotions, *, rate: float | None = None) -> dict[str, np.nda
             if i == len(plan.answers.duration) - 1:
                 tau = np.append(tau, 1.0)
         taus.append(tau)
-    return at_origin(plan, rows_at(plan, taus))
+    columns = rows_at(plan, taus)
+    if not plan.is_at_origin:
+        return columns
+    from cspr_jax.outputs.platform_poses import at_origin  # SciPy's rotations take time
+
+    return at_origin(plan, columns)
 
 
 def rows_at(plan: PlannedMotions, taus: Sequence[np.ndarray]) -> dict[str, np.ndarray]:

@@ -315,7 +315,7 @@ def _caption(plan: PlannedMotions) -> str:
 
 
 def retimed_words(before: float, after: float) -> str:
-    """What running along a path again has made of its duration.
+    """Durations before and after running along a path again.
 
     Args:
         before: planned duration, s.

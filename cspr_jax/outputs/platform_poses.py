@@ -12,17 +12,15 @@ from cspr_jax.plans.planning import PlannedMotions
 
 
 def at_origin(plan: PlannedMotions, columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Rows of a plan whose point is the origin of the platform's axes, of that point and of these axes.
+    """Rows of a plan whose point is the origin of a platform's axes, of that point and of these axes.
 
     Args:
         columns: rows of the mass centre, by the names of `schema.quantities.TRAJECTORY`, in the axes of the robot file;
             orientations count from the reference orientation.
 
     Returns:
-        the rows, with the mass centre as a column of its own; of other plans as they are.
+        the rows, with the mass centre as a column of its own.
     """
-    if not plan.is_at_origin:
-        return columns
     reference = plan.frame.turned_quaternions(reference_of(build_robot(plan.robot_file, plan.keys, Path("plan"))))
     quaternion = products(columns["quaternion"], reference[None])
     centre = np.asarray(plan.robot_file.centre_of_mass or [0.0] * 3)

@@ -65,7 +65,7 @@ def _axis_in(comments: list[str]) -> str | None:
 
 
 def _vertical(arrays: dict[str, np.ndarray]) -> str | None:
-    # Where z points, or None where the motion is level: the power of the cables, -tension . rate, is fitted by mass *
+    # Direction of z, or None where the motion is level: the power of the cables, -tension . rate, is fitted by mass *
     # velocity . acceleration + weight * velocity_z, and by a term of rotations; the sign of the weight tells.
     needed = ("velocity", "acceleration", "tension", "rate")
     if any(name not in arrays or not np.isfinite(arrays[name]).all() for name in needed):
@@ -122,6 +122,6 @@ def _places(heads: list[str]) -> dict[str, Any]:
         places[name] = slice(start, start + count) if parts else start
         start += count
     if start < len(names):
-        own = "; a motion of your own needs its robot, --robot" if "position" not in places else ""
-        raise DamagedError(f"column {shown(names[start])}: must be one that `cspr plan` writes, in its order{own}")
+        hint = "; a motion of your own needs its robot, --robot" if "position" not in places else ""
+        raise DamagedError(f"column {shown(names[start])}: must be one that `cspr plan` writes, in its order{hint}")
     return places

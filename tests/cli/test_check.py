@@ -109,7 +109,7 @@ def test_the_motion_is_not_overwritten(own):
         (("--robot", "nobody"), "nobody"),
         (("--robot", "prototype", "--smooth", "-1"), "--smooth"),
         (("--robot", "prototype", "--limits", "limits.csv"), "limits.csv"),
-        (("--robot", "prototype", "-o", "out.txt"), "must end in .csv, .h5 or .json"),
+        (("--robot", "prototype", "-o", "out.txt"), "must end in .csv or .h5 or .json"),
     ],
 )
 def test_one_line_for_a_mistake(own, change, words):
