@@ -104,9 +104,9 @@ def with_robot(result: Result, file: str, keys: dict[str, Any]) -> Result:
     return _with_robot_file(result, file, robot_file, "--robot", {"plan": text_of(keys)})
 
 
-def _refuse_kept(option: str, given: str, result: Result, file: str) -> None:
+def _refuse_kept(option: str, words: str, result: Result, file: str) -> None:
     if result.is_map or keeps_plan(result):
-        raise ConfigError(option, f"{given}: cannot be combined with {file}, which keeps what it was made of")
+        raise ConfigError(option, f"{words}: cannot be combined with {file}, which keeps what it was made of")
 
 
 def _with_robot_file(
