@@ -1,21 +1,30 @@
 """Fields of the object that `cspr plan --json` prints, with units and meanings; the reference is written from here."""
 
+_POINT = '"mass-centre" or "origin": point of the platform whose poses files hold; null of a point mass.'
+# Fields that --rate adds.
+_ROWS = {
+    "rows": (
+        "",
+        "With `--rate`, without `-o`: the motion over time, by the names of motion files; null of one that is not "
+        "feasible (`--anyway` gives it).",
+    ),
+    "units": ("", "With `rows`: their units."),
+    "last_step": ("s", "With `--rate`: time between the last two rows, of which the last is the end of the motion."),
+}
 WHOLE = {
     "schema": ("1", "Version of these fields."),
     "robot": ("", "Name of the robot."),
     "family": ("", "Trajectory family of the plan."),
     "amplitude": ("", "Amplitude function; null for families that have a law of their own."),
     "z0": ("m", "Depth of P0 below the centroid of the spools, given or chosen; null without P0."),
-    "point": (
-        "",
-        '"mass-centre" or "origin": point of the platform whose poses files of the plan hold; null of a point mass.',
-    ),
+    "point": ("", _POINT),
     "z_axis": ("", '"down" or "up", as in the robot file; all coordinates are in its axes.'),
     "gravity": ("m s-2", "Gravity."),
     "segments": ("", "One object for each segment, below."),
     "total_duration": ("s", "Sum of all durations."),
     "feasible": ("", "Whether every segment is feasible."),
     "launch": ("", "Release and flight of an object, below; absent if the plan releases none."),
+    **_ROWS,
 }
 SEGMENT = {
     "from": ("1", "Number of the pose where the segment starts, from 0 on."),
@@ -237,6 +246,7 @@ CHECK = {
         "samples leave open, in its unit; empty where there are none.",
     ),
     "interpolation": ("", '"cubic", "quintic", "hermite", "pieces" (polynomials), or "function" (sampled).'),
+    "point": ("", _POINT),
     "ends": ("", '"rest", "natural" or "periodic"; null where the motion has its own ends.'),
     "blocks": ("1", "Number of blocks of time that were looked at."),
     "slower": (
@@ -249,4 +259,5 @@ CHECK = {
         "With --retime: this object again, of the motion that runs along its path in the least time, with "
         "`planned_duration`, `gain`, `lower_bound`, `gap`, `retimed` and `path_deviation` of a retimed plan.",
     ),
+    **_ROWS,
 }
