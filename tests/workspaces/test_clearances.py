@@ -239,6 +239,42 @@ def test_whole_cells_among_obstacles(tmp_path, shape):
     assert min((side == number).sum() for number in (0, 1, 2)) > 1
 
 
+CAROCA = """schema = 1
+map = "workspace"
+[robot]
+name = "CAROCA"
+z_axis = "up"
+base_points = [
+    [1.659, -2.85, 3.221], [1.35, -3.159, 3.221], [-1.35, -3.159, 3.221], [-1.659, -2.85, 3.221],
+    [-1.659, 2.85, 3.221], [-1.35, 3.159, 3.221], [1.359, 3.159, 3.221], [1.659, 2.85, 3.221],
+]
+platform_points = [
+    [0.16, 0.14, 0.105], [-0.13, -0.21, -0.105], [0.13, -0.21, 0.105], [-0.16, 0.14, -0.105],
+    [-0.16, -0.14, 0.105], [0.13, 0.21, -0.105], [-0.13, 0.21, 0.105], [0.16, -0.14, -0.105],
+]
+mass = 150.0
+inertia = [[6.5, 0.0, 0.0], [0.0, 20.0, 0.0], [0.0, 0.0, 22.5]]
+[axes]
+x = [-0.15, 0.0, 0.15]
+y = [-0.25, 0.0, 0.25]
+z = [1.0, 1.2]
+[workspace]
+conditions = ["interference-free"]
+prove = true
+"""
+
+
+def test_cells_that_reach_farther_than_the_clearance_are_proved(tmp_path):
+    """As wide as a map of 25 x 25 x 17 cells has them, of a robot with eight cables."""
+    (tmp_path / "w.toml").write_text(CAROCA)
+    code, out, error = cspr("run", tmp_path / "w.toml", "-o", tmp_path / "run")
+    assert code == 0 and "does the robot lack cable_diameter?" in error
+    with h5py.File(out.strip()) as file:
+        side, clearance = file["cell_side"][...], file["clearance"][...]
+        assert (file["cell_open"][...][side != 0] == 0).all()
+    assert (clearance < np.linalg.norm([0.075, 0.125, 0.1])).all() and (side == 1).mean() > 0.8
+
+
 @pytest.mark.thorough
 def test_cells_of_a_robot_with_pulleys(tmp_path):
     """Distances are those of where the cables leave; cells are proved though that moves."""

@@ -254,6 +254,7 @@ def test_cables_that_are_too_long(tmp_path):
         ({"conditions": '["static"]', "more": "[limits]\ntension_max = 9"}, "limits.tension_max"),
         ({"more": "[limits]\ncable_speed_max = 1"}, "limits.cable_speed_max"),
         ({"more": "[limits]\ntension_min = 100"}, "tension_min"),
+        ({"more": "[limits]\nuncertainty = { spool_positions = 0.01 }"}, "a wrench_box holds"),
         ({"robot": "prototype", "more": "orientation = [1, 0, 0, 0]"}, "workspace.orientation"),
         ({"robot": "nothing"}, "robot"),
         ({"more": 'orientations = "some"'}, "workspace.orientations"),
