@@ -24,12 +24,13 @@ Files, each importing only from those above it:
     poses           tasks from poses, and motions from what is found
     closed_forms    motions of other families, from which searches begin, too
     question        poses, limits and objective of a search, and how bounds tighten
+    still_poses     poses that no motion can have
     contacts        planes that keep bodies apart where a motion brings them too near
     robust          bounds that leave room for all robots within an uncertainty
     proofs          motions tightened until they are proved, for the planned robot or for all
     free_motion     the fastest motion through poses, proved
     followed        splines that follow motions of other families
-    no_slower       closed forms in place of what a search finds, where they are faster
+    no_slower       motions of other families in place of what a search finds, where they are faster
     neighbours      the best motions of many pairs of poses, from few starts and from neighbours' motions
     many            the fastest motions of many pairs of poses, tightened until they are proved
     time_bounds     lower bounds of the time of all motions between two poses

@@ -15,7 +15,9 @@ from cspr_jax.free.tasks import Tasks
 from cspr_jax.motions.leg import Leg
 from cspr_jax.motions.motion import Motion, states_at
 from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.proved_answers import ProvedAnswers
 from cspr_jax.robots.point_mass import spool_radius
+from cspr_jax.schema.families import FAMILIES
 from cspr_jax.schema.limits import LIMITS
 
 # Part of the robot's size, and of the speed of a fall from its height, by which motions may miss poses.
@@ -32,12 +34,14 @@ class ClosedForm(NamedTuple):
         motions: n of them, in the axes of the kernels.
         is_feasible: (n,) whether each is proved.
         duration: (n,) s.
+        answers: of them, where they are proved as splines are.
     """
 
     family: str
     motions: list[Motion]
     is_feasible: np.ndarray
     duration: np.ndarray
+    answers: ProvedAnswers | None = None
 
     def segment(self, i: int) -> "ClosedForm":
         """The motion of one segment alone.
@@ -46,28 +50,30 @@ class ClosedForm(NamedTuple):
             the form.
         """
         rows = slice(i, i + 1)
-        return ClosedForm(self.family, self.motions[rows], self.is_feasible[rows], self.duration[rows])
+        answers = None if self.answers is None else self.answers.rows(np.arange(i, i + 1))
+        return ClosedForm(self.family, self.motions[rows], self.is_feasible[rows], self.duration[rows], answers)
 
 
 def closed_forms(legs: Sequence[Leg], problem: Problem, poses: FreePoses) -> list[ClosedForm]:
     """Join poses by other families.
 
     Args:
-        legs: of these families, which take no limits of the mass centre.
+        legs: of these families.
 
     Returns:
-        the forms of the families that join these poses, within all limits but those of the mass centre.
+        the forms of the families that join these poses, within all limits that the family knows.
     """
     forms = list[ClosedForm]()
     limits = dataclasses.replace(problem.limits, **{row.name: None for row in LIMITS if row.of_mass_centre})
-    taken = problem._replace(limits=limits)
     for leg in legs:
+        taken = problem if FAMILIES[leg.stops.family].knows_mass_centre else problem._replace(limits=limits)
         try:
             leg.check(taken)
             answers, motions = leg.join(taken, poses.z0)
         except (ConfigError, InputError):
             continue  # the family joins other poses
-        form = ClosedForm(leg.stops.family, motions, answers.feasible, np.asarray(answers.duration))
+        proved = answers if isinstance(answers, ProvedAnswers) else None
+        form = ClosedForm(leg.stops.family, motions, answers.feasible, np.asarray(answers.duration), proved)
         if answers.feasible.any() and _passes(form, problem, poses):
             forms.append(form)
     return forms

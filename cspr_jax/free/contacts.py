@@ -15,7 +15,7 @@ import numpy as np
 from cspr_jax.free.instants import coordinates
 from cspr_jax.free.poses import quaternions_of
 from cspr_jax.free.question import FreeQuestion, more
-from cspr_jax.free.search import BARRIERS, again, optima, started
+from cspr_jax.free.search import BARRIERS, Ending, OutOfTime, again, optima, started
 from cspr_jax.free.starts import BENT, bulge, ways
 from cspr_jax.free.tasks import OUTER, ClearancePlanes, Tasks, Unknowns
 from cspr_jax.motions.piece_slacks import PieceSlacks
@@ -76,6 +76,9 @@ def around(
 
     Returns:
         the task within planes, and the motion; None where no obstacle is in the way, or no search converges.
+
+    Raises:
+        OutOfTime: the time has ended before one has.
     """
     is_met, size = _clearances(question, slacks) < 0.0, float(spool_radius(tasks.robot))
     _, pairs = _bodies(question)
@@ -85,7 +88,12 @@ def around(
     least = dict.fromkeys(np.flatnonzero(is_met.any(axis=0)).tolist(), APART * size)
     best: tuple[Tasks, Unknowns] | None = None
     for bent in _bent(tasks, unknowns, segments):
-        clear = _clear(question, tasks, bent, least)
+        try:
+            clear = _clear(question, tasks, bent, least)
+        except OutOfTime:
+            if best is None:
+                raise
+            break
         if clear is not None and (best is None or clear[0].cost(clear[1])[0] < best[0].cost(best[1])[0]):
             best = clear
     return best
@@ -99,7 +107,7 @@ def _clear(
     begun = started(within, within.controls(begun), begun.duration)
     level = BARRIERS[0], SOFTNESS
     for _ in range(SEARCHES):
-        result = optima(within, begun, *level)
+        result = optima(within, begun, *level, Ending(question.settings.until))
         if not (result.is_optimal[0] and within.objective.keeps_limits(result.unknowns.level)[0]):
             return None
         further, begun = _parted(question, within, result.unknowns, least, np.inf)

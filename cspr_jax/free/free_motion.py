@@ -14,8 +14,8 @@ from cspr_jax.free.closed_forms import ClosedForm, form_starts
 from cspr_jax.free.poses import FreePoses, divided, segments_of
 from cspr_jax.free.proofs import first_optimum, proved, robust_proof
 from cspr_jax.free.question import FreeQuestion, FreeSettings, planned_problem
-from cspr_jax.free.search import Optima, optima, started
-from cspr_jax.free.starts import starts
+from cspr_jax.free.search import Ending, Optima, OutOfTime, optima, started
+from cspr_jax.free.starts import Starts, joined_starts, starts
 from cspr_jax.free.tasks import Tasks, Unknowns
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import ProvedAnswers, judge_all_robots
@@ -31,6 +31,9 @@ TOGETHER = ((1.0, 0), (1.0, 1), (1.5, 0), (2.0, 0), (1.0, 2))
 # this part of its duration: by what the intervals are divided, and the softness; instants of each interval. The last
 # one, on few intervals, is for those for which no start has led to any.
 SEARCHES, FEWEST, SAME = ((2, 10.0), (2, 1.0), (1, 1.0), (3, 10.0)), 3, 1e-3
+# Part of the time after which searches of segments end once each has a motion: the rest is for all together, and for
+# tightening.
+ENOUGH = 0.5
 
 USUAL = FreeSettings()
 
@@ -73,7 +76,7 @@ class FreeMotion:
         is_stopped: whether Ctrl-C, or `search_time`, has ended it before its end.
         searched: duration of all segments before bounds were tightened, s; NaN without a motion.
         parts: best motions along the segments by themselves.
-        family: whose motions these are, where the search came to none that are faster; None: its own.
+        families: (n,) whose motions these are, where the search came to none that are faster; None: its own.
     """
 
     motions: list[Spline]
@@ -84,7 +87,7 @@ class FreeMotion:
     is_stopped: bool
     searched: float
     parts: tuple[SegmentMotion, ...] = ()
-    family: str | None = None
+    families: tuple[str | None, ...] = ()
 
     @property
     def duration(self) -> float:
@@ -99,6 +102,7 @@ def free_motion(
     settings: FreeSettings = USUAL,
     before: FreeMotion | None = None,
     forms: Sequence[ClosedForm] = (),
+    lines: Sequence[ClosedForm] = (),
 ) -> FreeMotion:
     """Search for the fastest motion through poses, all its segments together, and prove it.
 
@@ -107,6 +111,7 @@ def free_motion(
             all robots within an uncertainty: then they are judged alone.
         before: what a search from the usual starts has come to, which goes on from other ones.
         forms: these are motions of other families.
+        lines: motions from which it begins beside the usual starts.
 
     Returns:
         the motion; where tightening ends before all is proved, the last one.
@@ -119,11 +124,15 @@ def free_motion(
     if len(divided(problem, poses)):
         best, is_stopped = _begun(question), False
     else:
-        best, is_stopped = _searched(question, () if before is None else before.parts, forms)
+        best, is_stopped = _searched(question, () if before is None else before.parts, forms, lines)
     tasks, optimum = question.tasks(settings.intervals, question.instants), None
     for share, way in TOGETHER if all(one.is_optimal for one in best) else ():
         tasks = question.tasks(2 * round(0.5 * settings.intervals / share), question.instants)
-        optimum = first_optimum(tasks, [(_together(tasks, best, FINE[way][0]), *FINE[way])])
+        try:
+            optimum = first_optimum(tasks, [(_together(tasks, best, FINE[way][0]), *FINE[way])], settings.until)
+        except OutOfTime:
+            is_stopped = True
+            break
         if optimum is not None:
             break
     unknowns, is_optimal = optimum or _together(tasks, best, FINE[0][0]), optimum is not None
@@ -145,14 +154,18 @@ def _begun(question: FreeQuestion) -> list[SegmentMotion]:
 
 
 def _searched(
-    question: FreeQuestion, before: Sequence[SegmentMotion], forms: Sequence[ClosedForm]
+    question: FreeQuestion,
+    before: Sequence[SegmentMotion],
+    forms: Sequence[ClosedForm],
+    lines: Sequence[ClosedForm],
 ) -> tuple[list[SegmentMotion], bool]:
     # The best motion along each segment by itself, from all starts, or after those from forms; where starts disagree,
     # by all searches. Whether the search has been stopped: by Ctrl-C only where there is something to keep.
     settings, poses = question.settings, question.poses
     # No form is the start that has led to what was there before.
     count, best = len(poses.positions) - 1, {k: part._replace(start=-1) for k, part in enumerate(before)}
-    until = np.inf if settings.search_time is None else time.monotonic() + settings.search_time
+    until, now = settings.until, time.monotonic()
+    enough = now + ENOUGH * (until - now)
     for number, (share, softness) in enumerate(SEARCHES, 1):
         is_last = number == len(SEARCHES)
         is_left = [
@@ -160,28 +173,38 @@ def _searched(
             for k in range(count)
         ]
         rows = np.flatnonzero(is_left)
-        if not len(rows) or (best and time.monotonic() > until):
+        if not len(rows) or (best and time.monotonic() > (enough if _all_optimal(best) else until)):
             return list(best.values()), bool(len(rows))
         stage(f"free motion: search {number}{_said(best, settings.objective)}")
         single = segments_of(question.tasks(settings.intervals // share, FEWEST))
-        begun = form_starts(single, rows, forms) if forms else starts(single.taken(rows), poses.z0, settings.starts)
+        begun = form_starts(single, rows, forms) if forms else _starts(question, single, rows, lines)
         if not len(begun.task):
             break
-        lanes = single.taken(rows[begun.task])
-        result = optima(lanes, started(lanes, begun.controls, begun.duration), softness=softness, until=until)
+        lanes, ending = single.taken(rows[begun.task]), Ending(until, enough, begun.task)
+        begin = started(lanes, begun.controls, begun.duration)
+        result = optima(lanes, begin, softness=softness, ending=ending, keeps=True)
         _keep(best, rows, begun.task, lanes, result)
         if result.is_stopped:
-            if not all(one.is_optimal for one in best.values()) and time.monotonic() < until:
+            if not _all_optimal(best) and time.monotonic() < until:
                 raise KeyboardInterrupt
             return list(best.values()), True
     return list(best.values()), False
 
 
+def _starts(question: FreeQuestion, single: Tasks, rows: np.ndarray, lines: Sequence[ClosedForm]) -> Starts:
+    usual = starts(single.taken(rows), question.poses.z0, question.settings.starts)
+    return joined_starts([usual, form_starts(single, rows, lines)])
+
+
 def _said(best: dict[int, SegmentMotion], objective: str) -> str:
     # The best so far, for people who wait.
-    if not best or not all(one.is_optimal for one in best.values()):
+    if not best or not _all_optimal(best):
         return ""
     return f", so far {sum(one.duration for one in best.values()):.4g} s" if objective == "time" else ", one is there"
+
+
+def _all_optimal(best: dict[int, SegmentMotion]) -> bool:
+    return all(one.is_optimal for one in best.values())
 
 
 def _keep(best: dict[int, SegmentMotion], rows: np.ndarray, of_task: np.ndarray, lanes: Tasks, result: Optima) -> None:

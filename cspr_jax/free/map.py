@@ -1,8 +1,5 @@
 """Maps of the least durations of free motions from one place to each target."""
 
-import functools
-import operator
-
 import numpy as np
 from jax import Array
 
@@ -15,15 +12,12 @@ from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.free.many import free_motions
 from cspr_jax.free.poses import FreePoses, check_searched
+from cspr_jax.free.still_poses import OF_PLACES
 from cspr_jax.free.time_bounds import time_bounds
-from cspr_jax.maps.proved_map import CONTACTS, ProvedMap, proved_columns
+from cspr_jax.maps.proved_map import ProvedMap, proved_columns
 from cspr_jax.motions.proved_answers import ProvedAnswers, answers_of, judge_all_robots, proofs_of
 from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.schema.verdicts import FLAGS, Verdict
-
-# Criteria of a place alone, which no motion to it meets where it does not.
-_OF_PLACES = (CONTACTS, Verdict.ABOVE_SPOOLS, Verdict.BELOW_FLOOR, Verdict.CABLE_TOO_LONG)
-OF_PLACES = functools.reduce(operator.or_, _OF_PLACES)
 
 
 class FreeMap(ProvedMap):

@@ -1,18 +1,22 @@
-"""Closed forms in place of what a search finds, where they are faster, or it finds nothing."""
+"""Motions of other families in place of what a search finds, where they are faster, or it finds nothing."""
 
 import dataclasses
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 
-from cspr_jax.free.closed_forms import ClosedForm
+from cspr_jax.curves.spline import Spline
+from cspr_jax.free.closed_forms import NEAR, ClosedForm
 from cspr_jax.free.followed import energy_along, followed
 from cspr_jax.free.free_motion import FreeMotion
 from cspr_jax.free.poses import FreePoses, half_swing
 from cspr_jax.free.question import FreeQuestion, FreeSettings
 from cspr_jax.free.starts import ARCS
+from cspr_jax.motions.answers import replaced
+from cspr_jax.motions.motion import Motion, states_at
 from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.proved_answers import proved_answers
+from cspr_jax.motions.proved_answers import ProvedAnswers, proved_answers
 from cspr_jax.robots.clearance import Scene
 
 # Intervals of each half swing of a spline that follows a closed form, at first, and how often they are doubled.
@@ -74,5 +78,76 @@ def _followed(
         answers = proved_answers(problem, motions, scene)
         if answers.feasible.all():
             energy, level = np.array([energy_along(tasks, motion) for motion in motions]), np.full(len(motions), np.nan)
-            return FreeMotion(motions, answers, energy, level, True, False, np.nan, family=form.family)
+            families = (form.family,) * len(motions)
+            return FreeMotion(motions, answers, energy, level, True, False, np.nan, families=families)
     return None
+
+
+def stood_in(
+    problem: Problem, scene: Scene | None, poses: FreePoses, settings: FreeSettings, line: ClosedForm
+) -> FreeMotion:
+    """Lines in place of a search that has been stopped before it has found anything."""
+    motions, answers = cast(list[Spline], line.motions), cast(ProvedAnswers, line.answers)
+    energy = _energies(FreeQuestion.of(problem, scene, poses, settings), line.motions)
+    families, level = (line.family,) * len(motions), np.full(len(motions), np.nan)
+    return FreeMotion(motions, answers, energy, level, False, True, np.nan, (), families)
+
+
+def no_slower_than_lines(
+    free: FreeMotion,
+    problem: Problem,
+    scene: Scene | None,
+    poses: FreePoses,
+    settings: FreeSettings,
+    lines: Sequence[ClosedForm],
+) -> FreeMotion:
+    """A motion of whose segments none is slower than a line between the same poses, or missing beside one.
+
+    Args:
+        free: as it was found.
+        poses: with the accelerations that are asked for.
+
+    Returns:
+        the motion, with lines as they are on some segments: their accelerations jump.
+    """
+    for line in lines:
+        is_better = ~free.answers.feasible
+        if settings.objective == "time":
+            is_better |= line.duration < free.answers.duration
+        rows = np.flatnonzero(is_better & fits(line, problem, poses, settings))
+        if len(rows):
+            free = _with(free, stood_in(problem, scene, poses, settings, line), rows)
+    return free
+
+
+def _with(free: FreeMotion, line: FreeMotion, rows: np.ndarray) -> FreeMotion:
+    # The segments of a motion, some of them along lines.
+    chosen, count = set(rows.tolist()), len(free.motions)
+    motions = [(line if k in chosen else free).motions[k] for k in range(count)]
+    families = tuple(line.families[k] if k in chosen else (free.families or [None] * count)[k] for k in range(count))
+    energy, level = free.energy.copy(), free.level.copy()
+    energy[rows], level[rows] = line.energy[rows], line.level[rows]
+    answers = replaced(free.answers, rows, line.answers, rows)
+    return dataclasses.replace(free, motions=motions, answers=answers, energy=energy, level=level, families=families)
+
+
+def fits(line: ClosedForm, problem: Problem, poses: FreePoses, settings: FreeSettings) -> np.ndarray:
+    """Whether lines are proved, short enough, and accelerate at the poses as is asked, (n,)."""
+    is_short = line.duration <= (np.inf if settings.longest is None else settings.longest)
+    return line.is_feasible & is_short & (_accelerations_missed(line, poses) <= NEAR * float(problem.robot.gravity))
+
+
+def _accelerations_missed(line: ClosedForm, poses: FreePoses) -> np.ndarray:
+    # By how much accelerations differ from those that are asked for, at most, (n,) m/s^2 or rad/s^2.
+    missed = np.zeros(len(line.motions))
+    for k, motion in enumerate(line.motions):
+        state, asked = states_at(motion, np.array([0.0, 1.0])), poses.accelerations[k : k + 2]
+        parts = [state.acceleration, *([] if poses.quaternions is None else [state.angular_acceleration])]
+        away = np.abs(np.concatenate([np.asarray(part) for part in parts], axis=1) - asked)
+        missed[k] = np.max(away, initial=0.0, where=~np.isnan(asked))
+    return missed
+
+
+def _energies(question: FreeQuestion, motions: Sequence[Motion]) -> np.ndarray:
+    tasks = question.tasks(question.settings.intervals, question.instants)
+    return np.array([energy_along(tasks, motion) for motion in motions])

@@ -8,7 +8,7 @@ from cspr_jax.free.contacts import apart, around
 from cspr_jax.free.poses import motions_of
 from cspr_jax.free.question import FreeQuestion, slacks_of, tightened
 from cspr_jax.free.robust import for_all_robots, widened
-from cspr_jax.free.search import again, optima
+from cspr_jax.free.search import Ending, OutOfTime, again, optima
 from cspr_jax.free.tasks import Tasks, Unknowns
 from cspr_jax.motions.piece_slacks import PieceSlacks
 from cspr_jax.motions.proved_answers import ProvedAnswers, proved_answers
@@ -31,7 +31,7 @@ class FreeProof(NamedTuple):
         unknowns: of it.
         motions: one a segment.
         answers: of them, of the planned robot alone.
-        is_stopped: whether Ctrl-C has ended the search.
+        is_stopped: whether Ctrl-C, or its time, has ended the search.
     """
 
     tasks: Tasks
@@ -41,18 +41,22 @@ class FreeProof(NamedTuple):
     is_stopped: bool
 
 
-def first_optimum(tasks: Tasks, begun: Iterable[tuple[Unknowns, float, float]]) -> Unknowns | None:
+def first_optimum(tasks: Tasks, begun: Iterable[tuple[Unknowns, float, float]], until: float) -> Unknowns | None:
     """The optimum of the first search that converges.
 
     Args:
         tasks: one.
         begun: starts, and the weight of barriers and the softness with which each search begins.
+        until: as of `FreeSettings`, s.
 
     Returns:
         the optimum; None where no search converges.
+
+    Raises:
+        OutOfTime: the time has ended.
     """
     for start in begun:
-        result = optima(tasks, *start)
+        result = optima(tasks, *start, Ending(until))
         if result.is_optimal[0] and tasks.objective.keeps_limits(result.unknowns.level)[0]:
             return result.unknowns
     return None
@@ -81,11 +85,11 @@ def proved(question: FreeQuestion, tasks: Tasks, unknowns: Unknowns, *, is_optim
         if tighter is None:
             break
         try:
-            further = _again(*tighter)
+            further = _again(question, *tighter)
             if further is None and tighter[0].planes is not None and tasks.planes is None:
                 stage("free motion: round obstacles")
                 further = around(question, tasks, unknowns, slacks)
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, OutOfTime):
             is_stopped = True
             break
         if further is None:
@@ -103,12 +107,13 @@ def _tighter(
     return parted or (None if tighter is None else (tighter, unknowns))
 
 
-def _again(tasks: Tasks, unknowns: Unknowns) -> tuple[Tasks, Unknowns] | None:
+def _again(question: FreeQuestion, tasks: Tasks, unknowns: Unknowns) -> tuple[Tasks, Unknowns] | None:
     # The best motion within other bounds, from one found before; None where no room is left between them.
     low, high = tasks.bounds(unknowns.level)
     if not (low < high).all():
         return None
-    further = first_optimum(tasks, ((again(tasks, unknowns, each[0]), *each) for each in ON))
+    begun = ((again(tasks, unknowns, each[0]), *each) for each in ON)
+    further = first_optimum(tasks, begun, question.settings.until)
     return None if further is None else (tasks, further)
 
 
@@ -130,7 +135,7 @@ def robust_proof(
         whole = _with_room(all_robots, tasks, tasks, unknowns)
         part = None if whole else _with_room(fewer, tasks, tasks, unknowns)
         whole = _with_room(all_robots, tasks, *part) if part else whole
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, OutOfTime):
         return None
     if whole:
         return proved(all_robots, *whole)
@@ -145,7 +150,7 @@ def _with_room(
     for number in range(1, WIDER + 1):
         stage(f"free motion: room for all robots {number}")
         wider = widened(question, nominal, motions_of(tasks, unknowns, question.poses.z0))
-        further = _again(wider, unknowns)
+        further = _again(question, wider, unknowns)
         if further is None:
             break
         best = tasks, unknowns = further

@@ -32,7 +32,7 @@ class FreeSettings(NamedTuple):
         objective: row of `objectives.OBJECTIVES`.
         longest: duration of a segment, s; None for any.
         starts: number of motions from which the search of a segment begins; None for those of `starts.starts`.
-        search_time: after which the search ends, s; None for none.
+        until: time of `time.monotonic` at which all searches end, s.
         intervals: of the spline of a segment, even.
         instants: of each interval, at which the search looks; None for those of `INSTANTS`.
     """
@@ -40,7 +40,7 @@ class FreeSettings(NamedTuple):
     objective: str = "time"
     longest: float | None = None
     starts: int | None = None
-    search_time: float | None = None
+    until: float = np.inf
     intervals: int = 48
     instants: int | None = None
 

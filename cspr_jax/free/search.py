@@ -31,6 +31,32 @@ INSIDE, AWAY = 0.1, 1e-2
 APART = 1e10
 
 
+class OutOfTime(Exception):
+    """The time of a search has ended before it has converged."""
+
+
+class Ending(NamedTuple):
+    """When searches end that have not converged, by `time.monotonic`.
+
+    Fields:
+        until: s.
+        enough: from then on one optimum of each task is enough, s.
+        of_task: (l,) numbers of the tasks; () where nothing is enough.
+    """
+
+    until: float = np.inf
+    enough: float = np.inf
+    of_task: np.ndarray = np.zeros(0, int)
+
+    def is_over(self, is_optimal: np.ndarray) -> bool:
+        """Whether searches end now."""
+        now = time.monotonic()
+        return now > self.until or (now > self.enough and bool(np.isin(self.of_task, self.of_task[is_optimal]).all()))
+
+
+NEVER = Ending()
+
+
 class Optima(NamedTuple):
     """Results.
 
@@ -73,7 +99,9 @@ def optima(
     start: Unknowns,
     barrier: float = BARRIERS[0],
     softness: float = SOFTNESS[0],
-    until: float | None = None,
+    ending: Ending = NEVER,
+    *,
+    keeps: bool = False,
 ) -> Optima:
     """Search for the best motions.
 
@@ -81,27 +109,29 @@ def optima(
         start: from which the search begins.
         barrier: weight of the barriers at the start.
         softness: of the equations at the start.
-        until: time of `time.monotonic` at which the search ends, s; then Ctrl-C ends it, too, and what has converged
-            stays. None: neither.
+        keeps: whether what has converged stays where the time ends, or Ctrl-C is pressed.
 
     Returns:
         the motions; those that have not converged as they were last.
+
+    Raises:
+        OutOfTime: the time has ended, and nothing is kept.
     """
     count, points = len(start.duration), SearchPoints.of(tasks, start)
     soft = Softness(np.full(count, softness), points.metric(), start.multipliers.copy())
     result = Optima(Unknowns(*(leaf.copy() for leaf in start)), np.zeros(count, bool), np.zeros(count, int))
     try:
-        is_stopped = not _sought(
-            points, Levels(np.full(count, barrier), soft), result, np.inf if until is None else until
-        )
+        is_stopped = not _sought(points, Levels(np.full(count, barrier), soft), result, ending)
     except KeyboardInterrupt:
-        if until is None:
+        if not keeps:
             raise
         is_stopped = True
+    if is_stopped and not keeps:
+        raise OutOfTime
     return result._replace(is_stopped=is_stopped)
 
 
-def _sought(points: SearchPoints, levels: Levels, result: Optima, until: float) -> bool:
+def _sought(points: SearchPoints, levels: Levels, result: Optima, ending: Ending) -> bool:
     # Puts motions into the result as their searches end; whether all have ended in time.
     rows = np.arange(len(result.steps))
     curved, waited = np.zeros(len(rows)), np.zeros(len(rows))
@@ -110,7 +140,7 @@ def _sought(points: SearchPoints, levels: Levels, result: Optima, until: float) 
         levels, errors = _sharpened(points, levels)
         waited = np.where(levels.barrier < before, 0, waited + 1)
         is_optimal = (levels.barrier <= BARRIERS[1]) & (errors < CLOSE * BARRIERS[1]) & (points.missed() < MISSED)
-        is_late = time.monotonic() > until
+        is_late = ending.is_over(result.is_optimal)
         is_over = is_optimal | (number == STEPS) | (waited > PATIENCE) | is_late
         for leaf, values in zip(result.unknowns, points.unknowns.taken(is_over), strict=True):
             leaf[rows[is_over]] = values

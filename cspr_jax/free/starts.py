@@ -1,5 +1,6 @@
 """Motions from which searches begin: lines, lines bent to all sides, and swings about P0."""
 
+from collections.abc import Sequence
 from itertools import zip_longest
 from typing import NamedTuple
 
@@ -27,6 +28,11 @@ class Starts(NamedTuple):
     task: np.ndarray
     controls: np.ndarray
     duration: np.ndarray
+
+
+def joined_starts(parts: Sequence[Starts]) -> Starts:
+    """Starts of several kinds for the same tasks, one kind after the other."""
+    return Starts(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
 def starts(tasks: Tasks, z0: float, most: int | None = None) -> Starts:

@@ -66,6 +66,11 @@ class Leg(abc.ABC):
             ConfigError: which pose, and why.
         """
 
+    @classmethod
+    def for_searches(cls, stops: Waypoints) -> "Leg":
+        """The leg of the family over poses of another one, from whose motions a search can begin."""
+        return cls(stops)
+
     def begin_with(self, others: "Sequence[Leg]") -> None:  # noqa: B027
         """Take legs of other families over the same poses, from whose motions a search can begin."""
 

@@ -91,6 +91,7 @@ _OF_SOME = (
     "sections",
     "objective",
     "energy",
+    "source",
     "planned_duration",
     "gain",
     "retimed",

@@ -28,6 +28,7 @@ Files, each importing only from those above it:
     refusals            the place that no path speed passes
     least_time          the fastest motion along a section
     many                least times along many paths
+    fastest_lines       lines from which searches of free motions begin
     answers             what segments of plans tell of it
     stops               motions of any kind, and their smooth parts between stops
     retraced            their paths as sections

@@ -22,6 +22,7 @@ from cspr_jax.motions.proved_answers import proved_answers
 from cspr_jax.motions.waypoints import Waypoints
 from cspr_jax.paths.answers import PathAnswers, SectionAnswer, feeds_of
 from cspr_jax.paths.courses import Course, CourseEnds, FileAxes, course_of, course_through
+from cspr_jax.paths.fastest_lines import FastestLines
 from cspr_jax.paths.least_time import LeastTime, least_time_motion
 from cspr_jax.paths.section import Section, SectionSettings
 from cspr_jax.robots.platform import PlatformRobot
@@ -69,6 +70,11 @@ class Paths(Leg):
         for i, pose in enumerate(stops.poses):
             if i and pose.path is not None and not stops.keys.is_one_path:
                 self._check_path(i, pose.path)
+
+    @classmethod
+    def for_searches(cls, stops: Waypoints) -> Leg:
+        """Lines between the poses, whatever the plan says of paths; see `Leg.for_searches`."""
+        return FastestLines(stops)
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the poses; see `Leg.join`."""

@@ -79,7 +79,7 @@ def _others(stops: Waypoints) -> list[Leg]:
     for row in FAMILIES.values():
         if row.begins_searches and pattern in row.legs:
             with contextlib.suppress(ConfigError):  # of poses that the family does not join
-                legs.append(_judged(row.leg(pattern)(dataclasses.replace(stops, family=row.name))))
+                legs.append(_judged(row.leg(pattern).for_searches(dataclasses.replace(stops, family=row.name))))
     return legs
 
 

@@ -35,7 +35,8 @@ class Family:
         knows_pulleys: whether its own verdicts are right for cables that leave from pulleys; if not, likewise.
         knows_mass_centre: whether its verdicts take limits of the mass centre's speed and acceleration into account.
         is_searched: whether its motions are searched for, also from those of other families.
-        begins_searches: whether such searches begin from its motions.
+        begins_searches: whether such searches begin from its motions: where they find nothing else, or nothing fast.
+        precedes_searches: whether they do so at once, and their motions are never slower than its motions.
     """
 
     name: str
@@ -56,6 +57,7 @@ class Family:
     knows_mass_centre: bool = False
     is_searched: bool = False
     begins_searches: bool = False
+    precedes_searches: bool = False
 
     def leg(self, pattern: str) -> Any:
         """Class that joins the poses of a robot.
@@ -170,6 +172,8 @@ _ROWS = (
         knows_obstacles=True,
         knows_pulleys=True,
         knows_mass_centre=True,
+        begins_searches=True,
+        precedes_searches=True,
         keys=("path",),
         pose_keys=("path",),
     ),

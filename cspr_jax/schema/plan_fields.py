@@ -148,6 +148,11 @@ SEGMENT = {
         'Free motions: what the motion is the best in, "time", "energy", "tension" or "margin"; null elsewhere.',
     ),
     "energy": ("N^2 s", "Free motions: integral of the sum of the squares of the tensions; null elsewhere."),
+    "source": (
+        "",
+        'Free motions: family whose motion it is: "free", or the one than which the search found nothing faster; null '
+        "elsewhere.",
+    ),
     "planned_duration": ("s", "Retimed plans: duration of the motion that was planned; null elsewhere."),
     "gain": ("1", "Retimed plans: 1 - `duration` / `planned_duration`."),
     "retimed": ("", "Retimed plans: whether the motion is the faster one; the planned one stays where none is proved."),

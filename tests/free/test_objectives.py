@@ -97,7 +97,7 @@ def test_fewer_starts_and_no_time():
     """One start is enough here; without time there is the start, which is not proved."""
     few = best("time", starts=1)
     assert few.duration == pytest.approx(best("time").duration, rel=1e-3)
-    free, _ = solve(RING, LIMITS, ASIDE, settings=QUICK._replace(search_time=1e-9))
+    free, _ = solve(RING, LIMITS, ASIDE, settings=QUICK._replace(until=0.0))
     assert free.is_stopped
     assert not free.is_optimal
 

@@ -1,0 +1,47 @@
+"""Poses that no motion can have, whatever leads to them: refused at once, and not searched for."""
+
+import dataclasses
+import functools
+import operator
+
+import numpy as np
+
+from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.curves.spline import Spline
+from cspr_jax.free.poses import FreePoses
+from cspr_jax.free.question import planned_problem
+from cspr_jax.maps.proved_map import CONTACTS
+from cspr_jax.motions.cause import Cause
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.proved_answers import proved_answers
+from cspr_jax.robots.clearance import Scene
+from cspr_jax.schema.verdicts import Verdict
+
+# Criteria of a place alone, which no motion to it meets where it does not; where a robot is to rest, all are.
+_OF_PLACES = (CONTACTS, Verdict.ABOVE_SPOOLS, Verdict.BELOW_FLOOR, Verdict.CABLE_TOO_LONG)
+OF_PLACES = functools.reduce(operator.or_, _OF_PLACES)
+
+
+def first_refused(problem: Problem, scene: Scene | None, poses: FreePoses, frame: Frame) -> tuple[int, Cause] | None:
+    """The first pose that no motion can have.
+
+    Args:
+        frame: of the robot file, in whose axes causes are.
+
+    Returns:
+        its number, and the worst reason; None where there is no such pose.
+    """
+    units = [None] * len(poses.positions) if poses.quaternions is None else list(poses.quaternions)
+    still = [
+        Spline(leaf(np.array([0.0, 1.0])), leaf(place[None, None]), None if unit is None else leaf(unit[None, None]))
+        for place, unit in zip(poses.positions, units, strict=True)
+    ]
+    answers = proved_answers(planned_problem(problem), still, scene)
+    for i in range(len(still)):
+        rests = not (poses.accelerations[i].any() or poses.velocities[i].any())
+        causes = answers.proved_causes(i, frame) if answers.proof[i].broken.any() else ()
+        for cause in causes:
+            if rests or Verdict[cause.criterion.upper()] & OF_PLACES:
+                return i, dataclasses.replace(cause, t=np.nan)
+    return None
