@@ -35,6 +35,7 @@ OVERLAP = 100
 UNIT, SHORTEST, LONGEST = 1e-3, 0.5, 2.0
 MEETING = 1e-6  # share of the size of a motion by which its legs may miss each other
 
+EMPTY = (",", ";", "\t", " ")  # how lines begin that may have nothing in them
 _COMMENT_LINE = re.compile(r"^[ \t]*%.*$", re.MULTILINE)
 _EMPTY_LINE = re.compile(r"^[,;\t ]+$", re.MULTILINE)
 
@@ -203,7 +204,8 @@ class _Reader:
         plain = text.replace(",", ".") if self.delimiter in (";", "\t") else text
         if "%" in plain:
             plain = _COMMENT_LINE.sub("", plain)
-        if self.delimiter is not None:
+        # A search for plain text is far faster than one for a pattern.
+        if plain[:1] in EMPTY or any(f"\n{mark}" in plain for mark in EMPTY):
             plain = _EMPTY_LINE.sub("", plain)
         if self.preamble.tail:
             mark = re.escape(str(self.delimiter))
