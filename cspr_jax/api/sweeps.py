@@ -32,7 +32,28 @@ if TYPE_CHECKING:
 NAME = Path("sweep")
 
 keep_compiled_code = checked(_keep_compiled_code, "keep_compiled_code", __name__)
-open_result = checked(_open_result, "open_result", __name__)
+
+
+@checked
+def open_result(path: str | Path) -> Result:
+    """Read a result of `run` or `merge`, or a motion of `Plan.save`; also those of the command line.
+
+    A motion in a .csv file has neither robot nor plan nor segments; it is named after its file. An HDF5 file may come
+    from anybody: another process reads it, within limits of memory and time, and its content is checked like a sweep
+    file.
+
+    Args:
+        path: the file, or the directory of a run.
+
+    Returns:
+        the result.
+
+    Raises:
+        StoreError: the file is missing, not HDF5, damaged, or not written by this program; or the run in the directory
+            has not finished.
+    """
+    place = Path(path)
+    return _open_result(inspection.result_in(place) if place.is_dir() else place)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -50,6 +50,7 @@ def test_tiles_computed_apart_give_the_bytes_of_one_run(tmp_path, kind, capsys):
         joined == str(tmp_path / "joined" / "map.h5")
         and whole.read_bytes() == (tmp_path / "joined/map.h5").read_bytes()
     )
+    assert cspr_jax.open_result(tmp_path / "joined").data.keys() == {"toy_distance"}
     report = cspr_jax.verify(tmp_path / "joined")
     assert (
         report["faults"] == []
@@ -89,6 +90,8 @@ def test_missing_tiles_are_named_and_nothing_is_written(tmp_path, kind):
     with pytest.raises(RefusedError, match=re.escape("tiles 1:3, 4:6 of 6 (24 cells) are in none of them")):
         cspr_jax.merge(parts, tmp_path / "joined")
     assert not (tmp_path / "joined").exists()
+    with pytest.raises(StoreError, match=r"0: holds no finished result: run the sweep to its end"):
+        cspr_jax.open_result(parts[0])
 
 
 def test_maps_that_differ_in_one_axis(tmp_path, kind):
