@@ -25,6 +25,8 @@ STOPPED = "the search was stopped before its end"
 ROBOTS = {"six": "laval-mssm", "eight": "cogiro"}
 LINE = {"family": "path", "path": {"ramp_time": 0.0, "grid": 200}}
 SAMPLES = 5000
+# By how much least times on different grids differ.
+SAME = 1e-6
 
 
 def asked(kind, seed):
@@ -219,7 +221,7 @@ def test_poses_that_no_motion_can_have_are_refused_at_once(tmp_path, monkeypatch
 @pytest.mark.parametrize("kind", ["six pulleys", "eight"])
 def test_platforms(kind):
     free, line, _ = compared(kind, 1)
-    assert free <= line
+    assert free <= line * (1.0 + SAME)
     assert np.isfinite(free)
 
 
@@ -233,4 +235,4 @@ def test_pairs_of_platforms(kind, capsys):
         sources = [source for *_, source in results]
         print(f"\n{kind}: {len(ratios)} lines, free over line {np.quantile(ratios, [0.0, 0.5, 1.0])}, {sources}")
     assert len(ratios)
-    assert (ratios <= 1.0).all()
+    assert (ratios <= 1.0 + SAME).all()
