@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from cspr_jax.api.argument_rules import Rule, choice, integer, kind_of, many, real, word
+from cspr_jax.api.argument_rules import Rule, choice, integer, kind_of, many, real, refuse_tracers, word
 from cspr_jax.errors import InputError
 from cspr_jax.schema.given_numbers import ANY
 from cspr_jax.schema.limits import LARGEST_GRID, LARGEST_MAX_ARCS, LIMITS, UNCERTAINTIES
@@ -22,6 +22,29 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 LARGEST_LENGTH = 1e6  # m
 LARGEST_POPULATION, LARGEST_DIVISIONS, LARGEST_SAMPLES = 4096, 128, 1_000_000
 MOST = 10**9  # for numbers that functions bound more narrowly by themselves
+
+
+# Functions whose arguments jax may trace, and for the others, which of these to differentiate instead.
+DIFFERENTIABLE = (
+    *("hypocycloid", "transition", "platform_motion", "straight_line", "bezier", "ellipse", "spline", "make_problem"),
+    *("point_mass_robot", "point_mass", "platform", "parallel_pair_robot", "with_cables", "three_cable_equivalent"),
+    *("slacks", "sampled_margin", "tensions"),
+)
+INSTEAD = {
+    name: f"jax differentiates {motion} with sampled_margin, for single motions"
+    for motion, names in {
+        "bezier": ("bezier_durations", "bezier_verdicts", "launch_range"),
+        "ellipse": ("ellipse_frequencies", "ellipse_margins", "swing_range"),
+        "hypocycloid": ("minimum_arcs",),
+        "platform_motion": ("minimum_pose_arcs", "attainable", "accessible"),
+        "spline": ("check", "check_many", "least_time_paths", "retime"),
+        "straight_line": ("least_time",),
+        "transition": ("minimum_oscillations",),
+    }.items()
+    for name in names
+} | dict.fromkeys(
+    ("available_accelerations", "sensitivity", "workspace"), "jax differentiates tensions of a state of motion"
+)
 
 
 def checked(function: Function, name: str = "", module: str = "") -> Function:
@@ -35,11 +58,10 @@ def checked(function: Function, name: str = "", module: str = "") -> Function:
     Returns:
         the function; its signature and docstring stay.
     """
-    signature = inspect.signature(function)
+    signature, own_name = inspect.signature(function), name or function.__qualname__
+    instead = INSTEAD.get(own_name, "jax differentiates single motions with slacks, sampled_margin and tensions")
     rules = {
-        key: OF_FUNCTIONS.get(f"{name or function.__qualname__}.{key}") or ARGUMENTS[key]
-        for key in signature.parameters
-        if key != "self"
+        key: OF_FUNCTIONS.get(f"{own_name}.{key}") or ARGUMENTS[key] for key in signature.parameters if key != "self"
     }
 
     @functools.wraps(function)
@@ -49,8 +71,14 @@ def checked(function: Function, name: str = "", module: str = "") -> Function:
         except TypeError:
             return function(*arguments, **keywords)  # which says what is missing, or too many, in its own name
         for key, value in bound.items():
+            if own_name not in DIFFERENTIABLE:
+                refuse_tracers(key, value, instead)
             if key in rules:
-                rules[key](key, value)
+                try:
+                    rules[key](key, value)
+                except InputError:
+                    refuse_tracers(key, value, "jax may trace other arguments of this function alone")
+                    raise
         return function(*arguments, **keywords)
 
     if name:
@@ -159,6 +187,8 @@ _POINT_OR_NONE = real("three finite numbers, at most 1e6 m, or None", (3,), trac
 POINTS_WORDS = "finite numbers of shape (n, 3), n >= 1, at most 1e6 m"
 _POINTS = real(POINTS_WORDS, (ANY, 3), **LENGTHS)
 _POINTS_OR_NONE = real(f"{POINTS_WORDS}, or None", (ANY, 3), none=True, **LENGTHS)
+_TRACED_POINTS = real(POINTS_WORDS, (ANY, 3), traced=True, **LENGTHS)
+_TRACED_POINTS_OR_NONE = real(f"{POINTS_WORDS}, or None", (ANY, 3), traced=True, none=True, **LENGTHS)
 _STARTS = real("finite numbers of shape (3,) or (n, 3), at most 1e6 m", (3,), (ANY, 3), **LENGTHS)
 _STARTS_OR_NONE = real(
     "None, or finite numbers of shape (3,) or (n, 3), at most 1e6 m", (3,), (ANY, 3), none=True, **LENGTHS
@@ -363,9 +393,11 @@ OF_FUNCTIONS: dict[str, Rule] = {
     "merge.directory": _PATH,
     "run.tiles": real("two integers, first and end, or None", (2,), none=True),
     "status.directory": _PATH,
+    "spline.accelerations": _TRACED_POINTS_OR_NONE,
     "spline.ends": _ENDS,
-    "spline.positions": _POINTS,
+    "spline.positions": _TRACED_POINTS,
     "spline.times": real("instants (n,), s", (ANY,)),
+    "spline.velocities": _TRACED_POINTS_OR_NONE,
     "straight_line.start": _POINT,
     "swing_range.start": _STARTS,
     "table.amplitude": _TEXT_OR_NONE,

@@ -1,8 +1,9 @@
 """Rules of arguments: functions that refuse what an argument may not be."""
 
+import dataclasses
 import os
 import sys
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any
 
 from cspr_jax.errors import InputError
@@ -10,7 +11,7 @@ from cspr_jax.schema.given_numbers import Numbers, whole
 
 # A rule refuses what an argument, named in errors, may not be.
 Rule = Callable[[str, Any], None]
-NESTED = 4  # lists in a list are searched so deep for what jax traces
+NESTED = 4  # what is in a list or a dictionary is searched so deep for what jax traces
 
 
 def real(
@@ -31,7 +32,7 @@ def real(
     kind = Numbers(allowed, shapes or None, **bounds)
 
     def check(key: str, value: Any) -> None:
-        if not ((none and value is None) or (traced and _is_traced(value, NESTED))):
+        if not ((none and value is None) or (traced and _traced_place(value) is not None)):
             kind.array(key, value)
 
     return check
@@ -107,13 +108,35 @@ def many(rule: Rule, allowed: str) -> Rule:
     return check
 
 
-def _is_traced(value: Any, depth: int) -> bool:
+def _traced_place(value: Any, depth: int = NESTED) -> str | None:
+    # Return where a value holds what jax traces, as Python writes it; None: nowhere.
     jax = sys.modules.get("jax")
-    if jax is None or not depth:
-        return False
-    if isinstance(value, list | tuple):
-        return any(_is_traced(part, depth - 1) for part in value)
-    return isinstance(value, jax.core.Tracer)
+    if jax is None or isinstance(value, jax.core.Tracer):
+        return None if jax is None else ""
+    parts: Iterable[tuple[str, Any]] = ()
+    if isinstance(value, Mapping):
+        parts = ((f"[{key!r}]", part) for key, part in value.items())
+    elif isinstance(value, list | tuple):
+        parts = ((f"[{i}]", part) for i, part in enumerate(value))
+    elif dataclasses.is_dataclass(value) and not isinstance(value, type):
+        parts = ((f".{field.name}", getattr(value, field.name)) for field in dataclasses.fields(value))
+    inner = ((name, _traced_place(part, depth - 1)) for name, part in parts) if depth else ()
+    return next((name + place for name, place in inner if place is not None), None)
+
+
+def refuse_tracers(key: str, value: Any, instead: str) -> None:
+    """Refuse what jax traces, anywhere in an argument of a function that computes with NumPy.
+
+    Args:
+        instead: what jax may trace, in words.
+
+    Raises:
+        InputError: it holds a tracer; named by its key where it is in a dictionary.
+    """
+    place = _traced_place(value)
+    if place is not None:
+        fault = "a tracer of jax, as grad, jit and vmap pass"
+        raise InputError(key + place, None, f"must be numbers: {instead}", fault=fault)
 
 
 def word(*words: str) -> Rule:

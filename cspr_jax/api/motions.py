@@ -4,6 +4,7 @@ Motions and margins here have the precision that jax is set to: call `jax.config
 float64, as searches use whatever jax is set to.
 """
 
+import dataclasses
 from typing import Any
 
 import jax
@@ -16,6 +17,7 @@ from cspr_jax.api.arguments import amplitude_of, kernel_problem, warn_of_rest
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import IDENTITY, Frame
 from cspr_jax.curves.files import kept_to, placed_inward, reference_of, samples_of, source_spline
+from cspr_jax.curves.interpolation import linear_maps
 from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import InputError
 from cspr_jax.motions import slacks as motion_slacks
@@ -175,7 +177,7 @@ def spline(
 
     Args:
         robot: a robot of any pattern, on any number of cables.
-        times: (n,) increasing, s.
+        times: (n,) increasing, s; jax may trace positions, velocities and accelerations, but no other argument.
         positions: (n, 3) of the mass centre, in the robot's axes, m.
         quaternions: (n, 4) orientations of the platform, scalar first; None: its own axes.
         velocities: (n, 3) m/s, for Hermite pieces.
@@ -189,10 +191,23 @@ def spline(
     Raises:
         InputError: samples that make no motion.
     """
-    samples = samples_of(times, positions, quaternions, velocities, accelerations)
-    is_platform = isinstance(robot, PlatformRobot)
-    axis = robot.z_axis
-    curve = source_spline(samples, z_axis=axis, is_platform=is_platform, interpolation=interpolation, ends=ends)
+    samples = [array for array in (positions, velocities, accelerations) if array is not None]
+    options = {"interpolation": interpolation, "ends": ends}
+    if not any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(samples)):
+        return _spline(robot, times, quaternions, samples, **options)
+    # Orientations and knots do not depend on them; coefficients are linear in them.
+    arrays = [jnp.asarray(array, float) for array in samples]
+    placed = _spline(robot, times, quaternions, [np.zeros(array.shape) for array in arrays], **options)
+    kind = interpolation or ("cubic" if velocities is None else "hermite")
+    maps = linear_maps(np.asarray(times, float), kind, ends or "rest", len(arrays))
+    table = sum(jnp.einsum("pdn,nw->pdw", part, array) for part, array in zip(maps, arrays, strict=False))
+    moved = dataclasses.replace(placed.motion, position=jnp.asarray(placed.frame.inward(table)))
+    return dataclasses.replace(placed, motion=moved)
+
+
+def _spline(robot: AnyRobot, times, quaternions, arrays: list, **options: str | None) -> Placed[Spline]:
+    samples = samples_of(times, arrays[0], quaternions, *arrays[1:])
+    curve = source_spline(samples, z_axis=robot.z_axis, is_platform=isinstance(robot, PlatformRobot), **options)
     curve, frame = kept_to(robot.pattern, curve, is_planar=False), centred(robot)[1]
     return Placed(placed_inward(curve, frame, reference_of(robot)), frame)
 

@@ -78,6 +78,25 @@ def interpolated(
     return dataclasses.replace(curve, interpolation=interpolation, ends="" if interpolation == "hermite" else ends)
 
 
+def linear_maps(times: np.ndarray, kind: str, ends: str, n_arrays: int) -> list[np.ndarray]:
+    """Linear maps from the samples of a motion to the Bernstein coefficients of its pieces.
+
+    Args:
+        times: (n,) increasing, s.
+        kind: one of `INTERPOLATIONS`.
+        ends: as of `interpolated`.
+        n_arrays: positions, and of Hermite pieces velocities and accelerations too.
+
+    Returns:
+        (n - 1, degree + 1, n) for each array of samples.
+    """
+    since, unit = np.asarray(times, float) - times[0], np.eye(len(times))
+    if kind != "hermite":
+        return [_spline(since, unit, 3 if kind == "cubic" else 5, ends)]
+    arrays = range(n_arrays)
+    return [hermite(since, [unit if i == j else np.zeros_like(unit) for i in arrays]) for j in arrays]
+
+
 def continuous(quaternions: np.ndarray) -> np.ndarray:
     """Unit quaternions, each of the sign that is nearer to the one before.
 

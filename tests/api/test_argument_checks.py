@@ -224,6 +224,24 @@ def test_traced_arguments_pass(good):
     assert jax.eval_shape(jax.vmap(lambda target: margin(target, 1.7)), targets).shape == (5,)
 
 
+def test_tracers_are_refused_where_nothing_is_differentiated(good):
+    """One line names the argument, or the key in it, and the function that jax differentiates instead."""
+    robot, times = good["robot"], np.array([0.0, 1.0])
+    points = jnp.array([[0.4, 0.1, 1.5], [0.3, 0.1, 1.4]])
+    cases = {
+        "targets: .*hypocycloid": lambda x: cspr_jax.minimum_arcs(robot, points * x, z0=1.7),
+        "z0: .*transition": lambda x: cspr_jax.minimum_oscillations(robot, points, z0=x),
+        "positions: .*spline": lambda x: cspr_jax.check(robot, times, points * x),
+        r"given\['z0'\]: .*single motions": lambda x: cspr_jax.plan({"schema": 1, "z0": x}),
+        "positions: .*tensions": lambda x: cspr_jax.workspace(robot, points * x, condition="static"),
+        "times: .*other arguments": lambda x: cspr_jax.spline(robot, times * x, points),
+        "quaternions: .*other arguments": lambda x: cspr_jax.spline(robot, times, points, jnp.eye(4)[:2] * x),
+    }
+    for words, function in cases.items():
+        with pytest.raises(InputError, match=f"^{words}"):
+            jax.grad(function)(1.0)
+
+
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_functions_can_be_pickled(name):
     """Processes that are given one find it again under its name."""

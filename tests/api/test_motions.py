@@ -156,3 +156,40 @@ def test_what_is_no_motion_is_refused():
     ):
         with pytest.raises(InputError):
             refused()
+
+
+SAMPLES = {
+    "cubic": ({}, 1),
+    "natural": ({"ends": "natural"}, 1),
+    "periodic": ({"ends": "periodic"}, 1),
+    "quintic": ({"interpolation": "quintic"}, 1),
+    "hermite": ({}, 2),
+    "hermite of accelerations": ({}, 3),
+}
+
+
+@pytest.mark.parametrize("kind", SAMPLES)
+def test_splines_are_differentiated_by_their_samples(kind):
+    """What jax traces gives the same motion as numbers do, and its derivative: it is linear in them."""
+    options, count = SAMPLES[kind]
+    robot, signs = point_mass("up")
+    times = np.array([0.0, 0.4, 0.9, 1.7, 2.2])
+    rng = np.random.default_rng(7)
+    arrays = [FAR + np.array([0.1, 0.2, 1.5]) * signs + 0.1 * rng.normal(size=(5, 3)), *rng.normal(size=(2, 5, 3))]
+    if kind == "periodic":
+        arrays[0][-1] = arrays[0][0]
+    names = ("positions", "velocities", "accelerations")[:count]
+
+    def states(*given):
+        motion = cspr_jax.spline(robot, times, **dict(zip(names, given, strict=True)), **options)
+        return jax.vmap(motion.state)(jnp.linspace(0.0, 1.0, 7))
+
+    plain, traced = states(*arrays[:count]), jax.jit(states)(*arrays[:count])
+    for one, other in zip(jax.tree.leaves(plain), jax.tree.leaves(traced), strict=True):
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-9)
+    along = [rng.normal(size=(5, 3)) for _ in range(count)]
+    along[0][-1] = along[0][0]
+    _, found = jax.jvp(states, tuple(arrays[:count]), tuple(along))
+    moved = states(*(a + b for a, b in zip(arrays, along, strict=False)))
+    for one, other, slope in zip(*(jax.tree.leaves(x) for x in (plain, moved, found)), strict=True):
+        np.testing.assert_allclose(other - one, slope, rtol=0, atol=1e-8)
