@@ -57,7 +57,7 @@ def ellipse(
     prepared_robot, frame = prepared(robot, pulleys=True)
     if isinstance(frequency, str):
         with double_precision():
-            problem = Problem(prepared_robot, limits_over(robot, limits), named("quintic"))
+            problem = Problem(prepared_robot, limits_over(robot, limits, families=("ellipse",)), named("quintic"))
             place = Ellipse(frame.inward(centre), frame.turned(a), frame.turned(b))
             frequency = chosen_frequency(problem, place, frequency)
     place = Ellipse(*(jnp.asarray(x, float) for x in (frame.inward(centre), frame.turned(a), frame.turned(b))))

@@ -78,5 +78,5 @@ def least_time(
     largest = np.inf if max_acceleration is None else max_acceleration
     with double_precision():
         prepared_robot, frame = prepared(robot)
-        problem = Problem(prepared_robot, limits_over(robot, limits), named("quintic"))
+        problem = Problem(prepared_robot, limits_over(robot, limits, families=("s-curve",)), named("quintic"))
         return least_times(problem, frame.inward(starts), frame.inward(ends), max_acceleration=largest)

@@ -20,6 +20,7 @@ from cspr_jax.config.robot import resolve_robot
 from cspr_jax.curves.files import kept_to, placed_inward, reference_of, samples_of, source_spline
 from cspr_jax.curves.several import SeveralSplines
 from cspr_jax.errors import InputError
+from cspr_jax.motions.attained import with_attained
 from cspr_jax.motions.cause import Cause
 from cspr_jax.motions.proved_answers import answers_of, judge_all_robots, proofs_of
 from cspr_jax.robots.cables import AnyRobot
@@ -111,7 +112,7 @@ def check_many(
                 raise InputError(f"motion {i}, {error.key}", error.value, error.allowed, fault=error.fault) from error
         several, scene = SeveralSplines(motions), scene_of(problem.robot, file, axes, keys, NAME, trajectory=keys)
         proofs = proofs_of(problem, several.bounds, several.durations, scene, several.jumps)
-        answers = answers_of(proofs, several.durations)
+        answers = with_attained(problem, answers_of(proofs, several.durations), motions, scene)
         judge_all_robots(problem, answers, motions, scene)
     names = ("verdict", "duration", "margin", "margin_bound", "limit_margin")
     arrays = {name: getattr(answers, name) for name in names}

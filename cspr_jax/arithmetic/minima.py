@@ -11,6 +11,8 @@ GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 # Places that are refined for each function, points at each place, and rounds, each eight times as fine as the last.
 PLACES, POINTS, ROUNDS = 3, 17, 4
+# Samples whose distances differ by less than this ratio tell how a function bends.
+EVEN = 1e-6
 
 
 class Bracket(NamedTuple):
@@ -68,12 +70,38 @@ def golden_step(function: Callable, bracket: Bracket, *, left_if_equal: bool = T
     return Bracket(low, high, left, right, at_left, at_right), value
 
 
+def vertex_values(times: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Smallest values near samples, estimated by parabolas through three of them each.
+
+    Args:
+        times: (..., n) increasing.
+        values: (..., n, n_functions) samples.
+
+    Returns:
+        (..., n, n_functions) vertices of the parabolas, at samples that are no minima their values.
+    """
+    least = np.array(values, float)
+    gaps = np.diff(times)[..., None]
+    before, after = gaps[..., :-1, :], gaps[..., 1:, :]
+    slopes = np.diff(values, axis=-2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slopes = slopes / gaps
+        fall, rise = slopes[..., :-1, :], slopes[..., 1:, :]
+        square, slope = (rise - fall) / (before + after), (fall * after + rise * before) / (before + after)
+        drop = slope**2 / (4.0 * square)
+    # Both sides of a joint tell nothing of how values change.
+    is_even = np.minimum(before, after) > EVEN * np.maximum(before, after)
+    is_low = (fall <= 0.0) & (rise >= 0.0) & np.isfinite(drop) & is_even
+    least[..., 1:-1, :] -= np.where(is_low, drop, 0.0)
+    return least
+
+
 def narrowed(function: Callable[[np.ndarray], np.ndarray], tau: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Smallest value of each function along each of several motions.
 
     Args:
         function: takes instants (n_motions, m), and gives values (n_motions, m, n_functions).
-        tau: (n,) equidistant instants from 0 to 1, at least three.
+        tau: (n,) or (n_motions, n) increasing instants from 0 to 1, at least three.
         values: (n_motions, n, n_functions) values at these instants.
 
     Returns:
@@ -89,20 +117,28 @@ def narrowed_places(
 
     Args:
         function: as for `narrowed`.
-        tau: (n,) as for `narrowed`.
+        tau: as for `narrowed`.
         values: (n_motions, n, n_functions) as for `narrowed`.
 
     Returns:
         (n_motions, n_functions) values, and (n_motions, n_functions) instants.
     """
+    tau = np.broadcast_to(tau, values.shape[:2])
     padded = np.pad(values, ((0, 0), (1, 1), (0, 0)), constant_values=np.inf)
-    lows = np.where((values <= padded[:, :-2]) & (values <= padded[:, 2:]), values, np.inf)
-    place = tau[np.argsort(lows, axis=1)[:, :PLACES]]  # (n_motions, PLACES, n_functions)
-    smallest, width = values.min(1), tau[1] - tau[0]
-    when = tau[values.argmin(1)]
+    is_low = (values <= padded[:, :-2]) & (values <= padded[:, 2:])
+    order = np.argsort(np.where(is_low, vertex_values(tau, values), np.inf), axis=1)[
+        :, :PLACES
+    ]  # (n_motions, PLACES, n_functions)
+    gaps = np.diff(tau, axis=1, prepend=tau[:, :1], append=tau[:, -1:])
+    place, width = (
+        np.take_along_axis(np.broadcast_to(table[..., None], values.shape), order, axis=1)
+        for table in (tau, np.maximum(gaps[:, 1:], gaps[:, :-1]))
+    )
+    smallest = values.min(1)
+    when = np.take_along_axis(tau, values.argmin(1), axis=1)
     column = np.arange(values.shape[2])
     for _ in range(ROUNDS):
-        points = np.clip(place[..., None] + width * np.linspace(-1.0, 1.0, POINTS), 0.0, 1.0)
+        points = np.clip(place[..., None] + width[..., None] * np.linspace(-1.0, 1.0, POINTS), 0.0, 1.0)
         samples = function(points.reshape(len(points), -1)).reshape(*points.shape, -1)
         # At each place of a function keep only the values of this function: (n_motions, PLACES, n_functions, POINTS).
         own_samples = np.moveaxis(samples[:, :, column, :, column], 0, 2)

@@ -1,5 +1,6 @@
 """Durations of Bezier segments that keep every cable taut, as intervals; and the least of them under limits."""
 
+import math
 from functools import partial
 
 import jax
@@ -156,7 +157,7 @@ def _nearest(judgements: Verdicts) -> int:
 
 
 def slowest(problem: Problem, points: np.ndarray) -> float:
-    """Duration that is long enough for the limits of the cables' speeds and accelerations.
+    """Duration that is long enough for the limits of speeds and accelerations.
 
     Args:
         points: (n + 1, 3) of the path, m; NaN where not known yet.
@@ -166,10 +167,16 @@ def slowest(problem: Problem, points: np.ndarray) -> float:
     """
     way = float(np.nansum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
     way = way or float(spool_radius(problem.robot))
-    speed, acceleration = problem.limits.cable_speed_max, problem.limits.cable_acceleration_max
-    by_speed = 0.0 if speed is None else way / float(np.min(np.asarray(speed)))
-    by_acceleration = 0.0 if acceleration is None else np.sqrt(way / float(np.min(np.asarray(acceleration))))
-    return AMPLE * max(by_speed, by_acceleration)
+    limits = problem.limits
+    speeds, accelerations = (
+        [float(np.min(np.asarray(limit))) for limit in pair if limit is not None]
+        for pair in (
+            (limits.cable_speed_max, limits.speed_max),
+            (limits.cable_acceleration_max, limits.acceleration_max),
+        )
+    )
+    times = [way / speed for speed in speeds] + [math.sqrt(way / acceleration) for acceleration in accelerations]
+    return AMPLE * max(times, default=0.0)
 
 
 def _narrowed(judged, times: np.ndarray, first: int) -> float:

@@ -35,7 +35,7 @@ def limit_slacks(problem: Problem, motions: Bezier, kappa: np.ndarray, is_below:
         is_below: (n,) whether the segment is proved to stay below the spools: elsewhere slacks of tensions are -inf.
 
     Returns:
-        slacks without a unit, (n, n_limits); of speeds 1 - (rate / limit)^2.
+        slacks without a unit, (n, n_limits); of speeds, and of the mass centre, 1 - (rate / limit)^2.
     """
     rows, tables = limits_set(problem.limits), _tables(problem, motions, kappa, is_below)
     slacks = [_SLACKS[row.name](problem, getattr(problem.limits, row.name)) for row in rows]
@@ -87,6 +87,8 @@ def _tables(problem: Problem, motions: Bezier, kappa: np.ndarray, is_below: np.n
         "determinant": np.where(is_below[:, None], level, [1.0, 0.0, 0.0])[:, None],
         "depth": place[:, 2:],
         "rate": product(per_time, product(along, along)),
+        "speed": product(per_time, _dot(growth, growth)),
+        "acceleration": _dot(bend[:, None], bend[:, None]),
         "bend": total(product(per_time, _dot(growth, growth)), -_dot(rays, bend[:, None])),
         "z0": np.broadcast_to(motions.z0[:, None, None], (len(u), 1, 1)),
     }
@@ -130,6 +132,10 @@ def _acceleration(problem: Problem, limit) -> Callable[[Items], Any]:
     return slack
 
 
+def _of_mass_centre(problem: Problem, limit, quantity: str) -> Callable[[Items], Any]:
+    return lambda at: at[quantity] * (-1.0 / float(limit) ** 2) + 1.0
+
+
 # By the names of the limits.
 _SLACKS: dict[str, Callable[[Problem, Any], Callable[[Items], Any]]] = {
     "tension_min": partial(_tension, sense=1.0),
@@ -138,4 +144,6 @@ _SLACKS: dict[str, Callable[[Problem, Any], Callable[[Items], Any]]] = {
     "cable_length_max": _length,
     "cable_speed_max": _speed,
     "cable_acceleration_max": _acceleration,
+    "speed_max": partial(_of_mass_centre, quantity="speed"),
+    "acceleration_max": partial(_of_mass_centre, quantity="acceleration"),
 }

@@ -11,7 +11,7 @@ from cspr_jax.beziers.margins import cubics, smallest_margins
 from cspr_jax.beziers.motion import Bezier
 from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.proved_verdicts import Verdicts, plain_slack
+from cspr_jax.motions.proved_verdicts import SPEEDS, Verdicts, plain_slack
 from cspr_jax.robots.force_balance import pseudotensions
 from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.schema.verdicts import FLAGS, Verdict
@@ -67,7 +67,10 @@ def verdicts(problem: Problem, motions: Bezier) -> Verdicts:
             np.where(known & (proved.attained < -TOLERANCE), [row.flag.value for row in rows], 0), axis=1
         )
         is_open |= ~(proved.bound > TOLERANCE).all(1)
-        shown = [plain_slack(row.name, x) for row, x in zip(rows, proved.attained.T, strict=True)]
+        shown = [
+            plain_slack(row.name, x, (*SPEEDS, "acceleration_max"))
+            for row, x in zip(rows, proved.attained.T, strict=True)
+        ]
         room = np.min(shown, axis=0)
     verdict = np.where(broken > 0, broken, np.where(is_open, Verdict.UNDECIDED.value, 0))
     verdict = np.where(finite, verdict, Verdict.NOT_FINITE.value).astype(FLAGS)

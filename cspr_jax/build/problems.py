@@ -8,7 +8,7 @@ from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude, Traj
 from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.motions import amplitudes
 from cspr_jax.motions.amplitudes import Amplitude, boundary_errors
-from cspr_jax.motions.given_limits import check_bounded, check_certain, check_judged
+from cspr_jax.motions.given_limits import check_bounded, check_certain
 from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.platform import PlatformRobot
@@ -87,7 +87,6 @@ def build_problem(
     try:
         if not is_redundant_platform(robot):
             check_bounded(limit_values)
-        check_judged(limit_values, keys.families)
         check_certain(robot, limit_values, keys.families, in_pairs=robot_file.pairs is not None)
     except InputError as error:
         raise ConfigError(file, str(error)) from error

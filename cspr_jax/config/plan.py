@@ -82,8 +82,8 @@ class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys, FreeMotionKeys):
     )
     point: Literal["mass-centre", "origin"] | None = Field(
         None,
-        description='spline: point of a platform whose positions a file has: "mass-centre", the default, as poses of '
-        'plans, or "origin" of its axes',
+        description='point of a platform whose positions poses and files of motions have: "mass-centre", the default, '
+        'or "origin" of its axes; P0, ellipses and paths of their own are always of the mass centre',
     )
     smooth: Positive | None = Field(
         None,

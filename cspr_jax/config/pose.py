@@ -25,7 +25,11 @@ Turns = Annotated[float, Field(ge=0.0, le=1e6)]
 class Pose(Table):
     """One pose of the sequence."""
 
-    position: Point | None = Field(None, description="target [x, y, z], m; a rest pose may leave it out")
+    position: Point | None = Field(
+        None,
+        description="target [x, y, z], m; of a platform that of its mass centre, unless the plan's `point` says "
+        "otherwise; a rest pose may leave it out",
+    )
     rest: bool = Field(False, description="true: at rest in P0, below the centroid of the spools")
     tilt_torsion: TiltTorsion | None = Field(
         None,

@@ -56,7 +56,10 @@ def axis_points(axis: AxisRange | list[float]) -> np.ndarray:
     return np.array(axis, float)
 
 
-_OF_TARGETS = "{} of the targets, m: {{ start, stop, count }} or a list"
+_OF_TARGETS = (
+    "{} of the targets, m: {{ start, stop, count }} or a list; of a platform those of its mass centre, in workspaces "
+    "of the origin of its axes, unless workspace.point says otherwise"
+)
 _OF_STARTS = "{} of the start points, m, in place of trajectory.from"
 
 
@@ -108,7 +111,7 @@ BetaHatChoice = Annotated[
 class From(Table):
     """Start of every segment."""
 
-    position: Point | None = Field(None, description="start point [x, y, z], m")
+    position: Point | None = Field(None, description="start point [x, y, z], m; of a platform that of its mass centre")
     rest: bool = Field(False, description="true: at rest in P0")
     tilt_torsion: TiltTorsion | None = Field(None, description="poses: orientation at the start, as in a plan")
     quaternion: Quaternion | None = Field(

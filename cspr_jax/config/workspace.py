@@ -116,6 +116,11 @@ class WorkspaceTable(SurroundingsKeys, PoseConditions):
     obstacle: Obstacles | None = Field(
         None, description="interference-free: [[workspace.obstacle]], bodies fixed in space that nothing may meet"
     )
+    point: Literal["mass-centre", "origin"] | None = Field(
+        None,
+        description='point of a platform whose places x, y, z are: "origin" of its axes, the default, or '
+        '"mass-centre", as in plans',
+    )
     speed: Speed | None = Field(
         None,
         description="with cable_speed_max: speed that the origin of the platform frame, or the point mass, must be "

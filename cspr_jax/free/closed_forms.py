@@ -1,6 +1,5 @@
 """Motions of other families over the same poses, from which searches go on."""
 
-import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -17,8 +16,6 @@ from cspr_jax.motions.motion import Motion, states_at
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import ProvedAnswers
 from cspr_jax.robots.point_mass import spool_radius
-from cspr_jax.schema.families import FAMILIES
-from cspr_jax.schema.limits import LIMITS
 
 # Part of the robot's size, and of the speed of a fall from its height, by which motions may miss poses.
 NEAR = 1e-9
@@ -61,15 +58,13 @@ def closed_forms(legs: Sequence[Leg], problem: Problem, poses: FreePoses) -> lis
         legs: of these families.
 
     Returns:
-        the forms of the families that join these poses, within all limits that the family knows.
+        the forms of the families that join these poses, within all limits.
     """
     forms = list[ClosedForm]()
-    limits = dataclasses.replace(problem.limits, **{row.name: None for row in LIMITS if row.of_mass_centre})
     for leg in legs:
-        taken = problem if FAMILIES[leg.stops.family].knows_mass_centre else problem._replace(limits=limits)
         try:
-            leg.check(taken)
-            answers, motions = leg.join(taken, poses.z0)
+            leg.check(problem)
+            answers, motions = leg.join(problem, poses.z0)
         except (ConfigError, InputError):
             continue  # the family joins other poses
         proved = answers if isinstance(answers, ProvedAnswers) else None

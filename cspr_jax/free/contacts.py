@@ -18,6 +18,7 @@ from cspr_jax.free.question import FreeQuestion, more
 from cspr_jax.free.search import BARRIERS, Ending, OutOfTime, again, optima, started
 from cspr_jax.free.starts import BENT, bulge, ways
 from cspr_jax.free.tasks import OUTER, ClearancePlanes, Tasks, Unknowns
+from cspr_jax.motions.criteria import has_extent
 from cspr_jax.motions.piece_slacks import PieceSlacks
 from cspr_jax.robots.clearance import Meeting, Scene, clearances
 from cspr_jax.robots.contact_bodies import bodies_of, default_scene, meetings
@@ -121,7 +122,9 @@ def _clear(
 def _clearances(question: FreeQuestion, slacks: PieceSlacks) -> np.ndarray:
     # Lower bounds (n_pieces, n_meetings), m.
     scene, pairs = _bodies(question)
-    last = len(slacks.rows) - int(question.problem.limits.floor is not None and scene.body is not None)
+    last = len(slacks.rows) - int(
+        question.problem.limits.floor is not None and has_extent(question.problem.robot, scene)
+    )
     return slacks.low[:, last - len(pairs) : last]
 
 

@@ -222,7 +222,7 @@ def _bounds_of_rows(problem: Problem) -> np.ndarray:
     robot, names = problem.robot, names_of(problem.robot, problem.limits)
     faces, limit_names = 2 * len(spanning(robot.n_cables, robot.dof)), moving(problem.limits)
     counts = {"tension_min": faces, "tension_max": faces, "cable_speed_max": robot.n_cables}
-    counts["cable_acceleration_max"] = 2 * robot.n_cables
+    counts |= {"cable_acceleration_max": 2 * robot.n_cables, "speed_max": 1, "acceleration_max": 2}
     rows = [np.tile(np.arange(faces // 2), 2)]
     for name, count in counts.items():
         if name in limit_names:

@@ -80,6 +80,11 @@ def _constants(lines: LineSlacks, edges: np.ndarray) -> tuple[np.ndarray, np.nda
             most = line.largest["cable_acceleration_max"] / least
             up = np.minimum(up, np.where(rates[0] > 0.0, most, np.inf).min(-1))
             down = np.minimum(down, np.where(rates[1] < 0.0, most, np.inf).min(-1))
+        length = np.sqrt(line.square)
+        if "speed_max" in line.largest:
+            speed = np.minimum(speed, line.largest["speed_max"][..., 0] / length)
+        if "acceleration_max" in line.largest:
+            up, down = (np.minimum(x, line.largest["acceleration_max"][..., 0] / length) for x in (up, down))
     return np.maximum(up, 0.0), np.maximum(down, 0.0), speed
 
 

@@ -43,7 +43,7 @@ class LineSlacks:
         spans: (n_faces,) whether the cables of the face span it.
         low: smallest tensions over the mass by group of faces, (n_cables,) m/s^2 each.
         high: likewise the largest, inf for none.
-        largest: of the limits that depend on how the effector moves, by name; (n_cables,) each.
+        largest: of the limits that depend on how the effector moves, by name; (n_cables,) of cables, else (1,).
     """
 
     square: Array
@@ -114,9 +114,9 @@ def line_slacks(problem: Problem, start: Array, end: Array) -> LineSlacks:
         low=low,
         high=high,
         largest={
-            row.name: jnp.broadcast_to(jnp.asarray(getattr(problem.limits, row.name)), (robot.n_cables,))
+            row.name: jnp.broadcast_to(getattr(problem.limits, row.name), (robot.n_cables if row.per_cable else 1,))
             for row in limits_set(problem.limits)
-            if row.quantity in ("speed", "acceleration")
+            if row.of_motion and row.quantity != "tension"
         },
     )
 
@@ -160,6 +160,11 @@ def slacks(line: LineSlacks, name: str, at: Instants, tensions: Any = None) -> A
         (..., n_rows): distances from the faces in m/s^2, positive inside, inf of a face that bounds nothing; of limits
         of a motion without a unit, of speeds 1 - (rate / limit)^2.
     """
+    if name == "speed_max":
+        return 1.0 - at.speed * (line.square[..., None] / line.largest[name] ** 2)
+    if name == "acceleration_max":
+        share = at.bend * (line.square[..., None] ** 0.5 / line.largest[name])
+        return joined(1.0 - share, 1.0 + share)
     away = at.s - line.nearest
     square = line.square[..., None]
     length2 = away**2 * square + line.apart

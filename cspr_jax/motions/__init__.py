@@ -39,6 +39,7 @@ Files, each importing only from those above it:
     piece_slacks        slacks of any motion over each of its pieces
     feeds               proof of largest speeds that hold over some pieces of a motion alone
     proved_answers      answers of motions that give bounds of their states
+    attained            smallest slacks that proved motions attain, and when
     judged              motions of families that know neither surroundings nor pulleys, judged with both
     stretching          the least uniform stretching of time that is feasible
     proved              summaries of proofs of motions

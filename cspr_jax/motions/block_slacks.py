@@ -20,7 +20,7 @@ from cspr_jax.motions.criteria import AT_INSTANTS, contact_criteria, criteria, j
 from cspr_jax.motions.limits import limits_set
 from cspr_jax.robots.cables import AnyRobot, wrench_units
 from cspr_jax.robots.clearance import Scene
-from cspr_jax.robots.contact_bodies import Bodies, bodies_of, default_scene
+from cspr_jax.robots.contact_bodies import Bodies, bodies_of, default_scene, platform_corners
 from cspr_jax.robots.contact_bounds import contact_bounds, corner_depths, passings
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import plane_normal
@@ -103,8 +103,9 @@ def _kernel(
             parts += [*tension_slacks(robot, limits, matrix, wrench), *limit_slacks(limits, state, cables)]
             parts += _of_pose(robot, matrix, state)
         parts.append(contact_bounds(robot, bodies, state, cables))
-        if limits.floor is not None and bodies.body is not None:
-            heights = -corner_depths(bodies.body, state) + limits.floor
+        corners = platform_corners(robot, bodies)
+        if limits.floor is not None and corners is not None:
+            heights = -corner_depths(corners, state) + limits.floor
             parts.append((jnp.min(heights.low(), keepdims=True), jnp.min(heights.high(), keepdims=True)))
         return _joined(parts)
 

@@ -8,7 +8,8 @@ In natural units (N, m, m/s, m/s^2), with n cables:
     regular     of a platform on n = dof cables: size of the normalised determinant less what counts as singular
     below       of a point mass or a rigid platform on n = dof cables: depth below the plane of the spools
     contacts    of all bodies that can meet: clearance of their surfaces, `robots.contact_bounds`
-    floor       where there is one, and the shape of the platform is known: height of its lowest corner above the floor
+    floor       of a platform, where there is one: height above it of the lowest of its attachment points, and of the
+                corners of its shape, if that is known
 """
 
 from typing import Literal, NamedTuple
@@ -21,7 +22,7 @@ from cspr_jax.robots.clearance import Scene
 from cspr_jax.robots.contact_bodies import default_scene, meetings
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.patterns import PATTERNS
-from cspr_jax.robots.platform import RIGID
+from cspr_jax.robots.platform import RIGID, PlatformRobot
 from cspr_jax.robots.wrench_balance import SINGULAR
 from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.schema.verdicts import Verdict
@@ -115,9 +116,18 @@ def contact_criteria(robot: AnyRobot, limits: Limits, scene: Scene | None = None
     for kind, cable, other in meetings(robot, around):
         bodies = [k for k in (cable, other if kind == "cables" else -1) if k >= 0]
         rows.append(Criterion(FLAGS[kind], tuple(bodies), "m", other if FLAGS[kind] == Verdict.OBSTACLE else None))
-    if limits.floor is not None and around.body is not None:
+    if limits.floor is not None and has_extent(robot, around):
         rows.append(Criterion(Verdict.BELOW_FLOOR, (), "m", allowed=float(limits.floor), sense="most"))
     return rows
+
+
+def has_extent(robot: AnyRobot, scene: Scene) -> bool:
+    """Tell whether a robot has points beside its mass centre that must be above a floor.
+
+    Returns:
+        whether it is a platform, or has a shape.
+    """
+    return isinstance(robot, PlatformRobot) or scene.body is not None
 
 
 def judged_poses(robot: AnyRobot) -> tuple[bool, bool]:

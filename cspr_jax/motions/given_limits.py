@@ -95,24 +95,16 @@ def check_bounded(limits: Limits) -> None:
         )
 
 
-def check_judged(limits: Limits, families: tuple[str, ...]) -> None:
-    """Refuse limits of the mass centre's motion where verdicts do not take them into account.
-
-    Args:
-        families: as for `check_certain`.
+def check_of_motion(limits: Limits) -> None:
+    """Refuse limits of the mass centre's motion where none is judged.
 
     Raises:
         InputError: a limit that must be absent.
     """
-    knowing = [row.name for row in FAMILIES.values() if row.knows_mass_centre]
     for row in LIMITS:
-        if (
-            row.of_mass_centre
-            and getattr(limits, row.name) is not None
-            and not (families and set(families) <= set(knowing))
-        ):
-            allowed = f"absent but for the families {', '.join(knowing)}"
-            raise InputError(row.name, float(getattr(limits, row.name)), allowed)
+        value = getattr(limits, row.name)
+        if row.of_mass_centre and value is not None:
+            raise InputError(row.name, float(value), "absent where no motion is judged")
 
 
 def check_certain(
@@ -208,6 +200,7 @@ def limits_over(
     merged = limits_of(robot, vars(limits or NO_LIMITS), vars(robot.limits), "limits.")
     if not any_tensions:
         check_bounded(merged)
-    check_judged(merged, families)
+    if not families:
+        check_of_motion(merged)
     check_certain(robot, merged, families)
     return merged

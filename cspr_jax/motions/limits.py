@@ -9,6 +9,7 @@ from jax import Array
 from cspr_jax.robots import cables
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.state import State
 from cspr_jax.schema.limits import LIMITS, Limit
 
@@ -27,7 +28,7 @@ class Values(NamedTuple):
 
     Fields:
         tension: (n_cables,) N.
-        depth: () z, z down, m.
+        depth: () z of the lowest point of the effector, z down, m.
         length: (n_cables,) of the cables, m.
         speed: (n_cables,) size of the rate of the length, m/s.
         acceleration: (n_cables,) size of its second derivative, m/s^2.
@@ -57,10 +58,26 @@ def values(robot: AnyRobot, state: State) -> Values:
     return _values(robot, state, cables.tensions(robot, state))
 
 
+def lowest_depth(robot: AnyRobot, state: State, corners: Array | None = None) -> Array:
+    """Depth of the lowest point of the effector: mass centre, or joint, attachment points, and corners of its shape.
+
+    Args:
+        state: z down.
+        corners: (m, 3) of the shape of a platform, from the mass centre, platform axes, m; None: it has none.
+
+    Returns:
+        () m.
+    """
+    if not isinstance(robot, PlatformRobot):
+        return state.position[2]
+    points = robot.platform_points if corners is None else jnp.concatenate([robot.platform_points, corners])
+    return state.position[2] + jnp.maximum(jnp.max(points @ state.rotation[2]), 0.0)
+
+
 def _values(robot: AnyRobot, state: State, tensions: Array) -> Values:
     length, rate, bend = cables.cable_motion(robot, state)
     speed, pull = jnp.linalg.norm(state.velocity), jnp.linalg.norm(state.acceleration)
-    return Values(tensions, state.position[2], length, jnp.abs(rate), jnp.abs(bend), speed, pull)
+    return Values(tensions, lowest_depth(robot, state), length, jnp.abs(rate), jnp.abs(bend), speed, pull)
 
 
 def scales(n_cables: int, weight: Array, z0: Array) -> dict[str, tuple[float, Array]]:

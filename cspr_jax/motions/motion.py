@@ -23,6 +23,8 @@ from cspr_jax.robots.state_bounds import StateBounds
 
 # States that are computed at once.
 STATES = 64
+# Distance of the earlier side of a joint from it, over the time.
+BESIDE = 4.0 * np.finfo(float).eps
 
 jax.tree_util.register_dataclass(Frame, ["signs", "origin", "rest"], [])
 
@@ -146,6 +148,23 @@ class Placed(Generic[Kind]):
     def breaks(self) -> Array:
         """Breaks; see `Motion.breaks`."""
         return self.motion.breaks()
+
+
+def sample_times(motion: Motion, count: int, each: int = 4) -> np.ndarray:
+    """Times at which extremes of a motion are looked for: equidistant ones, and some in each piece and at its ends.
+
+    Args:
+        count: of equidistant times, at least three.
+        each: intervals of a piece, at least.
+
+    Returns:
+        (n,) increasing tau; at joints on both sides of them.
+    """
+    breaks = np.asarray(motion.breaks(), float)
+    edges = np.concatenate([[0.0], breaks, [1.0]])
+    inner = edges[:-1, None] + np.diff(edges)[:, None] * np.linspace(0.0, 1.0, each + 1)[1:-1]
+    parts = np.linspace(0.0, 1.0, count), inner.ravel(), breaks, breaks * (1.0 - BESIDE)
+    return np.sort(np.clip(np.concatenate(parts), 0.0, 1.0))
 
 
 def common_shape(motion: Kind) -> Kind:

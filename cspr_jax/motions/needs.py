@@ -13,7 +13,7 @@ from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.minima import narrowed_places
 from cspr_jax.motions.limits import limits_set, scales, slack, values
-from cspr_jax.motions.motion import Motion, common_shape
+from cspr_jax.motions.motion import Motion, common_shape, sample_times
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots import wrench_balance
 from cspr_jax.robots.cables import AnyRobot
@@ -75,7 +75,7 @@ def needs(problem: Problem, motion: Motion, samples: int) -> list[Need]:
         reached, slacks = in_batches(kernel, tau.ravel(), size=BATCH)
         return reached.reshape(*tau.shape, -1), slacks.reshape(*tau.shape, -1)
 
-    tau = np.linspace(0.0, 1.0, samples)
+    tau = sample_times(motion, samples)
     least, when = (x[0] for x in narrowed_places(lambda points: at(points)[1], tau, at(tau[None])[1]))
     column = np.arange(len(when))
     reached, first, worst = at(when[None])[0][0][column, column], 0, []

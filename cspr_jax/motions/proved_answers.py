@@ -8,7 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.arithmetic.intervals import united
 from cspr_jax.motions.answers import Answers
+from cspr_jax.motions.block_parts import TimeBlocks
 from cspr_jax.motions.block_slacks import BlockSlacks, block_slacks
 from cspr_jax.motions.cause import UNITS, Cause
 from cspr_jax.motions.criteria import AT_INSTANTS, Criterion, contact_criteria, criteria
@@ -95,6 +97,7 @@ class MotionProof(NamedTuple):
             failing=usual.failing + proof.failing,
             open=usual.open + proof.open,
             blocks=usual.blocks + proof.blocks,
+            near=usual.near,
         )
         scales = np.append(self.scales, row.allowed)
         return self._replace(criteria=(*self.criteria, row), proof=both, scales=scales, feeds=feeds)
@@ -103,6 +106,20 @@ class MotionProof(NamedTuple):
     def failing(self) -> np.ndarray:
         """Intervals in which at least one criterion fails, (m, 2) s, in their order and apart from each other."""
         return united(np.concatenate([np.empty((0, 2)), *self.proof.failing]))
+
+    @property
+    def failing_by_criterion(self) -> dict[str, list[list[float]]]:
+        """Intervals in which criteria fail, by the names of their flags, [start, end] s each."""
+        parts: dict[str, list[np.ndarray]] = {}
+        for row, intervals in zip(self.criteria, self.proof.failing, strict=True):
+            if len(intervals):
+                parts.setdefault(row.flag.text, []).append(intervals)
+        return {name: united(np.concatenate(each)).tolist() for name, each in parts.items()}
+
+    @property
+    def details(self) -> dict[str, Any]:
+        """Intervals of failure, as `Answers.details` gives them."""
+        return {"failing": self.failing.tolist(), "failing_by_criterion": self.failing_by_criterion}
 
     def causes(self, frame: Frame) -> tuple[Cause, ...]:
         """The worst cable of each criterion that fails, the worst one first; else of the criterion nearest to it.
@@ -119,24 +136,6 @@ class MotionProof(NamedTuple):
         order = [k for k in order if self.broken[k]]
         flags = [self.criteria[k].flag for k in order]
         return tuple(cause_of(self, k, frame) for j, k in enumerate(order) if flags.index(flags[j]) == j)
-
-
-def united(intervals: np.ndarray) -> np.ndarray:
-    """Intervals of which none overlaps or touches another one.
-
-    Args:
-        intervals: (n, 2) in any order.
-
-    Returns:
-        (m, 2) with the same points, increasing.
-    """
-    merged: list[list[float]] = []
-    for start, end in sorted(intervals.tolist()):
-        if merged and start <= merged[-1][1]:
-            merged[-1][1] = max(merged[-1][1], end)
-        else:
-            merged.append([start, end])
-    return np.array(merged).reshape(-1, 2)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -156,7 +155,7 @@ class ProvedAnswers(Answers):
 
     def details(self, i: int) -> dict[str, Any]:
         """Intervals of failure and the unit of the margin; see `Answers.details`."""
-        return {"margin_unit": "N", "failing": self.proof[i].failing.tolist()}
+        return {"margin_unit": "N"} | self.proof[i].details
 
     def proved_causes(self, i: int, frame: Frame) -> tuple[Cause, ...]:
         """The worst cable of each criterion that fails, else the nearest to it; see `Answers.proved_causes`."""
@@ -316,14 +315,25 @@ def answers_of(proofs: Sequence[MotionProof], duration: np.ndarray) -> ProvedAns
         tried_arcs=none,
         verdict=np.array([proof.verdict.value for proof in proofs], FLAGS),
         duration=duration,
-        margin=np.array([row.least(row.proof.high, TENSIONS) for row in proofs]),
-        margin_bound=np.array([row.least(row.proof.low, TENSIONS) for row in proofs]),
-        limit_margin=np.array([row.least(row.proof.high, TENSIONS, others=True) for row in proofs]),
+        **margins_of(proofs),
         feasible_at_infinity=nothing,
         tolerated=nothing.copy(),
         not_tolerated=nothing.copy(),
         proof=each,
     )
+
+
+def margins_of(proofs: Sequence[MotionProof]) -> dict[str, np.ndarray]:
+    """Margins of proofs.
+
+    Returns:
+        (n,) each, by their names in `Answers`.
+    """
+    return {
+        "margin": np.array([case.least(case.proof.high, TENSIONS) for case in proofs]),
+        "margin_bound": np.array([case.least(case.proof.low, TENSIONS) for case in proofs]),
+        "limit_margin": np.array([case.least(case.proof.high, TENSIONS, others=True) for case in proofs]),
+    }
 
 
 def sampled_proof(
@@ -362,8 +372,16 @@ def sampled_proof(
         failing=failing,
         open=[whole] * high.shape[1],
         blocks=len(tau),
+        near=_between(times, high),
     )
     return _proof(problem, rows, proof, scene)
+
+
+def _between(times: np.ndarray, high: np.ndarray) -> TimeBlocks:
+    # Blocks between instants, of which nothing is known from below.
+    upper = np.minimum(high[1:], high[:-1])
+    slacks = BlockSlacks(np.full_like(upper, -np.inf), upper).complete()
+    return TimeBlocks(np.zeros(len(upper), int), times[:-1], times[1:], slacks)
 
 
 def _runs(times: np.ndarray, flags: np.ndarray) -> np.ndarray:

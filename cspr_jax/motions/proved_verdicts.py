@@ -4,6 +4,9 @@ import dataclasses
 
 import numpy as np
 
+# Limits whose slacks are proved of squares.
+SPEEDS = ("cable_speed_max", "speed_max")
+
 
 @dataclasses.dataclass(frozen=True)
 class Verdicts:
@@ -32,13 +35,14 @@ class Verdicts:
             getattr(self, name)[rows] = values
 
 
-def plain_slack(name: str, values: np.ndarray) -> np.ndarray:
+def plain_slack(name: str, values: np.ndarray, squared: tuple[str, ...] = SPEEDS) -> np.ndarray:
     """Slack of a limit as it is shown.
 
     Args:
-        values: (...) slack as it is proved: of speeds 1 - (rate / limit)^2.
+        values: (...) slack as it is proved: of squared rates 1 - (rate / limit)^2.
+        squared: names of the limits of which it is so.
 
     Returns:
-        (...) of speeds 1 - rate / limit.
+        (...) 1 - rate / limit.
     """
-    return 1.0 - np.sqrt(np.maximum(1.0 - values, 0.0)) if name == "cable_speed_max" else values
+    return 1.0 - np.sqrt(np.maximum(1.0 - values, 0.0)) if name in squared else values

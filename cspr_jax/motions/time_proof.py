@@ -35,6 +35,7 @@ class TimeProof:
         open: for each criterion (m, 2) intervals, none longer than the resolution unless blocks ran out, that are
             undecided.
         blocks: number of blocks that were looked at.
+        near: blocks that may hold the smallest slack of some criterion; None: not known.
     """
 
     low: np.ndarray
@@ -43,6 +44,7 @@ class TimeProof:
     failing: list[np.ndarray]
     open: list[np.ndarray]
     blocks: int
+    near: TimeBlocks | None = None
 
 
 def time_proof(
@@ -182,17 +184,13 @@ def _proofs(blocks: TimeBlocks, totals: np.ndarray) -> list[TimeProof]:
     low, high = (_least(blocks.motion, side, count) for side in blocks.slacks[:2])
     failing = [_merged(blocks, column < 0.0, count) for column in blocks.slacks.high.T]
     is_open = [_merged(blocks, column, count) for column in blocks.undecided().T]
-    when = np.full_like(high, np.nan)
-    firsts = np.searchsorted(blocks.motion, np.arange(count + 1))
+    proofs, firsts = [], np.searchsorted(blocks.motion, np.arange(count + 1))
     for i, (first, last) in enumerate(itertools.pairwise(firsts)):
-        rows = first + blocks.slacks.high[first:last].argmin(0)
-        when[i] = 0.5 * (blocks.start + blocks.end)[rows]
-    return [
-        TimeProof(
-            low[i], high[i], when[i], [parts[i] for parts in failing], [parts[i] for parts in is_open], int(totals[i])
-        )
-        for i in range(count)
-    ]
+        when = 0.5 * (blocks.start + blocks.end)[first + blocks.slacks.high[first:last].argmin(0)]
+        near = blocks.taken(first + np.flatnonzero((blocks.slacks.low[first:last] <= high[i]).any(1)))
+        sides = [parts[i] for parts in failing], [parts[i] for parts in is_open]
+        proofs.append(TimeProof(low[i], high[i], when, *sides, int(totals[i]), near))
+    return proofs
 
 
 def _merged(blocks: TimeBlocks, flags: np.ndarray, count: int) -> list[np.ndarray]:

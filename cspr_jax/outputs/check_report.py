@@ -7,9 +7,11 @@ import numpy as np
 
 from cspr_jax.curves.spline import Spline
 from cspr_jax.motions.criteria import Criterion
+from cspr_jax.motions.demands import EXTREMES
 from cspr_jax.motions.proved_answers import MotionProof, ProvedAnswers
 from cspr_jax.outputs.plan_report import axes_text, finite, retimed_words, verdict_text
 from cspr_jax.plans.planning import PlannedMotions
+from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.runtime.terminal import cell
 from cspr_jax.schema.verdicts import Verdict
 
@@ -27,8 +29,8 @@ QUANTITIES = {
     Verdict.CABLE_TOO_LONG: ("cable_length_max", "largest cable length"),
     Verdict.CABLE_TOO_FAST: ("cable_speed_max", "largest cable speed"),
     Verdict.CABLE_OVER_ACCELERATION: ("cable_acceleration_max", "largest cable acceleration"),
-    Verdict.TOO_FAST: ("speed_max", "largest speed"),
-    Verdict.OVER_ACCELERATION: ("acceleration_max", "largest acceleration"),
+    Verdict.TOO_FAST: ("speed_max", "largest speed of the mass centre"),
+    Verdict.OVER_ACCELERATION: ("acceleration_max", "largest acceleration of the mass centre"),
     Verdict.CABLE_CABLE: ("cable_distance", "distance between cables"),
     Verdict.CABLE_PLATFORM: ("platform_distance", "distance of cables from the platform"),
     Verdict.OBSTACLE: ("obstacle_distance", "distance from obstacles"),
@@ -63,13 +65,15 @@ def check_object(plan: PlannedMotions) -> dict[str, Any]:
         "tolerated": float(answers.tolerated[0]),
         "not_tolerated": float(answers.not_tolerated[0]),
         "cause": [] if plan.feasible else [cause.to_dict() for cause in plan.causes[0]],
-        "failing": case.failing.tolist(),
+        **case.details,
         "tension_min": float(demands.tension_min[0]),
         "tension_max": float(demands.tension_max[0]),
         "tension_margin": float(answers.margin[0]) if plan.is_redundant else None,
         "cable_length_max": float(demands.length_max[0]),
         "cable_speed_max": float(demands.speed_max[0]),
         "cable_acceleration_max": float(demands.acceleration_max[0]),
+        "speed_max": float(demands.mass_centre_speed[0]),
+        "acceleration_max": float(demands.mass_centre_acceleration[0]),
         "z_lowest": float(demands.lowest[0]),
         "demands": {QUANTITIES[flag][0]: row for flag, row in _demands(plan, case).items()},
         "point": plan.point if plan.robot_file.is_platform else None,
@@ -118,6 +122,32 @@ def _demands(plan: PlannedMotions, case: MotionProof) -> dict[Verdict, dict[str,
             "cable": rows[k].cables[0] if rows[k].cables else None,
             **({"cables": list(rows[k].cables)} if len(rows[k].cables) > 1 else {}),
             "t": float(case.proof.when[k]),
+        }
+    table |= _sampled_demands(plan)
+    return {flag: table[flag] for flag in QUANTITIES if flag in table}
+
+
+def _sampled_demands(plan: PlannedMotions) -> dict[Verdict, dict[str, Any]]:
+    # Extremes that no criterion of the proof has: found along the motion, without a bound.
+    demands, rows = plan.demands, dict[Verdict, tuple[str, str, Any]]()
+    if plan.is_redundant:
+        low, high = tension_range(plan.problem.robot, plan.problem.limits)
+        rows |= {Verdict.SLACK_CABLE: ("tension_min", "N", low), Verdict.OVER_TENSION: ("tension_max", "N", high)}
+    if plan.problem.limits.speed_max is None:
+        rows[Verdict.TOO_FAST] = ("mass_centre_speed", "m/s", None)
+    if plan.problem.limits.acceleration_max is None:
+        rows[Verdict.OVER_ACCELERATION] = ("mass_centre_acceleration", "m/s^2", None)
+    table, count = {}, plan.problem.robot.n_cables
+    for flag, (name, unit, allowed) in rows.items():
+        cable = int(demands.cables[0, EXTREMES.index(name)])
+        table[flag] = {
+            "value": float(getattr(demands, name)[0]),
+            "bound": math.nan,
+            "allowed": math.nan if allowed is None else float(np.broadcast_to(allowed, count)[cable]),
+            "unit": unit,
+            "sense": "at least" if flag == Verdict.SLACK_CABLE else "at most",
+            "cable": cable if cable >= 0 else None,
+            "t": float(demands.when[0, EXTREMES.index(name)]),
         }
     return table
 
@@ -206,7 +236,8 @@ def check_table(plan: PlannedMotions):
         sign = "≥" if row["sense"] == "at least" else "≤"
         numbers = row.get("cables", [] if row["cable"] is None else [row["cable"]])
         cable = ", ".join(str(number + 1) for number in numbers) or "-"
-        values = [_digits(row["value"]), f"{sign} {_digits(row['bound'])}", f"{sign} {_digits(row['allowed'])}"]
+        values = [_digits(row["value"])]
+        values += [f"{sign} {_digits(row[name])}" if math.isfinite(row[name]) else "-" for name in ("bound", "allowed")]
         unit = row["unit"].replace("^2", "²")
         table.add_row(*(cell(text) for text in (QUANTITIES[flag][1], *values, unit, cable, f"{row['t']:.4f}")))
     return table

@@ -13,11 +13,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax import __version__
+from cspr_jax.arithmetic.intervals import united
 from cspr_jax.errors import ConfigError
 from cspr_jax.lines.motion import TimedLine
 from cspr_jax.motions.acceleration_sets import along
 from cspr_jax.motions.motion import Motion, common_shape, outward
-from cspr_jax.motions.proved_answers import united
+from cspr_jax.outputs.binding import binding
 from cspr_jax.outputs.path_columns import path_columns
 from cspr_jax.plans.causes import cause_columns
 from cspr_jax.plans.planning import PlannedMotions
@@ -36,6 +37,7 @@ from cspr_jax.schema.quantities import (
     columns_of,
     flag_attributes,
 )
+from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.netcdf import describe, new_hdf5, set_attributes
 from cspr_jax.store.publishing import publish
@@ -61,8 +63,8 @@ SAME_TICK = 1e-6
 def _states(robot, limits: Limits, motion: Motion, tau, *, rule: str, with_couples: bool):
     def one(t):
         state = motion.state(t)
-        length, rate, _ = cables.cable_motion(robot, state)
-        of_cables = {"length": length, "rate": rate}
+        length, rate, rate_slope = cables.cable_motion(robot, state)
+        of_cables = {"length": length, "rate": rate, "rate_slope": rate_slope}
         if robot.n_cables > robot.dof:
             chosen = cables.shared(robot, state, limits, rule)
             of_cables |= {"tension": chosen.tensions, "tension_residual": chosen.residual}
@@ -149,6 +151,7 @@ def rows_at(plan: PlannedMotions, taus: Sequence[np.ndarray]) -> dict[str, np.nd
             robot, limits, motion, padded, rule=plan.keys.tension_rule, with_couples=with_couples
         )
         state, of_cables = jax.tree.map(np.asarray, states_of_segment)
+        of_cables |= binding(plan.problem, state, of_cables, tau * duration[i], plan.details(i))
         state = outward(plan.frame, state)
         part = {name: getattr(state, field) for name, field in _FIELDS.items()} | of_cables
         part = {name: None if values is None else values[: len(tau)] for name, values in part.items()}
@@ -231,7 +234,8 @@ def _write_hdf5(plan: PlannedMotions, path: Path, columns: dict[str, np.ndarray]
             describe(data, SEGMENTS[name])
             if name != "segment":
                 data.dims[0].attach_scale(file["segment"])
-        set_attributes(file["segment_verdict"], flag_attributes())
+        for name in ("segment_verdict", "binding"):
+            set_attributes(file[name], flag_attributes())
         _write_others(file, plan.outcome_columns | failures(plan) | path_columns(plan))
 
 
@@ -261,7 +265,20 @@ def failures(plan: PlannedMotions) -> dict[str, np.ndarray]:
         start + np.reshape(plan.details(i).get("failing", ()), (-1, 2)) for i, start in enumerate(starts.tolist())
     ]
     failing = united(np.concatenate([np.empty((0, 2)), *intervals]))
-    return {"failure": np.arange(1.0, len(failing) + 1.0), "failing": failing} if len(failing) else {}
+    if not len(failing):
+        return {}
+    parts = [
+        (Verdict[name.upper()].value, start + interval[0], start + interval[1])
+        for i, start in enumerate(starts.tolist())
+        for name, each in plan.details(i).get("failing_by_criterion", {}).items()
+        for interval in each
+    ]
+    columns = {"failure": np.arange(1.0, len(failing) + 1.0), "failing": failing}
+    if parts:
+        columns["criterion_failure"] = np.arange(1.0, len(parts) + 1.0)
+        columns["criterion_failing"] = np.array([part[1:] for part in parts])
+        columns["criterion_flag"] = np.array([part[0] for part in parts], FLAGS)
+    return columns
 
 
 def attributes(plan: PlannedMotions) -> dict[str, Any]:

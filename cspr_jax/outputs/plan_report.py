@@ -80,6 +80,7 @@ _OF_SOME = (
     "control_points",
     "taut_durations",
     "failing",
+    "failing_by_criterion",
     "frequency",
     "frequency_intervals",
     "pseudotension_margin",
@@ -127,6 +128,8 @@ def _segment_object(plan: PlannedMotions, i: int) -> dict[str, Any]:
         "cable_length_max": float(demands.length_max[i]),
         "cable_speed_max": float(demands.speed_max[i]),
         "cable_acceleration_max": float(demands.acceleration_max[i]),
+        "speed_max": float(demands.mass_centre_speed[i]),
+        "acceleration_max": float(demands.mass_centre_acceleration[i]),
         "samples": int(demands.samples[i]),
     }
     return fields | dict.fromkeys(_OF_SOME) | plan.details(i) | {"margin_unit": plan.margin_unit(i)}
@@ -210,6 +213,7 @@ def _numbers(segments: list[dict[str, Any]]) -> dict[str, Column]:
     columns["tension (N)"] = lambda segment: " .. ".join(
         _number(segment[name], ".3f") for name in ("tension_min", "tension_max")
     )
+    columns |= {"v (m/s)": _of("speed_max", ".3f"), "a (m/s²)": _of("acceleration_max", ".3f")}
     if proved:
         return columns
     if all(segment["tension_margin"] is not None for segment in segments):

@@ -56,7 +56,7 @@ class JudgedAnswers(Answers):
     def details(self, i: int) -> dict[str, Any]:
         """Details of the family, and intervals of failure; see `Answers.details`."""
         details, proof = self.plain.details(i), self.proofs[i]
-        return details if proof is None else details | {"failing": proof.failing.tolist()}
+        return details if proof is None else details | proof.details
 
     def proved_causes(self, i: int, frame: Frame) -> tuple[Cause, ...] | None:
         """Causes by the proof, unless it says nothing against the motion; see `Answers.proved_causes`."""
@@ -125,7 +125,13 @@ class JudgedLeg(Leg):
         most = stops.max_arcs if is_searched else 0
         judged = judge.smallest(join, prescribed, step=self._leg.step, max_arcs=most)
         motions = join(np.arange(len(self)), judged.arcs)[1]
-        return _answers(judged.answers, judged.proofs, has_pulleys=has_pulleys), motions
+        from cspr_jax.motions.attained import attained  # few plans need it
+
+        proofs = [
+            None if proof is None else attained(problem, motion, proof, judge.scene, contacts_alone=not has_pulleys)
+            for motion, proof in zip(motions, judged.proofs, strict=True)
+        ]
+        return _answers(judged.answers, proofs, has_pulleys=has_pulleys), motions
 
     def _with(self, arcs: np.ndarray) -> Leg:
         leg = copy.copy(self._leg)

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cspr_jax.arithmetic.frames import IDENTITY, Frame, frame_of
+from cspr_jax.arithmetic.intervals import united
 from cspr_jax.build.problems import build_problem
 from cspr_jax.build.robots import build_robot
 from cspr_jax.build.scenes import scene_of
@@ -18,12 +19,14 @@ from cspr_jax.curves.files import centre_from, kept_to, placed_inward, reference
 from cspr_jax.curves.reading import window_splines
 from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.motions.demands import SAMPLES, Demands, demands
+from cspr_jax.motions.attained import attained
+from cspr_jax.motions.demands import EXTREMES, SAMPLES, Demands, demands
 from cspr_jax.motions.leg import JoinedLeg
 from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.proved_answers import MotionProof, answers_of, proof_of, united
+from cspr_jax.motions.proved_answers import MotionProof, answers_of, proof_of
 from cspr_jax.motions.time_proof import TimeProof
 from cspr_jax.plans.planning import PlannedMotions
+from cspr_jax.robots.contact_bodies import shape_corners
 from cspr_jax.robots.limits import NO_LIMITS
 from cspr_jax.schema.families import FAMILIES
 from cspr_jax.store.motion_samples import motion_windows
@@ -64,7 +67,7 @@ def long_plan(keys: PlanFile, path: Path) -> PlannedMotions:
         raise ConfigError(path, str(error)) from error
     duration = np.array([windows[-1].start + windows[-1].duration])
     answers = answers_of([_merged(windows)], duration)
-    extremes = _reduced([window.demands for window in windows])
+    extremes = _reduced([window.demands for window in windows], [window.start for window in windows])
     return PlannedMotions(
         robot_file=robot_file,
         keys=keys.model_copy(update={"interpolation": windows[0].interpolation, "ends": windows[0].ends or None}),
@@ -83,6 +86,7 @@ def _judged(
     problem: Problem, robot_file: RobotFile, frame: Frame, keys: PlanFile, path: Path, notes: dict[str, None]
 ) -> Iterator[_Window]:
     scene = scene_of(problem.robot, robot_file, frame, keys, path, trajectory=keys)
+    corners = shape_corners(problem.robot, scene)
     axes, limits = reference_of(build_robot(robot_file, keys, path)), problem.limits
     limits = limits if problem.robot.n_cables > problem.robot.dof else NO_LIMITS
     tables = motion_windows(path)
@@ -101,8 +105,8 @@ def _judged(
         centre = centre_from(robot_file, keys.point or says["point"])
         curve = kept_to(robot_file.own_pattern, curve, is_planar=bool(says["is_planar"]))
         motion: Spline = placed_inward(curve, frame, reference, centre)
-        extremes = demands(problem.robot, [motion], [SAMPLES + 1], limits, keys.tension_rule)
-        proof = proof_of(problem, motion, scene)
+        extremes = demands(problem.robot, [motion], [SAMPLES + 1], limits, keys.tension_rule, corners)
+        proof = attained(problem, motion, proof_of(problem, motion, scene), scene)
         yield _Window(start, float(motion.duration()), proof, extremes, curve.interpolation, curve.ends)
 
 
@@ -127,10 +131,14 @@ def _merged(windows: list[_Window]) -> MotionProof:
     return windows[0].proof._replace(proof=proof)
 
 
-def _reduced(each: list[Demands]) -> Demands:
-    columns = {}
-    for field in dataclasses.fields(Demands):
-        values = np.array([getattr(one, field.name)[0] for one in each])
-        columns[field.name] = np.array([values.min() if field.name in SMALLEST else values.max()])
-    columns["samples"] = np.array([sum(int(one.samples[0]) for one in each)])
-    return Demands(**columns)
+def _reduced(each: list[Demands], starts: list[float]) -> Demands:
+    # Extremes of windows that begin at these times, s.
+    columns, worst = {}, []
+    for name in EXTREMES:
+        values = np.array([getattr(one, name)[0] for one in each])
+        worst.append(int(values.argmin() if name in SMALLEST else values.argmax()))
+        columns[name] = values[worst[-1:]]
+    when = np.array([starts[k] + each[k].when[0, i] for i, k in enumerate(worst)])
+    cables = np.array([each[k].cables[0, i] for i, k in enumerate(worst)])
+    samples = np.array([sum(int(one.samples[0]) for one in each)])
+    return Demands(**columns, samples=samples, when=when[None], cables=cables[None])

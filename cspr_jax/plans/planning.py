@@ -23,6 +23,7 @@ from cspr_jax.motions.leg import JoinedLeg
 from cspr_jax.motions.motion import Motion, Placed
 from cspr_jax.motions.outcome import LegOutcome
 from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.waypoints import Waypoints
 from cspr_jax.plans.causes import Cause, causes
 from cspr_jax.plans.choices import best_amplitude, chosen_depth, nearly_resting
 from cspr_jax.plans.sequence import PlanLegs
@@ -168,6 +169,10 @@ def plan_of(keys: PlanFile, path: Path) -> PlannedMotions:
     """
     legs_of = [FAMILIES[name].legs for name in keys.families]
     robot_file = as_moved(resolve_robot(keys.robot, path, path.parent), legs_of)
+    if keys.point == "origin":
+        from cspr_jax.plans.given_points import with_mass_centres  # it loads pieces of SciPy
+
+        keys = with_mass_centres(robot_file, keys, path)
     sequence = PlanLegs(robot_file, keys, path)
     any_cables = all(robot_file.own_pattern in FAMILIES[name].any_cables for name in keys.families)
     problem = build_problem(robot_file, keys, keys, path, epsilon=FIRST_EPSILON, any_cables=any_cables, pulleys=True)
@@ -181,7 +186,8 @@ def plan_of(keys: PlanFile, path: Path) -> PlannedMotions:
     legs = tuple(JoinedLeg(leg.stops.family, *leg.join(problem, z0)) for leg in sequence.legs)
     _refuse_jumps(problem, sequence, legs)
     frame = sequence.stops.frame
-    why, extremes = _judged(problem, frame, legs, keys)
+    legs = tuple(_attained(problem, leg, sequence.stops) for leg in legs)
+    why, extremes = _judged(problem, robot_file, frame, legs, keys)
     lines = [line for leg in sequence.legs for line in leg.warnings(problem)]
     lines += nearly_resting(sequence.stops, z0)
     lines += _missed(keys, np.concatenate([leg.answers.feasible for leg in legs]), extremes)
@@ -207,6 +213,20 @@ def _point(keys: PlanFile, sequence: PlanLegs) -> str:
     return keys.point or (points.pop() if len(points) == 1 else None) or "mass-centre"
 
 
+def _attained(problem: Problem, leg: JoinedLeg, stops: Waypoints) -> JoinedLeg:
+    # The leg with margins and causes that its motions attain, where proofs bound them.
+    if not hasattr(leg.answers, "proof"):
+        return leg
+    # Families with proofs of their own need none of these.
+    from cspr_jax.build.scenes import scene_of
+    from cspr_jax.motions.attained import with_attained
+
+    answers: Any = leg.answers
+    keys = stops.keys
+    scene = scene_of(problem.robot, stops.robot_file, stops.frame, keys, stops.path, trajectory=keys)
+    return dataclasses.replace(leg, answers=with_attained(problem, answers, leg.motions, scene))
+
+
 def with_motions(plan: PlannedMotions, answers: Answers, motions: list[Motion], lines: list[str]) -> PlannedMotions:
     """A plan with other motions between its poses.
 
@@ -220,20 +240,31 @@ def with_motions(plan: PlannedMotions, answers: Answers, motions: list[Motion], 
         the plan.
     """
     legs = (JoinedLeg(plan.keys.family, answers, motions),)
-    why, extremes = _judged(plan.problem, plan.frame, legs, plan.keys)
+    why, extremes = _judged(plan.problem, plan.robot_file, plan.frame, legs, plan.keys)
     lines = [*plan.warnings, *lines, *_missed(plan.keys, answers.feasible, extremes)]
     warnings = tuple(dict.fromkeys(lines))
     return dataclasses.replace(plan, legs=legs, demands=extremes, causes=why, warnings=warnings)
 
 
 def _judged(
-    problem: Problem, frame: Frame, legs: tuple[JoinedLeg, ...], keys: PlanFile
+    problem: Problem, robot_file: RobotFile, frame: Frame, legs: tuple[JoinedLeg, ...], keys: PlanFile
 ) -> tuple[tuple[tuple[Cause, ...], ...], Demands]:
     # Causes of the segments, and demands with heights in the axes of the robot file.
     why = [causes(problem, frame, leg.answers, leg.motions, _counts(leg, keys)) for leg in legs]
-    extremes = _demands(problem, legs, keys)
+    extremes = _demands(problem, legs, keys, _shape(problem, robot_file, frame, keys))
     heights = dataclasses.replace(extremes, lowest=frame.height(extremes.lowest))
     return tuple(itertools.chain.from_iterable(why)), heights
+
+
+def _shape(problem: Problem, robot_file: RobotFile, frame: Frame, keys: PlanFile) -> np.ndarray | None:
+    # Corners of the shape of a platform, where it is known.
+    if keys.platform_box is None and keys.platform_hull is None:
+        return None
+    from cspr_jax.build.scenes import scene_of  # few plans have a shape
+    from cspr_jax.robots.contact_bodies import shape_corners
+
+    scene = scene_of(problem.robot, robot_file, frame, keys, Path("plan"), trajectory=keys)
+    return shape_corners(problem.robot, scene)
 
 
 def _points(sequence: PlanLegs, legs: tuple[JoinedLeg, ...], z0: float) -> np.ndarray:
@@ -288,13 +319,13 @@ def _missed(keys: PlanFile, is_feasible: np.ndarray, extremes: Demands) -> list[
     ]
 
 
-def _demands(problem: Problem, legs: tuple[JoinedLeg, ...], keys: PlanFile) -> Demands:
+def _demands(problem: Problem, legs: tuple[JoinedLeg, ...], keys: PlanFile, corners: np.ndarray | None) -> Demands:
     motions = [motion for leg in legs for motion in leg.motions]
     counts = np.concatenate([_counts(leg, keys) for leg in legs]).tolist()
     # The tensions of redundant cables alone depend on limits, and the compiled function on which of them are given.
     is_redundant = problem.robot.n_cables > problem.robot.dof
     limits = problem.limits if is_redundant else NO_LIMITS
-    return demands(problem.robot, motions, counts, limits, keys.tension_rule)
+    return demands(problem.robot, motions, counts, limits, keys.tension_rule, corners)
 
 
 def _counts(leg: JoinedLeg, keys: PlanFile) -> np.ndarray:

@@ -13,6 +13,7 @@ from cspr_jax.build.scenes import scene_of
 from cspr_jax.curves.spline import Spline, chained
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.motions.answers import replaced
+from cspr_jax.motions.attained import with_attained
 from cspr_jax.motions.motion import Motion
 from cspr_jax.motions.proved_answers import ProvedAnswers, proved_answers
 from cspr_jax.paths.answers import PathAnswers, feeds_of
@@ -108,7 +109,7 @@ def retimed(plan: PlannedMotions, grid: int, ramp_time: float, path: Path) -> Pl
     chosen = [new if better else old for new, old, better in zip(trial, motions, is_better, strict=True)]
     lines = _stays(moves & ~is_better) + _jumps(plan, faster, is_better) + _unbounded(plan, faster)
     lines += answers.notes("retime: ramp_time")
-    return with_motions(plan, answers, chosen, lines)
+    return with_motions(plan, with_attained(plan.problem, answers, chosen, scene), chosen, lines)
 
 
 def _feeds(plan: PlannedMotions) -> list[np.ndarray | None]:

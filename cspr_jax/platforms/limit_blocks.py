@@ -4,8 +4,10 @@
     speed           (|x_k|^2 - (x_k . x_k')^2 / limit^2) / z0^2
     acceleration    (|x_k|^3 -+ ((x_k'^2 + x_k . x_k'') |x_k|^2 - (x_k . x_k')^2) / limit) / z0^3
 
-with x_k cable k as a vector and primes for derivatives in time. The last two are positive exactly while the limit is
-met.
+    mass centre     1 - |p'|^2 / limit^2,   1 - |p''|^2 / limit^2
+
+with x_k cable k as a vector and primes for derivatives in time. All but the first are positive exactly while the limit
+is met.
 """
 
 from collections.abc import Callable, Sequence
@@ -52,6 +54,8 @@ class Sizes(NamedTuple):
         is_straight: whether lengths are analytic.
         squared: (n,) T^2, s^2.
         z0: (n,) depth of P0, m.
+        speed: (n,) bound of |p'| of the mass centre in normalised time, m.
+        bend: (n,) likewise of |p''|.
     """
 
     kappa: Sequence[Array]
@@ -61,6 +65,8 @@ class Sizes(NamedTuple):
     is_straight: Sequence[Array]
     squared: Array
     z0: Array
+    speed: Array
+    bend: Array
 
 
 class Enclosed(NamedTuple):
@@ -172,6 +178,16 @@ def _speed_slacks(enclosed: Enclosed, _: Array, __: bool) -> Pair:
     return jnp.min(enclosed.nodes[1], axis=1), jnp.min(enclosed.coefficients[0], axis=(0, 1))
 
 
+def _of_mass_centre(vector, largest: Array) -> list[Pair]:
+    # Values come in pairs.
+    value = 1.0 - dot(vector, vector) / largest**2
+    return [(value, value)]
+
+
+def _mass_centre_sizes(size: Array, largest: Array) -> list[Array]:
+    return [1.0 + (size / largest) ** 2] * 2
+
+
 def _accelerations(here: Here, limit: Array) -> list[Pair]:
     pairs = []
     for k, (length, _, bend) in enumerate(_rates(here)):
@@ -201,4 +217,16 @@ QUANTITIES = {
     "tension": LimitOnBlocks(CABLES, _tensions, _tension_sizes, _tension_slacks),
     "speed": LimitOnBlocks(CABLES, _speeds, _speed_sizes, _speed_slacks),
     "acceleration": LimitOnBlocks(2 * CABLES, _accelerations, _acceleration_sizes, _acceleration_slacks),
+    "mass_centre_speed": LimitOnBlocks(
+        2,
+        lambda here, limit: _of_mass_centre(here.state.velocity, jnp.sqrt(here.squared) * limit),
+        lambda sizes, limit: _mass_centre_sizes(sizes.speed, jnp.sqrt(sizes.squared) * limit),
+        _speed_slacks,
+    ),
+    "mass_centre_acceleration": LimitOnBlocks(
+        2,
+        lambda here, limit: _of_mass_centre(here.state.acceleration, here.squared * limit),
+        lambda sizes, limit: _mass_centre_sizes(sizes.bend, sizes.squared * limit),
+        _speed_slacks,
+    ),
 }

@@ -199,7 +199,8 @@ def _slacks(problem: Problem, segments: PlatformSegment, here: StateLanes, cable
     for row in of_pose(problem):
         limit = getattr(problem.limits, row.name)
         if row.quantity == "depth":
-            values.append((limit - here.position[2]) * factor / size)
+            attached = [ray[2] + robot.base_points[k, 2] for k, ray in enumerate(cables.rays)]
+            values.append((limit - largest([here.position[2], *attached])) * factor / size)
         else:
             values.append(smallest([1.0 - jnp.sqrt(dot(ray, ray)) / limit[k] for k, ray in enumerate(cables.rays)]))
     return values
@@ -215,7 +216,7 @@ def _steps(problem: Problem, segments: PlatformSegment, bends: _Bends) -> list[A
     for row in of_pose(problem):
         limit = getattr(problem.limits, row.name)
         if row.quantity == "depth":
-            steps.append(bends.centre * factor / size)
+            steps.append((bends.centre + jnp.max(arms) * bends.arm) * factor / size)
         else:
             steps.append(largest([(bends.centre + arms[k] * bends.arm) / limit[k] for k in range(CABLES)]))
     return steps

@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.arithmetic.lanes import dot, smallest
+from cspr_jax.arithmetic.lanes import dot, largest, smallest
 from cspr_jax.motions.limits import limits_set, scales, slack
 from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.motions.problem import Problem
@@ -115,6 +115,8 @@ def moving_slacks(
         "tension": [robot.mass * x / balance.denominator * y for x, y in zip(balance.numerators, lengths, strict=True)],
         "speed": [jnp.abs(rate) / pace for rate in rates],
         "acceleration": [jnp.abs(bend) / squared for bend in bends],
+        "mass_centre_speed": [jnp.sqrt(dot(here.velocity, here.velocity)) / pace],
+        "mass_centre_acceleration": [jnp.sqrt(dot(here.acceleration, here.acceleration)) / squared],
     }
     for row in rows:
         least = _least(row, limits, each[row.quantity], scale)
@@ -137,7 +139,11 @@ def still_slacks(problem: Problem, segment: PlatformSegment, here: StateLanes, c
     below = dot([normal[i] for i in range(3)], here.position) / z0
     values = [normalised_determinant(robot, cables) / segment.regular, below]
     scale = scales(CABLES, robot.mass * robot.gravity, z0)
-    each = {"depth": [here.position[2]], "length": [jnp.sqrt(dot(ray, ray)) for ray in cables.rays]}
+    attached = [ray[2] + robot.base_points[k, 2] for k, ray in enumerate(cables.rays)]
+    each = {
+        "depth": [largest([here.position[2], *attached])],
+        "length": [jnp.sqrt(dot(ray, ray)) for ray in cables.rays],
+    }
     return values + [_least(row, limits, each[row.quantity], scale) for row in _limit_rows(limits, of_motion=False)]
 
 

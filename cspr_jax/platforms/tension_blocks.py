@@ -284,7 +284,7 @@ def _sizes(problem: Problem, block: _Block, bounds: Reach, along: Array, lengths
     paces = [bounds.speed + lever * bounds.rotation_rate for lever in arms]
     pulls = [bounds.bend + lever * bounds.growth * (bounds.angular_acceleration + bounds.omega**2) for lever in arms]
     is_straight = [move < STRAIGHT * ray for ray, move in zip(lengths[0], moved, strict=True)]
-    cable_sizes = Sizes(kappa, rays, paces, pulls, is_straight, squared, z0)
+    cable_sizes = Sizes(kappa, rays, paces, pulls, is_straight, squared, z0, bounds.speed, bounds.bend)
     largest = [*kappa, whole, jnp.zeros_like(whole)]
     for quantity, row in _quantities(problem).items():
         largest += QUANTITIES[quantity].sizes(cable_sizes, getattr(problem.limits, row[0].name))

@@ -1,8 +1,9 @@
-"""Bodies that can meet while a robot moves, as arrays for compiled functions: cables, obstacles, platform. NumPy."""
+"""Bodies that can meet while a robot moves, as arrays for compiled functions: cables, obstacles, platform."""
 
 from typing import Any, NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.robots import clearance
@@ -129,6 +130,30 @@ def bodies_of(robot: AnyRobot, scene: Scene) -> Bodies:
         size=np.asarray(size),
         deepest=np.asarray(DEEPEST * size),
     )
+
+
+def shape_corners(robot: AnyRobot, scene: Scene) -> np.ndarray | None:
+    """Corners of the shape of a platform.
+
+    Args:
+        scene: in the robot's axes.
+
+    Returns:
+        (m, 3) from the mass centre, platform axes, m; None: it is not known.
+    """
+    body = bodies_of(robot, scene).body
+    return None if body is None else np.asarray(body.corners)
+
+
+def platform_corners(robot: AnyRobot, bodies: Bodies) -> Any:
+    """Points that reach as low as a platform: where cables are attached, and corners of its shape.
+
+    Returns:
+        (m, 3) from the mass centre, platform axes, m; None: it has no extent.
+    """
+    corners = [bodies.points] if isinstance(robot, PlatformRobot) else []
+    corners += [] if bodies.body is None else [bodies.body.corners]
+    return jnp.concatenate(corners) if corners else None
 
 
 def _axis(shape) -> np.ndarray:

@@ -95,13 +95,16 @@ def passings(robot: AnyRobot, bodies: Bodies, state: StateBounds, cables: CableB
     return jnp.concatenate(parts)
 
 
-def corner_depths(body: Shape, state: StateBounds) -> AffineBounds:
-    """Bounds of the depths of the corners of a platform.
+def corner_depths(corners: Array, state: StateBounds) -> AffineBounds:
+    """Bounds of the depths of points of a platform.
+
+    Args:
+        corners: (n_corners, 3) from the mass centre, platform axes, m.
 
     Returns:
         (n_corners,) z, z down, m.
     """
-    return dot(state.rotation.each(lambda x: x[2][None]), body.corners) + state.position.each(lambda x: x[2])
+    return dot(state.rotation.each(lambda x: x[2][None]), corners) + state.position.each(lambda x: x[2])
 
 
 def _ends(state: StateBounds, cables: CableBounds) -> AffineBounds:

@@ -33,7 +33,6 @@ class Family:
         knows_obstacles: whether its own verdicts take obstacles and the shape of the platform into account; if not,
             its motions are judged once more in plans.
         knows_pulleys: whether its own verdicts are right for cables that leave from pulleys; if not, likewise.
-        knows_mass_centre: whether its verdicts take limits of the mass centre's speed and acceleration into account.
         is_searched: whether its motions are searched for, also from those of other families.
         begins_searches: whether such searches begin from its motions: where they find nothing else, or nothing fast.
         precedes_searches: whether they do so at once, and their motions are never slower than its motions.
@@ -54,7 +53,6 @@ class Family:
     uncertain_redundancy: bool = False
     knows_obstacles: bool = False
     knows_pulleys: bool = False
-    knows_mass_centre: bool = False
     is_searched: bool = False
     begins_searches: bool = False
     precedes_searches: bool = False
@@ -141,8 +139,7 @@ _ROWS = (
         uncertain_redundancy=True,
         knows_obstacles=True,
         knows_pulleys=True,
-        knows_mass_centre=True,
-        keys=("motion", "trajectory", "interpolation", "ends", "smooth", "stretch", "point"),
+        keys=("motion", "trajectory", "interpolation", "ends", "smooth", "stretch"),
         pose_keys=("motion", "trajectory"),
         end_keys=("time", "velocity", "acceleration"),
     ),
@@ -171,7 +168,6 @@ _ROWS = (
         uncertain_redundancy=True,
         knows_obstacles=True,
         knows_pulleys=True,
-        knows_mass_centre=True,
         begins_searches=True,
         precedes_searches=True,
         keys=("path",),
@@ -188,7 +184,6 @@ _ROWS = (
         uncertain_redundancy=True,
         knows_obstacles=True,
         knows_pulleys=True,
-        knows_mass_centre=True,
         is_searched=True,
         keys=("objective", "duration_max", "end_accelerations", "together", "starts", "search_time"),
         end_keys=("velocity",),

@@ -77,7 +77,11 @@ def motion(arrays: Mapping[str, np.ndarray], attributes: Mapping[str, Any]) -> "
     used = {ACROSS.get(name) for name in arrays} | {part for name in arrays for part in OTHER_DIMS.get(name, ())}
     for part in PARTS.keys() - used:
         del axes[part]
-    axes |= {name: arrays[name] for name in ("segment", "flight_t", "throw", "failure", "path_node") if name in arrays}
+    axes |= {
+        name: arrays[name]
+        for name in ("segment", "flight_t", "throw", "failure", "criterion_failure", "path_node")
+        if name in arrays
+    }
     dims_of = dict.fromkeys(SEGMENTS, ("segment",)) | OTHER_DIMS
     variables = {
         name: (dims_of[name] if name in dims_of else ("t", ACROSS[name]) if name in ACROSS else ("t",), values)

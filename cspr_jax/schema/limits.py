@@ -80,7 +80,7 @@ class Limit:
 
     @property
     def of_mass_centre(self) -> bool:
-        """Tell whether it bounds how fast the mass centre moves, which the proof of any motion alone judges."""
+        """Tell whether it bounds how fast the mass centre moves."""
         return self.quantity.startswith("mass_centre")
 
 
@@ -93,11 +93,12 @@ def _of_cables(name: str, flag: Verdict, quantity: str, unit: str, *, of_motion:
     return Limit(name, flag, "most", quantity, unit, True, of_motion, False, f"largest cable {quantity}")
 
 
+FLOOR = "z of the floor, which no point of the effector passes: mass centre, attachment points, shape if it is given"
 # In the order of their slacks. The floor is z in the axes of a file, and a depth in the kernels': at most so deep.
 LIMITS = (
     Limit("tension_min", Verdict.SLACK_CABLE, "least", "tension", "N", True, True, True, "smallest tension"),
     Limit("tension_max", Verdict.OVER_TENSION, "most", "tension", "N", True, True, False, "largest tension"),
-    Limit("floor", Verdict.BELOW_FLOOR, "most", "depth", "m", False, False, True, "z of the floor"),
+    Limit("floor", Verdict.BELOW_FLOOR, "most", "depth", "m", False, False, True, FLOOR),
     _of_cables("cable_length_max", Verdict.CABLE_TOO_LONG, "length", "m", of_motion=False),
     _of_cables("cable_speed_max", Verdict.CABLE_TOO_FAST, "speed", "m/s", of_motion=True),
     _of_cables("cable_acceleration_max", Verdict.CABLE_OVER_ACCELERATION, "acceleration", "m/s^2", of_motion=True),

@@ -75,10 +75,15 @@ SEGMENT = {
         "Whether a smaller number of arcs could not be refuted, or, over pulleys, was refuted without them only.",
     ),
     "feasible_at_infinity": ("1", "Point masses: left-hand side of thesis (2.55)."),
-    "z_lowest": ("m", "z of the lowest place on the way."),
+    "z_lowest": (
+        "m",
+        "z of the lowest point on the way, of all of a platform: mass centre, attachment points, shape.",
+    ),
     "cable_length_max": ("m", "Largest length of any cable on the way."),
     "cable_speed_max": ("m s-1", "Largest speed of any cable on the way."),
     "cable_acceleration_max": ("m s-2", "Largest acceleration of any cable on the way."),
+    "speed_max": ("m s-1", "Largest speed of the mass centre on the way."),
+    "acceleration_max": ("m s-2", "Largest acceleration of the mass centre on the way."),
     "samples": ("1", "Number of instants at which tensions, lengths and speeds were taken."),
     "oscillations": ("1", "Transitions: smallest feasible number of oscillations; null: none."),
     "tried_oscillations": ("1", "Transitions: half of `tried_arcs`; absent in other families."),
@@ -111,6 +116,7 @@ SEGMENT = {
         "Splines: intervals of time in which the segment fails, since its start; of other families those in which it "
         "meets a body, over pulleys in which it fails; null elsewhere.",
     ),
+    "failing_by_criterion": ("s", "Likewise, by the criterion that fails, the name of its flag; null elsewhere."),
     "frequency": ("rad s-1", "Ellipses: frequency of the ellipse on which the segment ends; to rest, starts."),
     "frequency_intervals": (
         "rad s-1",
@@ -232,18 +238,21 @@ CHECK = {
         "s",
         "All intervals of time in which it fails, to 1e-6 s; of a function from sample to sample.",
     ),
+    "failing_by_criterion": ("s", "Likewise, by the criterion that fails, the name of its flag."),
     "tension_min": ("N", "Smallest tension of any cable, as of a segment of a plan."),
     "tension_max": ("N", "Largest tension of any cable, likewise."),
     "tension_margin": ("N", "Redundant cables: `margin`; else null."),
     "cable_length_max": ("m", "Largest length of any cable."),
     "cable_speed_max": ("m s-1", "Largest speed of any cable."),
     "cable_acceleration_max": ("m s-2", "Largest acceleration of any cable."),
-    "z_lowest": ("m", "z of the lowest place."),
+    "speed_max": ("m s-1", "Largest speed of the mass centre."),
+    "acceleration_max": ("m s-2", "Largest acceleration of the mass centre."),
+    "z_lowest": ("m", "z of the lowest point, of all of the platform: mass centre, attachment points, shape."),
     "demands": (
         "",
-        "By limit or condition: `value` of the worst cable, `bound` that is proved for all, what is `allowed`, `unit`, "
-        '`cable` (from 0 on; null: none), `t`, s, and `sense`: "at least" or "at most" what is allowed, in the axes of '
-        "the robot file.",
+        "By limit or condition: `value` of the worst cable, `bound` that is proved for all (null: of tensions that a "
+        "rule chooses, and of what has no limit), what is `allowed`, `unit`, `cable` (from 0 on; null: none), `t`, s, "
+        'and `sense`: "at least" or "at most" what is allowed, in the axes of the robot file.',
     ),
     "on_limit": (
         "",

@@ -202,6 +202,17 @@ TRAJECTORY = {
             'Motions with point = "origin": position of the mass centre (x, y, z). `position`, `velocity` and '
             "`acceleration` are then those of the origin of the platform's axes, and `quaternion` turns these axes.",
         ),
+        Quantity(
+            "binding",
+            "1",
+            "what binds",
+            "Flag of the criterion that is nearest to being broken, or broken by most: tensions over the weight "
+            "per cable, lengths over the size of the robot, all else over its limit. Contacts count where they fail.",
+            "uint32",
+        ),
+        Quantity(
+            "binding_cable", "1", "cable that binds", "Number of its cable, from 1 on; 0: no single cable.", "int16"
+        ),
     )
 }
 # A motion file holds these for each segment of its plan, and `TRAJECTORY` for each of its rows over time.
@@ -271,6 +282,14 @@ FAILURES = {
             "Start and end of the interval, since the start of the plan, in which a segment fails that is proved or "
             "refuted over its whole time.",
         ),
+        Quantity("criterion_failure", "1", "interval of failure of a criterion", "Number of the interval, from 1 on."),
+        Quantity(
+            "criterion_failing",
+            "s",
+            "time of the failure of a criterion",
+            "Start and end of an interval in which one criterion fails, since the start of the plan.",
+        ),
+        Quantity("criterion_flag", "1", "criterion that fails", "Verdict flag of the criterion.", "uint32"),
     )
 }
 # A motion file holds these for the nodes of the grids on which the least time along paths was sought.
@@ -318,6 +337,9 @@ OTHER_DIMS = {
     "segment_lower_bound": ("segment",),
     "failure": ("failure",),
     "failing": ("failure", "edge"),
+    "criterion_failure": ("criterion_failure",),
+    "criterion_failing": ("criterion_failure", "edge"),
+    "criterion_flag": ("criterion_failure",),
     "flight_t": ("flight_t",),
     "flight_position": ("flight_t", "axis"),
     "throw": ("throw",),
@@ -729,8 +751,8 @@ QUANTITIES = {
             "floor_margin",
             "m",
             "height above the floor",
-            "Height above the floor of the mass centre, or of the joint of a body that turns about one; negative "
-            "below it.",
+            "Height above the floor of the lowest point of the effector: its mass centre or joint, its attachment "
+            "points and, with interference-free, its shape; negative below it.",
             signed=True,
         ),
         Quantity(

@@ -52,7 +52,7 @@ def read_table(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
         if not np.isin(flags, (0.0, 1.0)).all():
             raise DamagedError(f"{FEASIBLE} holds another number than 0 and 1")
         attributes[FEASIBLE] = int(flags.all())
-    arrays = {name: np.ascontiguousarray(table[:, place]) for name, place in places.items()}
+    arrays = {name: _typed(name, np.ascontiguousarray(table[:, place])) for name, place in places.items()}
     if "mass_centre" in arrays:
         attributes["point"] = "origin"
     z_axis = _axis_in(comments) or _vertical(arrays)
@@ -88,6 +88,17 @@ def _vertical(arrays: dict[str, np.ndarray]) -> str | None:
     if not with_lifting < (1.0 - EXPLAINED) * without:
         return None
     return "up" if fitted[0] > 0.0 else "down"
+
+
+def _typed(name: str, values: np.ndarray) -> np.ndarray:
+    # The column in the type of its quantity.
+    kind = TRAJECTORY[name].kind
+    if kind == "float":
+        return values
+    limits = np.iinfo(kind)
+    if not ((values >= limits.min) & (values <= limits.max) & (values == np.round(values))).all():
+        raise DamagedError(f"{name} holds another number than integers from {limits.min} to {limits.max}")
+    return values.astype(kind)
 
 
 def _rows(file, comments: list[str]):

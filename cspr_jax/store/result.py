@@ -14,7 +14,7 @@ from cspr_jax.errors import ConfigError, InputError, StoreError, printable, show
 from cspr_jax.schema import labelled
 from cspr_jax.schema.best import best_of, check_axis
 from cspr_jax.schema.map_kinds import MAP_KINDS, quantity_of
-from cspr_jax.schema.quantities import AXES, EVERY, OTHER_DIMS, PARTS, QUANTITIES, SEGMENTS
+from cspr_jax.schema.quantities import ACROSS, AXES, EVERY, OTHER_DIMS, PARTS, QUANTITIES, SEGMENTS, TRAJECTORY
 from cspr_jax.store.documents import plain_json
 from cspr_jax.store.isolated import Reader
 from cspr_jax.store.motion_table import read_table
@@ -295,7 +295,7 @@ def _motion(
     segments = {name: array for name, array in arrays.items() if name in SEGMENTS}
     for name, array in arrays.items():
         shape: tuple[int, ...] = (len(time), widths.get(name, 3))
-        if name in ("t", "tension_residual"):
+        if name in TRAJECTORY and name not in ACROSS:
             shape = (len(time),)
         elif name in OTHER_DIMS:
             first, *rest = OTHER_DIMS[name]

@@ -1,4 +1,4 @@
-"""Limits of tension, height, cable length, speed and acceleration, as slacks.
+"""Limits of tension, height, cable length, of speeds and accelerations of cables and mass centre, as slacks.
 
 In the notation of `slacks`, with m the number of cables, rho_k the length of cable k, F the tension over
 the weight, and rates with respect to tau; w_k = (p - a_k) . p'. F of cable k is kappa_k rho_k / (m z0 eta).
@@ -8,6 +8,7 @@ the weight, and rates with respect to tau; w_k = (p - a_k) . p'. F of cable k is
     length         (rho_max^2 - rho_k^2) / (2 z0^2)
     speed          (rho_k^2 - (w_k / (T v_max))^2) / (2 z0^2)
     acceleration   (a_max T^2 rho_k^3 -+ (rho_k^2 w_k' - w_k^2)) / (a_max T^2 z0^3)
+    mass centre    1 - (|p'| / (T v_max))^2,   1 - (|p''| / (T^2 a_max))^2
 
 Each is dimensionless and free of a division that could blow up.
 """
@@ -41,6 +42,8 @@ class _AtInstant(NamedTuple):
     length: Array
     rate: Array
     rate_slope: Array
+    velocity: Array
+    acceleration: Array
 
 
 class _OverInterval(NamedTuple):
@@ -87,7 +90,11 @@ def _bent(over: _OverInterval, limit: Array) -> Array:
     return (cube + bend.curvature / (limit * over.time**2)) / over.z0**3
 
 
-# Every row of `schema.limits.LIMITS` has an entry, but those of the mass centre, which swings do not take.
+def _square_share(vector: Array, largest: Array) -> Array:
+    return 1.0 - jnp.dot(vector, vector) / largest**2
+
+
+# Every row of `schema.limits.LIMITS` has an entry.
 CLOSED = {
     "tension_min": _Closed(lambda state, limit: state.lift - limit / state.weight * state.eta, _lifted),
     "tension_max": _Closed(lambda state, limit: limit / state.weight * state.eta - state.lift, _lifted),
@@ -102,6 +109,18 @@ CLOSED = {
         lambda state, limit: (state.length**2 - (state.rate / (state.time * limit)) ** 2) / (2.0 * state.z0**2), _rated
     ),
     "cable_acceleration_max": _Closed(_bends, _bent, 2),
+    "speed_max": _Closed(
+        lambda state, limit: _square_share(state.velocity, state.time * limit),
+        lambda over, limit: (
+            2.0 * (over.pace.curvature**2 + over.pace.slope * over.pull.slope) / (over.time * limit) ** 2
+        ),
+    ),
+    "acceleration_max": _Closed(
+        lambda state, limit: _square_share(state.acceleration, state.time**2 * limit),
+        lambda over, limit: (
+            2.0 * (over.pull.slope**2 + over.pull.value * over.pull.curvature) / (over.time**2 * limit) ** 2
+        ),
+    ),
 }
 
 
@@ -139,7 +158,7 @@ def limit_slacks(
     rate_slope = jnp.dot(slope, slope) + rays @ curvature
     z0, time, weight = segment.hub[2], duration(segment, arcs), robot.mass * robot.gravity
     lift = jnp.stack(state.kappa) * length / (len(state.kappa) * z0)
-    here = _AtInstant(z0, time, weight, state.eta, lift, position[2], length, rate, rate_slope)
+    here = _AtInstant(z0, time, weight, state.eta, lift, position[2], length, rate, rate_slope, slope, curvature)
     slacks = (CLOSED[row.name].slack(here, getattr(limits, row.name)) for row in limits_set(limits))
     return tuple([slack] if slack.ndim == 0 else [slack[i] for i in range(slack.shape[0])] for slack in slacks)
 

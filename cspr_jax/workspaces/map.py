@@ -68,7 +68,8 @@ class WorkspaceMap(GridMap):
         except InputError as error:
             raise ConfigError(file, f"workspace.{error}") from error
         around, speeds = self._surroundings(robot_file), self._speeds(robot_file)
-        self._poses = RestPoses(self._robot, searches, around, self._limits, speeds, capacity)
+        is_centre = self._workspace.point == "mass-centre"
+        self._poses = RestPoses(self._robot, searches, around, self._limits, speeds, capacity, is_centre)
 
     def _refuse_unused(self) -> None:
         for limit in LIMITS:

@@ -42,7 +42,7 @@ class RestCells:
         """Tell which cells are proved to lie wholly on one side of the workspace.
 
         Args:
-            origins: (n, 3) of the platform frame at the centres of the cells, kernels' coordinates, m.
+            origins: (n, 3) of the platform at the centres of the cells, kernels' coordinates, m.
             half: (n, 3) half sizes of the cells, m.
 
         Returns:
@@ -81,6 +81,7 @@ class RestCells:
         """Proofs of cells without halving; see `whole_cells.CellConditions`."""
         held, is_broken = held.copy(), np.zeros(len(positions), bool)
         turns, reach = self._turns(len(positions)), np.linalg.norm(half, axis=1)
+        positions = self._poses.origins(positions, turns)
         places = mass_centres(self._robot, positions, turns)
         moved = shifts(self._robot, places, turns, reach)
         for k, (search, proofs) in enumerate(self._searches):

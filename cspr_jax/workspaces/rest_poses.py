@@ -9,7 +9,9 @@ import numpy as np
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.clearance import Scene
+from cspr_jax.robots.contact_bodies import shape_corners
 from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.schema.verdicts import FLAGS, OPEN, Verdict, conjunction
 from cspr_jax.workspaces import geometry
 from cspr_jax.workspaces.clearances import at_rest, flags, nearest_bodies
@@ -43,6 +45,7 @@ class RestPoses:
         limits: floor and largest cable lengths, kernels' axes; limits of tensions are those of the searches.
         speeds: velocities that the robot must be able to have; None: speeds do not count.
         capacity: search for the capacity margin, which has no part in the verdict; None: there is none.
+        of_mass_centre: whether positions are those of the mass centre, and not of the origin of the platform frame.
     """
 
     robot: AnyRobot
@@ -51,17 +54,33 @@ class RestPoses:
     limits: Limits
     speeds: CableSpeeds | None = None
     capacity: WorkspaceSearch | None = None
+    of_mass_centre: bool = False
 
-    def __call__(self, origins: np.ndarray, quaternions: np.ndarray) -> PoseColumns:
+    def origins(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
+        """Origins of the platform frame.
+
+        Args:
+            positions: (n, 3) as `__call__` takes them, m.
+            quaternions: (n, 4) unit quaternions, scalar first.
+
+        Returns:
+            (n, 3) m.
+        """
+        if not self.of_mass_centre:
+            return positions
+        return positions - mass_centres(self.robot, np.zeros_like(positions), quaternions)
+
+    def __call__(self, positions: np.ndarray, quaternions: np.ndarray) -> PoseColumns:
         """Tell whether poses meet all conditions.
 
         Args:
-            origins: (n, 3) of the platform frame, kernels' coordinates, m.
+            positions: (n, 3) of the platform, kernels' coordinates, m.
             quaternions: (n, 4) unit quaternions, scalar first.
 
         Returns:
             (n,) verdict, each of `MARGINS`, NaN where its condition does not count, and `NEAREST`.
         """
+        origins = self.origins(positions, quaternions)
         places, count = mass_centres(self.robot, origins, quaternions), len(origins)
         columns: PoseColumns = {name: np.full(count, np.nan) for name in MARGINS}
         verdict = np.zeros(count, FLAGS)
@@ -87,11 +106,23 @@ class RestPoses:
         poses = places, quaternions
         return in_batches(lambda x: geometry.cable_lengths(self.robot, *x), poses, size=BATCH)
 
+    def _depths(self, places: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
+        # Depths (n, k) of the mass centre, or joint, of the attachment points and of the corners of the shape.
+        robot = self.robot
+        if not isinstance(robot, PlatformRobot):
+            return places[:, 2:]
+        points = np.concatenate([np.zeros((1, 3)), np.asarray(robot.platform_points)])
+        corners = None if self.around is None else shape_corners(robot, self.around)
+        points = points if corners is None else np.concatenate([points, corners])
+        w, x, y, z = quaternions.T
+        lowest_row = np.stack([2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)], axis=1)
+        return places[:, 2:] + lowest_row @ points.T
+
     def limited(self, origins: np.ndarray, quaternions: np.ndarray) -> Iterator[tuple[str, Verdict, np.ndarray]]:
         """Slacks of the limits.
 
         Args:
-            origins: (n, 3) as `__call__` takes them, m.
+            origins: (n, 3) of the platform frame, m.
             quaternions: (n, 4) unit quaternions, scalar first.
 
         Returns:
@@ -99,7 +130,7 @@ class RestPoses:
         """
         places = mass_centres(self.robot, origins, quaternions)
         if self.limits.floor is not None:
-            yield "floor_margin", Verdict.BELOW_FLOOR, float(self.limits.floor) - places[:, 2:]
+            yield "floor_margin", Verdict.BELOW_FLOOR, float(self.limits.floor) - self._depths(places, quaternions)
         if self.limits.cable_length_max is not None:
             slack = np.asarray(self.limits.cable_length_max) - self._lengths(places, quaternions)
             yield "length_margin", Verdict.CABLE_TOO_LONG, slack

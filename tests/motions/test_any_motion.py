@@ -11,8 +11,11 @@ from oracles.any_motion_cases import KINDS, random_case
 
 import cspr_jax
 from cspr_jax.curves.interpolation import interpolated
+from cspr_jax.motions.attained import attained
 from cspr_jax.motions.block_slacks import block_slacks
 from cspr_jax.motions.criteria import criteria
+from cspr_jax.motions.problem import Problem
+from cspr_jax.motions.proved_answers import MotionProof
 from cspr_jax.motions.time_proof import time_proof
 from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.limits import Limits
@@ -57,7 +60,7 @@ def robot_of(case):
 
 
 def proof_of(case):
-    """The proof of a case, its criteria, and the start of the motion, s."""
+    """The proof of a case, the slacks that its motion attains, its criteria, and the start of the motion, s."""
     robot, frame = centred(robot_of(case))
     samples, limits = case.samples, dict(case.limits)
     floor = limits.pop("floor")
@@ -81,7 +84,10 @@ def proof_of(case):
     )
     slacks = partial(block_slacks, robot, limits, motion.bounds)
     proof = time_proof(slacks, float(motion.duration()), jumps=motion.jumps())
-    return proof, criteria(robot, limits), samples["times"][0]
+    rows = tuple(criteria(robot, limits))
+    problem = Problem(robot, limits, None)  # type: ignore[arg-type]
+    reached = attained(problem, motion, MotionProof(rows, proof, np.ones(len(rows)))).proof
+    return proof, reached, rows, samples["times"][0]
 
 
 def joined(intervals):
@@ -102,7 +108,7 @@ def lies_in(inner, outer):
 
 def compare(case):
     """Check the proof of a case; whether it decides."""
-    proof, rows, start = proof_of(case)
+    proof, reached, rows, start = proof_of(case)
     expected = any_motion.judged(case.robot, case.limits, case.motion)
     # The reference knows neither contacts, singularities nor the plane of the spools.
     known = [k for k, row in enumerate(rows) if row.flag in NAMES]
@@ -113,6 +119,7 @@ def compare(case):
         failing=[proof.failing[k] for k in known],
         open=[proof.open[k] for k in known],
     )
+    compare_attained(case, expected, {k: NAMES[rows[k].flag] for k in known}, reached, start)
     failing = joined(np.concatenate(proof.failing) + start)
     unknown = joined(np.concatenate([*proof.failing, *proof.open]) + start)
     names = np.array([NAMES[rows[k].flag] for k in known])
@@ -128,6 +135,19 @@ def compare(case):
     assert lies_in(failing, expected.failing), (failing, expected.failing)
     assert lies_in(expected.failing, unknown), (expected.failing, unknown)
     return bool(len(failing)) and all(np.diff(each, axis=1).max(initial=0.0) <= 4.0 * TIME for each in proof.open)
+
+
+def compare_attained(case, expected, names, reached, start):
+    """Smallest slacks, and those at their times, against the reference: to a millionth of the size of the criterion."""
+    judge = any_motion.judge(case.robot, case.limits, case.motion)
+    for name, slack in expected.slacks.items():
+        columns = [k for k, other in names.items() if other == name]
+        k = columns[int(np.argmin(reached.high[columns]))]
+        size = 1e-6 * np.max(np.abs(case.limits.get(name, case.limits["tension_max"])))
+        # The later side of a joint is at its time, the earlier one just before it.
+        sides = [judge.slacks(start + reached.when[k] + shift)[name][0] for shift in (-1e-12, 0.0, 1e-12)]
+        assert abs(reached.high[k] - slack) <= size, (name, reached.high[k], slack)
+        assert np.min(np.abs(sides - reached.high[k])) <= size, (name, reached.high[k], sides)
 
 
 @pytest.mark.parametrize(

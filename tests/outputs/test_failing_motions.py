@@ -12,6 +12,7 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 from scipy.spatial import ConvexHull
 
 import cspr_jax
+from cspr_jax.arithmetic.intervals import united
 from cspr_jax.config.plan import plan_keys
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.outputs.motion_files import failures
@@ -21,6 +22,7 @@ from cspr_jax.outputs.plots.obstacles import COLOUR, points_of
 from cspr_jax.outputs.plots.robot_along import moving
 from cspr_jax.outputs.plots.style import Style, in_style
 from cspr_jax.robots import shapes
+from cspr_jax.schema.verdicts import Verdict
 from outputs.test_pages import content_of
 
 OBSTACLES = [
@@ -35,6 +37,13 @@ POSES = [
 BALL, BOX = shapes.sphere([0.4, 0.2, 1.5], 0.1), shapes.box([0.0, 0.5, 1.2], [0.3, 0.1, 0.2], [0.8, 0.6, 0.0, 0.0])
 PLAN = {"schema": 1, "robot": "prototype", "family": "spline", "pose": POSES, "samples": 40}
 LIMIT = 0.2  # m/s of cables
+SLACK, FAST = "slack_cable", "cable_too_fast"
+# Criteria that each chart shows; those that none of a picture shows are in its chart of tensions.
+CHARTS = {
+    None: {"tension": (SLACK, FAST), "acceleration": ()},
+    "tensions": {"tension": (SLACK, FAST)},
+    "summary": {"tension": (SLACK,), "cable speed": (FAST,)},
+}
 
 
 def first_face(area: Poly3DCollection) -> np.ndarray:
@@ -85,6 +94,39 @@ def test_files_keep_the_intervals_of_failure(plan, file):
     assert table["failure"].values.tolist() == list(range(1, len(failing) + 1))
 
 
+def intervals_of(plan, criteria):
+    """Intervals in which some criteria fail, (m, 2) s since the start of the plan."""
+    starts = np.cumsum(plan.answers.duration) - plan.answers.duration
+    rows = [
+        start + np.reshape(plan.details(i)["failing_by_criterion"].get(name, ()), (-1, 2))
+        for i, start in enumerate(starts)
+        for name in criteria
+    ]
+    return united(np.concatenate([np.empty((0, 2)), *rows]))
+
+
+def test_failures_are_told_by_criterion(plan, file):
+    """Exactly where a cable is too fast the one fails, where one is slack the other; and rows say what binds."""
+    result = cspr_jax.open_result(file)
+    time, data = result.axes["t"], result.data
+    broken = {FAST: np.abs(data["rate"]).max(1) > LIMIT, SLACK: data["tension"].min(1) < 0.0}
+    flags = {name: Verdict[name.upper()].value for name in broken}
+    for name, expected in broken.items():
+        intervals = data["criterion_failing"][data["criterion_flag"] == flags[name]]
+        np.testing.assert_allclose(united(intervals), intervals_of(plan, (name,)))
+        inside = ((time[:, None] >= intervals[:, 0]) & (time[:, None] <= intervals[:, 1])).any(1)
+        np.testing.assert_array_equal(inside, expected)
+    np.testing.assert_array_equal(data["failing"], intervals_of(plan, broken))
+    # The smallest slack, over the limit, or of tensions over the weight a cable.
+    weight = result.attributes["mass"] * 9.81 / 3.0
+    slack = np.concatenate([data["tension"] / weight, 1.0 - np.abs(data["rate"]) / LIMIT], axis=1)
+    depth = (data["position"][:, 2] if result.attributes["z_axis"] == "down" else -data["position"][:, 2])[:, None]
+    assert (depth > 0.5).all()
+    nearest = slack.argmin(1)
+    np.testing.assert_array_equal(data["binding_cable"], nearest % 3 + 1)
+    np.testing.assert_array_equal(data["binding"], np.where(nearest < 3, flags[SLACK], flags[FAST]))
+
+
 def test_other_files_have_no_such_intervals(tmp_path):
     slow = [pose | {"time": 5.0 * pose["time"]} if "time" in pose else pose for pose in POSES]
     feasible = cspr_jax.plan(PLAN | {"pose": slow})
@@ -111,7 +153,11 @@ def test_pictures_over_time_shade_them(plan, file, quantity):
     over_time = [panel for panel in figure.axes if panel.get_xlabel() == "time (s)"]
     assert over_time
     for panel in over_time:
-        np.testing.assert_allclose(shaded(panel), failures(plan)["failing"])
+        own = CHARTS[quantity][panel.get_ylabel().split(" (")[0].split("\n")[0]]
+        expected = intervals_of(plan, own)
+        assert len(expected) or not own
+        np.testing.assert_allclose(shaded(panel) if own else np.empty((0, 2)), expected)
+        assert own or not any(isinstance(area, PolyCollection) for area in panel.collections)
     legends = [*figure.legends, *filter(None, (panel.get_legend() for panel in figure.axes))]
     assert sum(text.get_text() == "fails" for legend in legends for text in legend.get_texts()) == 1
 

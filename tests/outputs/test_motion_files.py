@@ -87,7 +87,7 @@ def test_rows_of_a_motion_that_is_not_feasible(tmp_path):
     assert plan(tmp_path, HARD, "-o", str(output), "--anyway", "--rate", "20")[0] == 1
     heads, *rows = csv.reader(line for line in output.read_text("utf-8").splitlines() if line[0] != "#")
     assert heads[:4] == ["t", "position_x", "position_y", "position_z"]
-    assert heads[-2:] == ["tension_3", "feasible"]
+    assert heads[-4:] == ["tension_3", "binding", "binding_cable", "feasible"]
     end = cspr_jax.plan(tmp_path / "plan.toml").answers.duration[0]
     assert {row[-1] for row in rows if float(row[0]) < end} == {"1"}
     assert {row[-1] for row in rows if float(row[0]) >= end} == {"0"}

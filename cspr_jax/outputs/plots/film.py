@@ -28,6 +28,7 @@ from cspr_jax.outputs.plots.robot_along import Moving, limits_of, moving
 from cspr_jax.outputs.plots.scene import colours_of_tension, fill_places, set_space
 from cspr_jax.outputs.plots.trajectory import name_spools
 from cspr_jax.runtime.stages import stage
+from cspr_jax.schema.quantities import FAILURES
 
 ENDINGS = (".gif", ".mp4", ".html")
 RANDOM = re.compile(rb"_anim_img([0-9a-f]{32})")
@@ -132,7 +133,7 @@ class _Picture:
     ) -> None:
         all_rows = np.arange(len(columns["t"]))
         self.robot, self._path = moving(columns, robot_file, rows, keys), moving(columns, robot_file, all_rows).position
-        self._bodies, self._failing = keys.bodies, {"failing": columns.get("failing", ())}
+        self._bodies, self._failing = keys.bodies, {name: columns[name] for name in FAILURES if name in columns}
         self._flight_time, self._flight = columns.get("flight_t", np.empty(0)), columns.get("flight_position")
         self._rows, self._time = rows, np.asarray(columns["t"], float)
         self.tension = np.asarray(columns["tension"], float)
@@ -191,7 +192,7 @@ class _Picture:
         for k, values in enumerate(self.tension.T):
             panel.plot(self._time, values, linewidth=1.2, label=self._names[k], **line_look(k))
         draw_limits(panel, limits, self.tension, "N")
-        shade_failing(panel, self._failing)
+        shade_failing(panel, self._failing, "tension")
         self._mark = panel.axvline(self._time[0], color=MARK, linewidth=1.8)
         panel.set(xlabel="time (s)", ylabel="tension (N)")
         panel.margins(x=0.01)

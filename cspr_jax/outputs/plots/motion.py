@@ -1,6 +1,6 @@
 """A motion over time: its path and the tensions of the cables."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
+from cspr_jax.outputs.plots.failing import failing_in
 from cspr_jax.outputs.plots.fitting import DOUBT, legend_above
 from cspr_jax.outputs.plots.labels import COLOURS, cable_names, line_look, robot_name
 from cspr_jax.outputs.plots.motion_source import keeps_plan, robot_and_plan
@@ -84,8 +85,9 @@ def motion_figure(result: Result) -> Figure:
         sizes = np.linalg.norm(acceleration, axis=1)
         _lines(drawn["acceleration"], time, np.c_[acceleration, sizes], ["x", "y", "z", "size"])
         drawn["acceleration"].set_ylabel("acceleration (m/s²)")
-    for name in {"orientation", "tension", *more} & drawn.keys():
-        _mark_intervals(drawn[name], result, is_named=name == "tension")
+    charts = [name for name in ("orientation", "tension", *more) if name in drawn]
+    for name in charts:
+        _mark_intervals(drawn[name], result, name, charts)
     place = "" if z0 is None else f"z0 = {float(z0):.4g} m, "
     axis = result.attributes.get("z_axis", "not known, see --robot")
     figure.suptitle(f"{robot_name(result)}: {place}z axis {axis}{point_words(result.data)}{doubt(result)}")
@@ -152,20 +154,22 @@ def boundaries(panel: Axes, result: Result) -> None:
         panel.axvline(time, color="black", linewidth=0.8, alpha=0.35)
 
 
-def _mark_intervals(panel: Axes, result: Result, *, is_named: bool) -> None:
+def _mark_intervals(panel: Axes, result: Result, chart: str, charts: Sequence[str]) -> None:
     boundaries(panel, result)
-    shade_failing(panel, result.data)
-    if is_named and "failing" in result.data:
+    shade_failing(panel, result.data, chart, charts)
+    if chart == "tension" and len(failing_in(result.data, chart, charts)):
         legend_above(panel, len(panel.lines) + 1)
 
 
-def shade_failing(panel: Axes, columns: Mapping[str, Any]) -> None:
+def shade_failing(panel: Axes, columns: Mapping[str, Any], chart: str, charts: Sequence[str] = ("tension",)) -> None:
     """Shade the intervals of time in which a motion fails, where they are known.
 
     Args:
-        columns: of the motion; "failing" (m, 2) s.
+        columns: of the motion; those of `schema.quantities.FAILURES`.
+        chart: name of the quantity that the panel shows.
+        charts: of all panels over time.
     """
-    intervals = columns.get("failing", ())
+    intervals = failing_in(columns, chart, charts)
     if len(intervals):
         # The areas reach from the bottom to the top of any panel; their edges show intervals without a length.
         areas = [[(start, 0.0), (start, 1.0), (end, 1.0), (end, 0.0)] for start, end in intervals]

@@ -43,7 +43,7 @@ def summary_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> Fig
     draw_trajectory(figure, space, result, robot_file, keys)
     figure.legend(*legend_of(result, keys), loc="outside lower center", ncols=6)
     over_time = figure.add_subplot(parts[1])
-    draw_tensions(over_time, result, limits_of(robot_file, keys))
+    draw_tensions(over_time, result, limits_of(robot_file, keys), ("tension", "rate"))
     legend_above(over_time, len(robot_file.base_points) + 5)
     _rates(figure.add_subplot(parts[2], sharex=over_time), result, limits_of(robot_file, keys, "speed"))
     if cells:
@@ -64,7 +64,7 @@ def _rates(panel: Axes, result: Result, limits: list[tuple[str, float]]) -> None
     draw_limits(panel, limits, result.data["rate"], "m/s", signed=True)
     panel.axhline(0.0, color="black", linewidth=0.8)
     boundaries(panel, result)
-    shade_failing(panel, result.data)
+    shade_failing(panel, result.data, "rate", ("tension", "rate"))
     panel.set(xlabel="time (s)", ylabel="cable speed (m/s)")
     # The names of the cables stand above the tensions.
     entries = zip(*panel.get_legend_handles_labels(), strict=True)

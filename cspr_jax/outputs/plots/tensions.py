@@ -1,5 +1,7 @@
 """Tensions of a motion over time: the band that they fill, and the limits."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -46,11 +48,14 @@ def extremes(result: Result) -> str:
     return "; ".join(each)
 
 
-def draw_tensions(panel: Axes, result: Result, limits: list[tuple[str, float]]) -> None:
+def draw_tensions(
+    panel: Axes, result: Result, limits: list[tuple[str, float]], charts: Sequence[str] = ("tension",)
+) -> None:
     """Tensions as a band from the smallest to the largest of all cables, each cable as a thin line, and the limits.
 
     Args:
         limits: words and values, N.
+        charts: names of the quantities of all panels over time.
     """
     time, tension = result.axes["t"], result.data["tension"]
     low, high = np.min(tension, axis=1), np.max(tension, axis=1)
@@ -66,6 +71,6 @@ def draw_tensions(panel: Axes, result: Result, limits: list[tuple[str, float]]) 
     # No cable pulls there.
     panel.axhline(0.0, color="black", linewidth=0.8)
     boundaries(panel, result)
-    shade_failing(panel, result.data)
+    shade_failing(panel, result.data, "tension", charts)
     panel.set(xlabel="time (s)", ylabel="tension (N)", ylim=(bottom, top))
     panel.margins(x=0.01)

@@ -153,7 +153,7 @@ function drawOverTime([place, name, words, unit]) {
     xaxis: { ...axis, title: { text: `time (s)${above}` }, hoverformat: ".4g" },
     yaxis: { ...axis, title: { text: `${words} (${unit})` }, rangemode: name === "tension" ? "tozero" : "normal" },
     shapes: [cursor(theme),
-      ...own.failing.map(([x0, x1]) => ({ type: "rect", yref: "paper", y0: 0, y1: 1, x0, x1, layer: "below",
+      ...own.failingIn[name].map(([x0, x1]) => ({ type: "rect", yref: "paper", y0: 0, y1: 1, x0, x1, layer: "below",
         fillcolor: FAILS, line: { color: FAILS, width: 1 } })),
       ...own.segments.slice(0, -1).map((part) => ({ type: "line", yref: "paper", y0: 0, y1: 1, x0: part.end,
         x1: part.end, line: { color: theme.soft, width: 1, dash: "dot" } })),

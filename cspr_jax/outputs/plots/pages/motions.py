@@ -9,6 +9,7 @@ from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.motions.cause import limit_words
 from cspr_jax.outputs.plots.bodies_in_space import lines_on
+from cspr_jax.outputs.plots.failing import failing_in
 from cspr_jax.outputs.plots.fitting import shortened
 from cspr_jax.outputs.plots.labels import WRITTEN, cable_names, margin_unit
 from cspr_jax.outputs.plots.motion import point_words
@@ -29,6 +30,7 @@ MOST_NODES = 50_000
 # Intervals of failure that the page names; it shades all of them.
 MOST_INTERVALS = 12
 # Columns of cables, each with the quantity of its limits; units of all quantities that limits bound.
+CHARTS = ("path", "tension", "rate", "length")
 OF_CABLES = {"tension": "tension", "rate": "speed", "length": "length"}
 UNITS = {row.quantity: WRITTEN.get(row.unit, row.unit).replace("^2", "²") for row in LIMITS}
 
@@ -82,6 +84,7 @@ def motion_content(
         "segments": _segments(segments),
         "paths": _paths(columns),
         "failing": np.asarray(columns.get("failing", ())).tolist(),
+        "failingIn": {name: failing_in(columns, name, CHARTS).tolist() for name in CHARTS},
         "bodies": [_surface(body) for body in ([] if keys is None else keys.bodies)],
     }
 
@@ -112,7 +115,7 @@ def _failures(columns: Mapping[str, np.ndarray]) -> list[tuple[str, str]]:
     intervals = np.asarray(columns.get("failing", ())).tolist()
     named = [f"{start:.6f} to {end:.6f} s" for start, end in intervals[:MOST_INTERVALS]]
     more = [f"{len(intervals) - MOST_INTERVALS} more"] if len(intervals) > MOST_INTERVALS else []
-    return [("fails", f"{', '.join(named + more)}; shaded in the charts")] if intervals else []
+    return [("fails", f"{', '.join(named + more)}; each shaded in its chart")] if intervals else []
 
 
 def _bounds(columns: Mapping[str, np.ndarray]) -> list[tuple[str, str]]:

@@ -1,0 +1,69 @@
+"""Binding criteria along a motion: at each time the one that is nearest to being broken, or broken by most."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cspr_jax.motions.criteria import judged_poses
+from cspr_jax.motions.limits import other_limits
+from cspr_jax.motions.problem import Problem
+from cspr_jax.robots.point_mass import plane_normal, spool_radius
+from cspr_jax.robots.state import State
+from cspr_jax.robots.wrench_sets import tension_range
+from cspr_jax.schema.verdicts import FLAGS, Verdict
+
+
+def binding(
+    problem: Problem, state: State, of_cables: Mapping[str, np.ndarray], times: np.ndarray, details: Mapping[str, Any]
+) -> dict[str, np.ndarray]:
+    """Flags of what binds, and its cables.
+
+    Args:
+        state: of the motion, z down; leaves (m, ...), m at least n.
+        of_cables: "tension", "length", "rate" and "rate_slope", (m, n_cables) each.
+        times: (n,) since the start of the segment, s.
+        details: of the segment, with the intervals in which criteria fail, if they are known.
+
+    Returns:
+        (n,) each, by the names of `schema.quantities.TRAJECTORY`.
+    """
+    slacks, names = [], []
+    for flag, slack in _slacks(problem, state, of_cables):
+        slacks.append(slack)
+        names += [(flag.value, k + 1 if slack.shape[1] > 1 else 0) for k in range(slack.shape[1])]
+    table, numbers = np.concatenate(slacks, axis=1)[: len(times)], np.array(names)
+    nearest = np.where(np.isnan(table), np.inf, table).argmin(1)
+    flags, cables = numbers[nearest].T
+    # Rows beyond these criteria are within the intervals of failure of others.
+    is_broken = (np.take_along_axis(table, nearest[:, None], 1) < 0.0).any(1)
+    for name, intervals in (details.get("failing_by_criterion") or {}).items():
+        ends = np.reshape(intervals, (-1, 2))
+        inside = ((ends[:, 0] <= times[:, None]) & (times[:, None] <= ends[:, 1])).any(1) & ~is_broken
+        flags, cables = np.where(inside, Verdict[name.upper()].value, flags), np.where(inside, 0, cables)
+    return {"binding": flags.astype(FLAGS), "binding_cable": cables.astype(np.int16)}
+
+
+def _slacks(problem: Problem, state: State, of_cables: Mapping[str, np.ndarray]) -> list[tuple[Verdict, np.ndarray]]:
+    # Slacks (m, 1), or (m, n_cables), of each criterion, as `motions.proved_answers` compares them.
+    robot, limits = problem.robot, problem.limits
+    weight, size = float(robot.mass * robot.gravity) / robot.n_cables, float(spool_radius(robot))
+    low, high = (np.asarray(side, float) for side in tension_range(robot, limits))
+    tension = of_cables["tension"]
+    rows = [(Verdict.SLACK_CABLE, (tension - low) / weight)]
+    if np.isfinite(high).any():
+        rows.append((Verdict.OVER_TENSION, (high - tension) / weight))
+    values = {
+        "depth": state.position[:, 2:],
+        "length": of_cables["length"],
+        "speed": np.abs(of_cables["rate"]),
+        "acceleration": np.abs(of_cables["rate_slope"]),
+        "mass_centre_speed": np.linalg.norm(state.velocity, axis=1)[:, None],
+        "mass_centre_acceleration": np.linalg.norm(state.acceleration, axis=1)[:, None],
+    }
+    for row in other_limits(limits):
+        limit = np.asarray(getattr(limits, row.name), float)
+        rows.append((row.flag, (limit - values[row.quantity]) / (size if row.unit == "m" else limit)))
+    if judged_poses(robot)[1]:
+        rows.append((Verdict.ABOVE_SPOOLS, (state.position @ np.asarray(plane_normal(robot)))[:, None] / size))
+    return rows

@@ -1,0 +1,70 @@
+"""Poses of a plan whose positions are those of the origin of a platform's axes, as poses of its mass centre."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cspr_jax.arithmetic.frames import frame_of
+from cspr_jax.build.orientations import pose_quaternions
+from cspr_jax.build.robots import build_robot
+from cspr_jax.config.plan import PlanFile
+from cspr_jax.config.pose import Pose
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.curves.files import centre_from, reference_of
+from cspr_jax.errors import ConfigError
+from cspr_jax.motions.waypoints import Waypoints
+
+# Keys of plans and poses that are of the mass centre, whatever point the positions of poses are of.
+OTHERS = ("ellipse", "path", "launch", "first_control_point", "velocity", "acceleration")
+
+
+def with_mass_centres(robot_file: RobotFile, keys: PlanFile, path: Path) -> PlanFile:
+    """A plan whose poses have the positions of the mass centre.
+
+    Returns:
+        the plan.
+
+    Raises:
+        ConfigError: point = "origin" with what is always of the mass centre.
+    """
+    centre = centre_from(robot_file.as_written, keys.point)
+    if centre is None or not centre.any():
+        return keys
+    _refuse_others(keys, path)
+    frame = frame_of(robot_file.base_points, robot_file.z_axis)
+    placed = [i for i, pose in enumerate(keys.pose) if pose.position is not None]
+    places = np.zeros((len(keys.pose), 3))
+    for i in placed:
+        places[i] = frame.inward(keys.pose[i].position)
+    arm, units = frame.turned(centre), None
+    shifts = np.broadcast_to(arm, places.shape)  # of a platform that only translates
+    if robot_file.is_platform and placed:
+        units = pose_quaternions(Waypoints(robot_file, keys, path, frame, keys.family, 0, len(places) - 1), places)
+        arm = _rotations(reference_of(build_robot(robot_file, keys, path))).apply(arm)
+        shifts = _rotations(units).apply(arm)
+    poses = list(keys.pose)
+    for i in placed:
+        changes = {"position": np.asarray(frame.outward(places[i] + shifts[i])).tolist()}
+        if poses[i].tilt_torsion is not None and units is not None:
+            # The direction from which the azimuth counts is that of the given place.
+            changes |= {"tilt_torsion": None, "quaternion": frame.turned_quaternions(units[i]).tolist()}
+        poses[i] = poses[i].model_copy(update=changes)
+    return keys.model_copy(update={"pose": poses})
+
+
+def _refuse_others(keys: PlanFile, path: Path) -> None:
+    tables: list[tuple[str, Pose | PlanFile]] = [("", keys)]
+    tables += [(f"pose[{i}].", pose) for i, pose in enumerate(keys.pose)]
+    for prefix, table in tables:
+        for key in OTHERS:
+            if getattr(table, key, None) is not None:
+                raise ConfigError(
+                    path, f'point = "origin": must be "mass-centre" with {prefix}{key}, which is of the mass centre'
+                )
+
+
+def _rotations(quaternions: np.ndarray) -> Any:
+    from scipy.spatial.transform import Rotation  # only such plans need it
+
+    return Rotation.from_quat(np.roll(quaternions, -1, axis=-1))
