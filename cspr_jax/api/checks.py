@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import re
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -32,6 +33,7 @@ from cspr_jax.plans import planning
 from cspr_jax.plans.long_motions import long_plan
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
+from cspr_jax.schema.limits import LIMITS
 from cspr_jax.splines.functions import FunctionMotion, function_motion
 
 
@@ -249,12 +251,15 @@ def check(  # noqa: PLR0913
         return _check_of(plan.with_source(str(NAME), source), text_of(keys))
 
 
-def check_file(motion: Path, keys: Mapping[str, Any], *, outputs: Sequence[str] = ()) -> Check:
+def check_file(
+    motion: Path, keys: Mapping[str, Any], *, outputs: Sequence[str] = (), limits: Path | None = None
+) -> Check:
     """Check the motion of a file.
 
     Args:
         keys: of a plan: its robot, and what else it has but the motion.
         outputs: options of what is to be made of the motion, for which it must be held.
+        limits: file that they come from; None: none.
 
     Returns:
         the check, feasible or not.
@@ -272,6 +277,18 @@ def check_file(motion: Path, keys: Mapping[str, Any], *, outputs: Sequence[str] 
                 held = f"must be absent: {motion} is too long to be held, and judged in windows"
                 raise ConfigError(outputs[0], held) from error
             return _shown(long_plan(plan, motion), text_of(data))
+        except ConfigError as error:
+            raise _of_file(error, motion, limits) from error
+
+
+def _of_file(error: ConfigError, motion: Path, limits: Path | None) -> ConfigError:
+    # Keys of Python have no file; here they have one.
+    before = f"{NAME}: "
+    if not error.args or not str(error.args[0]).startswith(before):
+        return error
+    first, *others = [line.removeprefix(before) for line in error.lines]
+    is_limit = re.split(r"[ \[]", first.removeprefix("limits."))[0] in {row.name for row in LIMITS}
+    return ConfigError(limits if limits is not None and is_limit else motion, first, others=others)
 
 
 def _check_of(keys: PlanFile, text: str) -> Check:

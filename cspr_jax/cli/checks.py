@@ -110,7 +110,8 @@ def _check(options: argparse.Namespace) -> int:
             "--retime": options.retime,
             "--rate": options.json and options.rate,
         }
-        check = checks.check_file(options.motion, keys, outputs=[name for name, value in outputs.items() if value])
+        names = [name for name, value in outputs.items() if value]
+        check = checks.check_file(options.motion, keys, outputs=names, limits=options.limits)
         slower = check.slower() if options.slower and not check.feasible else None
     for line in check.plan.warnings:
         warn(line)

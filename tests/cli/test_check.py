@@ -115,3 +115,12 @@ def test_the_motion_is_not_overwritten(own):
 def test_one_line_for_a_mistake(own, change, words):
     code, out, err = cspr("check", own / "own.csv", *change)
     assert (code, out) == (2, "") and err.count("\n") == 1 and words in err
+
+
+def test_mistakes_that_only_a_robot_shows_name_the_file_of_limits(own):
+    (own / "narrow.toml").write_text("tension_min = 9.0\ntension_max = 8.0\n")
+    words = ("check", own / "own.csv", "--robot", "prototype", "--limits", own / "narrow.toml")
+    code, out, err = cspr(*words)
+    assert (code, out) == (2, "") and err.startswith(
+        f"cspr: {own / 'narrow.toml'}: tension_min = [9.0, 9.0, 9.0]: must"
+    )
