@@ -107,7 +107,8 @@ class FreeMotions(Leg):
         stops = self.stops
         scene = scene_of(problem.robot, stops.robot_file, stops.frame, stops.keys, stops.path, trajectory=stops.keys)
         poses = self._poses(problem, z0)
-        self._refuse_poses(problem, scene, poses)
+        if not len(divided(problem, poses)):
+            self._refuse_poses(problem, scene, poses)
         # Segments have nothing in common if all accelerations are known.
         is_separate = stops.keys.together is False or not np.isnan(poses.accelerations[1:-1]).any()
         try:

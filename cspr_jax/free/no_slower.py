@@ -86,7 +86,11 @@ def _followed(
 def stood_in(
     problem: Problem, scene: Scene | None, poses: FreePoses, settings: FreeSettings, line: ClosedForm
 ) -> FreeMotion:
-    """Lines in place of a search that has been stopped before it has found anything."""
+    """Lines in place of a search that has been stopped before it has found anything.
+
+    Returns:
+        their motions.
+    """
     motions, answers = cast(list[Spline], line.motions), cast(ProvedAnswers, line.answers)
     energy = _energies(FreeQuestion.of(problem, scene, poses, settings), line.motions)
     families, level = (line.family,) * len(motions), np.full(len(motions), np.nan)
@@ -132,7 +136,11 @@ def _with(free: FreeMotion, line: FreeMotion, rows: np.ndarray) -> FreeMotion:
 
 
 def fits(line: ClosedForm, problem: Problem, poses: FreePoses, settings: FreeSettings) -> np.ndarray:
-    """Whether lines are proved, short enough, and accelerate at the poses as is asked, (n,)."""
+    """Tell whether lines are proved, short enough, and accelerate at the poses as is asked.
+
+    Returns:
+        (n,).
+    """
     is_short = line.duration <= (np.inf if settings.longest is None else settings.longest)
     return line.is_feasible & is_short & (_accelerations_missed(line, poses) <= NEAR * float(problem.robot.gravity))
 

@@ -49,7 +49,14 @@ class Ending(NamedTuple):
     of_task: np.ndarray = np.zeros(0, int)
 
     def is_over(self, is_optimal: np.ndarray) -> bool:
-        """Whether searches end now."""
+        """Tell whether searches end now.
+
+        Args:
+            is_optimal: (l,) which have converged.
+
+        Returns:
+            whether they end.
+        """
         now = time.monotonic()
         return now > self.until or (now > self.enough and bool(np.isin(self.of_task, self.of_task[is_optimal]).all()))
 

@@ -31,7 +31,11 @@ class Starts(NamedTuple):
 
 
 def joined_starts(parts: Sequence[Starts]) -> Starts:
-    """Starts of several kinds for the same tasks, one kind after the other."""
+    """Starts of several kinds for the same tasks.
+
+    Returns:
+        the starts, one kind after the other.
+    """
     return Starts(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
