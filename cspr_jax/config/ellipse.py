@@ -6,10 +6,11 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from cspr_jax.config.limits import Point, Positive
+from cspr_jax.config.limits import Point, Positive, has_direction
 from cspr_jax.config.reading import Table
 from cspr_jax.config.trajectory import Angle
 from cspr_jax.config.wording import fault
+from cspr_jax.schema.limits import SMALLEST
 
 
 class Hertz(Table):
@@ -41,8 +42,8 @@ class OscillationTable(Table):
 
     @model_validator(mode="after")
     def _has_axis(self) -> "OscillationTable":
-        if not any(self.axis):
-            raise fault("axis", self.axis, "a direction that is not zero")
+        if not has_direction(self.axis):
+            raise fault("axis", self.axis, f"a direction, of length {SMALLEST:g} at least")
         return self
 
 
@@ -76,10 +77,10 @@ class EllipseShape(Table):
         if self.half_axes is not None:
             if self.normal is not None:
                 raise fault("normal", self.normal, "absent beside half_axes")
-            if not any(any(axis) for axis in self.half_axes):
-                raise fault("half_axes", self.half_axes, "one or two axes of which at least one is not zero")
-        if self.normal is not None and not any(self.normal):
-            raise fault("normal", self.normal, "a direction that is not zero")
+            if not any(has_direction(axis) for axis in self.half_axes):
+                raise fault("half_axes", self.half_axes, f"one or two axes, one of length {SMALLEST:g} at least")
+        if self.normal is not None and not has_direction(self.normal):
+            raise fault("normal", self.normal, f"a direction, of length {SMALLEST:g} at least")
         return self
 
     def axes(self, *, is_planar: bool) -> tuple[np.ndarray, np.ndarray]:

@@ -9,9 +9,10 @@ from typing import NamedTuple
 from cspr_jax.config import gcode_words
 from cspr_jax.config.gcode_arcs import SAME_PLACE, ArcError, arc_about, arc_of_radius
 from cspr_jax.config.gcode_words import LENGTHS, SETTINGS, GcodeLine, Word, WordError, line_of
-from cspr_jax.config.limits import LARGEST, LARGEST_LENGTH, SMALLEST
+from cspr_jax.config.limits import LARGEST_LENGTH
 from cspr_jax.config.reading import read_text
 from cspr_jax.errors import ConfigError
+from cspr_jax.schema.limits import LARGEST, SMALLEST
 
 _UNITS = {20: 0.0254, 21: 0.001}
 _DECIMALS = re.compile(r"[XYZIJKR]\s*[+-]?\d*\.(\d+)", re.IGNORECASE)

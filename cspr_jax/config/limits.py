@@ -1,7 +1,7 @@
 """Limits of robots, plans and sweeps, and the kinds of numbers that these files hold."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import (
@@ -16,19 +16,38 @@ from pydantic import (
 )
 
 from cspr_jax.config.reading import Table
-from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES
+from cspr_jax.config.wording import fault
+from cspr_jax.schema.limits import LARGEST, LIMITS, SMALLEST, UNCERTAINTIES
 
 # Beyond these bounds squares and cubes of numbers overflow; no robot is near them. As in `robots.point_mass`, with jax.
 LARGEST_LENGTH = 1e6
-# Sizes, times, rates and limits are within these bounds in SI units: beyond, quotients and squares of them vanish or
-# overflow. No robot is near them.
-SMALLEST, LARGEST = 1e-9, 1e9
 MOST_CABLES = 1000
 Coordinate = Annotated[float, Field(ge=-LARGEST_LENGTH, le=LARGEST_LENGTH)]
 Point = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 Row = Annotated[list[Annotated[float, Field(ge=-1e18, le=1e18)]], Field(min_length=3, max_length=3)]
-Positive = Annotated[float, Field(gt=0, le=1e9)]
-NotNegative = Annotated[float, Field(ge=0, le=1e9)]
+
+
+def _not_tiny(value: float) -> float:
+    if 0.0 < abs(value) < SMALLEST:
+        raise fault("", value, f"at least {SMALLEST:g}")
+    return value
+
+
+NotTiny = AfterValidator(_not_tiny)
+Positive = Annotated[float, Field(gt=0, le=LARGEST), NotTiny]
+NotNegative = Annotated[float, Field(ge=0, le=LARGEST), NotTiny]
+
+
+def has_direction(vector: Sequence[float]) -> bool:
+    """Tell whether a vector is long enough to have a direction.
+
+    Args:
+        vector: [x, y, z].
+
+    Returns:
+        the answer.
+    """
+    return math.hypot(*vector) >= SMALLEST
 
 
 def _infinite(value: Any) -> Any:
@@ -47,6 +66,7 @@ Bound = Annotated[
     Field(gt=0, allow_inf_nan=True),
     BeforeValidator(_infinite),
     AfterValidator(_bounded),
+    NotTiny,
     PlainSerializer(lambda value: "inf" if math.isinf(value) else value, when_used="json"),
 ]
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from cspr_jax.arithmetic.frames import IDENTITY
-from cspr_jax.config.limits import Coordinate, Point
+from cspr_jax.config.limits import Coordinate, NotTiny, Point
 from cspr_jax.config.reading import Table
 from cspr_jax.config.wording import fault
 from cspr_jax.errors import InputError
@@ -16,7 +16,7 @@ MOST_OBSTACLES, MOST_CORNERS = 1000, 1000
 # A unit quaternion may miss the norm 1 by this much; `arithmetic.rotations`, which needs jax, has the same number.
 UNIT_TOLERANCE = 1e-6
 Extent = Annotated[float, Field(ge=0.0, le=shapes.LARGEST_LENGTH)]
-Radius = Annotated[float, Field(gt=0.0, le=shapes.LARGEST_LENGTH)]
+Radius = Annotated[float, Field(gt=0.0, le=shapes.LARGEST_LENGTH), NotTiny]
 Size = Annotated[list[Extent], Field(min_length=3, max_length=3)]
 Component = Annotated[float, Field(ge=-1.1, le=1.1)]
 Quaternion = Annotated[list[Component], Field(min_length=4, max_length=4)]

@@ -6,12 +6,12 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from cspr_jax.config.limits import NotNegative, Point, Positive
+from cspr_jax.config.limits import NotNegative, Point, Positive, has_direction
 from cspr_jax.config.reading import Table
 from cspr_jax.config.trajectory import Angle, Quaternion
 from cspr_jax.config.wording import either, fault
 from cspr_jax.errors import shown
-from cspr_jax.schema.limits import LARGEST_GRID
+from cspr_jax.schema.limits import LARGEST_GRID, SMALLEST
 
 # Keys of a shape, by the kinds that take them.
 _ALL = ("line", "polyline", "cubic", "quintic", "arc", "circle", "csv", "gcode")
@@ -102,10 +102,10 @@ class PathTable(Table):
         for key in ("orientations", "closed") if self.kind in _KINDS["points"] and self.points is None else ():
             if getattr(self, key) is not None:
                 raise fault(key, shown(getattr(self, key)), "absent without points")
-        if self.angle == 0.0:
-            raise fault("angle", self.angle, "an angle that is not zero")
-        if self.normal is not None and not any(self.normal):
-            raise fault("normal", self.normal, "a direction that is not zero")
+        if self.angle is not None and abs(self.angle) < SMALLEST:
+            raise fault("angle", self.angle, f"an angle of {SMALLEST:g} at least, of either sign")
+        if self.normal is not None and not has_direction(self.normal):
+            raise fault("normal", self.normal, f"a direction, of length {SMALLEST:g} at least")
         if (self.corner == "blend") != (self.blend_tolerance is not None):
             if self.blend_tolerance is None:
                 raise fault("blend_tolerance", None, 'a distance in m, with corner = "blend"')

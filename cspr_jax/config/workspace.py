@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
+from cspr_jax.config.limits import NotTiny
 from cspr_jax.config.obstacles import Obstacles, SurroundingsKeys
 from cspr_jax.config.reading import Table
 from cspr_jax.config.trajectory import Quaternion
@@ -12,7 +13,7 @@ from cspr_jax.config.wording import fault
 
 Condition = Literal["static", "wrench-feasible", "wrench-closure", "interference-free"]
 Component = Annotated[float, Field(ge=-1e12, le=1e12)]
-Speed = Annotated[float, Field(gt=0.0, le=1e6)]
+Speed = Annotated[float, Field(gt=0.0, le=1e6), NotTiny]
 Sizes = Annotated[list[Annotated[float, Field(ge=0.0, le=1e12)]], Field(min_length=1, max_length=6)]
 
 
@@ -71,7 +72,7 @@ class PoseConditions(Table):
         "in addition, m/s^2",
     )
 
-    capacity_length: Annotated[float, Field(gt=0.0, le=1e6)] | None = Field(
+    capacity_length: Annotated[float, Field(gt=0.0, le=1e6), NotTiny] | None = Field(
         None,
         description="wrench-feasible: also store capacity margins, with moments divided by this length, m (any for "
         "point masses)",

@@ -16,7 +16,7 @@ from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.schema.families import FAMILIES
 from cspr_jax.schema.given_numbers import numbers
-from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES, Limit
+from cspr_jax.schema.limits import LIMITS, SMALLEST, UNCERTAINTIES, Limit
 
 
 def limits_of(
@@ -144,6 +144,8 @@ def _limit(row: Limit, value: Any, n_cables: int, at: str) -> Array:
     is_number = np.isfinite(values) | ((values == np.inf) & (row.name == "tension_max") & (values.ndim > 0))
     if values.shape not in shapes or not ((values >= least) & is_number).all():
         raise InputError(f"{at}{row.name}", value, allowed)
+    if not row.is_height and ((values > 0.0) & (values < SMALLEST)).any():
+        raise InputError(f"{at}{row.name}", value, f"{allowed}, at least {SMALLEST:g}")
     return leaf(np.broadcast_to(values, (n_cables,) if row.per_cable else ()))
 
 

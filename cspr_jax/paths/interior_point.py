@@ -117,7 +117,10 @@ def interior_point(problem: Constrained, z: np.ndarray) -> Optimum:
             return Optimum(z, pressures, True)
         target, weights = AIM * complement / len(slacks), pressures / slacks
         push = target / slacks - pressures + weights * missed
-        step = problem.solved(z, weights, -residual - problem.pushed(z, push))
+        try:
+            step = problem.solved(z, weights, -residual - problem.pushed(z, push))
+        except np.linalg.LinAlgError:  # of cells whose widths differ beyond all digits
+            break
         slack_step = problem.change(z, step) - missed
         pressure_step = target / slacks - pressures - weights * slack_step
         primal = _length([(slacks, slack_step), (problem.positive(z), problem.positive(step))])

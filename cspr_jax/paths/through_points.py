@@ -13,6 +13,8 @@ from cspr_jax.paths.section import SAME_ORIENTATION, Track, half_angles
 
 # Part of the speed along the chords below which a spline stands still, and samples of each of its pieces.
 STANDING, SAMPLES = 1e-6, 32
+# Shortest chord of a spline over its longest one: the digits of its pieces are lost below.
+SMALLEST_CHORD = 1e-6
 
 
 def chords(points: np.ndarray, quaternions: np.ndarray | None = None) -> np.ndarray:
@@ -70,6 +72,10 @@ def through_points(
         lines = [Straight(a, b, turn) for a, b, turn in zip(points, points[1:], lengths.tolist(), strict=False)]
         rule: Corners = "every" if kind == "line" else "blend" if corner == "blend" else "stop"
         return tracks_of(lines, rule, tolerance)
+    close = np.flatnonzero(lengths < SMALLEST_CHORD * lengths.max())
+    if len(close):
+        allowed = f"at least {SMALLEST_CHORD:g} of the longest step from the point before it, {lengths.max():.3g} m"
+        raise InputError(f"points[{close[0] + 1}]", points[close[0] + 1].tolist(), allowed)
     s = np.concatenate([[0.0], np.cumsum(lengths)])
     curve = interpolated(s, points, interpolation=kind, ends="periodic" if closed else "natural")
     values = BPoly(np.moveaxis(np.asarray(curve.position), 1, 0), s)

@@ -5,8 +5,10 @@ import errno
 import locale
 import logging
 import os
+import resource
 import sys
 import threading
+import warnings
 from pathlib import Path
 
 from cspr_jax.arithmetic.cores import cores
@@ -15,10 +17,14 @@ from cspr_jax.errors import ConfigError, ResourceError
 # Threads that every command needs: for signals, and those of NumPy's library, one for each core. Then threads for jax:
 # some pools of XLA have one for each core.
 FEW, OF_JAX, OF_JAX_PER_CORE = 4, 16, 4
+# Address space below which jax does not compile a plan on two cores, bytes.
+LEAST_MEMORY = 2_000_000_000
 _SMALL_STACK = 1 << 16  # bytes
 _LARGER = "or the limit of a container or a job, must be larger"
 _THREADS = f"no more threads can be started: `ulimit -u`, {_LARGER}"
 _PROCESSES = f"no more processes can be started: `ulimit -u`, {_LARGER}"
+# Words of XLA, of LLVM and of the loader of shared objects for memory that they do not get.
+_NO_MEMORY = ("RESOURCE_EXHAUSTED", "failed to map segment", "annot allocate memory", "nable to allocate", "bad_alloc")
 _MEMORY = f"memory does not suffice: `ulimit -v`, {_LARGER}"
 
 
@@ -30,6 +36,10 @@ def settle() -> None:
     os.environ["MPLBACKEND"] = "Agg"
     os.environ["MATPLOTLIBRC"] = os.devnull  # an empty file: one of the user's may end the import of matplotlib
     logging.getLogger("matplotlib").setLevel(logging.CRITICAL)
+    if not sys.warnoptions:
+        # NumPy's warnings name lines of a library: what a user can act on are lines of ours. Workers inherit both.
+        warnings.filterwarnings("ignore", category=RuntimeWarning)
+        os.environ.setdefault("PYTHONWARNINGS", "ignore::RuntimeWarning")
     try:
         Path.home()
     except RuntimeError:
@@ -91,7 +101,7 @@ def check_threads(count: int = 0) -> None:
 
 
 def check_threads_of_jax(processes: int = 0) -> None:
-    """Refuse to begin where jax could not start its threads.
+    """Refuse to begin where jax could not start its threads, or map what it compiles: LLVM would end the process.
 
     Args:
         processes: number of processes that share the cores, each with a jax of its own; 0: this process computes.
@@ -99,6 +109,9 @@ def check_threads_of_jax(processes: int = 0) -> None:
     Raises:
         ResourceError: they cannot be started.
     """
+    most = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if 0 <= most < LEAST_MEMORY:
+        raise ResourceError(_MEMORY)
     if processes or "jax" not in sys.modules:
         check_threads((OF_JAX + FEW) * max(processes, 1) + OF_JAX_PER_CORE * max(cores(), processes))
 
@@ -110,7 +123,9 @@ def shortage(error: Exception) -> str | None:
         a line; None for any other failure.
     """
     text = str(error)
-    if isinstance(error, MemoryError) or (isinstance(error, RuntimeError) and "RESOURCE_EXHAUSTED" in text):
+    if isinstance(error, MemoryError) or (
+        isinstance(error, RuntimeError | ImportError) and any(words in text for words in _NO_MEMORY)
+    ):
         return _MEMORY
     if isinstance(error, RuntimeError) and "can't start new thread" in text:
         return _THREADS

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.errors import InputError
+from cspr_jax.schema.limits import LARGEST, SMALLEST
 
 # A shape has this in place of a length that may be any from 1 on.
 ANY = None
@@ -112,6 +113,9 @@ class Numbers:
         inside = (values > self.least if self.above else values >= self.least) & (values <= self.largest)
         inside &= ~np.isnan(values) if self.infinite else np.isfinite(values)
         inside |= np.isnan(values) & self.nan
+        if self.above and self.least == 0.0 and inside.all() and ((values < SMALLEST) | (values > LARGEST)).any():
+            beyond = float(values.min() if values.min() < SMALLEST else values.max())
+            raise InputError(key, beyond, f"{self.allowed}, from {SMALLEST:g} to {LARGEST:g}")
         if not inside.all():
             # One row of points, or one number, is enough to show.
             at = tuple(np.argwhere(~inside)[0][: 1 if values.ndim == 2 else values.ndim])

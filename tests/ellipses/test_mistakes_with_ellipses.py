@@ -42,7 +42,10 @@ def from_rest(ellipse, turns=1):
         (AXES, "centre is missing"),
         (f"{GOOD}, radius = 0.3", "radius = 0.3: must be half_axes, or the radius of a circle: one of them"),
         (f"{CENTRE}, radius = 0", "radius = 0: must be greater than 0"),
-        (f"{CENTRE}, radius = 1, normal = [0, 0, 0]", "normal = [0.0, 0.0, 0.0]: must be a direction that is not zero"),
+        (
+            f"{CENTRE}, radius = 1, normal = [0, 0, 0]",
+            "normal = [0.0, 0.0, 0.0]: must be a direction, of length 1e-09 at least",
+        ),
         (f"{GOOD}, normal = [0, 0, 1]", "normal = [0.0, 0.0, 1.0]: must be absent beside half_axes"),
         (f"{GOOD}, phase = nan", "phase = nan: must be a finite number"),
         *(

@@ -186,7 +186,7 @@ def one(keys, position=True):
         (whole('kind = "arc"\ncentre = [0, 0, 1]\nstart = [0.1, 0, 1]'), "path.angle is missing"),
         (
             whole('kind = "arc"\ncentre = [0, 0, 1]\nstart = [0.1, 0, 1]\nangle = 0'),
-            "path.angle = 0.0: must be an angle that is not zero",
+            "path.angle = 0.0: must be an angle of 1e-09 at least, of either sign",
         ),
         (
             whole('kind = "circle"\ncentre = [0, 0, 1.4]\nstart = [0.1, 0, 1.5]'),
@@ -194,7 +194,7 @@ def one(keys, position=True):
         ),
         (
             whole('kind = "circle"\ncentre = [0, 0, 1]\nstart = [0.1, 0, 1]\nnormal = [0, 0, 0]'),
-            "path.normal = [0.0, 0.0, 0.0]: must be a direction that is not zero",
+            "path.normal = [0.0, 0.0, 0.0]: must be a direction, of length 1e-09 at least",
         ),
         (whole(f"{LINE}\norientations = [[1, 0, 0, 0]]"), "path.orientations: given: must be absent for a point mass"),
         (whole(f"{LINE}\nstart_speed = -1"), "path.start_speed = -1: must be at least 0"),
@@ -247,7 +247,7 @@ def test_mistakes_of_files(tmp_path):
             "one that begins where the pose before is, not at [0.01, 0.0, 1.4]",
         ),
         (whole('kind = "csv"\nfile = "c.csv"'), 'c.csv: line 2, column 3: z = "one": must be a finite number'),
-        (whole('kind = "gcode"\nfile = "d.nc"'), "d.nc: line 2: G5: must be one of"),
+        (whole('kind = "gcode"\nfile = "d.nc"'), "d.nc: line 2: G5: must be written as G1, G2 and G3"),
     )
     for text, line in cases:
         code, out, err = plan(tmp_path, text)
