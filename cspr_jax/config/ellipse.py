@@ -10,7 +10,7 @@ from cspr_jax.config.limits import Point, Positive, has_direction
 from cspr_jax.config.reading import Table
 from cspr_jax.config.trajectory import Angle
 from cspr_jax.config.wording import fault
-from cspr_jax.schema.limits import SMALLEST
+from cspr_jax.schema.given_numbers import SMALLEST
 
 
 class Hertz(Table):

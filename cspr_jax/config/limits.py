@@ -17,7 +17,8 @@ from pydantic import (
 
 from cspr_jax.config.reading import Table
 from cspr_jax.config.wording import fault
-from cspr_jax.schema.limits import LARGEST, LIMITS, SMALLEST, UNCERTAINTIES
+from cspr_jax.schema.given_numbers import LARGEST, SMALLEST
+from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES
 
 # Beyond these bounds squares and cubes of numbers overflow; no robot is near them. As in `robots.point_mass`, with jax.
 LARGEST_LENGTH = 1e6

@@ -5,7 +5,7 @@ import math
 from typing import Any
 
 from cspr_jax.schema.limits import LIMITS
-from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.schema.verdicts import CRITERIA, Verdict
 
 # Digits that a number has at least, and at most where fewer do not tell it from another one.
 DIGITS, MOST_DIGITS = 3, 12
@@ -27,18 +27,7 @@ _WORDS[Verdict.OVER_FEED] = "the mass centre needs {needed} {unit}{when}, the fe
 _WORDS |= dict.fromkeys(
     (row.flag for row in LIMITS if row.of_mass_centre), "the mass centre needs {needed} {unit}{when}, {allowed} allowed"
 )
-UNITS = {row.flag: row.unit for row in LIMITS} | {Verdict.UNCERTAINTY: "1", Verdict.WRENCH_INFEASIBLE: "N"}
-# By flag: its limit, in words.
-_LIMITS = {
-    Verdict.SLACK_CABLE: "the smallest tension",
-    Verdict.OVER_TENSION: "the largest tension",
-    Verdict.WRENCH_INFEASIBLE: "the range of the tensions",
-    Verdict.CABLE_TOO_FAST: "the largest speed",
-    Verdict.CABLE_OVER_ACCELERATION: "the largest acceleration",
-    Verdict.TOO_FAST: "the largest speed of the mass centre",
-    Verdict.OVER_ACCELERATION: "the largest acceleration of the mass centre",
-    Verdict.OVER_FEED: "the feed",
-}
+UNITS = {flag: row.unit for flag, row in CRITERIA.items()} | {Verdict.UNCERTAINTY: "1"}
 _USUAL = "{cable} needs {needed} {unit}{when}, {allowed} allowed"
 
 
@@ -97,20 +86,6 @@ class Cause:
             unit=self.unit.replace("^2", "²"),
             when=when,
         )
-
-
-def limit_words(criterion: str, cable: int | None) -> str:
-    """A limit in words, such as "the smallest tension of cable 1".
-
-    Args:
-        criterion: name of its flag.
-        cable: from 0 on; None: of no single cable.
-
-    Returns:
-        the words.
-    """
-    words = _LIMITS.get(Verdict[criterion.upper()], criterion.replace("_", " "))
-    return words if cable is None else f"{words} of cable {cable + 1}"
 
 
 def _told_apart(first: float, second: float) -> tuple[str, str]:

@@ -15,8 +15,8 @@ from cspr_jax.robots.parallel_pairs import ParallelPairs
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.schema.families import FAMILIES
-from cspr_jax.schema.given_numbers import numbers
-from cspr_jax.schema.limits import LIMITS, SMALLEST, UNCERTAINTIES, Limit
+from cspr_jax.schema.given_numbers import SMALLEST, numbers
+from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES, Limit
 
 
 def limits_of(

@@ -13,29 +13,11 @@ from cspr_jax.outputs.plan_report import axes_text, finite, retimed_words, verdi
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.runtime.terminal import cell
-from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.schema.verdicts import CRITERIA, Verdict
 
 SCHEMA = 1
 # Intervals of failure that the text names; the JSON has all of them.
 MOST_INTERVALS = 12
-# By flag: the quantity that a criterion bounds, in JSON and in words.
-QUANTITIES = {
-    Verdict.SLACK_CABLE: ("tension_min", "smallest tension"),
-    Verdict.OVER_TENSION: ("tension_max", "largest tension"),
-    Verdict.WRENCH_INFEASIBLE: ("tension_margin", "distance of tensions from their limits"),
-    Verdict.SINGULAR: ("determinant", "determinant"),
-    Verdict.ABOVE_SPOOLS: ("depth", "depth below the spools"),
-    Verdict.BELOW_FLOOR: ("floor", "lowest z"),
-    Verdict.CABLE_TOO_LONG: ("cable_length_max", "largest cable length"),
-    Verdict.CABLE_TOO_FAST: ("cable_speed_max", "largest cable speed"),
-    Verdict.CABLE_OVER_ACCELERATION: ("cable_acceleration_max", "largest cable acceleration"),
-    Verdict.TOO_FAST: ("speed_max", "largest speed of the mass centre"),
-    Verdict.OVER_ACCELERATION: ("acceleration_max", "largest acceleration of the mass centre"),
-    Verdict.CABLE_CABLE: ("cable_distance", "distance between cables"),
-    Verdict.CABLE_PLATFORM: ("platform_distance", "distance of cables from the platform"),
-    Verdict.OBSTACLE: ("obstacle_distance", "distance from obstacles"),
-}
-
 
 # Details of a motion that was run along again.
 RETIMED = ("planned_duration", "gain", "lower_bound", "gap", "retimed", "path_deviation")
@@ -75,7 +57,7 @@ def check_object(plan: PlannedMotions) -> dict[str, Any]:
         "speed_max": float(demands.mass_centre_speed[0]),
         "acceleration_max": float(demands.mass_centre_acceleration[0]),
         "z_lowest": float(demands.lowest[0]),
-        "demands": {QUANTITIES[flag][0]: row for flag, row in _demands(plan, case).items()},
+        "demands": {CRITERIA[flag][0]: row for flag, row in _demands(plan, case).items()},
         "point": plan.point if plan.robot_file.is_platform else None,
         "interpolation": getattr(_motion(plan) or plan.keys, "interpolation", "function"),
         "ends": getattr(_motion(plan) or plan.keys, "ends", "") or None,
@@ -106,7 +88,7 @@ def _demands(plan: PlannedMotions, case: MotionProof) -> dict[Verdict, dict[str,
     for k in np.argsort(case.proof.high / case.scales).tolist():
         worst.setdefault(rows[k].flag, k)
     table = {}
-    for flag in (flag for flag in QUANTITIES if flag in worst):
+    for flag in (flag for flag in CRITERIA if flag in worst):
         k = worst[flag]
         allowed, value = rows[k].allowed, rows[k].value(float(case.proof.high[k]))
         # The bound is that of all cables.
@@ -124,7 +106,7 @@ def _demands(plan: PlannedMotions, case: MotionProof) -> dict[Verdict, dict[str,
             "t": float(case.proof.when[k]),
         }
     table |= _sampled_demands(plan)
-    return {flag: table[flag] for flag in QUANTITIES if flag in table}
+    return {flag: table[flag] for flag in CRITERIA if flag in table}
 
 
 def _sampled_demands(plan: PlannedMotions) -> dict[Verdict, dict[str, Any]]:
@@ -239,7 +221,7 @@ def check_table(plan: PlannedMotions):
         values = [_digits(row["value"])]
         values += [f"{sign} {_digits(row[name])}" if math.isfinite(row[name]) else "-" for name in ("bound", "allowed")]
         unit = row["unit"].replace("^2", "²")
-        table.add_row(*(cell(text) for text in (QUANTITIES[flag][1], *values, unit, cable, f"{row['t']:.4f}")))
+        table.add_row(*(cell(text) for text in (CRITERIA[flag][1], *values, unit, cable, f"{row['t']:.4f}")))
     return table
 
 

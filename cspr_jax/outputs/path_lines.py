@@ -2,8 +2,6 @@
 
 from typing import Any
 
-from cspr_jax.motions.cause import limit_words
-
 # Limits that a line names, at most; smaller shares of the time than this it leaves out.
 MOST_NAMED, LEAST_NAMED = 4, 0.005
 
@@ -28,13 +26,9 @@ def path_lines(segments: list[dict[str, Any]]) -> list[str]:
     return lines
 
 
-def _named(row: dict[str, Any]) -> str:
-    return f"feed {row['feed']}" if "feed" in row else limit_words(row["criterion"], row["cable"]).removeprefix("the ")
-
-
 def _binding(rows: list[dict[str, Any]]) -> str:
     texts = [
-        f"{_named(row)} ({_percent(row['share'])})"
+        f"{row['words']} ({_percent(row['share'])})"
         for row in rows[:MOST_NAMED]
         if row["share"] >= LEAST_NAMED or row is rows[0]
     ]

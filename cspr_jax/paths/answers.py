@@ -10,13 +10,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cspr_jax.arithmetic.frames import Frame
-from cspr_jax.motions.cause import Cause, limit_words
+from cspr_jax.motions.cause import Cause
 from cspr_jax.motions.proved_answers import ProvedAnswers
 from cspr_jax.paths.least_time import LeastTime
 from cspr_jax.paths.refusals import NoMotion
+from cspr_jax.paths.still import StaticTension
 from cspr_jax.paths.tightening import BindingName
 from cspr_jax.schema.limits import LIMITS
-from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.schema.verdicts import Verdict, criterion_words
 
 # An acceleration jumps where it changes by more than this part of the largest one; digits of numbers in lines, and
 # decimals of places, m.
@@ -100,7 +101,7 @@ def _binding(parts: Iterable[tuple[LeastTime, np.ndarray]]) -> list[dict[str, An
             shares[name] = shares.get(name, 0.0) + float(times[least.binds == k].sum())
     order = sorted((name for name in shares if shares[name] > 0.0), key=lambda name: -shares[name])
     return [
-        {"criterion": name.criterion, "cable": name.cable, "share": shares[name] / total}
+        {"criterion": name.criterion, "cable": name.cable, "words": name.words, "share": shares[name] / total}
         | ({"feed": name.feed} if name.feed else {})
         for name in order[:MOST_BINDING]
     ]
@@ -129,6 +130,7 @@ class PathCause(Cause):
         against: flag and cable of the other one; None: the speeds from which the rest of the path can be run along.
         end: "start" or "end" of the section, else "".
         speeds: smallest and largest possible speed of such an end, m/s.
+        still: tension that keeps the robot from standing still there; None: it can.
     """
 
     s: float = math.nan
@@ -137,10 +139,12 @@ class PathCause(Cause):
     against: tuple[str, int | None] | None = None
     end: str = ""
     speeds: tuple[float, float] = (math.nan, math.nan)
+    still: StaticTension | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The cause as a plan's JSON has it; see `Cause.to_dict`."""
         table = super().to_dict() | {"s": self.s, "position": list(self.position)}
+        table["still"] = None if self.still is None else self.still.to_dict()
         if self.end:
             return table | {"end": self.end, "speeds": list(self.speeds)}
         criterion, cable = self.against or (None, None)
@@ -150,22 +154,31 @@ class PathCause(Cause):
     def text(self) -> str:
         """The cause in words, in one line."""
         place = ", ".join(_shown(round(value, PLACES)) for value in self.position)
+        still = ""
+        if self.still is not None:
+            where = ", ".join(_shown(round(value, PLACES)) for value in self.still.position.tolist())
+            still = f"cannot stand still at ({where}): {self.still.text}; "
         if self.end:
             low, high = (_shown(speed) for speed in self.speeds)
-            return (
+            return still + (
                 f"{self.end}_speed = {_shown(self.needed)} m/s is not possible at ({place}): from {low} to {high} m/s "
                 "are"
             )
-        one = limit_words(self.criterion, self.cables[0] if self.cables else None)
+        one = _limit(self.criterion, self.cables[0] if self.cables else None)
         line = f"no path speed passes s = {_shown(self.s)} m at ({place})"
+        line = f"{still}{line}"
         if not math.isfinite(self.needed):
             return f"{line}: {one} cannot be kept there"
-        other = "the way on" if self.against is None else limit_words(*self.against)
+        other = "the way on" if self.against is None else _limit(*self.against)
         needing, allowing = (one, other) if self.needs else (other, one)
         return (
             f"{line}: {needing} needs {_shown(self.needed)} m/s² or more along the path, {allowing} allows "
             f"{_shown(self.allowed)} or less"
         )
+
+
+def _limit(criterion: str, cable: int | None) -> str:
+    return f"the {criterion_words(Verdict[criterion.upper()], cable)}"
 
 
 def _shown(value: float) -> str:
@@ -255,4 +268,5 @@ def _cause_of(failure: NoMotion, t: float, usual: Cause, frame: Frame) -> PathCa
         against=against,
         end=failure.end,
         speeds=failure.speeds,
+        still=None if failure.still is None else failure.still._replace(position=frame.outward(failure.still.position)),
     )

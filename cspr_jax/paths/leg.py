@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -23,12 +24,16 @@ from cspr_jax.motions.waypoints import Waypoints
 from cspr_jax.paths.answers import PathAnswers, SectionAnswer, feeds_of
 from cspr_jax.paths.courses import Course, CourseEnds, FileAxes, course_of, course_through
 from cspr_jax.paths.fastest_lines import FastestLines
-from cspr_jax.paths.least_time import LeastTime, least_time_motion
+from cspr_jax.paths.least_time import LeastTime, least_time_motions
 from cspr_jax.paths.section import Section, SectionSettings
 from cspr_jax.robots.platform import PlatformRobot
 
 # Directions of a motion that runs on through a pose differ by no more.
 SAME_DIRECTION = 1e-6
+# Sections that are solved one by one, at most, and those that are solved together, if there are more.
+FEW, TOGETHER = 16, 64
+# Cells of the grids of all sections: a proof looks at no more blocks.
+MOST_CELLS = 100_000
 
 
 class CourseRun(NamedTuple):
@@ -83,8 +88,8 @@ class Paths(Leg):
         parts: list[list[Spline]] = [[] for _ in range(len(self))]
         through = np.empty(len(self), object)
         through[:] = [[] for _ in range(len(self))]
-        for ride in self._rides(problem, z0):
-            fastest = least_time_motion(problem, ride.section, ride.settings)
+        rides = self._rides(problem, z0)
+        for ride, fastest in zip(rides, _least_times(problem, rides), strict=True):
             for segment, motion in cut(fastest, ride):
                 parts[segment].append(motion)
             section = section_answer(fastest, ride, stops.first)
@@ -113,6 +118,7 @@ class Paths(Leg):
         for run in self._runs:
             try:
                 course = self._course(run, places, units)
+                _check_work(course, GRID if run.table.grid is None else run.table.grid)
                 sections = [self._placed(section, course) for section in course.sections()]
             except InputError as error:
                 raise ConfigError(stops.path, f"{self._key(run)}.{error}") from error
@@ -209,6 +215,15 @@ class Paths(Leg):
                 )
 
 
+def _check_work(course: Course, grid: int) -> None:
+    # Refuse what would not be proved, before it takes hours.
+    cells = sum(max(grid, len(track.s) - 1) for track in course.tracks)
+    if cells > MOST_CELLS:
+        fault = f"{len(course.tracks):,} parts between stops have {cells:,} cells"
+        allowed = f'must be {MOST_CELLS:,} at most: blend corners (corner = "blend"), a smaller grid, or several plans'
+        raise InputError("grid", None, allowed, fault=fault)
+
+
 def _direction(curve: Spline, piece: int) -> np.ndarray:
     # Unit vector of the direction at the start of the first piece, or at the end of the last one.
     step = np.diff(np.asarray(curve.position)[piece], axis=0)[piece]
@@ -227,6 +242,14 @@ def _settled(run: CourseRun, sections: list[Section], segments: np.ndarray) -> l
         rides.append(Ride(section, SectionSettings(grid, ramp_time, start, end), segments[first:last]))
         first = last
     return rides
+
+
+def _least_times(problem: Problem, rides: list[Ride]) -> Iterator[LeastTime]:
+    # A few sections one by one, and many together.
+    size = TOGETHER if len(rides) > FEW else 1
+    for first in range(0, len(rides), size):
+        part = rides[first : first + size]
+        yield from least_time_motions(problem, [ride.section for ride in part], [ride.settings for ride in part])
 
 
 def section_answer(fastest: LeastTime, ride: Ride, before: int = 0) -> SectionAnswer:

@@ -15,7 +15,7 @@ from cspr_jax.motions.piece_slacks import Sides, close_bounds
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import TENSIONS
 from cspr_jax.paths.discrete import GridMargins
-from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.schema.verdicts import Verdict, criterion_words
 
 # Slack, over its scale, that is left where a limit is met; by what more than is missed, and by how
 # much at least, margins grow; below which a criterion binds.
@@ -53,6 +53,11 @@ class BindingName(NamedTuple):
     criterion: str
     cable: int | None
     feed: str = ""
+
+    @property
+    def words(self) -> str:
+        """The criterion in words."""
+        return criterion_words(Verdict[self.criterion.upper()], self.cable, self.feed)
 
 
 class CellSlacks(NamedTuple):

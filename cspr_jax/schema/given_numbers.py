@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.errors import InputError
-from cspr_jax.schema.limits import LARGEST, SMALLEST
 
+# Sizes, times, rates and limits are within these bounds, in SI units: beyond, their squares and quotients vanish or
+# overflow. No robot is near them.
+SMALLEST, LARGEST = 1e-9, 1e9
 # A shape has this in place of a length that may be any from 1 on.
 ANY = None
 

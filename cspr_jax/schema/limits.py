@@ -7,9 +7,6 @@ from cspr_jax.schema.verdicts import Verdict
 
 # Numbers of arcs that files and arguments may ask for.
 LARGEST_MAX_ARCS, LARGEST_GRID = 1000, 100_000
-# Sizes, times, rates and limits are within these bounds, in SI units: beyond, their squares and quotients vanish or
-# overflow. No robot is near them.
-SMALLEST, LARGEST = 1e-9, 1e9
 # Multiples of an uncertainty are not followed further.
 LARGEST_MULTIPLE = 1000.0
 

@@ -1,6 +1,7 @@
-"""Verdicts: bit flags, each with a sentence. No jax here: files and tables use them too."""
+"""Verdicts: bit flags, each with a sentence, and what criteria bound. No jax here: files and tables use them too."""
 
 import enum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -67,6 +68,56 @@ SENTENCES = {
     Verdict.OVER_ACCELERATION: "The mass centre exceeds its largest acceleration.",
     Verdict.OVER_FEED: "The mass centre exceeds the feed, the F of G-code.",
 }
+
+
+class CriterionRow(NamedTuple):
+    """Quantity that a criterion bounds, in JSON and in words.
+
+    Fields:
+        key: in JSON, below `demands`.
+        words: in text, and as `words` in JSON.
+        unit: of both; "1" of ratios.
+    """
+
+    key: str
+    words: str
+    unit: str
+
+
+CRITERIA = {
+    Verdict.SLACK_CABLE: CriterionRow("tension_min", "smallest tension", "N"),
+    Verdict.OVER_TENSION: CriterionRow("tension_max", "largest tension", "N"),
+    Verdict.WRENCH_INFEASIBLE: CriterionRow("tension_margin", "distance of tensions from their limits", "N"),
+    Verdict.SINGULAR: CriterionRow("determinant", "determinant", "1"),
+    Verdict.ABOVE_SPOOLS: CriterionRow("depth", "depth below the spools", "m"),
+    Verdict.BELOW_FLOOR: CriterionRow("floor", "lowest z", "m"),
+    Verdict.CABLE_TOO_LONG: CriterionRow("cable_length_max", "largest cable length", "m"),
+    Verdict.CABLE_TOO_FAST: CriterionRow("cable_speed_max", "largest cable speed", "m/s"),
+    Verdict.CABLE_OVER_ACCELERATION: CriterionRow("cable_acceleration_max", "largest cable acceleration", "m/s^2"),
+    Verdict.TOO_FAST: CriterionRow("speed_max", "largest speed of the mass centre", "m/s"),
+    Verdict.OVER_ACCELERATION: CriterionRow("acceleration_max", "largest acceleration of the mass centre", "m/s^2"),
+    Verdict.OVER_FEED: CriterionRow("feed", "feed", "m/s"),
+    Verdict.CABLE_CABLE: CriterionRow("cable_distance", "distance between cables", "m"),
+    Verdict.CABLE_PLATFORM: CriterionRow("platform_distance", "distance of cables from the platform", "m"),
+    Verdict.OBSTACLE: CriterionRow("obstacle_distance", "distance from obstacles", "m"),
+}
+
+
+def criterion_words(flag: Verdict, cable: int | None = None, feed: str = "") -> str:
+    """Name the quantity that a criterion bounds.
+
+    Args:
+        cable: from 0 on; None: of no single cable.
+        feed: as G-code has it, or "".
+
+    Returns:
+        such as "largest speed of cable 2", or "feed F6000".
+    """
+    row = CRITERIA.get(flag)
+    words = row.words if row is not None else flag.text.replace("_", " ")
+    if cable is not None:
+        return f"{words.replace('cable ', '')} of cable {cable + 1}"
+    return f"{words} {feed}".rstrip()
 
 
 def conjunction(flags: np.ndarray) -> np.ndarray:

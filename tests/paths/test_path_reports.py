@@ -10,6 +10,7 @@ import pytest
 from support.commands import plan
 
 import cspr_jax
+from cspr_jax.errors import ConfigError
 from cspr_jax.motions.amplitudes import named
 from cspr_jax.motions.problem import Problem
 from cspr_jax.outputs.plots.phase_planes import phase_plane_figure
@@ -17,7 +18,7 @@ from cspr_jax.paths.row_names import row_names
 from cspr_jax.paths.rows import path_rows
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.state import State
-from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.schema.verdicts import CRITERIA, Verdict
 
 SPOOLS = np.array([[0.22516660498395405, -0.13, 0.0], [-0.22516660498395405, -0.13, 0.0], [0.0, 0.26, 0.0]])
 MASS, GRAVITY, LEAST, LARGEST = 0.198, 9.81, 0.1, 4.0
@@ -144,11 +145,39 @@ def test_place_that_no_speed_passes(outside):
         values = tensions_for(ahead, cause[name] * way / np.linalg.norm(way))
         assert values[cable] == pytest.approx(limit, abs=1e-3)
     assert cause["needed"] > cause["allowed"]
+    # Nor can it stand still there.
+    values = tensions_for(place, np.zeros(3))
+    assert (cause["still"]["cable"], cause["still"]["allowed"]) == (int(values.argmin()), LEAST)
+    assert cause["still"]["needed"] == pytest.approx(values.min(), abs=1e-6)
+    words = f"cable 3 has a tension of {values.min():.4g} N, at least {LEAST:g} needed; no path speed passes"
+    assert outside.causes[0][0].text.startswith("cannot stand still at (0.1, -0.9, 1.1): ") and words in (
+        outside.causes[0][0].text
+    )
+
+
+def test_one_vocabulary_of_criteria(stopping):
+    (segment,) = stopping.to_dict()["segments"]
+    for row in segment["binding"]:
+        words = CRITERIA[Verdict[row["criterion"].upper()]].words
+        assert row["words"] == f"{words} of cable {row['cable'] + 1}"
+
+
+def test_too_much_work_is_refused_before_it_begins(tmp_path):
+    """Three thousand moves to and fro, each with a stop: more than a proof looks at."""
+    lines = ["G0 X0 Y0 Z1000", *(f"G1 X{100 * (k % 2 == 0)} F6000" for k in range(3000))]
+    (tmp_path / "a.nc").write_text("\n".join(lines))
+    keys = {"schema": 1, "robot": "prototype", "family": "path"}
+    with pytest.raises(ConfigError, match=r"path\.grid: 3,000 parts between stops have 180,000 cells: must be 100,000"):
+        cspr_jax.plan(keys | {"path": {"kind": "gcode", "file": str(tmp_path / "a.nc"), "grid": 60}})
 
 
 def test_refused_speed_at_an_end():
     way = {"points": [[0.0, 0.0, 1.0], OUTSIDE[0]]}
     (cause,) = planned(**way).to_dict()["segments"][0]["cause"]
+    # It is the other end at which the robot cannot rest.
+    values = tensions_for(np.array(OUTSIDE[0]), np.zeros(3))
+    assert cause["still"]["needed"] == pytest.approx(values.min(), abs=1e-6)
+    assert cause["still"]["position"] == pytest.approx(OUTSIDE[0], abs=1e-9)
     low, high = cause["speeds"]
     assert (cause["end"], cause["needed"], cause["allowed"], cause["unit"]) == ("start", 0.0, low, "m/s")
     for speed, is_possible in ((1.02 * low, True), (0.98 * low, False), (0.98 * high, True), (1.02 * high, False)):
@@ -173,7 +202,7 @@ points = {points}
     assert "binds: smallest tension of cable" in words and "% of the time)" in words
     assert "ramps of 0.02 s cost" in words and not err
     line = outside.causes[0][0].text
-    assert line.startswith("no path speed passes s = 0.14")
+    assert "no path speed passes s = 0.14" in line
     assert "the smallest tension of cable 3 needs" in line and "the largest tension of cable 1 allows" in line
     code, out, err = plan(tmp_path, text.format(points=OUTSIDE, ramp_time=0.0))
     assert code == 1

@@ -6,11 +6,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cspr_jax.motions.cause import limit_words
 from cspr_jax.outputs.plots.frequencies import BAND, EDGE
 from cspr_jax.outputs.plots.labels import COLOURS, STYLES, robot_name
 from cspr_jax.outputs.plots.motion import doubt
-from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.schema.verdicts import Verdict, criterion_words
 from cspr_jax.store.result import Result
 
 # Height of the picture, over the largest speed of the motion; what lies higher leaves it.
@@ -92,7 +91,7 @@ def _draw_motion(panel: Axes, data, rows: slice) -> None:
         if not (at_nodes & np.isfinite(speed)).any():
             continue
         line = np.where(at_nodes, speed, np.nan)
-        words = limit_words(Verdict(flag).text, cable - 1 if cable else None).removeprefix("the ")
+        words = criterion_words(Verdict(flag), cable - 1 if cable else None)
         look = FREE if k == 0 else {"color": COLOURS[k % len(COLOURS)], "linestyle": STYLES[(k - 1) // len(COLOURS)]}
         panel.plot(s, line, label="motion, nothing binds" if k == 0 else words, linewidth=2.4, zorder=3.5, **look)
 

@@ -7,7 +7,6 @@ import numpy as np
 
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
-from cspr_jax.motions.cause import limit_words
 from cspr_jax.outputs.plots.bodies_in_space import lines_on
 from cspr_jax.outputs.plots.failing import failing_in
 from cspr_jax.outputs.plots.fitting import shortened
@@ -21,7 +20,7 @@ from cspr_jax.outputs.plots.verdict_colours import FEASIBLE_COLOUR, REASONS
 from cspr_jax.plans.causes import cause_text
 from cspr_jax.robots.shapes import Obstacle
 from cspr_jax.schema.limits import LIMITS
-from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.schema.verdicts import Verdict, criterion_words
 
 # Rows of a motion in a page, at most.
 MOST_ROWS = 1200
@@ -134,7 +133,7 @@ def _paths(columns: Mapping[str, np.ndarray]) -> dict[str, Any] | None:
     least, largest, actual, allowed = np.asarray(columns["path_speed"]).T
     flags, cables = (np.asarray(columns[name]).tolist() for name in ("path_binds", "path_binding_cable"))
     words = [
-        limit_words(Verdict(flag).text, cable - 1 if cable else None).removeprefix("the ") if flag else "nothing"
+        criterion_words(Verdict(flag), cable - 1 if cable else None) if flag else "nothing"
         for flag, cable in zip(flags, cables, strict=True)
     ]
     speeds = {"least": least, "largest": largest, "actual": actual, "allowed": allowed}
