@@ -140,5 +140,5 @@ def _table(heads: tuple[str, ...], rows: list[tuple], *, wraps: bool = True):
     for head in heads:
         table.add_column(cell(head), no_wrap=not wraps)
     for row in rows:
-        table.add_row(*map(cell, row))
+        table.add_row(*(cell(*str(value).strip("\n").split("\n")) for value in row))
     return table

@@ -125,7 +125,7 @@ def refuse_others(file: h5py.File, objects: int, attributes: int) -> None:
 
 
 def text(item: h5py.HLObject, name: str, *, largest: int = LARGEST_TEXT) -> str | None:
-    """An attribute that is a text of fixed length.
+    """An attribute that is one text, of variable length or, in files of earlier versions, of a fixed one.
 
     Args:
         largest: bytes.
@@ -140,15 +140,20 @@ def text(item: h5py.HLObject, name: str, *, largest: int = LARGEST_TEXT) -> str 
         return None
     attribute = h5a.open(item.id, name.encode())
     kind = attribute.get_type()
-    scalar = attribute.get_space().get_simple_extent_type() == h5s.SCALAR
-    if not scalar or kind.get_class() != h5t.STRING or kind.is_variable_str():
-        raise DamagedError(f"its {name} must be a text of fixed length")
-    if kind.get_size() > largest:
-        raise DamagedError(f"its {name} has {kind.get_size()} bytes: must be at most {largest}")
-    array = np.empty((), f"S{kind.get_size()}")
-    attribute.read(array, mtype=kind)
+    if attribute.get_space().get_simple_extent_type() != h5s.SCALAR or kind.get_class() != h5t.STRING:
+        raise DamagedError(f"its {name} must be one text")
+    is_variable = kind.is_variable_str()
+    # The length of a text of variable length is known only once it has been read, within the limits of this process.
+    data = item.attrs[name].encode("utf-8", "surrogateescape") if is_variable else b""
+    size = len(data) if is_variable else kind.get_size()
+    if size > largest:
+        raise DamagedError(f"its {name} has {size} bytes: must be at most {largest}")
+    if not is_variable:
+        array = np.empty((), f"S{size}")
+        attribute.read(array, mtype=kind)
+        data = array.item()
     try:
-        return array.item().decode()
+        return data.decode()
     except UnicodeDecodeError as error:
         raise DamagedError(f"its {name} is not UTF-8 text") from error
 

@@ -125,13 +125,9 @@ def describe(data: h5py.Dataset, quantity: Quantity) -> None:
 
 
 def set_attributes(item: h5py.HLObject, values: dict[str, Any]) -> None:
-    """Write attributes; text has a fixed length, which is what netCDF does, and lies under HDF5's checksums."""
+    """Write attributes; h5py gives a text back as str only where its length is variable."""
     for name, value in values.items():
-        if isinstance(value, str):
-            data = value.encode()
-            item.attrs.create(name, np.bytes_(data), dtype=h5py.string_dtype("utf-8", max(len(data), 1)))
-        else:
-            item.attrs[name] = value
+        item.attrs[name] = value
 
 
 def plain(value: Any) -> Any:

@@ -22,6 +22,19 @@ def test_lists(capsys, tmp_path):
         cspr_jax.copy_examples("demo", tmp_path)
 
 
+def test_points_of_a_robot_stand_below_each_other(capsys, tmp_path):
+    """One point a line, and so with a source of several lines; a line break is never written out."""
+    path = tmp_path / "lines.toml"
+    path.write_text(
+        'name = "lines"\nplanar = true\nmass = 1.0\nbase_points = [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]\n'
+        'source = """\nmeasured\nby hand\n"""\n'
+    )
+    assert cli.main(["robots", "laval-mssm", str(path)]) == 0
+    text = capsys.readouterr().out
+    cells = [line.split("│")[2].strip() for line in text.splitlines() if line.startswith("│")]
+    assert "\\n" not in text and {"measured", "by hand", "0.744782, -0.43, 0", "1, 0, 0", "-1, 0, 0"} <= {*cells}
+
+
 @pytest.mark.thorough
 def test_the_list_of_robots(capsys, tmp_path):
     """One line a robot, without jax; all about one by its name or file, and what it is where it cannot hang taut."""

@@ -57,7 +57,7 @@ def test_a_kind_of_map_from_file_to_picture(sweep, tmp_path, workers):
     assert out.splitlines()[-1] == str(path)
     with h5py.File(path) as file:
         assert file.attrs["map"] == b"spool-distances"
-        assert file.attrs["title"].decode().startswith("Distances from the spools, robot prototype")
+        assert file.attrs["title"].startswith("Distances from the spools, robot prototype")
         data = file["spool_distance"]
         assert (data.attrs["units"], data.attrs["long_name"]) == (b"m", b"distance from the nearest spool")
         assert data.shape == (6, 3, 1) and np.prod(data.chunks) <= 8 and file["nearest_spool"].dtype == np.int16

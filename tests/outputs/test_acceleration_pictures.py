@@ -234,7 +234,7 @@ def test_a_file_that_lacks_what_is_needed(capsys, tmp_path):
     given = {"plan": None, "robot_settings": None}
     for k, (changes, told) in enumerate(faults):
         with h5py.File(path) as file:
-            given = {name: file.attrs[name].decode() for name in given} | changes
+            given = {name: file.attrs[name] for name in given} | changes
             rows = {name: file[name][...] for name in ("t", "position", "acceleration")}
         other = motion(tmp_path / f"{k}.h5", PLANAR, [[0.0] * 3] * 2, rows)
         with h5py.File(other) as file:

@@ -86,7 +86,7 @@ def test_a_family_from_file_to_picture(lines):
     path = lines / "motion.h5"
     assert cspr("plan", lines / "plan.toml", "-o", path, "--anyway")[0] == 1
     with h5py.File(path) as file:
-        assert file.attrs["family"] == b"straight-line"
+        assert file.attrs["family"] == "straight-line"
         position, time = file["position"][...], file["t"][...]
         np.testing.assert_allclose(position[[0, -1]], [[0.0, 0.0, 1.7], [-0.05, -0.1, 1.6]], atol=1e-12)
         assert time[-1] == pytest.approx(found["total_duration"])

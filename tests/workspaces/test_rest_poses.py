@@ -93,8 +93,8 @@ def test_files_hold_what_is_asked(tmp_path):
     assert (code, error) == (0, "")
     with h5py.File(out.strip()) as file:
         assert {name for name in file if name not in "xyz"} == {"verdict", "closure_margin", "floor_margin"}
-        assert "amplitude" not in file.attrs["title"].decode() and "wrench-closure" in file.attrs["title"].decode()
-        assert file["verdict"].attrs["long_name"].decode() == "verdict of the pose"
+        assert "amplitude" not in file.attrs["title"] and "wrench-closure" in file.attrs["title"]
+        assert file["verdict"].attrs["long_name"] == "verdict of the pose"
         np.testing.assert_allclose(file["floor_margin"][...], 1.0, atol=1e-12)
     path.write_text(SWEEP + '[run]\nstore = ["verdict", "wrench_margin"]\n')
     code, out, error = cspr("run", path, "-o", tmp_path / "other")
