@@ -14,6 +14,7 @@ from pathlib import Path
 import cspr_jax
 from cspr_jax.outputs.table_layout import Cell, computed_text
 from cspr_jax.published import chapter_3, table_3_4
+from cspr_jax.published.reasons import reason_of
 
 PAGE = Path(__file__).with_name("accuracy.md")
 HEAD = """# Accuracy
@@ -26,31 +27,6 @@ are in **bold**. "none" means that no feasible number was found. The text below 
 [What was compared](comparisons.md) has further comparisons, with independent oracles and with another simulator;
 `cspr table peers` compares with the numbers that other tools print.
 """
-# Why computed cells differ from the printed ones.
-REASONS = {
-    "1.1": "No cell differs.",
-    "1.2": "The printed inclination of A1 is the best for 1,001 samples of time; the number of oscillations is flat "
-    "there and differs by 1e-6 only, while n at the opposite inclination changes with it. A2 at v = 0 is 1.19: the "
-    "printed cell is a misprint.",
-    "1.3": "The caption names a distance whose w_max is 10; the printed numbers belong to 5 sqrt(3), a distance along "
-    "H_0. Both are computed. The printed epsilon of A_eff, 0.0399, cannot give the printed n; 0.0599 does.",
-    "2.1": "No cell differs.",
-    "3.2": "The text names the quintic amplitude function; with it the printed numbers of arcs are not feasible in "
-    "four segments. The piecewise function of chapter 1, (1.110), and its smooth relative give all of them but one, "
-    "for which they need fewer arcs than printed. Pose 2 as printed, with a torsion of pi/2, can neither be reached "
-    "nor left with the printed arcs; with pi/3 it can.",
-    "3.3": "The number of accessible orientations depends on how they are counted, and no reading of the text "
-    "gives the printed counts "
-    "([definitions](theory.md#orientations-accessible-attainable-chapter-3-sections-310-and-3123)). The proportions "
-    "depend on the amplitude function, see Table 3.2.",
-    "3.4": "The reasons are those of Table 3.3.",
-    "4.1": "The two imaginary solutions are printed with the sign of p exchanged.",
-    "4.2": "No reading gives all eight numbers: -1.752 follows from the printed T and p, of three decimals, and 0.896 "
-    "from exact ones.",
-    "4.3": "The source must have rounded the boundaries to five decimals: so rounded, all 1,240 numbers of the grid "
-    "agree. The other cell that differs is the optimum T that the source's text names, 4.35 s: it contradicts the "
-    "source's own table, where the first node without overshoot is 4.40 s.",
-}
 CHOICES_WORDS = (
     "The text does not say up to which number of arcs p, and with how many values of beta-hat, orientations were "
     "tried. These are the proportions, in percent, for both amplitude functions with short ends. Elsewhere on this "
@@ -82,7 +58,9 @@ def section(name: str, cells: list[Cell]) -> str:
         own = [cell for cell in printed if cell.variant == variant]
         parts += [f"*{variant}*\n"] if variant else []
         parts.append(block(own) if len(own) <= MANY else summary(own))
-    return "\n".join([*parts, textwrap.fill(REASONS[name], 118, break_long_words=False) + "\n"])
+    reasons = dict.fromkeys(reason_of(name, cell) for cell in printed if cell.differs)
+    lines = [textwrap.fill(f"- {text[:1].upper()}{text[1:]}.", 118, subsequent_indent="  ") for text in reasons if text]
+    return "\n".join([*parts, "\n".join(lines or ["No cell differs."]) + "\n"])
 
 
 def block(cells: list[Cell]) -> str:
@@ -144,14 +122,14 @@ def text(cell: Cell, cells: list[Cell]) -> str:
 def main(names: list[str]) -> None:
     """Compute tables, and replace their sections."""
     known = re.split(r"^(?=## )", PAGE.read_text("utf-8"), flags=re.MULTILINE)[1:] if PAGE.exists() else []
-    sections = {}
+    sections, tables = {}, [name for name in cspr_jax.list_tables() if name != "peers"]
     for own in known:
         name, tried = re.match(r"## Table ([^\s:]+)(: what was tried)?", own).groups()
         sections[f"choices-{name}" if tried else name] = own
-    for name in names or REASONS:
+    for name in names or tables:
         sections[name] = choices(CHOICES[name]) if name in CHOICES else section(name, cspr_jax.table(name))
     PAGE.write_text(
-        "\n".join([HEAD, *(sections[name].strip() + "\n" for name in (*REASONS, *CHOICES) if name in sections)]),
+        "\n".join([HEAD, *(sections[name].strip() + "\n" for name in (*tables, *CHOICES) if name in sections)]),
         "utf-8",
     )
 

@@ -246,6 +246,7 @@ ARGUMENTS: dict[str, Rule] = {
     "errors": kind_of("LaunchErrors(...)", has=("throws", "encoder", "seed")),
     "family": _TEXT,
     "fine": _FLAG,
+    "again": _FLAG,
     "folder": _PATH,
     "font_size": _NUMBER_OR_NONE,
     "frequencies": real("numbers > 0, rad/s", (), (ANY,), least=0.0, above=True),

@@ -60,7 +60,8 @@ def plot(  # noqa: PLR0913
         size: width and height, cm, as (16, 10) or "16x10"; None: the usual size of the picture.
         dpi: pixels per inch of a file; None: 160.
         font_size: size of the font, points; None: 10.
-        preset: "column", 8.5 cm wide, or "page", 17.5 cm, of a paper; the height follows. None: neither.
+        preset: "column", 8.89 cm wide, or "page", 17.5 cm, of a paper, or "column elsevier", "page ieee", "column
+            8.5cm" and the like; the height follows. None: neither.
         title: whether titles are drawn; a motion that is not proved feasible is marked in any case.
         plan: plan file of motions in CSV, which keep neither robot nor limits; None: none.
         robot: in its place the robot of motions in CSV, as for `check`; None: none.

@@ -35,6 +35,7 @@ def table(
     max_arcs: int | None = None,
     values: int | None = None,
     workers: int | None = 1,
+    again: bool = True,
 ) -> "list[Cell]":
     """Compute a published table again.
 
@@ -48,6 +49,8 @@ def table(
         values: tables 3.3, 3.4: number of values of beta-hat tried at each orientation; None: 20.
         workers: tables 3.3, 3.4: number of processes on this machine; above 1, a script must call this function under
             `if __name__ == "__main__":`. None: the usual number.
+        again: whether it is computed even where an earlier run of the same version has kept its cells beside the
+            compiled code, as `cspr table` does (`keep_compiled_code`).
 
     Returns:
         the cells of the table, each with `row`, `column`, `computed`, `published`, `variant` and `differs`.
@@ -67,7 +70,7 @@ def table(
     if workers is None:
         workers = usual_count(LARGEST) if TABLES[name].by_processes else 1
     with double_precision():
-        return table_cells(name, choice, workers)
+        return table_cells(name, choice, workers, again=again)
 
 
 @checked

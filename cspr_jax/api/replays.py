@@ -40,7 +40,7 @@ class Replay(replays.PlayedPlan):
             size: width and height, cm, as (16, 10) or "16x10"; None: the usual size of the picture.
             dpi: pixels per inch of a file; None: 160.
             font_size: size of the font, points; None: 10.
-            preset: width of a "column" or a "page" of a paper; None: neither.
+            preset: width of a "column" or a "page" of a paper, as in `plot`; None: neither.
             title: whether the title is drawn.
             output: picture to write; its ending selects the format. None: nothing is written.
 

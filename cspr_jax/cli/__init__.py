@@ -14,6 +14,7 @@ from cspr_jax import __version__
 from cspr_jax.cli import checks, listings, pictures, plans, published, sweeps
 from cspr_jax.cli.command import Command, printing, warn, write
 from cspr_jax.errors import ConfigError, CsprError, ExitCode, StoreError, printable
+from cspr_jax.outputs.plots.options import with_widths
 from cspr_jax.runtime import compile_cache, surroundings, terminal
 from cspr_jax.sweep.signals import Prompt, prompt_end
 
@@ -56,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.write("cspr: Linux and macOS are supported, Windows is not; its subsystem for Linux will do\n")
         return int(ExitCode.BAD_INPUT)
     try:
-        options = _parser().parse_args(arguments)
+        options = _parser().parse_args(with_widths(sys.argv[1:] if arguments is None else arguments))
         surroundings.check_threads()
         surroundings.check_matplotlibrc()
     except SystemExit as end:

@@ -31,6 +31,8 @@ def _add_table(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="3.3, 3.4: number of processes (default 1; for 3.4 one per core, at most 8)",
     )
+    parser.add_argument("--readings", action="store_true", help="show all readings of the source in full")
+    parser.add_argument("--again", action="store_true", help="compute it even where an earlier run has kept its cells")
     add_device(parser)
 
 
@@ -48,11 +50,11 @@ def _table(options: argparse.Namespace) -> int:
         name: getattr(options, name) for name in ("definition", "amplitude", "fine", "max_arcs", "values", "workers")
     }
     with waiting():
-        cells = published.table(options.name, **choices)
+        cells = published.table(options.name, **choices, again=options.again)
     if options.json:
         print_json(table_object(options.name, cells))
     else:
-        print_table(table_for_people(options.name, cells))
+        print_table(table_for_people(options.name, cells, all_readings=options.readings))
     return ExitCode.DONE
 
 

@@ -1,7 +1,7 @@
 """A published table as printed: its rows and columns, published and computed numbers in one cell."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
@@ -54,34 +54,65 @@ class Cell:
 
 
 def grid(
-    title: str, cells: Sequence[Cell], *, transposed: bool = False, heads: Mapping[str, str] = MappingProxyType({})
+    title: str,
+    cells: Sequence[Cell],
+    *,
+    transposed: bool = False,
+    heads: Mapping[str, str] = MappingProxyType({}),
+    reading: str = "",
+    is_full: bool = False,
+    reason: Callable[[Cell], str] = lambda _: "",
 ) -> Any:
-    """A table for a terminal, one block for each reading of the source.
+    """A table for a terminal: one block for each reading of the source, or for the one that its numbers fit.
 
     Args:
         transposed: whether rows are printed as columns.
         heads: names of rows and columns that are others in this table, as people read them.
+        reading: variant that the numbers of the source fit; empty: none is named.
+        is_full: whether the other variants are blocks too, and not a line each.
+        reason: why a cell differs, in a line; empty where that is not known.
 
     Returns:
         a rich renderable.
     """
     from rich.console import Group  # only a terminal needs it
 
-    variants = dict.fromkeys(cell.variant for cell in cells)
+    variants = list(dict.fromkeys(cell.variant for cell in cells))
+    reading = reading if reading in variants else ""
+    variants.sort(key=lambda name: name != reading)
     blocks: list[Any] = []
+    reasons: dict[str, str] = {}  # mark of each
     for name in variants:
-        blocks += [terminal.cell(name, style="bold")] if name else []
         cells_of_variant = [cell for cell in cells if cell.variant == name]
+        marks = {cell: _mark(reason(cell), reasons) for cell in cells_of_variant if cell.differs}
+        if reading and name != reading and not is_full:
+            blocks.append(terminal.cell(_in_a_line(name, cells_of_variant, marks)))
+            continue
+        words = f"{name} (the reading that the printed numbers fit)" if name and name == reading else name
+        blocks += [terminal.cell(words, style="bold")] if name else []
         across = list(dict.fromkeys(cell.row if transposed else cell.column for cell in cells_of_variant))
         step = SIDE_BY_SIDE if len(across) > WIDEST else len(across)
         for first in range(0, len(across), step):
             heads_of_block = across[first : first + step]
             part = [cell for cell in cells_of_variant if (cell.row if transposed else cell.column) in heads_of_block]
-            blocks.append(_block(part, transposed, _HEADS | dict(heads)))
-    return Group(terminal.cell(title, style="italic"), *blocks, terminal.cell(LEGEND, style="dim"))
+            blocks.append(_block(part, transposed, _HEADS | dict(heads), marks))
+    lines = [terminal.cell(f"{mark}: {text}") for text, mark in reasons.items()]
+    return Group(terminal.cell(title, style="italic"), *blocks, *lines, terminal.cell(LEGEND, style="dim"))
 
 
-def _block(cells: list[Cell], transposed: bool, heads: Mapping[str, str]) -> Any:
+def _mark(text: str, reasons: dict[str, str]) -> str:
+    # Reasons are lettered in the order in which they appear.
+    return reasons.setdefault(text, f"[{chr(ord('a') + len(reasons))}]") if text else ""
+
+
+def _in_a_line(name: str, cells: list[Cell], marks: Mapping[Cell, str]) -> str:
+    printed = [cell for cell in cells if cell.printed]
+    listed = " ".join(sorted({mark for mark in marks.values() if mark}))
+    words = f"{len(marks)} of {len(printed)} cells differ {listed}".rstrip() if marks else "no cell differs"
+    return f"{name}: {words}"
+
+
+def _block(cells: list[Cell], transposed: bool, heads: Mapping[str, str], marks: Mapping[Cell, str]) -> Any:
     from rich.table import Table
 
     table = Table()
@@ -91,14 +122,17 @@ def _block(cells: list[Cell], transposed: bool, heads: Mapping[str, str]) -> Any
     for name in columns:
         table.add_column(terminal.cell(heads.get(name, name)), justify="right", no_wrap=True)
     for row in rows:
-        texts = [_text(by[row, column], cells) if (row, column) in by else terminal.cell("") for column in columns]
+        known = [by.get((row, column)) for column in columns]
+        texts = [terminal.cell("") if one is None else _text(one, cells, marks.get(one, "")) for one in known]
         table.add_row(terminal.cell(heads.get(row, row)), *texts)
     return table
 
 
-def _text(cell: Cell, cells: list[Cell]) -> Any:
+def _text(cell: Cell, cells: list[Cell], mark: str) -> Any:
     text = f"{cell.printed or UNKNOWN} / {computed_text(cell, cells)}"
-    return terminal.cell(f"{text} {MISMATCH}", style="bold red") if cell.differs else terminal.cell(text)
+    if not cell.differs:
+        return terminal.cell(text)
+    return terminal.cell(f"{text} {MISMATCH} {mark}".rstrip(), style="bold red")
 
 
 def computed_text(cell: Cell, cells: list[Cell]) -> str:

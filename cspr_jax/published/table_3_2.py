@@ -33,18 +33,25 @@ def table_3_2() -> dict[Key, float | None]:
     Returns:
         cells; rows name the pose at which a segment starts.
     """
-    data, cells = read_toml(SEQUENCE), {}
-    for amplitude, key in _AMPLITUDES.items():
+    data, cells = read_toml(SEQUENCE), dict[Key, float | None]()
+    for number, (amplitude, key) in enumerate(_AMPLITUDES.items()):
+        segments: dict[int, tuple[float | None, float | None]] = {}
         for torsion, angle in _TORSIONS.items():
             changed = copy.deepcopy(data)
             changed["amplitude"] = key
             changed["pose"][_POSE]["tilt_torsion"][2] = angle
-            with within(f"{amplitude}, pose 2 {torsion}"):
+            # A segment depends on its two poses alone: only those at pose 2 are planned again.
+            first = _POSE - 1 if segments else 0
+            changed["pose"] = changed["pose"][first : _POSE + 2] if segments else changed["pose"]
+            with within(f"{amplitude} ({number + 1} of {len(_AMPLITUDES)}), pose 2 {torsion}"):
                 answers = plan_of(checked(PlanFile, changed, SEQUENCE), SEQUENCE).answers
-            for i, arcs in enumerate(answers.arcs):
-                is_found = arcs > 0
-                cells[str(i), "p", _variant(amplitude, torsion)] = float(arcs) if is_found else None
-                cells[str(i), "T", _variant(amplitude, torsion)] = float(answers.duration[i]) if is_found else None
+            segments |= {
+                first + i: (float(arcs), float(answers.duration[i])) if arcs > 0 else (None, None)
+                for i, arcs in enumerate(answers.arcs)
+            }
+            for i, found in segments.items():
+                for column, value in zip(("p", "T"), found, strict=True):
+                    cells[str(i), column, _variant(amplitude, torsion)] = value
     return cells
 
 

@@ -11,6 +11,8 @@ from cspr_jax.plans.planning import plan
 from cspr_jax.published import batotp, boralugoda, chapter_1, chapter_3, peers, ray_hulls, table_3_2, table_3_4
 from cspr_jax.published.chapter_1 import Key
 from cspr_jax.published.chapter_3 import TableSettings
+from cspr_jax.published.reasons import READINGS, reason_of
+from cspr_jax.runtime.kept_results import kept_result
 from cspr_jax.runtime.stages import within
 
 SCHEMA = 1
@@ -31,6 +33,7 @@ class TableSource:
         by_processes: whether several processes compute it where the user gives no number.
         transposed: whether the source prints these rows as columns.
         heads: names of rows and columns that mean something else in this source than in the others.
+        measures: whether it measures times, which no earlier run can have done.
     """
 
     title: str
@@ -40,6 +43,7 @@ class TableSource:
     by_processes: bool = False
     transposed: bool = False
     heads: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    measures: bool = False
 
 
 def _table_2_1() -> dict[Key, float | None]:
@@ -132,27 +136,35 @@ TABLES = {
         "that is proved to keep all limits, and a lower bound of the time of all motions along its path",
         ray_hulls.PUBLISHED | batotp.PUBLISHED,
         lambda: peers.peers() | ray_hulls.hulls() | batotp.least_time(),
+        measures=True,
     ),
 }
 
 
-def table_cells(name: str, choice: TableSettings | None = None, workers: int = 1) -> list[Cell]:
+def table_cells(name: str, choice: TableSettings | None = None, workers: int = 1, *, again: bool = True) -> list[Cell]:
     """Compute a table.
 
     Args:
         name: one of `TABLES`.
         choice: for tables that have one; None: the usual one.
         workers: number of processes, for tables that have a choice.
+        again: whether it is computed even where an earlier run has kept it.
 
     Returns:
         its cells, row by row.
     """
-    source = TABLES[name]
-    with within(f"table {name}"):
-        computed = source.compute(choice or TableSettings(), workers) if source.with_choice else source.compute()
+    source, choice = TABLES[name], choice or TableSettings()
+
+    def compute() -> list[list]:
+        with within(f"table {name}"):
+            computed = source.compute(choice, workers) if source.with_choice else source.compute()
+        return [[*key, value] for key, value in computed.items()]
+
+    settings = dataclasses.asdict(choice) if source.with_choice else {}
+    rows = compute() if source.measures else kept_result(f"table-{name}", settings, compute, again=again)
     return [
         Cell(row, column, value, source.published.get((row, column, variant), ""), variant)
-        for (row, column, variant), value in computed.items()
+        for row, column, variant, value in rows
     ]
 
 
@@ -177,13 +189,25 @@ def _variant(text: str) -> dict[str, str]:
     return dict(part.split(" = ", 1) for part in text.split("; "))
 
 
-def table_for_people(name: str, cells: list[Cell]) -> Any:
-    """The table for a terminal, as printed: published and computed in each cell.
+def table_for_people(name: str, cells: list[Cell], *, all_readings: bool = False) -> Any:
+    """The table for a terminal, as printed: published and computed in each cell, and why cells differ.
+
+    Args:
+        all_readings: whether readings of the source that its numbers do not fit are shown in full too.
 
     Returns:
         a rich renderable.
     """
-    return grid(TABLES[name].title, cells, transposed=TABLES[name].transposed, heads=TABLES[name].heads)
+    source = TABLES[name]
+    return grid(
+        source.title,
+        cells,
+        transposed=source.transposed,
+        heads=source.heads,
+        reading=READINGS.get(name, ""),
+        is_full=all_readings,
+        reason=lambda cell: reason_of(name, cell),
+    )
 
 
 def chosen(name: str, options: dict[str, Any]) -> TableSettings | None:

@@ -92,25 +92,36 @@ def progress() -> Iterator[Callable[[int, int], None]]:
 
 @contextlib.contextmanager
 def _lines() -> Iterator[Callable[[int, int], None]]:
-    pace, cells, over = Pace(), [(0, 0)], threading.Event()
+    pace, cells = Pace(), [(0, 0)]
 
     def on_tile(done: int, total: int) -> None:
         pace.advance(done, total)
         cells.append((done, total))
 
+    def line() -> str:
+        done, total = cells[-1]
+        rate = "" if pace.rate is None else f", {pace.rate:,.3g} cells/s, {pace.left()}"
+        share = f"{100.0 * done / total:.0f} %, {done:,} of {total:,} cells" if total else "before the first tile"
+        return f"{share}{rate}"
+
+    with _every_minute(line):
+        yield on_tile
+
+
+@contextlib.contextmanager
+def _every_minute(line: Callable[[], str]) -> Iterator[None]:
+    over = threading.Event()
+
     def write_lines() -> None:
         while not over.wait(LINE_SECONDS):
-            done, total = cells[-1]
-            rate = "" if pace.rate is None else f", {pace.rate:,.3g} cells/s, {pace.left()}"
-            share = f"{100.0 * done / total:.0f} %, {done:,} of {total:,} cells" if total else "before the first tile"
             with contextlib.suppress(OSError, ValueError):  # nobody may be there to be told
-                sys.stderr.write(f"cspr: {share}{rate}\n")
+                sys.stderr.write(f"cspr: {printable(line())}\n")
                 sys.stderr.flush()
 
     thread = threading.Thread(target=write_lines, daemon=True)
     thread.start()
     try:
-        yield on_tile
+        yield
     finally:
         over.set()
         thread.join()
@@ -118,13 +129,17 @@ def _lines() -> Iterator[Callable[[int, int], None]]:
 
 @contextlib.contextmanager
 def waiting() -> Iterator[None]:
-    """Show the stage of the work while the block runs, on a terminal; nothing may be printed meanwhile.
+    """Show the stage of the work while the block runs: on a terminal all the time, elsewhere by a line a minute.
+
+    Nothing may be printed meanwhile.
 
     Yields:
         nothing.
     """
     if not sys.stderr.isatty():
-        yield
+        latest = ["starting"]
+        with _every_minute(lambda: latest[0]), stages.heard(lambda text: latest.__setitem__(0, text or "computing")):
+            yield
         return
     from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 

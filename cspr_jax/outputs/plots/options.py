@@ -1,12 +1,22 @@
 """Options of the command line for pictures; no matplotlib here, for `cspr --help` is to answer at once."""
 
 import argparse
+import re
+from collections.abc import Sequence
 from pathlib import Path
 
 # Names that `--quantity` takes for motions.
 ACCELERATION, PATH_ACCELERATION, LANDING = "acceleration", "path_acceleration", "landing"
 PHASE_PLANE = "phase_plane"
 TRAJECTORY, TENSIONS, SUMMARY = "trajectory", "tensions", "summary"
+# Widths of pictures for papers, cm: usual ones, and those of publishers.
+USUAL = "usual"
+WIDTHS = {
+    "column": {USUAL: 8.89, "ieee": 8.89, "elsevier": 9.0},
+    "page": {USUAL: 17.5, "ieee": 18.1, "elsevier": 19.0},
+}
+_WIDTH = re.compile(r"[\d.]+[a-z]*", re.ASCII)
+_SHORTEST = 5  # letters of an option that is shortened
 
 
 def add_plot(parser: argparse.ArgumentParser) -> None:
@@ -78,16 +88,37 @@ def add_look(parser: argparse.ArgumentParser) -> None:
     """
     parser.add_argument("--size", metavar="WIDTHxHEIGHT", help="size of the picture, cm, such as 16x10")
     presets = parser.add_mutually_exclusive_group()
-    for name, words in (("column", "8.5 cm wide"), ("page", "17.5 cm wide")):
+    for name, widths in WIDTHS.items():
+        journals = ", ".join(f"{words} {width:g}" for words, width in widths.items() if words != USUAL)
         presets.add_argument(
             f"--{name}",
             dest="preset",
-            action="store_const",
-            const=name,
-            help=f"make it {words}, for a {name} of a paper",
+            type=f"{name} {{}}".format,
+            metavar="WIDTH",
+            help=f"make it as wide as a {name} of a paper, {widths[USUAL]:g} cm, or WIDTH: {journals}, or as in 8.5cm",
         )
     parser.add_argument("--no-title", dest="title", action="store_false", help="leave out the title")
     parser.add_argument("--dpi", type=float, metavar="N", help="pixels per inch (default 160)")
     parser.add_argument(
         "--font-size", type=float, metavar="PT", help="size of the font, points (default 10; --column 8, --page 9)"
     )
+
+
+def with_widths(words: Sequence[str]) -> list[str]:
+    """Words of a command line in which each option of a width has one, since the name of a file may follow it.
+
+    Args:
+        words: behind the name of the program.
+
+    Returns:
+        the words, such as "--column=ieee" and "--page=usual".
+    """
+    joined, rest = list[str](), list(words)
+    while rest and rest[0] != "--":
+        word = rest.pop(0)
+        option = next((f"--{name}" for name in WIDTHS if len(word) >= _SHORTEST and f"--{name}".startswith(word)), None)
+        if option is not None:
+            named = bool(rest) and (any(rest[0] in widths for widths in WIDTHS.values()) or _WIDTH.fullmatch(rest[0]))
+            word = f"{option}={rest.pop(0) if named else USUAL}"
+        joined.append(word)
+    return [*joined, *rest]

@@ -14,6 +14,7 @@ from matplotlib.text import Text
 
 from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.outputs.plots.fitting import fit, share_of_panels
+from cspr_jax.outputs.plots.options import USUAL, WIDTHS
 from cspr_jax.outputs.plots.scene import fill_places
 
 # Over matplotlib's own defaults, so that a user's matplotlibrc changes nothing. Letters stay letters: TrueType in PDF,
@@ -40,8 +41,9 @@ LOOK = {
 METADATA: dict[str, dict] = {".png": {"Software": None}, ".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
 INCH = 2.54  # cm
 SIDES, DPIS, FONT_SIZES = (4.0, 120.0), (30.0, 1200.0), (4.0, 40.0)
-# Width and letters of pictures for papers, cm and points; their heights follow from their content.
-PRESETS = {"column": (8.5, 8.0), "page": (17.5, 9.0)}
+# Letters of pictures for papers, points; their heights follow from their content.
+PRESETS = {"column": 8.0, "page": 9.0}
+UNITS = {"cm": 1.0, "mm": 0.1, "in": INCH}
 # Panels take at least this share of the height; where they have less the picture gets higher, at most so often.
 LEAST_SHARE, HIGHER, TRIES = 0.5, 1.2, 6
 # Letters of the default size get smaller instead where the size of the picture is given, down to so many points.
@@ -86,7 +88,8 @@ def style_of(
         size: such as "16x10" or (16, 10), cm; None: what suits the picture.
         dpi: pixels an inch; None: the default.
         font_size: points; None: the default.
-        preset: "column" or "page" of a paper; None: neither.
+        preset: "column" or "page" of a paper, which may be followed by a width, such as "column elsevier" or "page
+            17cm"; None: neither.
 
     Returns:
         the style.
@@ -94,11 +97,12 @@ def style_of(
     Raises:
         ConfigError: a wrong text, or a number out of bounds.
     """
-    if preset is not None and preset not in PRESETS:
+    name, _, of_width = (preset or "").partition(" ")
+    if preset is not None and name not in PRESETS:
         raise ConfigError("preset", f"{shown(preset)}: must be one of {', '.join(PRESETS)}, or absent")
     if preset is not None and size is not None:
-        raise ConfigError("--size", f"{size}: cannot be combined with --{preset}")
-    width, letters = PRESETS[preset] if preset else (None, Style().font_size)
+        raise ConfigError("--size", f"{size}: cannot be combined with --{name}")
+    width, letters = (_width(name, of_width or USUAL), PRESETS[name]) if name else (None, Style().font_size)
     default = Style(font_size=letters)
     return Style(
         None if size is None else _sides(size if isinstance(size, str) else "x".join(f"{side:g}" for side in size)),
@@ -108,6 +112,17 @@ def style_of(
         title,
         font_size is None,
     )
+
+
+def _width(preset: str, text: str) -> float:
+    widths, (low, high) = WIDTHS[preset], SIDES
+    match = re.fullmatch(r"(\d{1,6}(?:\.\d{0,6})?)(cm|mm|in)", text, re.ASCII)
+    width = widths.get(text) or (float(match[1]) * UNITS[match[2]] if match else 0.0)
+    if not low <= width <= high:
+        names = ", ".join(name for name in widths if name != USUAL)
+        allowed = f"must be absent, {names}, or a width from {low:g}cm to {high:g}cm, as in 8.5cm, 85mm or 3.5in"
+        raise ConfigError(f"--{preset}", f"{shown(text)}: {allowed}")
+    return width
 
 
 def _sides(text: str) -> tuple[float, float]:
