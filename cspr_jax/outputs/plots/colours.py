@@ -1,13 +1,18 @@
 """Colours of the cells of a map: a scale that a few extreme cells do not use up."""
 
 import dataclasses
+from typing import Any
 
 import matplotlib
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, Normalize
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
+
+from cspr_jax.outputs.plots.layout import is_narrow
 
 NONE_COLOUR = "#d0d0d0"
 # The scale ends where this share of the cells does, if a scale of all cells would be longer by this factor. If there
@@ -114,18 +119,26 @@ def _of_counts(data: np.ndarray) -> Scale:
     return Scale(colours, BoundaryNorm(bounds, len(shown)), extend, beyond, (ticks, texts), whole=True)
 
 
-def add_bar(figure: Figure, image, panels: list[Axes], scale: Scale, words: str) -> None:
-    """The bar that explains the colours.
+def add_bar(figure: Figure, image, panels: list[Axes], scale: Scale, words: str) -> dict[str, Artist]:
+    """Explain the colours of panels: by a bar, below them in a narrow picture, or by entries of its legend for words.
 
     Args:
         image: that the bar explains.
         panels: the panels that it belongs to.
+
+    Returns:
+        entries of the legend.
     """
+    ticks, texts = scale.ticks or ([], [])
+    if is_narrow() and texts and not any(text.lstrip("-").isdigit() for text in texts):
+        return {text: Patch(color=image.cmap(image.norm(tick))) for tick, text in zip(ticks, texts, strict=True)}
     text = f"{words}; {scale.beyond}" if scale.beyond else words
-    bar = figure.colorbar(image, ax=panels, shrink=0.9, extend=scale.extend, label=text, spacing="uniform")
+    where: dict[str, Any] = {"location": "bottom", "aspect": 30, "pad": 0.02} if is_narrow() else {"shrink": 0.9}
+    bar = figure.colorbar(image, ax=panels, extend=scale.extend, label=text, spacing="uniform", **where)
     if scale.ticks is not None:
         bar.set_ticks(scale.ticks[0], labels=scale.ticks[1])
         bar.ax.minorticks_off()
     elif scale.whole:
         bar.locator = MaxNLocator(8, integer=True)
         bar.update_ticks()
+    return {}

@@ -18,6 +18,7 @@ from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.bodies_in_space import draw_bodies
+from cspr_jax.outputs.plots.ends import draw_ends, entries_of_ends, segment_rows
 from cspr_jax.outputs.plots.fitting import fit, legend_above
 from cspr_jax.outputs.plots.gif import GifWriter
 from cspr_jax.outputs.plots.labels import COLOURS, cable_names, line_look
@@ -25,8 +26,8 @@ from cspr_jax.outputs.plots.motion import draw_limits, shade_failing
 from cspr_jax.outputs.plots.moving_figure import MovingFigure
 from cspr_jax.outputs.plots.obstacles import AREA, points_of
 from cspr_jax.outputs.plots.robot_along import Moving, limits_of, moving
-from cspr_jax.outputs.plots.scene import colours_of_tension, fill_places, set_space
-from cspr_jax.outputs.plots.trajectory import name_spools
+from cspr_jax.outputs.plots.scene import colours_of_tension, fill_places, set_space, shape_of
+from cspr_jax.outputs.plots.trajectory import add_tension_bar, name_spools
 from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.quantities import FAILURES
 
@@ -35,7 +36,9 @@ RANDOM = re.compile(rb"_anim_img([0-9a-f]{32})")
 # Pictures a second: as many as give a film no more pictures than the second numbers, else the last. The delays of a GIF
 # are whole hundredths of a second. The pictures of a page are whole ones each.
 RATES, MOST, OF_PAGES = (20, 10, 5, 2, 1), 600, 150
-SIZE, DPI = (10.0, 5.6), 90
+SIZE, DPI = (10.0, 7.2), 90
+# Height over width below which a robot lies above its tensions, and not beside them.
+WIDE = 0.85
 # Browsers hardly open a page of more MB than this.
 LARGEST = 100.0
 MARK = "#D55E00"
@@ -135,6 +138,7 @@ class _Picture:
         self.robot, self._path = moving(columns, robot_file, rows, keys), moving(columns, robot_file, all_rows).position
         self._bodies, self._failing = keys.bodies, {name: columns[name] for name in FAILURES if name in columns}
         self._flight_time, self._flight = columns.get("flight_t", np.empty(0)), columns.get("flight_position")
+        self._columns = columns
         self._rows, self._time = rows, np.asarray(columns["t"], float)
         self.tension = np.asarray(columns["tension"], float)
         self._names = cable_names(columns)
@@ -143,9 +147,14 @@ class _Picture:
         self._norm = Normalize(0.0, self._largest)
         self._colours = colours_of_tension()
         self.figure = MovingFigure(figsize=SIZE, layout="constrained")
-        grid = self.figure.add_gridspec(1, 2, width_ratios=[1.0, 1.05])
+        places = self._places()
+        # A robot that is wide gets the width, one that is high the height.
+        if shape_of(places) < WIDE:
+            grid = self.figure.add_gridspec(2, 1, height_ratios=[1.0, 0.36])
+        else:
+            grid = self.figure.add_gridspec(1, 2, width_ratios=[1.0, 0.8])
         self._space: Any = self.figure.add_subplot(grid[0], projection="3d", computed_zorder=False)
-        self._draw_space(is_down=robot_file.z_axis == "down")
+        self._draw_space(places, is_down=robot_file.z_axis == "down")
         self._draw_tensions(self.figure.add_subplot(grid[1]), limits_of(robot_file, keys))
         self.figure.suptitle(title)
         # Lay the figure out once: places of axes do not change.
@@ -155,34 +164,36 @@ class _Picture:
         of_cables = [*self.cables, *self._edges, self._mass]
         self.figure.settle([self._flown, self.object, self._behind, *of_cables, self._mark, self._clock], DPI)
 
-    def _draw_space(self, *, is_down: bool) -> None:
-        space, robot = self._space, self.robot
-        of_robot = [robot.ways.reshape(-1, 3), robot.corners.reshape(-1, 3)]
+    def _places(self) -> np.ndarray:
+        of_robot = [self.robot.ways.reshape(-1, 3), self.robot.corners.reshape(-1, 3)]
         flight = np.empty((0, 3)) if self._flight is None else self._flight
-        places = np.concatenate([*of_robot, self._path, flight, *map(points_of, self._bodies)])
+        return np.concatenate([*of_robot, self._path, flight, *map(points_of, self._bodies)])
+
+    def _draw_space(self, places: np.ndarray, *, is_down: bool) -> None:
+        space, robot = self._space, self.robot
         set_space(space, places, is_down=is_down)
         draw_bodies(space, self._bodies, is_down=is_down)
         space.plot(*self._path.T, color="0.7", linewidth=0.8)
         name_spools(space, robot.base)
-        for place, marker, name in zip(self._path[[0, -1]], ("o", "D"), ("start", "end"), strict=True):
-            space.plot(*place[:, None], linestyle="", marker=marker, color="black", markerfacecolor="white", label=name)
+        ends = segment_rows(self._columns, self._time)
+        draw_ends(space, self._path, ends)
         # The object that is released, and its way since then.
         self._flown = space.plot([], [], [], color=COLOURS[2], linewidth=1.4, linestyle="--")[0]
         self.object = space.plot([], [], [], linestyle="", marker="o", markersize=6, color=COLOURS[2])[0]
-        if len(flight):
+        if self._flight is not None:
             self._flown.set_label("flight")
         handles, words = space.get_legend_handles_labels()
+        entries = entries_of_ends(ends) | dict(zip(words, handles, strict=True))
         if self._bodies:
-            handles, words = [*handles, Patch(**AREA)], [*words, "obstacles"]
-        self.figure.legend(handles, words, loc="outside lower left", ncols=3)
+            entries["obstacles"] = Patch(**AREA)
+        self.figure.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=len(entries))
         self._behind = space.plot([], [], [], color="black", linewidth=1.1)[0]
         space.plot(*robot.base.T, linestyle="", marker="s", markersize=5, color="0.35", label="spools, by cable")
         self.cables = [space.plot([], [], [], linewidth=2.0)[0] for _ in robot.base]
         self._edges = [space.plot([], [], [], color="black", linewidth=2.0)[0] for _ in range(self._edge_count)]
         self._mass = space.plot([], [], [], linestyle="", marker="o", markersize=6, color="black")[0]
         self._mass.set_visible(not self._edge_count)
-        bar = ScalarMappable(self._norm, self._colours)
-        self.figure.colorbar(bar, ax=space, label="tension (N)", shrink=0.7, location="left", pad=0.02)
+        add_tension_bar(self.figure, space, ScalarMappable(self._norm, self._colours))
 
     @property
     def _edge_count(self) -> int:
@@ -197,7 +208,7 @@ class _Picture:
         panel.set(xlabel="time (s)", ylabel="tension (N)")
         panel.margins(x=0.01)
         panel.set_ylim(bottom=min(0.0, float(np.nanmin(self.tension))))
-        legend_above(panel, 4)
+        legend_above(panel, len(panel.get_legend_handles_labels()[0]))
         self._clock = panel.annotate("", (0.99, 0.98), xycoords="axes fraction", ha="right", va="top", bbox=BEHIND)
 
     def show(self, number: int) -> None:

@@ -127,7 +127,7 @@ def _fit_above(panel: Axes, room: float) -> None:
         return
     handles = [handle for handle in legend.legend_handles if handle is not None]
     words = [text.get_text() for text in legend.get_texts()]
-    for columns in range(len(words) - 1, 0, -1):
+    for columns in _fewer_columns(len(words)):
         if legend.get_window_extent().width <= room:
             return
         legend = legend_above(panel, columns, handles, words)
@@ -179,7 +179,7 @@ def _fit_legend(figure: Figure, legend: Legend, room: float) -> None:
     words = [text.get_text() for text in legend.get_texts()]
     where: Literal["lower center", "outside lower center"]
     where = "lower center" if figure.get_layout_engine() is None else "outside lower center"
-    for columns in range(len(words) - 1, 0, -1):
+    for columns in _fewer_columns(len(words)):
         if legend.get_window_extent().width <= room:
             return
         legend.remove()
@@ -187,6 +187,11 @@ def _fit_legend(figure: Figure, legend: Legend, room: float) -> None:
     beside = legend.get_window_extent().width - max(text.get_window_extent().width for text in legend.get_texts())
     for text in legend.get_texts():
         _break(text, room - beside)
+
+
+def _fewer_columns(count: int) -> list[int]:
+    # Numbers of columns in which so many entries fill lines of nearly the same length, the largest first.
+    return list(dict.fromkeys(-(-count // lines) for lines in range(2, count + 1)))
 
 
 def _shares(panel: Axes) -> tuple[float, float]:

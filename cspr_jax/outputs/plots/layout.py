@@ -15,6 +15,13 @@ from cspr_jax.outputs.plots.labels import principal_angle
 DEGREES = (0.5, 1.0, 2.0, 5.0, 10.0, 15.0, 30.0, 45.0, 60.0, 90.0, 180.0)
 # Least width of a panel, inches, with its share of labels and colour bar.
 LEAST_WIDTH = 1.6
+# Below this width, cm, a picture is that of a column: its title has one line, its bars lie below the panels.
+NARROW, INCH = 12.0, 2.54
+
+
+def is_narrow() -> bool:
+    """Tell whether the picture that is made inside `style.in_style` is that of a column."""
+    return bool(matplotlib.rcParams["figure.figsize"][0] * INCH < NARROW)
 
 
 def columns_of(count: int) -> int:

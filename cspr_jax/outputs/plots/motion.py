@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 
+from cspr_jax.outputs.plots.ends import draw_ends, entries_of_ends, segment_rows
 from cspr_jax.outputs.plots.failing import failing_in
 from cspr_jax.outputs.plots.fitting import DOUBT, legend_above
 from cspr_jax.outputs.plots.labels import COLOURS, cable_names, line_look, robot_name
@@ -65,6 +66,7 @@ def motion_figure(result: Result) -> Figure:
     for name, j in (("xy", 1), ("xz", 2)):
         if name in drawn:
             _path(drawn[name], position, j)
+            draw_ends(drawn[name], position, segment_rows(result.data, time), (0, j))
             if "flight_position" in result.data:
                 _flight(drawn[name], result.data["flight_position"], j)
     if result.attributes.get("z_axis", "down") == "down":
@@ -88,6 +90,8 @@ def motion_figure(result: Result) -> Figure:
     charts = [name for name in ("orientation", "tension", *more) if name in drawn]
     for name in charts:
         _mark_intervals(drawn[name], result, name, charts)
+    ends = entries_of_ends(segment_rows(result.data, time))
+    figure.legend(list(ends.values()), list(ends), loc="outside lower center", ncols=len(ends))
     place = "" if z0 is None else f"z0 = {float(z0):.4g} m, "
     axis = result.attributes.get("z_axis", "not known, see --robot")
     figure.suptitle(f"{robot_name(result)}: {place}z axis {axis}{point_words(result.data)}{doubt(result)}")

@@ -48,7 +48,7 @@ def set_space(panel: Any, points: np.ndarray, *, is_down: bool) -> None:
         # A label that is turned by matplotlib may stand on its head.
         axis.set_rotate_label(False)
         axis.label.set_rotation(90.0 if name == "z" else 0.0)
-        axis.labelpad = rcParams["font.size"] * (0.2 if name == "z" else 1.1)
+        axis.labelpad = rcParams["font.size"] * (0.4 if name == "z" else 1.8)
         axis.set_in_layout(False)
     panel.set_box_aspect(tuple(size))
     panel.set_proj_type("ortho")
@@ -71,6 +71,20 @@ def across_and_up(*, is_down: bool) -> np.ndarray:
     across = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
     up = np.array([-np.sin(elevation) * np.cos(azimuth), -np.sin(elevation) * np.sin(azimuth), np.cos(elevation)])
     return np.stack([across, up]) * signs_of(is_down=is_down)
+
+
+def towards_eye(*, is_down: bool) -> np.ndarray:
+    """Direction towards the eye.
+
+    Args:
+        is_down: as for `set_space`.
+
+    Returns:
+        (3,) unit vector, in the axes of the file.
+    """
+    elevation, azimuth = np.radians([ELEVATION, AZIMUTH])
+    level = np.cos(elevation)
+    return np.array([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)]) * signs_of(is_down=is_down)
 
 
 def signs_of(*, is_down: bool) -> np.ndarray:
@@ -121,6 +135,7 @@ def fill_places(figure: Figure) -> None:
             _fill(figure, panel, place)
             if not _meet(panel):
                 break
+        _add_ticks(figure, panel)
         _leave_out(panel)
         if min(len(axis.get_major_locator()()) for axis in _axes(panel)) < LEAST_TICKS:
             # Two numbers show a scale: rather leave out single ones of many.
@@ -128,6 +143,23 @@ def fill_places(figure: Figure) -> None:
                 axis.set_major_locator(MaxNLocator(MOST_TICKS, prune="both"))
             _fill(figure, panel, place)
             _leave_out(panel)
+
+
+def _add_ticks(figure: Figure, panel: Any) -> None:
+    # Axes that have room for more ticks than the others get them.
+    for axis in _axes(panel):
+        usual = axis.get_major_locator()
+        for count in range(2 * MOST_TICKS, LEAST_TICKS, -2):
+            locator = MaxNLocator(count, steps=[1, 2, 5, 10], prune="both")
+            low, high = axis.get_view_interval()
+            if len(locator.tick_values(low, high)) <= len(usual()):
+                break
+            axis.set_major_locator(locator)
+            _place_words(figure, panel)
+            if not _meet(panel):
+                break
+            axis.set_major_locator(usual)
+    _place_words(figure, panel)
 
 
 def _fill(figure: Figure, panel: Any, place: Bbox) -> None:
@@ -149,8 +181,9 @@ def _fill(figure: Figure, panel: Any, place: Bbox) -> None:
 
 
 def _place_words(figure: Figure, panel: Any) -> None:
-    # Ticks and labels of a panel in space are where it was drawn last; nothing else in the figure has changed.
-    others = [artist for artist in figure.get_children() if artist is not panel and not artist.get_animated()]
+    # Ticks and labels of a panel in space are where it was drawn last; nothing else is needed for that.
+    others = [*figure.get_children(), *panel.collections, *panel.lines, *panel.texts]
+    others = [artist for artist in others if artist is not panel and not artist.get_animated()]
     for artist in others:
         artist.set_animated(True)
     figure.draw_without_rendering()

@@ -112,7 +112,7 @@ def section_figure(
         words.append(f"around: {axis_label(result, across[0])}, outward: {axis_label(result, across[1])}")
     else:
         _name_axes(result, across, bottom, left)
-    add_bar(figure, image, axes, scale, label(result, name))
+    legend = add_bar(figure, image, axes, scale, label(result, name)) | legend
     if legend:
         figure.legend(legend.values(), legend.keys(), loc="outside lower center", ncols=len(legend))
     figure.suptitle(f"{heading(result, name)}\n{', '.join(words)}")

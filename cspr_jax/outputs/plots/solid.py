@@ -4,41 +4,50 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib import rcParams
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.boundary import Boundary, BoundarySides, boundary, sides_of
 from cspr_jax.outputs.plots.conditions import conditions
-from cspr_jax.outputs.plots.labels import COLOURS, axis_label, robot_name
+from cspr_jax.outputs.plots.labels import COLOURS, robot_name
 from cspr_jax.outputs.plots.obstacles import COLOUR as OBSTACLE
 from cspr_jax.outputs.plots.obstacles import faces_of, obstacles
 from cspr_jax.outputs.plots.robot_at import Posed, posed
+from cspr_jax.outputs.plots.scene import set_space, shape_of, signs_of, towards_eye
 from cspr_jax.outputs.volumes import WorkspaceVolume, volume_of
 from cspr_jax.store.result import Result
 
 SPACE = ["x", "y", "z"]
-ELEVATION, AZIMUTH = 20.0, -62.0  # degrees, of the eye
 SURFACE, END, LINES, CABLES = COLOURS[5], "#9a9a9a", COLOURS[0], COLOURS[1]
 BACK, FRONT = 0.4, 0.3  # opacities
-# Width and least height, inches, and the share of the box in the figure; the rest is for ticks, title and legend.
-WIDTH, LEAST_HEIGHT = 7.2, 4.4
-WIDE, HIGH, MIDDLE = 0.76, 0.68, 0.51
-MARGIN = 0.02  # room around the drawn points, over their largest side
-# Share of the side of a panel that the diagonal of a box takes where mplot3d shows it without zoom.
-DIAGONAL = 1.03
+# Inches: width of the box, height of title and legend, and heights of the picture.
+ACROSS, BESIDE, LOW, HIGH = 6.8, 1.3, 3.6, 7.6
 
 
 class _Eye(NamedTuple):
     # Signs of the axes of the picture in those of the file, and the direction towards the eye in the latter.
     signs: np.ndarray
     towards: np.ndarray
+
+
+class _LevelLines(Line3DCollection):
+    # Lines of a surface at the heights of the ticks, wherever these are in the end.
+
+    def __init__(self, triangles: np.ndarray, panel: Axes3D, layer: float) -> None:
+        self._triangles, self._panel, self._heights = triangles, panel, None
+        super().__init__(triangles[:1, :2], colors=LINES, linewidths=0.5, zorder=layer)
+
+    def do_3d_projection(self) -> float:
+        heights = np.asarray(self._panel.zaxis.get_majorticklocs())
+        if self._heights is None or not np.array_equal(heights, self._heights):
+            self._heights = heights
+            self.set_segments(_level_lines(self._triangles, heights))
+        return super().do_3d_projection()
 
 
 def solid_figure(result: Result, index: dict[str, int], fixed: list[str]) -> Figure:
@@ -63,13 +72,16 @@ def solid_figure(result: Result, index: dict[str, int], fixed: list[str]) -> Fig
     robot = posed(result, _middle(sides), angles)
     bodies = obstacles(result)
     points = np.concatenate([surface.corners, robot.ways.reshape(-1, 3), *bodies])
-    box = np.stack([points.min(0), points.max(0)]) + np.array([[-1.0], [1.0]]) * MARGIN * np.ptp(points, axis=0).max()
-    figure, panel = _panel(box[1] - box[0])
-    eye = _axes(panel, result, box)
+    is_down = result.attributes.get("z_axis", "down") == "down"
+    height = float(np.clip(ACROSS * shape_of(points) + BESIDE, LOW, HIGH))
+    figure = Figure(figsize=(7.2, height), layout="constrained")
+    panel: Axes3D = figure.add_subplot(projection="3d", computed_zorder=False)
+    set_space(panel, points, is_down=is_down)
+    eye = _Eye(signs_of(is_down=is_down), towards_eye(is_down=is_down))
     _draw_surface(panel, surface, eye)
     _draw_robot(panel, robot)
     _draw_obstacles(panel, bodies, eye, surface)
-    figure.legend(*_legend(surface, has_obstacles=bool(bodies)), loc="lower center", ncols=4)
+    figure.legend(*_legend(surface, has_obstacles=bool(bodies)), loc="outside lower center", ncols=5)
     figure.suptitle(
         f"{robot_name(result)}: workspace, {conditions(result)}\n{', '.join([_volume(result, index), *fixed])}"
     )
@@ -85,45 +97,6 @@ def _middle(sides: BoundarySides) -> np.ndarray:
     if sides.verdict[nearest] == 0:
         return middle
     return inside[np.square(inside - middle).sum(1).argmin()]
-
-
-def _panel(sizes: np.ndarray) -> tuple[Figure, Axes3D]:
-    # The picture of a box fits into a figure of any shape: a panel is as large a square as its place allows, and the
-    # place is higher or lower than the figure, as the picture is.
-    elevation, azimuth = np.radians([ELEVATION, AZIMUTH])
-    right, back, up = sizes / np.linalg.norm(sizes)
-    across = abs(right * np.sin(azimuth)) + abs(back * np.cos(azimuth))
-    high = up * np.cos(elevation) + (abs(right * np.cos(azimuth)) + abs(back * np.sin(azimuth))) * np.sin(elevation)
-    larger = max(across, high)
-    room = HIGH / (WIDE * high / larger)
-    figure = Figure(figsize=(WIDTH, max(LEAST_HEIGHT, WIDTH / room)))
-    panel: Axes3D = figure.add_axes(
-        (0.0, MIDDLE - 0.5 * room, 1.0, room),
-        projection="3d",
-        elev=ELEVATION,
-        azim=AZIMUTH,
-        proj_type="ortho",
-        computed_zorder=False,
-    )
-    panel.set_box_aspect(tuple(sizes), zoom=WIDE / (DIAGONAL * larger))
-    return figure, panel
-
-
-def _axes(panel: Axes3D, result: Result, box: np.ndarray) -> _Eye:
-    # Scales are equal. Where z points down y is turned, too, so that nothing is mirrored.
-    is_down = result.attributes.get("z_axis", "down") == "down"
-    signs = np.array([1.0, -1.0, -1.0]) if is_down else np.ones(3)
-    for name, sign, (low, high) in zip(SPACE, signs, box.T, strict=True):
-        panel.set(**{f"{name}lim": (low, high) if sign > 0.0 else (high, low)})
-    parts = np.ptp(box, axis=0) / np.ptp(box, axis=0).max()
-    for name, part, axis in zip(SPACE, parts, (panel.xaxis, panel.yaxis, panel.zaxis), strict=True):
-        axis.set_major_locator(MaxNLocator(max(2, round((15.0 if name == "z" else 9.0) * part)), steps=[1, 2, 5, 10]))
-        axis.set_rotate_label(False)
-        axis.set_label_text(axis_label(result, name), rotation=90.0 if name == "z" else 0.0)
-        axis.labelpad = rcParams["font.size"] * (0.2 if name == "z" else 1.3)
-    elevation, azimuth = np.radians([ELEVATION, AZIMUTH])
-    level = np.cos(elevation)
-    return _Eye(signs, signs * np.array([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)]))
 
 
 def _draw_surface(panel: Axes3D, surface: Boundary, eye: _Eye) -> None:
@@ -144,8 +117,8 @@ def _draw_surface(panel: Axes3D, surface: Boundary, eye: _Eye) -> None:
         collection.set_rasterized(True)
         collection.set_agg_filter(partial(_fainter, opacity))
         panel.add_collection3d(collection)
-        lines = _level_lines(triangles[is_drawn], panel.zaxis.get_major_locator()())
-        panel.add_collection3d(Line3DCollection(lines, colors=LINES, linewidths=0.5, zorder=layer + 0.1))
+        if is_drawn.any():
+            panel.add_collection3d(_LevelLines(triangles[is_drawn], panel, layer + 0.1))
 
 
 def _level_lines(triangles: np.ndarray, heights: np.ndarray) -> np.ndarray:
@@ -196,6 +169,9 @@ def _draw_robot(panel: Axes3D, robot: Posed) -> None:
     panel.add_collection3d(Line3DCollection(robot.edges, colors="black", linewidths=1.2, zorder=2.2))
     for points, look in ((robot.base, "s"), (robot.attached, "o")):
         panel.plot(*points.T, look, color="black", markersize=4.0 if look == "s" else 2.0, zorder=2.3)
+    # A flat box is larger than its panel, which is a square.
+    for artist in (*panel.collections, *panel.lines):
+        artist.set(clip_on=False, in_layout=False)
 
 
 def _draw_obstacles(panel: Axes3D, bodies: list[np.ndarray], eye: _Eye, surface: Boundary) -> None:

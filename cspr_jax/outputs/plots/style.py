@@ -14,6 +14,7 @@ from matplotlib.text import Text
 
 from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.outputs.plots.fitting import fit, share_of_panels
+from cspr_jax.outputs.plots.layout import INCH, NARROW
 from cspr_jax.outputs.plots.options import USUAL, WIDTHS
 from cspr_jax.outputs.plots.scene import fill_places
 
@@ -39,7 +40,6 @@ LOOK = {
 }
 # No dates and versions in the files.
 METADATA: dict[str, dict] = {".png": {"Software": None}, ".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
-INCH = 2.54  # cm
 SIDES, DPIS, FONT_SIZES = (4.0, 120.0), (30.0, 1200.0), (4.0, 40.0)
 # Letters of pictures for papers, points; their heights follow from their content.
 PRESETS = {"column": 8.0, "page": 9.0}
@@ -48,8 +48,6 @@ UNITS = {"cm": 1.0, "mm": 0.1, "in": INCH}
 LEAST_SHARE, HIGHER, TRIES = 0.5, 1.2, 6
 # Letters of the default size get smaller instead where the size of the picture is given, down to so many points.
 SMALLER, LEAST_LETTERS = 0.92, 5.0
-# Below this width, cm, a title has one line.
-NARROW = 12.0
 # A picture is held in memory as a whole, several bytes a pixel.
 LARGEST_PIXELS = 1e8
 

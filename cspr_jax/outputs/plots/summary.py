@@ -1,8 +1,10 @@
 """One page about a plan for a paper: the motion in space, tensions, rates of the cables, and a table of segments."""
 
+import textwrap
 from typing import Any
 
 import numpy as np
+from matplotlib import rcParams
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -10,6 +12,7 @@ from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.outputs.plots.fitting import legend_above
 from cspr_jax.outputs.plots.labels import cable_names, line_look, margin_unit, robot_name
+from cspr_jax.outputs.plots.layout import is_narrow
 from cspr_jax.outputs.plots.motion import FAILS, boundaries, doubt, draw_limits, point_words, shade_failing
 from cspr_jax.outputs.plots.robot_along import limits_of
 from cspr_jax.outputs.plots.tensions import draw_tensions, extremes
@@ -22,8 +25,9 @@ from cspr_jax.store.result import Result
 SEGMENTS = 8
 # Inches: height of a line of the table.
 LINE = 0.28
-WIDTHS = (0.15, 0.12, 0.22, 0.18, 0.33)
 HEADS = ("segment", "arcs", "duration (s)", "margin", "verdict")
+# Shares of the width, and letters of a line of the verdict: of a page, and of a column.
+WIDE, NARROW = ((0.14, 0.1, 0.2, 0.16, 0.4), 36), ((0.18, 0.1, 0.2, 0.18, 0.34), 14)
 
 
 def summary_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> Figure:
@@ -37,8 +41,9 @@ def summary_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> Fig
         the figure.
     """
     cells = _cells(result)
-    figure = Figure(figsize=(7.2, 8.2 + LINE * len(cells)), layout="constrained")
-    parts = figure.add_gridspec(4, 1, height_ratios=[4.4, 2.0, 1.6, 0.3 + LINE * len(cells)])
+    lines = sum(_lines(row) for row in cells)
+    figure = Figure(figsize=(7.2, 8.6 + LINE * lines), layout="constrained")
+    parts = figure.add_gridspec(4, 1, height_ratios=[4.4, 2.0, 1.6, 0.3 + LINE * lines])
     space = figure.add_subplot(parts[0], projection="3d", computed_zorder=False)
     draw_trajectory(figure, space, result, robot_file, keys)
     figure.legend(*legend_of(result, keys), loc="outside lower center", ncols=6)
@@ -47,14 +52,29 @@ def summary_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> Fig
     legend_above(over_time, len(robot_file.base_points) + 5)
     _rates(figure.add_subplot(parts[2], sharex=over_time), result, limits_of(robot_file, keys, "speed"))
     if cells:
-        table = figure.add_subplot(parts[3])
-        table.axis("off")
-        # Its letters get smaller where the picture is narrow.
-        bbox: Any = (0.0, 0.0, 1.0, 1.0)
-        table.table(cells, colLabels=HEADS, cellLoc="center", edges="horizontal", bbox=bbox, colWidths=WIDTHS)
+        _draw_table(figure.add_subplot(parts[3]), cells)
     words = f"{result.axes['t'][-1]:.4g} s{point_words(result.data)}\n{extremes(result)}{doubt(result)}"
     figure.suptitle(f"{robot_name(result)}: {words}")
     return figure
+
+
+def _draw_table(panel: Axes, cells: list[list[str]]) -> None:
+    # Letters of a table keep their size; matplotlib would make them as small as the narrowest column needs.
+    panel.axis("off")
+    heads = [head.replace(" (", "\n(") if is_narrow() else head for head in HEADS]
+    widths, letters = NARROW if is_narrow() else WIDE
+    bbox: Any = (0.0, 0.0, 1.0, 1.0)
+    words = [[*row[:-1], "\n".join(textwrap.wrap(row[-1], letters))] for row in cells]
+    table = panel.table(words, colLabels=heads, cellLoc="center", edges="horizontal", bbox=bbox, colWidths=widths)
+    table.auto_set_font_size(False)
+    table.set_fontsize(0.95 * rcParams["font.size"])
+    for (row, _), cell in table.get_celld().items():
+        cell.set_height(_lines(cells[row - 1]) if row else 1.0 + is_narrow())
+        cell.PAD = 0.02
+
+
+def _lines(row: list[str]) -> int:
+    return len(textwrap.wrap(row[-1], (NARROW if is_narrow() else WIDE)[1])) or 1
 
 
 def _rates(panel: Axes, result: Result, limits: list[tuple[str, float]]) -> None:

@@ -9,11 +9,13 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.transforms import ScaledTranslation
 from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.outputs.plots.bodies_in_space import draw_bodies
+from cspr_jax.outputs.plots.ends import draw_ends, entries_of_ends, segment_rows
 from cspr_jax.outputs.plots.labels import COLOURS, robot_name
 from cspr_jax.outputs.plots.motion import doubt, point_words
 from cspr_jax.outputs.plots.obstacles import AREA, points_of
@@ -24,7 +26,7 @@ from cspr_jax.store.result import Result
 # The robot is drawn where segments begin and end, at most so often.
 SHOWN = 6
 # Inches: width of the robot, height of the texts above and below it, and heights of the picture.
-ACROSS, BESIDE, LOW, HIGH = 5.2, 1.2, 3.6, 7.2
+ACROSS, BESIDE, LOW, HIGH = 6.6, 1.9, 3.9, 7.6
 # Spools nearer to each other than this share of the largest distance have one label.
 TOGETHER = 0.08
 
@@ -61,7 +63,8 @@ def draw_trajectory(figure: Figure, panel: Any, result: Result, robot_file: Robo
         robot_file: the robot whose cables have these tensions.
         keys: the plan, for obstacles and the shape of the platform.
     """
-    rows = _instants(result)
+    ends = segment_rows(result.data, result.axes["t"])
+    rows = ends[np.unique(np.linspace(0, len(ends) - 1, min(SHOWN, len(ends))).round().astype(int))]
     robot, path = moving(result.data, robot_file, rows, keys), result.data["position"]
     flight = result.data.get("flight_position", np.empty((0, 3)))
     bodies, is_down = keys.bodies, result.attributes.get("z_axis", "down") == "down"
@@ -85,12 +88,13 @@ def draw_trajectory(figure: Figure, panel: Any, result: Result, robot_file: Robo
         if len(corners):
             edges = corners.reshape(-1, 2, 3)
             panel.add_collection3d(Line3DCollection(edges, colors="black", linewidths=1.2, zorder=4.0))
-    ends = path[rows[[0, -1]]]
-    for place, marker in zip(ends, ("o", "D"), strict=True):
-        panel.plot(*place[:, None], marker=marker, markersize=6, color="black", markerfacecolor="white", zorder=5.0)
-    if not robot.corners.shape[1]:
-        panel.plot(*path[rows[1:-1]].T, linestyle="", marker=".", markersize=8, color="black", zorder=4.0)
-    figure.colorbar(ScalarMappable(norm, colours), ax=panel, label="tension (N)", shrink=0.6, location="left", pad=0.04)
+    draw_ends(panel, path, ends)
+    add_tension_bar(figure, panel, ScalarMappable(norm, colours))
+
+
+def add_tension_bar(figure: Figure, panel: Any, colours: ScalarMappable) -> None:
+    """The bar of the cables' colours, below the robot, which needs the width."""
+    figure.colorbar(colours, ax=panel, label="tension (N)", location="bottom", shrink=0.5, aspect=36, pad=0.02)
 
 
 def name_spools(panel: Any, base: np.ndarray) -> None:
@@ -105,16 +109,11 @@ def name_spools(panel: Any, base: np.ndarray) -> None:
     while left:
         group = [k for k in left if np.linalg.norm(base[k] - base[left[0]]) <= near]
         left = [k for k in left if k not in group]
-        words = ", ".join(str(k + 1) for k in group) + "\n"
-        panel.text(*base[group].mean(0), words, ha="center", va="center", fontsize="small", zorder=6.0)
-
-
-def _instants(result: Result) -> np.ndarray:
-    # Return the rows at the ends of segments, evenly chosen if there are many.
-    time = result.axes["t"]
-    ends = np.concatenate([time[:1], result.data.get("segment_end", time[-1:])])
-    rows = np.clip(np.searchsorted(time, ends - 1e-9 * max(time[-1], 1.0)), 0, len(time) - 1)
-    return rows[np.unique(np.linspace(0, len(rows) - 1, min(SHOWN, len(rows))).round().astype(int))]
+        words = ", ".join(str(k + 1) for k in group)
+        # The words stand above the marks.
+        above = panel.transData + ScaledTranslation(0.0, 0.06, panel.figure.dpi_scale_trans)
+        place, look = base[group].mean(0), {"ha": "center", "va": "bottom", "fontsize": "small", "zorder": 6.0, "in_layout": False}
+        panel.text(*place, words, transform=above, **look)
 
 
 def legend_of(result: Result, keys: PlanFile) -> tuple[list[Artist], list[str]]:
@@ -126,11 +125,9 @@ def legend_of(result: Result, keys: PlanFile) -> tuple[list[Artist], list[str]]:
     Returns:
         artists and words.
     """
-    hollow: dict[str, Any] = {"linestyle": "", "color": "black", "markerfacecolor": "white"}
     entries: dict[str, Artist] = {
         "path": Line2D([], [], color="black", linewidth=1.2),
-        "start": Line2D([], [], marker="o", **hollow),
-        "end": Line2D([], [], marker="D", **hollow),
+        **entries_of_ends(segment_rows(result.data, result.axes["t"])),
         "cables": Line2D([], [], color=colours_of_tension()(0.6), linewidth=1.6),
         "spools, by cable": Line2D([], [], linestyle="", marker="s", color="0.35"),
     }
