@@ -21,6 +21,7 @@ from cspr_jax.outputs.plots.motion_source import completed, keeps_plan, robot_an
 from cspr_jax.outputs.plots.pages.maps import map_content, order_of
 from cspr_jax.outputs.plots.pages.motions import MOST_ROWS, motion_content
 from cspr_jax.outputs.plots.pages.page import page_of
+from cspr_jax.outputs.plots.pages.solids import solids_content
 from cspr_jax.outputs.plots.pages.telling import telling
 from cspr_jax.outputs.plots.selection import is_own_motion, nearest, result_at
 from cspr_jax.plans.cell_plan import cell_plan
@@ -181,6 +182,7 @@ def _of_map(
     page = {
         "title": title,
         "map": content,
+        "solid": solids_content(result, names, points),
         "motions": motions,
         "cells": motion_of_cell,
         "shown": motion_of_cell.get(first or "", 0),

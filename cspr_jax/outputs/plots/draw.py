@@ -20,7 +20,7 @@ from cspr_jax.outputs.plots.planes import in_order
 from cspr_jax.outputs.plots.ratio import ratio_of
 from cspr_jax.outputs.plots.sections import POLAR, PlaneSection, section_figure, tells
 from cspr_jax.outputs.plots.selection import nearest
-from cspr_jax.outputs.plots.solid import SPACE, solid_figure
+from cspr_jax.outputs.plots.solid import SPACE, is_solid, solid_figure
 from cspr_jax.schema.quantities import RATIO, TILT_TORSION
 from cspr_jax.store.result import Result
 
@@ -119,8 +119,7 @@ def _refuse(option: str, others: dict[str, str | bool | None]) -> None:
 
 def _solid(results: list[Result], at: dict[str, float]) -> Figure:
     result = results[0]
-    counts = [len(np.unique(result.axes.get(axis, ()))) for axis in SPACE]
-    if len(results) > 1 or not is_workspace(result) or min(counts) < 2:
+    if len(results) > 1 or not is_solid(result):
         allowed = 'of one result of map = "workspace" that holds verdicts over two points or more of each of x, y and z'
         raise InputError("--solid", "no workspace in space", allowed)
     if set(at) & set(SPACE):

@@ -13,7 +13,7 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.boundary import Boundary, BoundarySides, boundary, sides_of
-from cspr_jax.outputs.plots.conditions import conditions
+from cspr_jax.outputs.plots.conditions import conditions, is_workspace
 from cspr_jax.outputs.plots.labels import COLOURS, robot_name
 from cspr_jax.outputs.plots.obstacles import COLOUR as OBSTACLE
 from cspr_jax.outputs.plots.obstacles import faces_of, obstacles
@@ -69,7 +69,7 @@ def solid_figure(result: Result, index: dict[str, int], fixed: list[str]) -> Fig
         raise InputError("--solid", "nothing is inside", "a workspace with poses inside")
     surface = boundary(sides)
     angles = {axis: float(result.axes[axis][place]) for axis, place in index.items()}
-    robot = posed(result, _middle(sides), angles)
+    robot = posed(result, middle_of(sides), angles)
     bodies = obstacles(result)
     points = np.concatenate([surface.corners, robot.ways.reshape(-1, 3), *bodies])
     is_down = result.attributes.get("z_axis", "down") == "down"
@@ -83,13 +83,18 @@ def solid_figure(result: Result, index: dict[str, int], fixed: list[str]) -> Fig
     _draw_obstacles(panel, bodies, eye, surface)
     figure.legend(*_legend(surface, has_obstacles=bool(bodies)), loc="outside lower center", ncols=5)
     figure.suptitle(
-        f"{robot_name(result)}: workspace, {conditions(result)}\n{', '.join([_volume(result, index), *fixed])}"
+        f"{robot_name(result)}: workspace, {conditions(result)}\n{', '.join([volume_words(result, index), *fixed])}"
     )
     return figure
 
 
-def _middle(sides: BoundarySides) -> np.ndarray:
-    # Return the centroid of the points inside; if it is not in the workspace itself, the point inside that is nearest.
+def is_solid(result: Result) -> bool:
+    """Tell whether a map is a workspace over points in space."""
+    return is_workspace(result) and min(len(np.unique(result.axes.get(axis, ()))) for axis in SPACE) > 1
+
+
+def middle_of(sides: BoundarySides) -> np.ndarray:
+    """The centroid of the points inside; if it is not in the workspace itself, the point inside that is nearest."""
     grid = np.stack(np.meshgrid(*sides.points, indexing="ij"), axis=-1)
     inside = grid[sides.verdict == 0]
     middle = inside.mean(0)
@@ -199,7 +204,8 @@ def _legend(surface: Boundary, *, has_obstacles: bool = False) -> tuple[list[Any
     return list(entries.values()), list(entries)
 
 
-def _volume(result: Result, index: dict[str, int]) -> str:
+def volume_words(result: Result, index: dict[str, int]) -> str:
+    """The volume of a workspace with its error, in words."""
     volume: WorkspaceVolume = volume_of(result)
     place = tuple(index[axis] for axis in volume.axes)
     size, error = float(volume.volume[place]), float(volume.error[place])

@@ -112,7 +112,10 @@ def name_spools(panel: Any, base: np.ndarray) -> None:
         words = ", ".join(str(k + 1) for k in group)
         # The words stand above the marks.
         above = panel.transData + ScaledTranslation(0.0, 0.06, panel.figure.dpi_scale_trans)
-        place, look = base[group].mean(0), {"ha": "center", "va": "bottom", "fontsize": "small", "zorder": 6.0, "in_layout": False}
+        place, look = (
+            base[group].mean(0),
+            {"ha": "center", "va": "bottom", "fontsize": "small", "zorder": 6.0, "in_layout": False},
+        )
         panel.text(*place, words, transform=above, **look)
 
 

@@ -257,7 +257,7 @@ function addSliders() {
     const input = made("input", "", { type: "range", min: 0, max: count - 1, value: map.index[k] });
     input.dataset.axis = k;
     input.setAttribute("aria-label", content.map.axes[k].name);
-    input.addEventListener("input", () => { map.index[k] = Number(input.value); tellSliders(); drawMap(); });
+    input.addEventListener("input", () => { map.index[k] = Number(input.value); tellSliders(); drawMap(); drawSolid(); });
     node.append(input, made("output", ""));
     element("sliders").append(node);
   });

@@ -39,6 +39,13 @@ function shade(value, [low, high]) {
   return value < 0 ? colours().ink : `rgb(${mixed})`;
 }
 
+// Numbers of cables; those of spools that stand together are one label, at the first of them.
+function spoolNames(base) {
+  const size = Math.max(...[0, 1, 2].map((k) => { const [low, high] = extremes(base.map((point) => point[k])); return high - low; }));
+  const first = base.map((point) => base.findIndex((other) => Math.hypot(...point.map((x, k) => x - other[k])) <= 0.08 * size));
+  return base.map((_, k) => base.map((_, n) => n + 1).filter((n) => first[k] === k && first[n - 1] === k).join(", "));
+}
+
 // Coordinates of the traces that move, at one row: cables, edges of the platform, the effector.
 function moving(row) {
   // The robot of a table may not be known: then it has no spools.
@@ -71,12 +78,16 @@ function robotTraces() {
   const path = [0, 1, 2].map((k) => columnOf(own.path, 3, k));
   traces.push(points(path, { mode: "lines", name: "path", showlegend: true, line: { width: 2, color: theme.soft } }));
   const base = [0, 1, 2].map((k) => own.base.map((point) => point[k]));
-  traces.push(points(base, { mode: "markers+text", name: "spools", text: own.base.map((_, k) => `${k + 1}`),
+  traces.push(points(base, { mode: "markers+text", name: "spools", text: spoolNames(own.base),
     textposition: "top center", textfont: { color: theme.ink }, showlegend: count > 0,
     marker: { size: 4, symbol: "square", color: theme.soft } }));
-  for (const [name, row, symbol] of [["start", 0, "circle-open"], ["end", own.count - 1, "diamond-open"]]) {
-    traces.push(points([0, 1, 2].map((k) => [own.path[3 * row + k]]), { mode: "markers", name, showlegend: true,
-      marker: { size: 6, symbol, color: theme.ink } }));
+  // Each mark lies within the one before it, so that all are seen where they fall together.
+  const ends = own.segments.slice(0, -1).map((part) => Math.max(own.t.findIndex((t) => t >= part.end - 1e-9), 0));
+  const marks = [["start", [0], "circle-open", 9], ["way-points", ends.length > 40 ? [] : ends, "square-open", 6],
+    ["end", [own.count - 1], "diamond", 3]];
+  for (const [name, rows, symbol, size] of marks.filter((mark) => mark[1].length)) {
+    traces.push(points([0, 1, 2].map((k) => rows.map((row) => own.path[3 * row + k])), { mode: "markers", name,
+      showlegend: true, marker: { size, symbol, color: theme.ink } }));
   }
   if (own.flight) {
     const flight = [0, 1, 2].map((k) => own.flight.map((point) => point[k]));
@@ -107,26 +118,33 @@ function box() {
   const { own } = motion, every = [0, 1, 2].map((k) => [...own.base.map((point) => point[k]),
     ...columnOf(own.attached, 3, k), ...columnOf(own.arcs, 3, k), ...columnOf(own.corners, 3, k), ...columnOf(own.path, 3, k),
     ...own.bodies.flatMap((body) => body.corners.map((point) => point[k])), ...(own.flight ?? []).map((point) => point[k])]);
-  const ranges = every.map(extremes), margin = 0.04 * Math.max(...ranges.map(([low, high]) => high - low));
+  return withMargin(every.map(extremes));
+}
+
+function withMargin(ranges) {
+  const margin = 0.04 * Math.max(...ranges.map(([low, high]) => high - low));
   return ranges.map(([low, high]) => [low - margin, high + margin]);
 }
 
 function drawRobot() {
-  const signs = motion.own.isDown ? [1, -1, -1] : [1, 1, 1], ranges = box();
-  Plotly.react("robot", robotTraces(), layoutOf((axis, theme) => {
-    const sizes = ranges.map(([low, high]) => high - low), parts = sizes.map((size) => size / Math.max(...sizes));
-    const own = ["x", "y", "z"].map((name, k) => ({ title: { text: `${name} (m)` }, gridcolor: theme.line,
-      zerolinecolor: theme.line, showbackground: false, showspikes: false,
-      // Numbers of a short axis would lie upon each other.
-      nticks: parts[k] < 0.3 ? 3 : 6, showticklabels: parts[k] > 0.15,
-      range: signs[k] > 0 ? ranges[k] : [...ranges[k]].reverse(), autorange: false }));
-    const [x, y, z] = sizes.map((own) => 1.9 * own / Math.hypot(...sizes));
-    const aspectratio = { x, y, z };
-    return { margin: { l: 0, r: 0, t: 0, b: 0 }, uirevision: "robot",
-      legend: { orientation: "h", x: 0.5, xanchor: "center", y: 0, yanchor: "bottom" },
-      scene: { xaxis: own[0], yaxis: own[1], zaxis: own[2], aspectmode: "manual", aspectratio,
-        camera: { eye: { x: 1.0, y: -1.4, z: 0.55 }, projection: { type: "orthographic" } } } };
-  }), CHARTS);
+  const ranges = box();
+  Plotly.react("robot", robotTraces(), layoutOf((_, theme) => spaceOf(ranges, motion.own.isDown, theme, "robot")), CHARTS);
+}
+
+// Layout of a box in space, of true proportions, seen from the side with z upward.
+function spaceOf(ranges, isDown, theme, uirevision) {
+  const signs = isDown ? [1, -1, -1] : [1, 1, 1];
+  const sizes = ranges.map(([low, high]) => high - low), parts = sizes.map((size) => size / Math.max(...sizes));
+  const own = ["x", "y", "z"].map((name, k) => ({ title: { text: `${name} (m)` }, gridcolor: theme.line,
+    zerolinecolor: theme.line, showbackground: false, showspikes: false,
+    // Numbers of a short axis would lie upon each other.
+    nticks: parts[k] < 0.3 ? 3 : 6, showticklabels: parts[k] > 0.15,
+    range: signs[k] > 0 ? ranges[k] : [...ranges[k]].reverse(), autorange: false }));
+  const [x, y, z] = sizes.map((size) => 1.9 * size / Math.hypot(...sizes));
+  return { margin: { l: 0, r: 0, t: 0, b: 0 }, uirevision,
+    legend: { orientation: "h", x: 0.5, xanchor: "center", y: 0, yanchor: "bottom" },
+    scene: { xaxis: own[0], yaxis: own[1], zaxis: own[2], aspectmode: "manual", aspectratio: { x, y, z },
+      camera: { eye: { x: 1.0, y: -1.4, z: 0.55 }, projection: { type: "orthographic" } } } };
 }
 
 const cursor = (theme) => ({ type: "line", yref: "paper", y0: 0, y1: 1, x0: motion.own.t[motion.row],

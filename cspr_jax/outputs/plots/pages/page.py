@@ -10,7 +10,7 @@ from cspr_jax import __version__
 from cspr_jax.errors import InputError
 
 # The page's own parts, in the order in which a browser reads them.
-SCRIPTS = ("page.js", "map.js", "motion.js", "start.js")
+SCRIPTS = ("page.js", "map.js", "motion.js", "solid.js", "start.js")
 STYLE, FRAME = "page.css", "page.html"
 PLACE = re.compile(r"<!-- (\w+) -->")
 

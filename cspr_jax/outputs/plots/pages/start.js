@@ -3,6 +3,7 @@ function setTheme(name) {
   document.documentElement.dataset.theme = name;
   if (map.values.length) drawMap();
   if (motion.own) drawMotion();
+  drawSolid();
 }
 
 async function start() {
@@ -22,10 +23,12 @@ async function start() {
   if (content.notes) element("notes").textContent = content.notes;
   // What is alone takes the whole width.
   document.querySelector("main").classList.toggle("alone", !content.map);
-  document.querySelector("main").classList.toggle("still", !content.motions.length);
+  document.querySelector("main").classList.toggle("still", !content.motions.length && !content.solid);
   element("motion-keys").hidden = !content.motions.length;
   element("motion-side").hidden = !content.motions.length;
+  element("solid-side").hidden = !content.solid;
   if (content.map) await startMap();
+  await startSolid();
   if (content.motions.length) await showMotion(content.shown ?? 0);
   document.documentElement.dataset.ready = "yes";
 }
