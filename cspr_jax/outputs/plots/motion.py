@@ -7,11 +7,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from cspr_jax.outputs.plots.ends import draw_ends, entries_of_ends, segment_rows
 from cspr_jax.outputs.plots.failing import failing_in
 from cspr_jax.outputs.plots.fitting import DOUBT, legend_above
 from cspr_jax.outputs.plots.labels import COLOURS, cable_names, line_look, robot_name
+from cspr_jax.outputs.plots.layout import is_narrow
 from cspr_jax.outputs.plots.motion_source import keeps_plan, robot_and_plan
 from cspr_jax.outputs.plots.obstacles import draw_shadows
 from cspr_jax.outputs.plots.robot_along import limits_of
@@ -25,6 +27,7 @@ ONE_PLANE = 1e-9
 # Limits beyond this many times the largest value are written and not drawn.
 FAR = 3.0
 FAILS = "fails"
+FLIGHT = ("flight", "release", "landing")
 FAILING: dict[str, Any] = {"facecolor": (0.8, 0.1, 0.1, 0.14), "edgecolor": (0.8, 0.1, 0.1, 0.3), "linewidth": 0.6}
 LIMIT: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": "--"}
 
@@ -90,7 +93,9 @@ def motion_figure(result: Result) -> Figure:
     charts = [name for name in ("orientation", "tension", *more) if name in drawn]
     for name in charts:
         _mark_intervals(drawn[name], result, name, charts)
-    ends = entries_of_ends(segment_rows(result.data, time))
+    entries = zip(*reversed(drawn["xz"].get_legend_handles_labels()), strict=True)
+    flight = {name: artist for name, artist in entries if name in FLIGHT}
+    ends = entries_of_ends(segment_rows(result.data, time)) | flight
     figure.legend(list(ends.values()), list(ends), loc="outside lower center", ncols=len(ends))
     place = "" if z0 is None else f"z0 = {float(z0):.4g} m, "
     axis = result.attributes.get("z_axis", "not known, see --robot")
@@ -202,6 +207,8 @@ def _path(panel: Axes, position: np.ndarray, j: int) -> None:
     panel.set_xlabel("x (m)")
     panel.set_ylabel(f"{'xyz'[j]} (m)")
     panel.set_aspect("equal", adjustable="datalim")
+    if is_narrow():
+        panel.xaxis.set_major_locator(MaxNLocator(3))
     panel.grid(alpha=0.3)
 
 
@@ -211,7 +218,6 @@ def _flight(panel: Axes, position: np.ndarray, j: int) -> None:
     for row, marker, name in ((0, "o", "release"), (-1, "x", "landing")):
         place = position[row, 0], position[row, j]
         panel.plot(*place, linestyle="", marker=marker, markersize=6, color=COLOURS[1], label=name)
-    legend_above(panel, 3)
 
 
 def _orientation(panel: Axes, time: np.ndarray, quaternion: np.ndarray) -> None:

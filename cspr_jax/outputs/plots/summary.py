@@ -15,16 +15,18 @@ from cspr_jax.outputs.plots.labels import cable_names, line_look, margin_unit, r
 from cspr_jax.outputs.plots.layout import is_narrow
 from cspr_jax.outputs.plots.motion import FAILS, boundaries, doubt, draw_limits, point_words, shade_failing
 from cspr_jax.outputs.plots.robot_along import limits_of
+from cspr_jax.outputs.plots.scene import shape_of
 from cspr_jax.outputs.plots.tensions import draw_tensions, extremes
-from cspr_jax.outputs.plots.trajectory import draw_trajectory, legend_of
+from cspr_jax.outputs.plots.trajectory import draw_trajectory, legend_of, points_in_space
 from cspr_jax.outputs.plots.verdict_colours import reasons
 from cspr_jax.schema.verdicts import NO_REASON
 from cspr_jax.store.result import Result
 
 # Lines of the table, which shows the first segments of a longer plan.
 SEGMENTS = 8
-# Inches: height of a line of the table.
-LINE = 0.28
+# Inches: height of a line of the table, on a page and in a column; width of the robot, and its heights.
+LINE, NARROW_LINE = 0.28, 0.44
+ACROSS, LOW, HIGH = 6.6, 3.0, 6.4
 HEADS = ("segment", "arcs", "duration (s)", "margin", "verdict")
 # Shares of the width, and letters of a line of the verdict: of a page, and of a column.
 WIDE, NARROW = ((0.14, 0.1, 0.2, 0.16, 0.4), 36), ((0.18, 0.1, 0.2, 0.18, 0.34), 14)
@@ -42,8 +44,10 @@ def summary_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> Fig
     """
     cells = _cells(result)
     lines = sum(_lines(row) for row in cells)
-    figure = Figure(figsize=(7.2, 8.6 + LINE * lines), layout="constrained")
-    parts = figure.add_gridspec(4, 1, height_ratios=[4.4, 2.0, 1.6, 0.3 + LINE * lines])
+    height = (NARROW_LINE if is_narrow() else LINE) * (lines + 1)
+    space_height = float(np.clip(ACROSS * shape_of(points_in_space(result, robot_file, keys)), LOW, HIGH))
+    figure = Figure(figsize=(7.2, 4.8 + space_height + height), layout="constrained")
+    parts = figure.add_gridspec(4, 1, height_ratios=[space_height, 2.0, 1.6, height])
     space = figure.add_subplot(parts[0], projection="3d", computed_zorder=False)
     draw_trajectory(figure, space, result, robot_file, keys)
     figure.legend(*legend_of(result, keys), loc="outside lower center", ncols=6)

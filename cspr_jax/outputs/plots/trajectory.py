@@ -41,9 +41,7 @@ def trajectory_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> 
     Returns:
         the figure.
     """
-    points = np.concatenate(
-        [result.data["position"], np.asarray(robot_file.base_points, float), *map(points_of, keys.bodies)]
-    )
+    points = points_in_space(result, robot_file, keys)
     height = float(np.clip(ACROSS * shape_of(points) + BESIDE, LOW, HIGH))
     figure = Figure(figsize=(7.2, height), layout="constrained")
     panel = figure.add_subplot(projection="3d", computed_zorder=False)
@@ -53,6 +51,13 @@ def trajectory_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> 
         f"{robot_name(result)}: trajectory, {result.axes['t'][-1]:.4g} s{point_words(result.data)}{doubt(result)}"
     )
     return figure
+
+
+def points_in_space(result: Result, robot_file: RobotFile, keys: PlanFile) -> np.ndarray:
+    """Path, spools and corners of obstacles (n, 3), which decide the shape of a picture."""
+    return np.concatenate(
+        [result.data["position"], np.asarray(robot_file.base_points, float), *map(points_of, keys.bodies)]
+    )
 
 
 def draw_trajectory(figure: Figure, panel: Any, result: Result, robot_file: RobotFile, keys: PlanFile) -> None:
