@@ -57,6 +57,7 @@ def test_the_trajectory_in_space(motions, figures, capsys):
     assert [text.get_text() for text in figure.legends[0].get_texts()] == [
         "path",
         "start",
+        "way-points",
         "end",
         "cables",
         "spools, by cable",

@@ -59,6 +59,7 @@ def scale_of(data: np.ndarray, *, signed: bool = False) -> Scale:
     """
     if data.dtype.kind in "iu":
         return _of_counts(data)
+    data = data.astype(float)  # the largest number is beyond those of single precision
     inside = data[np.abs(data) < LARGEST]
     low, high = (float(inside.min()), float(inside.max())) if inside.size else (0.0, 1.0)
     least, most = low, high

@@ -1,6 +1,8 @@
 """Text that fits into a picture: long names cut, long lines broken."""
 
+import itertools
 import re
+import warnings
 from collections.abc import Callable
 from typing import Any, Literal
 
@@ -8,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.text import Text
-from matplotlib.ticker import FixedFormatter, FuncFormatter
+from matplotlib.ticker import FixedFormatter, FixedLocator, FuncFormatter, MaxNLocator
 
 from cspr_jax.errors import printable
 
@@ -22,6 +24,8 @@ DOUBT = "NOT PROVED FEASIBLE"
 # Share of a panel's place that its tick labels leave free.
 BETWEEN_LABELS = 0.82
 ABOVE = "legend above its panel"
+# Largest numbers of intervals between ticks, tried one after the other.
+FEWER_TICKS = (5, 4, 3, 2, 1)
 
 
 def shortened(text: str, most: int = LONGEST_NAME) -> str:
@@ -97,6 +101,30 @@ def share_of_panels(figure: Figure) -> float:
 
 def _is_panel(panel: Axes) -> bool:
     return panel.get_visible() and panel.get_label() != "<colorbar>"
+
+
+def thin_ticks(figure: Figure) -> None:
+    """Give horizontal axes of numbers fewer ticks where these would meet.
+
+    Args:
+        figure: the picture, with its final size.
+    """
+    for panel in figure.axes:
+        is_plane = panel.get_visible() and panel.name == "rectilinear"
+        if not is_plane or not isinstance(panel.xaxis.get_major_locator(), MaxNLocator):
+            continue
+        for count in FEWER_TICKS:
+            with warnings.catch_warnings():
+                warnings.filterwarnings("ignore", "constrained_layout not applied")
+                figure.draw_without_rendering()
+            low, high = sorted(panel.get_xlim())
+            ticks = [tick for tick in panel.xaxis.get_major_ticks() if low <= tick.get_loc() <= high]
+            boxes = [tick.label1.get_window_extent().padded(1.0) for tick in ticks if tick.label1.get_visible()]
+            if not any(one.overlaps(other) for one, other in itertools.pairwise(boxes)):
+                break
+            # Two numbers show a scale: at last the outer ones stay.
+            ends = FixedLocator([ticks[0].get_loc(), ticks[-1].get_loc()])
+            panel.xaxis.set_major_locator(MaxNLocator(count) if count > 1 else ends)
 
 
 def _fit_title(figure: Figure, room: float, *, has_title: bool, lines: int | None) -> None:

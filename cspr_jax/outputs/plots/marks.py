@@ -59,8 +59,9 @@ def mark(panel: Axes, result: Result, name: str, across: list[str], place: dict[
         if _contains(section, point):
             at = _drawn(section, point[None])
             if _inside(limits, at).any():
-                symbol, size = ("P", 7.0) if words == "P0" else ("o", 5.5)
-                artists[words] = panel.plot(*at[0], symbol, markersize=size, **_EDGE)[0]
+                # Both are seen where they fall together: the plus lies within the circle.
+                symbol, size, layer = ("P", 6.0, 2.6) if words == "P0" else ("o", 9.0, 2.5)
+                artists[words] = panel.plot(*at[0], symbol, markersize=size, zorder=layer, **_EDGE)[0]
     panel.set(xlim=limits[0], ylim=limits[1])
     return artists
 

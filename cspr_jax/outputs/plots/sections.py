@@ -180,7 +180,7 @@ def _section(panel: Axes, result: Result, cells: np.ndarray, across: list[str], 
         y, cells = np.maximum(y, 0.0), np.repeat(cells, parts, axis=0)
     if cells.dtype.kind == "f":
         # Infinite values lie beyond an end of the scale; only NaN is drawn as no value.
-        cells = np.ma.masked_invalid(np.clip(cells, -LARGEST, LARGEST))
+        cells = np.ma.masked_invalid(np.clip(cells.astype(float), -LARGEST, LARGEST))
     image = panel.pcolormesh(x, y, cells.T, cmap=scale.colours, norm=scale.norm, rasterized=True)
     if _equal(result, across):
         panel.set_aspect("equal")

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from cspr_jax.errors import ConfigError, InputError, shown
-from cspr_jax.outputs.plots.fitting import fit, share_of_panels
+from cspr_jax.outputs.plots.fitting import fit, share_of_panels, thin_ticks
 from cspr_jax.outputs.plots.layout import INCH, NARROW
 from cspr_jax.outputs.plots.options import USUAL, WIDTHS
 from cspr_jax.outputs.plots.scene import fill_places
@@ -181,6 +181,7 @@ def laid_out(figure: Figure, style: Style) -> None:
     with _no_missing_letters():
         fit(figure, has_title=style.has_title, lines=1 if width * INCH < NARROW else None)
         _give_room(figure, style)
+        thin_ticks(figure)
         fill_places(figure)
 
 
@@ -190,13 +191,14 @@ def _give_room(figure: Figure, style: Style) -> None:
         return
     letters, before = style.font_size, -1.0
     for _ in range(TRIES):
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "constrained_layout not applied")
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.filterwarnings("always", "constrained_layout not applied")
             figure.draw_without_rendering()
-        share = share_of_panels(figure)
+        # Panels without room stay where they were.
+        share = 0.0 if caught else share_of_panels(figure)
         if share >= LEAST_SHARE:
             return
-        if style.size is None and share <= before:  # panels of a shape of their own
+        if style.size is None and 0.0 < share <= before:  # panels of a shape of their own
             figure.set_figheight(figure.get_figheight() / HIGHER)
             return
         before = share
