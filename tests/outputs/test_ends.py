@@ -34,7 +34,7 @@ def test_start_way_points_and_end_are_seen_where_they_fall_together():
     sizes, layers = ([line.get_markersize() for line in panel.lines], [line.get_zorder() for line in panel.lines])
     assert sizes == sorted(sizes, reverse=True) and layers == sorted(layers) and len(set(sizes)) == 3
     # A diamond or a square lies within the mark before it, its corners too.
-    assert all(small * np.sqrt(2.0) < large for large, small in zip(sizes, sizes[1:], strict=False))
+    assert all(small * np.sqrt(2.0) < large for large, small in itertools.pairwise(sizes))
     assert list(entries_of_ends(rows)) == ["start", "way-points", "end"]
     assert list(entries_of_ends(rows[[0, -1]])) == list(entries_of_ends(np.arange(99))) == ["start", "end"]
 

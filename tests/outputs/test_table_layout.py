@@ -1,12 +1,15 @@
 """Published tables as printed: digits, signs, blocks. Nothing here computes a table."""
 
 import io
+import sys
 
 import pytest
 from rich.console import Console
 
 from cspr_jax.outputs.table_layout import LEGEND, Cell, grid, two_digits
+from cspr_jax.published.reasons import READINGS, REASONS, reason_of
 from cspr_jax.published.tables import TABLES, table_for_people
+from cspr_jax.runtime import terminal
 
 
 def lines_of(cells, **options) -> list[list[str]]:
@@ -95,3 +98,28 @@ def test_p_is_the_number_of_arcs_in_every_table(name, head):
 )
 def test_two_digits(value, text):
     assert two_digits(value) == text
+
+
+def test_the_reading_that_fits_is_shown_and_reasons_are_named_once(capsys):
+    """Others are a line each, with the letters of their reasons; all in full where they are asked for."""
+    numbers = {("one", "p"): 8.0, ("two", "p"): 9.0}
+    variants = ("right", "wrong")
+    cells = [Cell(row, "p", value, "8", variant) for variant in variants for (row, _), value in numbers.items()]
+
+    def told(**choices):
+        table = grid("title", cells, reading="right", reason=lambda cell: "misprint", **choices)
+        terminal.print_table(table, sys.stdout)
+        return capsys.readouterr().out
+
+    text = told()
+    assert "right (the reading that the printed numbers fit)" in text and "wrong: 1 of 2 cells differ [a]" in text
+    assert text.count("8 / 9 != [a]") == 1 and text.count("[a]: misprint") == 1
+    assert told(is_full=True).count("8 / 9 != [a]") == 2
+
+
+def test_every_reading_that_is_named_is_one_of_its_table():
+    for name, reading in READINGS.items():
+        assert reading in {variant for _, _, variant in TABLES[name].published}
+    assert REASONS.keys() <= TABLES.keys()
+    cell = Cell("2", "p", None, "9", "amplitude = quintic; pose_2 = pi/2 (printed)")
+    assert "pi/3" in reason_of("3.2", cell) and reason_of("3.2", Cell("3", "p", 1.0, "12", cell.variant)) == ""

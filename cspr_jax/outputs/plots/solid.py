@@ -39,7 +39,8 @@ class _LevelLines(Line3DCollection):
     # Lines of a surface at the heights of the ticks, wherever these are in the end.
 
     def __init__(self, triangles: np.ndarray, panel: Axes3D, layer: float) -> None:
-        self._triangles, self._panel, self._heights = triangles, panel, None
+        self._triangles, self._panel = triangles, panel
+        self._heights: np.ndarray | None = None
         super().__init__(triangles[:1, :2], colors=LINES, linewidths=0.5, zorder=layer)
 
     def do_3d_projection(self) -> float:
