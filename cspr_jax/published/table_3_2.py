@@ -49,8 +49,8 @@ def table_3_2() -> dict[Key, float | None]:
                 first + i: (float(arcs), float(answers.duration[i])) if arcs > 0 else (None, None)
                 for i, arcs in enumerate(answers.arcs)
             }
-            for i, found in segments.items():
-                for column, value in zip(("p", "T"), found, strict=True):
+            for i, numbers in segments.items():
+                for column, value in zip(("p", "T"), numbers, strict=True):
                     cells[str(i), column, _variant(amplitude, torsion)] = value
     return cells
 

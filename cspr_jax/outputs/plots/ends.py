@@ -48,6 +48,13 @@ def draw_ends(panel: Any, path: np.ndarray, rows: np.ndarray, axes: Sequence[int
 
 
 def entries_of_ends(rows: np.ndarray) -> dict[str, Artist]:
-    """Entries of a legend for what `draw_ends` marks."""
+    """Entries of a legend for what `draw_ends` marks.
+
+    Args:
+        rows: of `segment_rows`.
+
+    Returns:
+        artists by their words.
+    """
     shown = [name for name in LOOKS if name != "way-points" or 0 < len(rows) - 2 <= MOST]
     return {name: Line2D([], [], **LOOKS[name]) for name in shown}

@@ -20,7 +20,11 @@ NARROW, INCH = 12.0, 2.54
 
 
 def is_narrow() -> bool:
-    """Tell whether the picture that is made inside `style.in_style` is that of a column."""
+    """Tell whether the picture that is made inside `style.in_style` is that of a column.
+
+    Returns:
+        whether it is.
+    """
     return bool(matplotlib.rcParams["figure.figsize"][0] * INCH < NARROW)
 
 

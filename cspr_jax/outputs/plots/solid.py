@@ -90,12 +90,20 @@ def solid_figure(result: Result, index: dict[str, int], fixed: list[str]) -> Fig
 
 
 def is_solid(result: Result) -> bool:
-    """Tell whether a map is a workspace over points in space."""
+    """Tell whether a map is a workspace over points in space.
+
+    Returns:
+        whether it is one.
+    """
     return is_workspace(result) and min(len(np.unique(result.axes.get(axis, ()))) for axis in SPACE) > 1
 
 
 def middle_of(sides: BoundarySides) -> np.ndarray:
-    """The centroid of the points inside; if it is not in the workspace itself, the point inside that is nearest."""
+    """The centroid of the points inside; if it is not in the workspace itself, the point inside that is nearest.
+
+    Returns:
+        (3,) m.
+    """
     grid = np.stack(np.meshgrid(*sides.points, indexing="ij"), axis=-1)
     inside = grid[sides.verdict == 0]
     middle = inside.mean(0)
@@ -206,7 +214,14 @@ def _legend(surface: Boundary, *, has_obstacles: bool = False) -> tuple[list[Any
 
 
 def volume_words(result: Result, index: dict[str, int]) -> str:
-    """The volume of a workspace with its error, in words."""
+    """The volume of a workspace with its error, in words.
+
+    Args:
+        index: of the point, for each of the other axes.
+
+    Returns:
+        such as "volume 479 ± 32 m³".
+    """
     volume: WorkspaceVolume = volume_of(result)
     place = tuple(index[axis] for axis in volume.axes)
     size, error = float(volume.volume[place]), float(volume.error[place])

@@ -54,7 +54,15 @@ def trajectory_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> 
 
 
 def points_in_space(result: Result, robot_file: RobotFile, keys: PlanFile) -> np.ndarray:
-    """Path, spools and corners of obstacles (n, 3), which decide the shape of a picture."""
+    """Path, spools and corners of obstacles, which decide the shape of a picture.
+
+    Args:
+        robot_file: the robot.
+        keys: the plan, for obstacles.
+
+    Returns:
+        (n, 3) m.
+    """
     return np.concatenate(
         [result.data["position"], np.asarray(robot_file.base_points, float), *map(points_of, keys.bodies)]
     )
@@ -98,7 +106,12 @@ def draw_trajectory(figure: Figure, panel: Any, result: Result, robot_file: Robo
 
 
 def add_tension_bar(figure: Figure, panel: Any, colours: ScalarMappable) -> None:
-    """The bar of the cables' colours, below the robot, which needs the width."""
+    """The bar of the cables' colours, below the robot, which needs the width.
+
+    Args:
+        panel: axes in three dimensions.
+        colours: of tensions.
+    """
     figure.colorbar(colours, ax=panel, label="tension (N)", location="bottom", shrink=0.5, aspect=36, pad=0.02)
 
 
