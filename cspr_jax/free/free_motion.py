@@ -164,8 +164,8 @@ def _searched(
     settings, poses = question.settings, question.poses
     # No form is the start that has led to what was there before.
     count, best = len(poses.positions) - 1, {k: part._replace(start=-1) for k, part in enumerate(before)}
-    until, now = settings.until, time.monotonic()
-    enough = now + ENOUGH * (until - now)
+    until, begin = settings.until, time.monotonic()
+    enough = begin + ENOUGH * (until - begin)
     for number, (share, softness) in enumerate(SEARCHES, 1):
         is_last = number == len(SEARCHES)
         is_left = [
@@ -181,8 +181,8 @@ def _searched(
         if not len(begun.task):
             break
         lanes, ending = single.taken(rows[begun.task]), Ending(until, enough, begun.task)
-        begin = started(lanes, begun.controls, begun.duration)
-        result = optima(lanes, begin, softness=softness, ending=ending, keeps=True)
+        unknowns = started(lanes, begun.controls, begun.duration)
+        result = optima(lanes, unknowns, softness=softness, ending=ending, keeps=True)
         _keep(best, rows, begun.task, lanes, result)
         if result.is_stopped:
             if not _all_optimal(best) and time.monotonic() < until:

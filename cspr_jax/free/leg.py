@@ -41,7 +41,7 @@ DIVIDED = (
 )
 FOLLOWED = 'the search found nothing faster than family = "{}", whose motions these are'
 LINES = 'the search found nothing faster than a line in its least time, as of family = "{}", which leads to {}{}'
-# Where accelerations change at once by more than this part of the largest one, they jump.
+# Part of the largest acceleration by which accelerations change at once where they jump.
 JUMPING, JUMP = "; accelerations jump along it", 0.01
 MISSED = "the search found no motion that keeps all limits; the numbers are those of the last one that it looked at"
 
@@ -180,11 +180,11 @@ class FreeMotions(Leg):
         for i in range(len(self)):
             quaternions = None if poses.quaternions is None else poses.quaternions[i : i + 2]
             ends = poses.positions[i : i + 2], quaternions, poses.velocities[i : i + 2]
-            segment, asked = (
+            segment, requested = (
                 FreePoses(*ends, each[i : i + 2].copy(), poses.z0) for each in (accelerations, poses.accelerations)
             )
             forms = partial(_of_segment, lines, i), partial(_of_segment, others, i)
-            parts.append(self._no_slower(problem, scene, segment, asked, *forms))
+            parts.append(self._no_slower(problem, scene, segment, requested, *forms))
             if any(parts[-1].families) and FAMILIES[str(parts[-1].families[0])].precedes_searches:
                 continue
             end = parts[-1].motions[0].state(jnp.asarray(1.0))
@@ -197,7 +197,7 @@ class FreeMotions(Leg):
         problem: Problem,
         scene: Scene,
         poses: FreePoses,
-        asked: FreePoses,
+        requested: FreePoses,
         lines: Callable[[], list[ClosedForm]],
         others: Callable[[], list[ClosedForm]],
     ) -> FreeMotion:
@@ -207,13 +207,13 @@ class FreeMotions(Leg):
             return free_motion(problem, scene, poses, settings)
         stage("free motion: lines")
         straight = lines()
-        whole = [line for line in straight if fits(line, problem, asked, settings).all()]
+        whole = [line for line in straight if fits(line, problem, requested, settings).all()]
         if whole and time.monotonic() > settings.until:
             return stood_in(problem, scene, poses, settings, whole[0])
         free = None
         try:
             free = free_motion(problem, scene, poses, settings, None, (), straight)
-            free = no_slower_than_lines(free, problem, scene, asked, settings, straight)
+            free = no_slower_than_lines(free, problem, scene, requested, settings, straight)
             if not free.is_stopped and can_be_faster(free, problem, poses, settings):
                 free = self._from_others(problem, scene, poses, settings, free, others())
         except KeyboardInterrupt:
@@ -221,7 +221,7 @@ class FreeMotions(Leg):
                 raise
             free = stood_in(problem, scene, poses, settings, whole[0]) if free is None else free
             free = dataclasses.replace(free, is_stopped=True)
-        return no_slower_than_lines(free, problem, scene, asked, settings, straight)
+        return no_slower_than_lines(free, problem, scene, requested, settings, straight)
 
     def _from_others(
         self,

@@ -149,10 +149,10 @@ def _accelerations_missed(line: ClosedForm, poses: FreePoses) -> np.ndarray:
     # By how much accelerations differ from those that are asked for, at most, (n,) m/s^2 or rad/s^2.
     missed = np.zeros(len(line.motions))
     for k, motion in enumerate(line.motions):
-        state, asked = states_at(motion, np.array([0.0, 1.0])), poses.accelerations[k : k + 2]
+        state, requested = states_at(motion, np.array([0.0, 1.0])), poses.accelerations[k : k + 2]
         parts = [state.acceleration, *([] if poses.quaternions is None else [state.angular_acceleration])]
-        away = np.abs(np.concatenate([np.asarray(part) for part in parts], axis=1) - asked)
-        missed[k] = np.max(away, initial=0.0, where=~np.isnan(asked))
+        away = np.abs(np.concatenate([np.asarray(part) for part in parts], axis=1) - requested)
+        missed[k] = np.max(away, initial=0.0, where=~np.isnan(requested))
     return missed
 
 

@@ -57,8 +57,10 @@ class Ending(NamedTuple):
         Returns:
             whether they end.
         """
-        now = time.monotonic()
-        return now > self.until or (now > self.enough and bool(np.isin(self.of_task, self.of_task[is_optimal]).all()))
+        instant = time.monotonic()
+        return instant > self.until or (
+            instant > self.enough and bool(np.isin(self.of_task, self.of_task[is_optimal]).all())
+        )
 
 
 NEVER = Ending()

@@ -70,7 +70,7 @@ class FastestLines(Leg):
 
 
 def _in_order(problem: Problem, lines: list[Section]) -> list[Section]:
-    # Those along which a motion runs on a grid, the fastest first.
+    # Lines along which a motion runs on a grid, the fastest first.
     paths = discretes(problem, lines, [SectionSettings(MAP_GRID, 0.0)] * len(lines))
     runs = [motion.run for motion in jumping_motions(paths)]
     times = [
