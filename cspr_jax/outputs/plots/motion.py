@@ -93,14 +93,17 @@ def motion_figure(result: Result) -> Figure:
     charts = [name for name in ("orientation", "tension", *more) if name in drawn]
     for name in charts:
         _mark_intervals(drawn[name], result, name, charts)
-    entries = zip(*reversed(drawn["xz"].get_legend_handles_labels()), strict=True)
-    flight = {name: artist for name, artist in entries if name in FLIGHT}
-    ends = entries_of_ends(segment_rows(result.data, time)) | flight
-    figure.legend(list(ends.values()), list(ends), loc="outside lower center", ncols=len(ends))
+    _name_ends(figure, drawn["xz"], segment_rows(result.data, time))
     place = "" if z0 is None else f"z0 = {float(z0):.4g} m, "
     axis = result.attributes.get("z_axis", "not known, see --robot")
     figure.suptitle(f"{robot_name(result)}: {place}z axis {axis}{point_words(result.data)}{doubt(result)}")
     return figure
+
+
+def _name_ends(figure: Figure, panel: Axes, rows: np.ndarray) -> None:
+    entries = zip(*reversed(panel.get_legend_handles_labels()), strict=True)
+    ends = entries_of_ends(rows) | {name: artist for name, artist in entries if name in FLIGHT}
+    figure.legend(list(ends.values()), list(ends), loc="outside lower center", ncols=len(ends))
 
 
 def point_words(columns: Mapping[str, Any]) -> str:
