@@ -40,7 +40,7 @@ FUNCTIONS = {
     "new": ("new_file",),
 }
 # Options that say how to print, or what the process is set to, and what another function does.
-PRINTING = {"help", "json", "device", "all_errors", "list", "all"}
+PRINTING = {"help", "json", "device", "all_errors", "list", "all", "readings"}
 NAMES = {"sweep": "given", "plan": "given", "result": "results"}
 
 
