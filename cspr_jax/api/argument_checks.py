@@ -12,7 +12,18 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from cspr_jax.api.argument_rules import Rule, choice, integer, kind_of, many, real, refuse_tracers, word
+from cspr_jax.api.argument_rules import (
+    DIFFERENTIABLE,
+    INSTEAD,
+    Rule,
+    choice,
+    integer,
+    kind_of,
+    many,
+    real,
+    refuse_tracers,
+    word,
+)
 from cspr_jax.errors import InputError
 from cspr_jax.schema.given_numbers import ANY
 from cspr_jax.schema.limits import LARGEST_GRID, LARGEST_MAX_ARCS, LIMITS, UNCERTAINTIES
@@ -22,29 +33,6 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 LARGEST_LENGTH = 1e6  # m
 LARGEST_POPULATION, LARGEST_DIVISIONS, LARGEST_SAMPLES = 4096, 128, 1_000_000
 MOST = 10**9  # for numbers that functions bound more narrowly by themselves
-
-
-# Functions whose arguments jax may trace, and for the others, which of these to differentiate instead.
-DIFFERENTIABLE = (
-    *("hypocycloid", "transition", "platform_motion", "straight_line", "bezier", "ellipse", "spline", "make_problem"),
-    *("point_mass_robot", "point_mass", "platform", "parallel_pair_robot", "with_cables", "three_cable_equivalent"),
-    *("slacks", "sampled_margin", "tensions"),
-)
-INSTEAD = {
-    name: f"jax differentiates {motion} with sampled_margin, for single motions"
-    for motion, names in {
-        "bezier": ("bezier_durations", "bezier_verdicts", "launch_range"),
-        "ellipse": ("ellipse_frequencies", "ellipse_margins", "swing_range"),
-        "hypocycloid": ("minimum_arcs",),
-        "platform_motion": ("minimum_pose_arcs", "attainable", "accessible"),
-        "spline": ("check", "check_many", "least_time_paths", "retime"),
-        "straight_line": ("least_time",),
-        "transition": ("minimum_oscillations",),
-    }.items()
-    for name in names
-} | dict.fromkeys(
-    ("available_accelerations", "sensitivity", "workspace"), "jax differentiates tensions of a state of motion"
-)
 
 
 def checked(function: Function, name: str = "", module: str = "") -> Function:

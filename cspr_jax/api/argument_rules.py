@@ -11,7 +11,28 @@ from cspr_jax.schema.given_numbers import Numbers, whole
 
 # A rule refuses what an argument, named in errors, may not be.
 Rule = Callable[[str, Any], None]
-NESTED = 4  # what is in a list or a dictionary is searched so deep for what jax traces
+NESTED = 4  # what is in a list, a dictionary or a dataclass is searched so deep
+# Functions whose arguments jax may trace, and for the others, which of these to differentiate instead.
+DIFFERENTIABLE = (
+    *("hypocycloid", "transition", "platform_motion", "straight_line", "bezier", "ellipse", "spline", "make_problem"),
+    *("point_mass_robot", "point_mass", "platform", "parallel_pair_robot", "with_cables", "three_cable_equivalent"),
+    *("slacks", "sampled_margin", "tensions"),
+)
+INSTEAD = {
+    name: f"jax differentiates {motion} with sampled_margin, for single motions"
+    for motion, names in {
+        "bezier": ("bezier_durations", "bezier_verdicts", "launch_range"),
+        "ellipse": ("ellipse_frequencies", "ellipse_margins", "swing_range"),
+        "hypocycloid": ("minimum_arcs",),
+        "platform_motion": ("minimum_pose_arcs", "attainable", "accessible"),
+        "spline": ("check", "check_many", "least_time_paths", "retime"),
+        "straight_line": ("least_time",),
+        "transition": ("minimum_oscillations",),
+    }.items()
+    for name in names
+} | dict.fromkeys(
+    ("available_accelerations", "sensitivity", "workspace"), "jax differentiates tensions of a state of motion"
+)
 
 
 def real(
