@@ -128,6 +128,8 @@ def test_bad_arguments(function, good, tmp_path, monkeypatch):
             if key == "self" or is_good(function, key, kind):
                 continue
             given = {name: None if name == "self" else good[name] for name in needed} | {key: value}
+            if function == "merge" and key != "paths":
+                given["paths"] = ["a", "b"]
             if function == "check_many" and key != "positions":
                 given["positions"] = [[[0.4, 0.1, 1.5]] * 2]
             with pytest.raises(InputError) as raised:

@@ -57,7 +57,6 @@ def points_in_space(result: Result, robot_file: RobotFile, keys: PlanFile) -> np
     """Path, spools and corners of obstacles, which decide the shape of a picture.
 
     Args:
-        robot_file: the robot.
         keys: the plan, for obstacles.
 
     Returns:
@@ -110,7 +109,6 @@ def add_tension_bar(figure: Figure, panel: Any, colours: ScalarMappable) -> None
 
     Args:
         panel: axes in three dimensions.
-        colours: of tensions.
     """
     figure.colorbar(colours, ax=panel, label="tension (N)", location="bottom", shrink=0.5, aspect=36, pad=0.02)
 
