@@ -5,6 +5,7 @@ read `__init__.pyi`.
 """
 
 import importlib
+import sys
 from typing import Any
 
 __version__ = "0.2.0"
@@ -88,7 +89,8 @@ def __getattr__(name: str) -> Any:
     """Load a public name when it is first used."""
     attribute = _ALIASES.get(name, name)
     if attribute not in _MODULES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        # With these two, Python itself asks whether a name of `__dir__` was meant.
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}", name=name, obj=sys.modules[__name__])
     return getattr(importlib.import_module(f"cspr_jax.{_MODULES[attribute]}"), attribute)
 
 

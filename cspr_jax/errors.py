@@ -121,12 +121,12 @@ def demand(allowed: str) -> str:
     """Phrase what a message demands of a value.
 
     Args:
-        allowed: what would be right, or, from "cannot" on, what is wrong.
+        allowed: what would be right; or, from "cannot" on, what is wrong, and from "did you mean" on, a whole clause.
 
     Returns:
         the words behind the value.
     """
-    return allowed if allowed.startswith("cannot ") else f"must be {allowed}"
+    return allowed if allowed.startswith(("cannot ", "did you mean ")) else f"must be {allowed}"
 
 
 def printable(text: object) -> str:

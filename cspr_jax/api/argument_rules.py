@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any
 
+from cspr_jax.config.suggestions import one_of
 from cspr_jax.errors import InputError
 from cspr_jax.schema.given_numbers import Numbers, whole
 
@@ -103,8 +104,14 @@ def choice(rule: Rule, *others: Any) -> Rule:
     """
 
     def check(key: str, value: Any) -> None:
-        if not (value is None or isinstance(value, str)) or value not in others:
+        if (value is None or isinstance(value, str)) and value in others:
+            return
+        try:
             rule(key, value)
+        except InputError as error:
+            if not isinstance(value, str) or error.fault:
+                raise
+            raise InputError(key, value, one_of(value, filter(None, others), error.allowed)) from None
 
     return check
 
@@ -170,6 +177,6 @@ def word(*words: str) -> Rule:
 
     def check(key: str, value: Any) -> None:
         if value is not None and not (isinstance(value, str) and value in words):
-            raise InputError(key, value, allowed)
+            raise InputError(key, value, one_of(value, words, allowed) if isinstance(value, str) else allowed)
 
     return check

@@ -10,6 +10,7 @@ from cspr_jax.api.argument_checks import DEPTH, DEPTH_WORDS, LENGTHS, POINTS_WOR
 from cspr_jax.arithmetic.frames import IDENTITY, Frame
 from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE
 from cspr_jax.config.near_rest import almost_at_rest
+from cspr_jax.config.suggestions import one_of
 from cspr_jax.errors import InputError
 from cspr_jax.motions.amplitudes import NAMES, Amplitude, boundary_errors, named
 from cspr_jax.motions.answers import Answers
@@ -89,7 +90,7 @@ def amplitude_of(amplitude: str | Amplitude, *, free_end: bool | None = None) ->
     try:
         function = named(amplitude) if isinstance(amplitude, str) else amplitude
     except InputError as error:
-        allowed = f"one of {', '.join(NAMES)}; those with an epsilon are amplitude(name, epsilon)"
+        allowed = f"{one_of(amplitude, NAMES)}; those with an epsilon are amplitude(name, epsilon)"
         raise InputError("amplitude", amplitude, allowed) from error
     if free_end is not None and isinstance(function.coefficients, np.ndarray):
         broken = boundary_errors(function, free_end=free_end)

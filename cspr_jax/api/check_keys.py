@@ -9,7 +9,8 @@ import numpy as np
 from cspr_jax.config.limits import LimitTable
 from cspr_jax.config.mappings import plain
 from cspr_jax.config.obstacles import SurroundingsKeys
-from cspr_jax.errors import InputError
+from cspr_jax.config.suggestions import did_you_mean
+from cspr_jax.errors import InputError, demand
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.patterns import PATTERNS
@@ -65,8 +66,10 @@ def check_keys(
 
 def _limit_keys(limits: Limits | Mapping[str, Any] | None) -> dict[str, Any]:
     if limits is None or isinstance(limits, Mapping):
-        for key in set(limits or {}) - {*LimitTable.model_fields, *SurroundingsKeys.model_fields}:
-            raise InputError(f"limits[{key!r}]", None, "a key of [limits] of a plan, or of what surrounds the robot")
+        known = [*LimitTable.model_fields, *SurroundingsKeys.model_fields]
+        for key in (key for key in limits or {} if key not in known):
+            allowed = demand("a key of [limits] of a plan, or of what surrounds the robot")
+            raise InputError(f"limits[{key!r}]", None, did_you_mean(str(key), known) + allowed, fault="unknown key")
         return plain(dict(limits or {}))
     values = {row.name: getattr(limits, row.name) for row in LIMITS}
     numbers = {name: np.asarray(value) for name, value in values.items() if value is not None}

@@ -232,6 +232,8 @@ def check(  # noqa: PLR0913
         ConfigError: a mistake in a file.
         InputError: samples that make no motion, or an impossible argument.
     """
+    samples = {"quaternions": quaternions, "velocities": velocities, "accelerations": accelerations}
+    _check_source(times, {"positions": positions, **samples}, duration)
     if trajectory is not None and not isinstance(times, str | Path):
         raise InputError("trajectory", trajectory, "absent but for a file of CASPR")
     settings = {"interpolation": interpolation, "ends": ends, "smooth": smooth, "point": point}
@@ -240,8 +242,6 @@ def check(  # noqa: PLR0913
         if isinstance(times, str | Path):
             return check_file(Path(times), keys)
         plan = plan_keys(keys, NAME)
-        if duration is not None and not callable(times):
-            raise InputError("duration", duration, "absent but for a function of time")
         if positions is not None:
             source: Any = samples_of(times, positions, quaternions, velocities, accelerations)
         elif hasattr(times, "state") or hasattr(times, "x") or hasattr(times, "t"):
@@ -249,6 +249,18 @@ def check(  # noqa: PLR0913
         else:
             source = _function(times, duration, plan)
         return _check_of(plan.with_source(str(NAME), source), text_of(keys))
+
+
+def _check_source(times: Any, samples: Mapping[str, Any], duration: float | None) -> None:
+    # Samples belong to an array of times alone, and a duration to a function.
+    is_file, is_motion = isinstance(times, str | Path), hasattr(times, "state")
+    if is_file or is_motion or callable(times):
+        kind = "a file" if is_file else "a motion" if is_motion else "a curve or a function"
+        for name in (name for name, rows in samples.items() if rows is not None):
+            fault = f"given beside {kind} in place of times"
+            raise InputError(name, None, "must be absent; with an array of times (n,) s, samples", fault=fault)
+    if duration is not None and (is_file or is_motion or hasattr(times, "x") or not callable(times)):
+        raise InputError("duration", duration, "absent but for a function of time")
 
 
 def check_file(
@@ -303,9 +315,9 @@ def _shown(planned: planning.PlannedMotions, text: str) -> Check:
 
 def _function(function: Any, duration: float | None, keys: PlanFile) -> Placed[FunctionMotion]:
     if not callable(function):
-        raise InputError("positions", None, "needed with instants: (n, 3) m")
+        raise InputError("positions", None, "must be given beside times: (n, 3) m", fault="missing")
     if duration is None:
-        raise InputError("duration", None, "needed with a function: s")
+        raise InputError("duration", None, "must be given beside a function: s", fault="missing")
     file = resolve_robot(keys.robot, NAME, Path())
     frame, reference = frame_of(file.base_points, file.z_axis), reference_of(build_robot(file, keys, NAME))
     motion = function_motion(function, duration, frame=frame, reference=reference, is_platform=file.is_platform)

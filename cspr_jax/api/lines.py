@@ -6,6 +6,7 @@ import numpy as np
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import check_point_mass, starts_and_ends
 from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.config.suggestions import one_of
 from cspr_jax.errors import InputError
 from cspr_jax.lines.least_time import LeastTimes, least_times
 from cspr_jax.lines.motion import LAWS, TimedLine, fixed_law, s_curve
@@ -40,7 +41,7 @@ def straight_line(
     """
     check_point_mass(robot)
     if law not in LAWS:
-        raise InputError("law", law, "one of " + ", ".join(LAWS))
+        raise InputError("law", law, one_of(law, LAWS))
     frame, time = prepared(robot)[1], jnp.asarray(duration, float)
     first, last = (jnp.asarray(frame.inward(point), float) for point in (start, end))
     ratio = jnp.asarray(0.5) if acceleration_time is None else jnp.asarray(acceleration_time, float) / time

@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from cspr_jax.api.argument_checks import checked
-from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.config.suggestions import one_of
+from cspr_jax.errors import ConfigError, InputError, demand
 from cspr_jax.outputs import example_files, listings
 
 # There is a template for each of these kinds of file.
@@ -97,7 +98,7 @@ def new_file(
     from cspr_jax.outputs import templates  # with the schema of files, which lists do not need
 
     if what not in KINDS:
-        raise ConfigError("what", f'"{what}": must be one of {", ".join(KINDS)}')
+        raise ConfigError("what", f'"{what}": {demand(one_of(what, KINDS))}')
     try:
         if what == "robot":
             text = templates.robot_template(like)

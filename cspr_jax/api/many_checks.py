@@ -91,10 +91,10 @@ def check_many(
     """
     keys = plan_keys(check_keys(robot, limits, interpolation=interpolation, ends=ends), NAME)
     columns = (positions, quaternions, velocities, accelerations)
-    count = len(np.asarray(positions))
-    if not count:
-        raise InputError("positions", None, "must hold at least one motion", fault="none")
-    instants = np.broadcast_to(np.asarray(times, float), (count, np.shape(times)[-1]))
+    others = {"times": times, "quaternions": quaternions, "velocities": velocities, "accelerations": accelerations}
+    count, rows = np.shape(positions)[:2]
+    _check_shapes(count, rows, {name: np.shape(array) for name, array in others.items() if array is not None})
+    instants = np.broadcast_to(np.asarray(times, float), (count, rows))
     with double_precision():
         file = as_moved(resolve_robot(keys.robot, NAME, Path()), [FAMILIES["spline"].legs])
         problem = build_problem(file, keys, keys, NAME, any_cables=True)
@@ -118,3 +118,12 @@ def check_many(
     arrays = {name: getattr(answers, name) for name in names}
     causes = [() if answers.feasible[i] else answers.proved_causes(i, axes) for i in range(count)]
     return ManyChecks(**arrays, failing=[proof.failing for proof in answers.proof], causes=causes)
+
+
+def _check_shapes(count: int, rows: int, shapes: dict[str, tuple[int, ...]]) -> None:
+    for name, shape in shapes.items():
+        ways = [(rows,), (count, rows)] if name == "times" else [(count, rows, shape[-1])]
+        if shape not in ways:
+            fitting = " or ".join(map(str, ways))
+            words = f"must have shape {fitting}, as positions of {count} motions at {rows} times each"
+            raise InputError(name, None, words, fault=f"shape {shape}")

@@ -16,6 +16,7 @@ from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import amplitude_of, kernel_problem, warn_of_rest
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import IDENTITY, Frame
+from cspr_jax.config.suggestions import one_of
 from cspr_jax.curves.files import kept_to, placed_inward, reference_of, samples_of, source_spline
 from cspr_jax.curves.interpolation import linear_maps
 from cspr_jax.curves.spline import Spline
@@ -231,7 +232,7 @@ def tensions(robot: AnyRobot, state: State, rule: str = CENTRED) -> Array:
     """
     prepared_robot, frame = prepared(robot, pulleys=True)
     if rule not in TENSION_RULES:
-        raise InputError("rule", rule, f"one of {', '.join(TENSION_RULES)}")
+        raise InputError("rule", rule, one_of(rule, TENSION_RULES))
     high = robot.limits.tension_max
     if TENSION_RULES[rule].is_bounded and robot.n_cables > robot.dof and (high is None or not _is_finite(high)):
         raise InputError("rule", rule, "another one without a largest tension of every cable")

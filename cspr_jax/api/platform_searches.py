@@ -11,6 +11,7 @@ from cspr_jax.api.arguments import batched, depths, kernel_problem, points_of, q
 from cspr_jax.api.searches import WithMotions
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.config.suggestions import one_of
 from cspr_jax.errors import InputError
 from cspr_jax.motions.amplitudes import Amplitude
 from cspr_jax.motions.motion import Placed
@@ -178,7 +179,7 @@ def _of_place(
     if not isinstance(robot, PlatformRobot):
         raise InputError("robot", getattr(robot, "name", robot), "a platform")
     if definition not in DEFINITIONS:
-        raise InputError("definition", definition, f"one of {', '.join(DEFINITIONS)}")
+        raise InputError("definition", definition, one_of(definition, DEFINITIONS))
     if divisions % 2 or not 4 <= divisions <= 128:
         raise InputError("divisions", divisions, "an even number from 4 to 128")
     where = points_of("place", [place])

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Any
 
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.errors import ConfigError, shown
+from cspr_jax.config.suggestions import one_of
+from cspr_jax.errors import ConfigError, demand, shown
 from cspr_jax.runtime.processes import LARGEST, check_count, usual_count
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ def table(
     from cspr_jax.published.tables import TABLES, chosen, table_cells
 
     if name not in TABLES:
-        raise ConfigError("table", f"{shown(name)}: must be one of {', '.join(TABLES)}")
+        raise ConfigError("table", f"{shown(name)}: {demand(one_of(name, TABLES))}")
     check_count(workers)
     options: dict[str, Any] = {"--definition": definition, "--amplitude": amplitude, "--fine": fine or None}
     options |= {"--max-arcs": max_arcs, "--values": values}

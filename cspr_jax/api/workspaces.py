@@ -9,6 +9,7 @@ from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import check_in_plane, check_point_mass, points_of, quaternions
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.config.suggestions import one_of
 from cspr_jax.errors import InputError
 from cspr_jax.motions.given_limits import limits_over
 from cspr_jax.robots.kernel_axes import centred, prepared
@@ -78,9 +79,9 @@ def workspace(  # noqa: PLR0913
     _check_kind(robot)
     check_cables(robot)
     if condition not in CONDITIONS:
-        raise InputError("condition", condition, " or ".join(f'"{name}"' for name in CONDITIONS))
+        raise InputError("condition", condition, one_of(condition, CONDITIONS))
     if precision not in PRECISIONS:
-        raise InputError("precision", precision, " or ".join(f'"{name}"' for name in PRECISIONS))
+        raise InputError("precision", precision, one_of(precision, PRECISIONS))
     requirements = {"wrench_box": wrench_box, "wrench_ellipsoid": wrench_ellipsoid, "acceleration": acceleration}
     requirements |= {"tension_min": tension_min, "tension_max": tension_max, "wrenches": wrenches}
     for key, value in (*requirements.items(), ("capacity_length", capacity_length)):

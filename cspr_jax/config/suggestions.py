@@ -5,6 +5,8 @@ import re
 import unicodedata
 from collections.abc import Iterable
 
+from cspr_jax.errors import demand
+
 # Words that users write, with the words of the keys that they mean.
 _SYNONYMS = {
     "maximum": "max",
@@ -94,6 +96,21 @@ def did_you_mean(text: str, allowed: Iterable[str]) -> str:
     """
     near = nearest(text, allowed)
     return f"did you mean {near}? " if near else ""
+
+
+def one_of(text: str, names: Iterable[str], allowed: str = "") -> str:
+    """What an error's line demands in place of a name: the one that was probably meant, then all of them.
+
+    Args:
+        allowed: in words, where these are not "one of" them all.
+
+    Returns:
+        the words behind the value, for `InputError` and `demand`.
+    """
+    names = list(names)
+    allowed = allowed or f"one of {', '.join(names)}"
+    question = did_you_mean(text, names)
+    return f"{question}{demand(allowed)}" if question else allowed
 
 
 def _words(name: str) -> list[str]:

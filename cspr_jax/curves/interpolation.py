@@ -111,6 +111,16 @@ def continuous(quaternions: np.ndarray) -> np.ndarray:
     return units * np.cumprod(np.append(1.0, flips))[:, None]
 
 
+def check_order(times: np.ndarray, *, repeated: bool) -> None:
+    """Refuse times that do not increase; the error names the first that does not, and the time before it."""
+    steps = np.diff(times)
+    early = np.flatnonzero(steps < 0.0 if repeated else steps <= 0.0)
+    if len(early):
+        i, least = int(early[0]) + 1, "at least" if repeated else "more than"
+        before = f"{least} times[{i - 1}] = {float(times[i - 1])!r}: times must increase"
+        raise InputError(f"times[{i}]", float(times[i]), before)
+
+
 def check_steps(times: np.ndarray) -> None:
     """Refuse instants that are too close for numbers.
 
@@ -133,10 +143,7 @@ def _check(times: np.ndarray, positions, quaternions, interpolation: str, ends: 
             raise InputError(name, value, " or ".join(f'"{each}"' for each in allowed))
     if times.ndim != 1 or len(times) < 2 or not np.isfinite(times).all():
         raise InputError("times", None, "must be two or more finite numbers, in s", fault=f"shape {times.shape}")
-    late = np.flatnonzero(np.diff(times) <= 0.0)
-    if len(late):
-        i = int(late[0]) + 1
-        raise InputError(f"times[{i}]", float(times[i]), f"more than times[{i - 1}] = {float(times[i - 1])!r}")
+    check_order(times, repeated=False)
     check_steps(times)
     for name, values, width in (("positions", positions, 3), ("quaternions", quaternions, 4)):
         if values is None:

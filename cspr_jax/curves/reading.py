@@ -18,7 +18,7 @@ from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.piecewise_bounds import bernstein_of_powers
 from cspr_jax.config.motions.table import MotionPieces, MotionTable
 from cspr_jax.config.motions.text import MotionWindow
-from cspr_jax.curves.interpolation import check_steps, continuous, hermite, interpolated
+from cspr_jax.curves.interpolation import check_order, check_steps, continuous, hermite, interpolated
 from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import InputError
 
@@ -48,8 +48,7 @@ def spline_of(
     check_steps(source.knots if isinstance(source, MotionPieces) else source.times)
     if isinstance(source, MotionPieces):
         return _of_pieces(source, interpolation, ends)
-    if (np.diff(source.times) < 0.0).any():
-        raise InputError("times", None, "must increase", fault="out of order")
+    check_order(source.times, repeated=True)
     kind = interpolation or source.interpolation or ("cubic" if source.velocities is None else "hermite")
     table = source
     if kind == "hermite" and table.velocities is not None:

@@ -17,6 +17,7 @@ from cspr_jax.config.obstacles import SurroundingsKeys
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import Table
 from cspr_jax.config.robot import RobotFile
+from cspr_jax.config.suggestions import one_of
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import InputError, RefusedError, StoreError, printable
 from cspr_jax.outputs.example_files import folder
@@ -45,7 +46,7 @@ def robot_template(like: str) -> str:
         InputError: no such robot.
     """
     if like not in catalogue.catalogue_names():
-        raise InputError("--like", like, "one of " + ", ".join(catalogue.catalogue_names()))
+        raise InputError("--like", like, one_of(like, catalogue.catalogue_names()))
     values = tomllib.loads((catalogue.CATALOGUE / f"{like}.toml").read_text("utf-8"))
     values |= {"name": "my robot", "source": ""}
     head = "A robot; change what stands here, and take off the # of what you need."
@@ -62,7 +63,7 @@ def sweep_template(kind: str) -> str:
         InputError: no such kind.
     """
     if kind not in MAP_KINDS:
-        raise InputError("--map", kind, "one of " + ", ".join(MAP_KINDS))
+        raise InputError("--map", kind, one_of(kind, MAP_KINDS))
     row = MAP_KINDS[kind]
     examples = _examples("map")
     alike = (name for name, other in MAP_KINDS.items() if name in examples and other.families == row.families)
@@ -90,7 +91,7 @@ def plan_template(family: str) -> str:
         InputError: no such family.
     """
     if family not in FAMILIES:
-        raise InputError("--family", family, "one of " + ", ".join(FAMILIES))
+        raise InputError("--family", family, one_of(family, FAMILIES))
     examples = _examples("family")
     alike = (name for name, other in FAMILIES.items() if name in examples and other.legs == FAMILIES[family].legs)
     values = dict(examples[family if family in examples else next(alike)], family=family)

@@ -5,7 +5,8 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from cspr_jax.errors import ConfigError, shown
+from cspr_jax.config.suggestions import one_of
+from cspr_jax.errors import ConfigError, demand, shown
 from cspr_jax.outputs.table_layout import Cell, grid
 from cspr_jax.plans.planning import plan
 from cspr_jax.published import batotp, boralugoda, chapter_1, chapter_3, peers, ray_hulls, table_3_2, table_3_4
@@ -232,7 +233,7 @@ def chosen(name: str, options: dict[str, Any]) -> TableSettings | None:
     def values_of(option: str, names: Iterable[str], otherwise: tuple[str, ...]) -> tuple[str, ...]:
         value, known = options[option], tuple(names)
         if value not in (None, "all", *known):
-            raise ConfigError(option, f"{shown(value)}: must be one of {', '.join(known)}, all")
+            raise ConfigError(option, f"{shown(value)}: {demand(one_of(str(value), known))}, all")
         return otherwise if value is None else known if value == "all" else (value,)
 
     return TableSettings(

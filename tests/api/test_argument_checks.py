@@ -132,6 +132,8 @@ def test_bad_arguments(function, good, tmp_path, monkeypatch):
                 given["paths"] = ["a", "b"]
             if function == "check_many" and key != "positions":
                 given["positions"] = [[[0.4, 0.1, 1.5]] * 2]
+            if function == "merge" and key != "paths":
+                given["paths"] = ["first", "second"]
             with pytest.raises(InputError) as raised:
                 TAKING[function](**given)
             line = str(raised.value)
@@ -254,6 +256,36 @@ def test_functions_can_be_pickled(name):
 def test_too_few_arguments_are_pythons_own_error():
     with pytest.raises(TypeError, match=r"minimum_arcs\(\) missing"):
         cspr_jax.minimum_arcs()
+
+
+def test_names_that_nearly_fit_are_asked_about(good, tmp_path):
+    """Words, keys of mappings, keywords and public names."""
+    robot, times, points = good["robot"], [0.0, 1.0], [[0.4, 0.1, 1.5], [0.3, 0.1, 1.4]]
+    cases = {
+        r"limits\['max_tension'\]: unknown key: did you mean tension_max\? must be a key": lambda: cspr_jax.check(
+            robot, times, points, limits={"max_tension": 3.0}
+        ),
+        r"did you mean cubic\? must be .*, or None": lambda: cspr_jax.check(robot, times, points, interpolation="cubc"),
+        r"did you mean fastest\? must be a number": lambda: cspr_jax.ellipse(
+            robot, points[0], [0.1, 0, 0], [0, 0.1, 0], frequency="fastst"
+        ),
+        r"did you mean centred\? must be one of": lambda: cspr_jax.tensions(
+            robot, cspr_jax.spline(robot, times, points).state(0.5), rule="centered"
+        ),
+        r"did you mean wrench-feasible\? must": lambda: cspr_jax.workspace(robot, points, condition="wrench-feasble"),
+        r"did you mean quintic\? must be one of .*; those": lambda: cspr_jax.make_problem(robot, amplitude="quintc"),
+        r"did you mean 3\.2\? must be one of 1\.1": lambda: cspr_jax.table("3.22"),
+        r"did you mean sweep\? must be one of robot": lambda: cspr_jax.new_file("sweeep", tmp_path / "a.toml"),
+        r"did you mean minimum-arcs\? must": lambda: cspr_jax.new_file("sweep", tmp_path / "a.toml", map="minimum_arc"),
+    }
+    for words, call in cases.items():
+        with pytest.raises(CsprError, match=words):
+            call()
+    with pytest.raises(TypeError, match=r"check\(\) takes no limit: did you mean limits\?"):
+        cspr_jax.check(robot, times, points, limit={})
+    with pytest.raises(AttributeError) as caught:
+        cspr_jax.minimum_arc  # noqa: B018
+    assert caught.value.obj is cspr_jax and caught.value.name == "minimum_arc"  # by which Python asks
 
 
 def test_public_names_are_listed():

@@ -233,3 +233,42 @@ def test_a_motion_on_its_limit_says_so(share):
     assert row["criterion"] == "slack_cable" and abs(row["needed"]) < 1e-7 < row["tolerance"] < 1e-5
     assert any(line.startswith("on its limit") for line in coarse.lines())
     assert fine.to_dict()["on_limit"] == [] and not any(line.startswith("on its limit") for line in fine.lines())
+
+
+def test_what_is_given_beside_a_source_of_its_own_is_refused():
+    """One line each: samples beside a function, a motion or a file, and numbers of motions that do not fit."""
+    motion = cspr_jax.spline(cspr_jax.load_robot("prototype"), TIMES, PLACES)
+    samples = dict.fromkeys(("positions", "velocities", "accelerations"), PLACES)
+    samples["quaternions"] = np.tile([1.0, 0, 0, 0], (7, 1))
+    for source in (lambda t: PLACES[0], motion, "own.csv", CubicSpline(TIMES, PLACES)):
+        for name, rows in samples.items():
+            with pytest.raises(InputError, match=f"^{name}: given beside .*must be absent"):
+                cspr_jax.check("prototype", source, **{name: rows})
+    for source in (motion, "own.csv", CubicSpline(TIMES, PLACES)):
+        with pytest.raises(InputError, match=r"duration = 2\.0: must be absent"):
+            cspr_jax.check("prototype", source, duration=2.0)
+    with pytest.raises(InputError, match="positions: missing"):
+        cspr_jax.check("prototype", TIMES)
+    with pytest.raises(ConfigError, match=r"times\[1\] = 5.0: must be at least times\[0\] = 6.0: times must increase"):
+        cspr_jax.check("prototype", TIMES[::-1], PLACES)
+
+
+def test_shapes_of_many_motions_fit():
+    times, three = np.tile([0.0, 1.0, 2.0], (3, 1)), np.tile(PLACES[:3], (3, 1, 1))
+    shapes = {
+        r"times: shape \(3, 3\): must have shape \(3,\) or \(2, 3\)": (times, three[:2]),
+        r"times: shape \(2, 3\): .*\(3, 3\)": (times[:2], three),
+        r"times: shape \(3, 1\): ": (times[:, :1], three),
+        r"times: shape \(3, 3\): .* at 2 times each": (times, three[:, :2]),
+        r"motion 1, times\[2\] = 1.0: must be at least times\[1\] = 2.0": (
+            np.array([*times[:1], [0, 2, 1]]),
+            three[:2],
+        ),
+        r"times = \[.*1e\+300.*must be .*at most 1e\+12": (1e300 * times, three),
+    }
+    for words, (instants, positions) in shapes.items():
+        with pytest.raises(InputError, match=words):
+            cspr_jax.check_many("prototype", instants, positions)
+    for name in ("velocities", "accelerations"):
+        with pytest.raises(InputError, match=rf"{name}: shape \(2, 3, 3\): must have shape \(3, 3, 3\)"):
+            cspr_jax.check_many("prototype", times, three, **{"velocities": three, name: three[:2]})

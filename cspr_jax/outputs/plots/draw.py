@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
+from cspr_jax.config.suggestions import one_of
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.comparison import Compared, comparison_figure
 from cspr_jax.outputs.plots.conditions import excluded, is_workspace, said, shown_first
@@ -224,7 +225,9 @@ def _telling_cells(result: Result, at: dict[str, float], order: list[str]) -> np
 
 def _lines_figure(result: Result, view: MapView, by: str) -> Figure:
     if by not in view.across or len(view.across) < 2:
-        raise InputError("--lines", by, "one of two or more axes that vary: " + ", ".join(view.across))
+        raise InputError(
+            "--lines", by, one_of(by, view.across, f"one of two or more axes that vary: {', '.join(view.across)}")
+        )
     along = next(axis for axis in view.across if axis != by)
     order = [along, by, *(axis for axis in view.across if axis not in (along, by))]
     view = _panelled(result, view, order)
@@ -253,7 +256,7 @@ def _panelled(result: Result, view: MapView, order: list[str]) -> MapView:
 def _view(result: Result, quantity: str | None, at: dict[str, float]) -> MapView:
     name = quantity or shown_first(result)
     if name not in result.data:
-        raise InputError("--quantity", name, "one of " + ", ".join(sorted(result.data)))
+        raise InputError("--quantity", name, one_of(name, sorted(result.data)))
     fixed, place = [], {}
     for axis, coordinate in at.items():
         place[axis], words = nearest(result, axis, coordinate)

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from matplotlib.figure import Figure
 
+from cspr_jax.config.suggestions import one_of
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.landings import landing_figure
 from cspr_jax.outputs.plots.motion import motion_figure
@@ -81,5 +82,5 @@ def motion_picture(result: Result, file: str, quantity: str | None, at: dict[str
         return motion_figure(result)
     known = [name for name, row in MOTION_PICTURES.items() if not row.needs or row.needs in result.data]
     if quantity not in known:
-        raise InputError("--quantity", quantity, f"one of {', '.join(known)} for this motion, or absent")
+        raise InputError("--quantity", quantity, f"{one_of(quantity, known)} for this motion, or absent")
     return MOTION_PICTURES[quantity].draw(result, file, at)

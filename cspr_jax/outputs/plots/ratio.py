@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 
+from cspr_jax.config.suggestions import one_of
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.conditions import shown_first
 from cspr_jax.schema.quantities import RATIO
@@ -33,7 +34,9 @@ def ratio_of(results: list[Result], names: list[str], quantity: str | None) -> R
     name = quantity or shown_first(results[0])
     both = sorted(results[0].data.keys() & results[1].data.keys())
     if name not in both:
-        raise InputError("--quantity", name, f"one that both maps have ({', '.join(both) or 'none'})")
+        raise InputError(
+            "--quantity", name, one_of(name, both, f"one that both maps have ({', '.join(both) or 'none'})")
+        )
     axes = [{axis: points for axis, points in result.axes.items() if len(points) > 1} for result in results]
     shared = results[0].axes.keys() & results[1].axes.keys()
     if axes[0].keys() != axes[1].keys() or not all(

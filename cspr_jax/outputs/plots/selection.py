@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cspr_jax.config.suggestions import one_of
 from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.outputs.plots.labels import value
 from cspr_jax.store.result import Result
@@ -84,7 +85,7 @@ def nearest(result: Result, axis: str, coordinate: float, option: str = "--at") 
         InputError: no such axis, or a value out of its range.
     """
     if axis not in result.axes:
-        raise InputError(option, axis, "one of " + ", ".join(result.axes))
+        raise InputError(option, axis, one_of(axis, result.axes))
     points = result.axes[axis]
     low, high = float(points.min()), float(points.max())
     rounding = SAME * max(abs(low), abs(high))

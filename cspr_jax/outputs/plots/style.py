@@ -12,7 +12,8 @@ import matplotlib.style
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from cspr_jax.errors import ConfigError, InputError, shown
+from cspr_jax.config.suggestions import one_of
+from cspr_jax.errors import ConfigError, InputError, demand, shown
 from cspr_jax.outputs.plots.fitting import fit, share_of_panels, thin_ticks
 from cspr_jax.outputs.plots.layout import INCH, NARROW
 from cspr_jax.outputs.plots.options import USUAL, WIDTHS
@@ -97,7 +98,7 @@ def style_of(
     """
     name, _, of_width = (preset or "").partition(" ")
     if preset is not None and name not in PRESETS:
-        raise ConfigError("preset", f"{shown(preset)}: must be one of {', '.join(PRESETS)}, or absent")
+        raise ConfigError("preset", f"{shown(preset)}: {demand(one_of(preset, PRESETS))}, or absent")
     if preset is not None and size is not None:
         raise ConfigError("--size", f"{size}: cannot be combined with --{name}")
     width, letters = (_width(name, of_width or USUAL), PRESETS[name]) if name else (None, Style().font_size)

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import BoundaryNorm, to_hex
 
+from cspr_jax.config.suggestions import one_of
 from cspr_jax.errors import InputError
 from cspr_jax.outputs.plots.colours import Scale, scale_of
 from cspr_jax.outputs.plots.conditions import is_margin, said, shown_first
@@ -58,7 +59,7 @@ def map_content(result: Result, quantity: str | None = None) -> tuple[dict[str, 
     kind = MAP_KINDS[result.attributes["map"]]
     known = [name for name in dict.fromkeys((*kind.pictured, *FIRST, *result.data)) if name in result.data]
     if quantity is not None and quantity not in known:
-        raise InputError("--quantity", quantity, "one of " + ", ".join(sorted(result.data)))
+        raise InputError("--quantity", quantity, one_of(quantity, sorted(result.data)))
     known = [name for name in known if name == quantity or _is_asked(result, name)] or known[:1]
     first = quantity or shown_first(result)
     first = first if first in known else known[0]
