@@ -16,7 +16,9 @@ from cspr_jax.api.argument_rules import (
     DIFFERENTIABLE,
     INSTEAD,
     Rule,
+    ask_about_keywords,
     choice,
+    instants,
     integer,
     kind_of,
     many,
@@ -24,7 +26,6 @@ from cspr_jax.api.argument_rules import (
     refuse_tracers,
     word,
 )
-from cspr_jax.config.suggestions import did_you_mean
 from cspr_jax.errors import InputError
 from cspr_jax.schema.given_numbers import ANY
 from cspr_jax.schema.limits import LARGEST_GRID, LARGEST_MAX_ARCS, LIMITS, UNCERTAINTIES
@@ -32,9 +33,6 @@ from cspr_jax.schema.limits import LARGEST_GRID, LARGEST_MAX_ARCS, LIMITS, UNCER
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 LARGEST_LENGTH = 1e6  # m
-LARGEST_TIME = 1e12  # s; powers of longer ones would overflow
-TIMES: dict[str, Any] = {"least": -LARGEST_TIME, "largest": LARGEST_TIME}
-_TO_TIMES = f", at most {LARGEST_TIME:.0e}"
 LARGEST_POPULATION, LARGEST_DIVISIONS, LARGEST_SAMPLES = 4096, 128, 1_000_000
 MOST = 10**9  # for numbers that functions bound more narrowly by themselves
 
@@ -61,10 +59,7 @@ def checked(function: Function, name: str = "", module: str = "") -> Function:
         try:
             bound = signature.bind(*arguments, **keywords).arguments
         except TypeError:
-            for key in keywords.keys() - signature.parameters.keys():
-                question = did_you_mean(key, signature.parameters)
-                if question:
-                    raise TypeError(f"{own_name}() takes no {key}: {question.strip()}") from None
+            ask_about_keywords(own_name, keywords, signature.parameters)
             return function(*arguments, **keywords)  # which says what is missing, or too many, in its own name
         for key, value in bound.items():
             if own_name not in DIFFERENTIABLE:
@@ -149,7 +144,7 @@ def _limits_or_keys(key: str, value: Any) -> None:
 
 def _instants(key: str, value: Any) -> None:  # or what has a motion in itself: a file, a spline, a function
     if not (isinstance(value, str | os.PathLike) or callable(value) or hasattr(value, "state")):
-        real(f"instants (n,) in s{_TO_TIMES}, a path, a spline of SciPy, or a motion", (ANY,), **TIMES)(key, value)
+        instants("(n,) in s, a path, a spline of SciPy, or a motion", (ANY,))(key, value)
 
 
 _NUMBER = real("a number", (), infinite=True, nan=True)
@@ -356,7 +351,7 @@ OF_FUNCTIONS: dict[str, Rule] = {
     "check_many.positions": real("finite numbers of shape (k, n, 3), at most 1e6 m", (ANY, ANY, 3), **LENGTHS),
     "check_many.quaternions": real("None, or quaternions of shape (k, n, 4)", (ANY, ANY, 4), none=True),
     "check_many.robot": _ROBOT_OR_NAME,
-    "check_many.times": real(f"instants (n,) or (k, n), s{_TO_TIMES}", (ANY,), (ANY, ANY), **TIMES),
+    "check_many.times": instants("(n,) or (k, n), s", (ANY,), (ANY, ANY)),
     "check_many.velocities": _MANY_POINTS,
     "hypocycloid.z0": _ONE_DEPTH,
     "keep_compiled_code.folder": _PATH_OR_NONE,
@@ -393,7 +388,7 @@ OF_FUNCTIONS: dict[str, Rule] = {
     "spline.accelerations": _TRACED_POINTS_OR_NONE,
     "spline.ends": _ENDS,
     "spline.positions": _TRACED_POINTS,
-    "spline.times": real(f"instants (n,), s{_TO_TIMES}", (ANY,), **TIMES),
+    "spline.times": instants("(n,), s", (ANY,)),
     "spline.velocities": _TRACED_POINTS_OR_NONE,
     "straight_line.start": _POINT,
     "swing_range.start": _STARTS,

@@ -6,13 +6,12 @@ import sys
 from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any
 
-from cspr_jax.config.suggestions import one_of
+from cspr_jax.config.suggestions import did_you_mean, one_of
 from cspr_jax.errors import InputError
 from cspr_jax.schema.given_numbers import Numbers, whole
 
 # A rule refuses what an argument, named in errors, may not be.
 Rule = Callable[[str, Any], None]
-NESTED = 4  # what is in a list, a dictionary or a dataclass is searched so deep
 # Functions whose arguments jax may trace, and for the others, which of these to differentiate instead.
 DIFFERENTIABLE = (
     *("hypocycloid", "transition", "platform_motion", "straight_line", "bezier", "ellipse", "spline", "make_problem"),
@@ -34,6 +33,8 @@ INSTEAD = {
 } | dict.fromkeys(
     ("available_accelerations", "sensitivity", "workspace"), "jax differentiates tensions of a state of motion"
 )
+LARGEST_TIME = 1e12  # s
+NESTED = 4  # what is in a list or a dictionary is searched so deep for what jax traces
 
 
 def real(
@@ -58,6 +59,12 @@ def real(
             kind.array(key, value)
 
     return check
+
+
+def instants(allowed: str, *shapes: tuple[int | None, ...]) -> Rule:
+    """Return the rule of times, whose powers must not overflow."""
+    words = f"instants {allowed}, at most {LARGEST_TIME:.0e} s"
+    return real(words, *shapes, least=-LARGEST_TIME, largest=LARGEST_TIME)
 
 
 def integer(least: int, largest: int, *, none: bool = False) -> Rule:
@@ -165,6 +172,14 @@ def refuse_tracers(key: str, value: Any, instead: str) -> None:
     if place is not None:
         fault = "a tracer of jax, as grad, jit and vmap pass"
         raise InputError(key + place, None, f"must be numbers: {instead}", fault=fault)
+
+
+def ask_about_keywords(function: str, given: Iterable[str], known: Collection[str]) -> None:
+    """Raise a `TypeError` where a keyword that a function does not take is nearly one that it takes."""
+    for key in (key for key in given if key not in known):
+        question = did_you_mean(key, known)
+        if question:
+            raise TypeError(f"{function}() takes no {key}: {question.strip()}") from None
 
 
 def word(*words: str) -> Rule:

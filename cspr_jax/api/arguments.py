@@ -90,7 +90,7 @@ def amplitude_of(amplitude: str | Amplitude, *, free_end: bool | None = None) ->
     try:
         function = named(amplitude) if isinstance(amplitude, str) else amplitude
     except InputError as error:
-        allowed = f"{one_of(amplitude, NAMES)}; those with an epsilon are amplitude(name, epsilon)"
+        allowed = f"{one_of(str(amplitude), NAMES)}; those with an epsilon are amplitude(name, epsilon)"
         raise InputError("amplitude", amplitude, allowed) from error
     if free_end is not None and isinstance(function.coefficients, np.ndarray):
         broken = boundary_errors(function, free_end=free_end)

@@ -122,8 +122,8 @@ def check_many(
 
 def _check_shapes(count: int, rows: int, shapes: dict[str, tuple[int, ...]]) -> None:
     for name, shape in shapes.items():
-        ways = [(rows,), (count, rows)] if name == "times" else [(count, rows, shape[-1])]
-        if shape not in ways:
-            fitting = " or ".join(map(str, ways))
-            words = f"must have shape {fitting}, as positions of {count} motions at {rows} times each"
+        fitting = [(rows,), (count, rows)] if name == "times" else [(count, rows, shape[-1])]
+        if shape not in fitting:
+            shapes_in_words = " or ".join(map(str, fitting))
+            words = f"must have shape {shapes_in_words}, as positions of {count} motions at {rows} times each"
             raise InputError(name, None, words, fault=f"shape {shape}")

@@ -112,13 +112,21 @@ def continuous(quaternions: np.ndarray) -> np.ndarray:
 
 
 def check_order(times: np.ndarray, *, repeated: bool) -> None:
-    """Refuse times that do not increase; the error names the first that does not, and the time before it."""
+    """Refuse times that do not increase; the error names the first that does not, and the time before it.
+
+    Args:
+        times: (n,) s.
+        repeated: whether some may be equal to those before them.
+
+    Raises:
+        InputError: they do not increase.
+    """
     steps = np.diff(times)
     early = np.flatnonzero(steps < 0.0 if repeated else steps <= 0.0)
     if len(early):
         i, least = int(early[0]) + 1, "at least" if repeated else "more than"
-        before = f"{least} times[{i - 1}] = {float(times[i - 1])!r}: times must increase"
-        raise InputError(f"times[{i}]", float(times[i]), before)
+        allowed = f"{least} times[{i - 1}] = {float(times[i - 1])!r}: times must increase"
+        raise InputError(f"times[{i}]", float(times[i]), allowed)
 
 
 def check_steps(times: np.ndarray) -> None:

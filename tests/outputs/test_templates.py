@@ -72,7 +72,10 @@ def test_nothing_is_overwritten(tmp_path, capsys):
     ("words", "said"),
     [
         (("sweep", "x.toml", "--map", "arcs"), '--map = "arcs": must be one of minimum-arcs'),
-        (("plan", "x.toml", "--family", "line"), '--family = "line": must be one of hypocycloid-standard'),
+        (
+            ("plan", "x.toml", "--family", "line"),
+            '--family = "line": did you mean spline? must be one of hypocycloid-standard',
+        ),
         (("robot", "x.toml", "--like", "none"), '--like = "none": must be one of'),
         (("robot", "x.txt"), "must be a name that ends in .toml"),
     ],
