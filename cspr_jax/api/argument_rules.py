@@ -62,7 +62,11 @@ def real(
 
 
 def instants(allowed: str, *shapes: tuple[int | None, ...]) -> Rule:
-    """Return the rule of times, whose powers must not overflow."""
+    """Rule of times, whose powers must not overflow.
+
+    Returns:
+        the rule.
+    """
     words = f"instants {allowed}, at most {LARGEST_TIME:.0e} s"
     return real(words, *shapes, least=-LARGEST_TIME, largest=LARGEST_TIME)
 
@@ -174,9 +178,9 @@ def refuse_tracers(key: str, value: Any, instead: str) -> None:
         raise InputError(key + place, None, f"must be numbers: {instead}", fault=fault)
 
 
-def ask_about_keywords(function: str, given: Iterable[str], known: Collection[str]) -> None:
+def ask_about_keywords(function: str, keywords: Iterable[str], known: Collection[str]) -> None:
     """Raise a `TypeError` where a keyword that a function does not take is nearly one that it takes."""
-    for key in (key for key in given if key not in known):
+    for key in (key for key in keywords if key not in known):
         question = did_you_mean(key, known)
         if question:
             raise TypeError(f"{function}() takes no {key}: {question.strip()}") from None
