@@ -6,12 +6,13 @@ import re
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.check_keys import NAME, check_keys
+from cspr_jax.api.notebooks import Displayed
 from cspr_jax.api.plans import Plan
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.arithmetic.frames import frame_of
@@ -36,9 +37,12 @@ from cspr_jax.robots.limits import Limits
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.splines.functions import FunctionMotion, function_motion
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-@dataclasses.dataclass(frozen=True)
-class Check:
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class Check(Displayed):
     """A motion that was checked.
 
     Fields:
@@ -76,6 +80,12 @@ class Check:
             the lines that `cspr check` prints above its table.
         """
         return check_report.check_lines(self.plan) + [row.text for row in self._touched]
+
+    def _summary(self) -> list[str]:
+        return [f"Check of {line}" if not i else f"  {line}" for i, line in enumerate(self.lines())]
+
+    def _picture(self) -> "Figure":
+        return self.plan._picture()
 
     @property
     def verdict(self) -> str:

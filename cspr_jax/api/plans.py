@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cspr_jax.api.argument_checks import checked
+from cspr_jax.api.notebooks import Displayed, plan_summary
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.config.mappings import plain, text_of
 from cspr_jax.config.plan import plan_keys
@@ -23,6 +24,7 @@ from cspr_jax.store.publishing import publish
 
 if TYPE_CHECKING:
     import xarray
+    from matplotlib.figure import Figure
 
     from cspr_jax.store.result import Result
 
@@ -30,8 +32,8 @@ if TYPE_CHECKING:
 NAME = Path("plan")
 
 
-@dataclasses.dataclass(frozen=True)
-class Plan(planning.PlannedMotions):
+@dataclasses.dataclass(frozen=True, repr=False)
+class Plan(Displayed, planning.PlannedMotions):
     """A planned sequence of motions; see `cspr_jax.plans.planning.PlannedMotions` for its fields."""
 
     @checked
@@ -197,6 +199,14 @@ class Plan(planning.PlannedMotions):
         """
         with double_precision():
             return plan_report.plan_table(self)
+
+    def _summary(self) -> list[str]:
+        return plan_summary(self)
+
+    def _picture(self) -> "Figure":
+        from cspr_jax.api.pictures import plot  # matplotlib takes time
+
+        return plot(self.to_result())
 
     @property
     def launch(self) -> LaunchOutcome | None:

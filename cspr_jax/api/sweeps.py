@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cspr_jax.api.argument_checks import checked
+from cspr_jax.api.notebooks import DisplayedResult
 from cspr_jax.config.mappings import plain, text_of
 from cspr_jax.errors import ConfigError
 from cspr_jax.outputs.volumes import WorkspaceVolume, volume_of
@@ -53,7 +54,8 @@ def open_result(path: str | Path) -> Result:
             has not finished.
     """
     place = Path(path)
-    return _open_result(inspection.result_in(place) if place.is_dir() else place)
+    result = _open_result(inspection.result_in(place) if place.is_dir() else place)
+    return DisplayedResult(**vars(result))
 
 
 @dataclasses.dataclass(frozen=True)

@@ -12,6 +12,19 @@ if TYPE_CHECKING:
 class Columns:
     """Answers whose fields are columns: arrays with a value for each of n cases."""
 
+    def __init_subclass__(cls, **keywords: Any) -> None:
+        """Keep dataclasses from writing every number of every column out."""
+        super().__init_subclass__(**keywords)
+        cls.__repr__ = Columns.__repr__  # type: ignore[method-assign]
+
+    def __repr__(self) -> str:
+        arrays = self.arrays()
+        count = len(next(iter(arrays.values()), ()))
+        lines = [f"{type(self).__name__} of {count} cases"]
+        with np.printoptions(precision=5, threshold=8, edgeitems=2, linewidth=100):
+            lines += [f"  {name}: {' '.join(str(values).split())}" for name, values in arrays.items()]
+        return "\n".join(lines)
+
     def arrays(self) -> dict[str, np.ndarray]:
         """The fields that are arrays.
 

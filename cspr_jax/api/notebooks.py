@@ -1,0 +1,89 @@
+"""What interactive sessions show of plans, checks and results: a few lines, and in notebooks a picture below them."""
+
+import base64
+import html
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cspr_jax.errors import CsprError, printable
+from cspr_jax.store.result import Result
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MOST_LINES = 8
+DPI = 80  # of pictures in notebooks
+
+
+class Displayed:
+    """Object that shows itself in a few lines; its picture is drawn only when a notebook asks for it."""
+
+    def _summary(self) -> list[str]:
+        raise NotImplementedError
+
+    def _picture(self) -> "Figure":
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        lines = [printable(line) for text in self._summary() for line in text.splitlines()]
+        more = [f"... and {len(lines) - MOST_LINES} lines more"] * (len(lines) > MOST_LINES)
+        return "\n".join(lines[:MOST_LINES] + more)
+
+    def _repr_html_(self) -> str:
+        text = f"<pre>{html.escape(repr(self))}</pre>"
+        try:
+            image = _image(self._picture())
+        except CsprError:  # nothing of it can be drawn
+            return text
+        return f'{text}<img alt="" src="data:image/png;base64,{image}">'
+
+
+def _image(figure: "Figure") -> str:
+    from cspr_jax.outputs.plots.style import Style, in_style, rendered  # matplotlib takes time
+
+    style = Style(dpi=DPI)
+    with in_style(style):
+        return base64.b64encode(rendered(figure, ".png", style)).decode("ascii")
+
+
+class DisplayedResult(Displayed, Result):
+    """Result that shows itself; see `store.result.Result`."""
+
+    def _summary(self) -> list[str]:
+        name = self.attributes.get("map") or "motion"
+        lines = [f"Result: {name}, robot {self.settings['robot']['name']}" if self._has_robot else f"Result: {name}"]
+        for axis, points in self.axes.items():
+            unit = self.units.get(axis, "").replace("1", "")
+            lines.append(f"  {axis}: {len(points)} from {points.min():.6g} to {points.max():.6g} {unit}".rstrip())
+        return [*lines, f"  {', '.join(self.data)}"]
+
+    @property
+    def _has_robot(self) -> bool:
+        return isinstance(self.settings.get("robot"), dict) and "name" in self.settings["robot"]
+
+    def _picture(self) -> "Figure":
+        from cspr_jax.api.pictures import plot  # likewise
+
+        return plot(self)
+
+
+def plan_summary(plan: Any) -> list[str]:
+    """Robot, durations and verdicts of a plan, as lines.
+
+    Args:
+        plan: `api.plans.Plan`.
+
+    Returns:
+        one line for the plan, and one for each segment.
+    """
+    segments = plan.to_dict()["segments"]
+    word = "feasible, proved" if plan.feasible else "not proved feasible"
+    families, total = ", ".join(plan.keys.families), float(np.sum(plan.answers.duration))
+    lines = [f"Plan of {plan.robot_file.name}: {families}, {len(segments)} segments in {total:.6g} s: {word}"]
+    for i, segment in enumerate(segments):
+        arcs = f", {segment['arcs']} arcs" if segment.get("arcs") else ""
+        needed = "".join(f"; {cause.text}" for cause in plan.causes[i][:1]) if plan.causes else ""
+        duration = float(plan.answers.duration[i])
+        lines.append(f"  to pose {segment['to']}: {segment['verdict']}{arcs}, {duration:.6g} s{needed}")
+    return lines
