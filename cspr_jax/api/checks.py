@@ -38,7 +38,7 @@ from cspr_jax.schema.limits import LIMITS
 from cspr_jax.splines.functions import FunctionMotion, function_motion
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from cspr_jax.store.result import Result
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -84,8 +84,8 @@ class Check(Displayed):
     def _summary(self) -> list[str]:
         return [f"Check of {line}" if not i else f"  {line}" for i, line in enumerate(self.lines())]
 
-    def _picture(self) -> "Figure":
-        return self.plan._picture()
+    def _drawn_result(self) -> "Result":
+        return self.plan.to_result()
 
     @property
     def verdict(self) -> str:

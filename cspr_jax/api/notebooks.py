@@ -1,4 +1,4 @@
-"""What interactive sessions show of plans, checks and results: a few lines, and in notebooks a picture below them."""
+"""Texts that interactive sessions show of plans, checks and results, with pictures in notebooks."""
 
 import base64
 import html
@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cspr_jax.errors import CsprError, printable
-from cspr_jax.store.result import Result
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from cspr_jax.store.result import Result
 
 MOST_LINES = 8
 DPI = 80  # of pictures in notebooks
@@ -22,7 +21,7 @@ class Displayed:
     def _summary(self) -> list[str]:
         raise NotImplementedError
 
-    def _picture(self) -> "Figure":
+    def _drawn_result(self) -> "Result":
         raise NotImplementedError
 
     def __repr__(self) -> str:
@@ -33,39 +32,21 @@ class Displayed:
     def _repr_html_(self) -> str:
         text = f"<pre>{html.escape(repr(self))}</pre>"
         try:
-            image = _image(self._picture())
+            image = _image(self._drawn_result())
         except CsprError:  # nothing of it can be drawn
             return text
         return f'{text}<img alt="" src="data:image/png;base64,{image}">'
 
 
-def _image(figure: "Figure") -> str:
-    from cspr_jax.outputs.plots.style import Style, in_style, rendered  # matplotlib takes time
+def _image(result: "Result") -> str:
+    from cspr_jax.outputs.plots.draw import drawn  # matplotlib takes time
+    from cspr_jax.outputs.plots.style import Style, in_style, laid_out, rendered
 
     style = Style(dpi=DPI)
     with in_style(style):
+        figure = drawn([result], ["result"])
+        laid_out(figure, style)
         return base64.b64encode(rendered(figure, ".png", style)).decode("ascii")
-
-
-class DisplayedResult(Displayed, Result):
-    """Result that shows itself; see `store.result.Result`."""
-
-    def _summary(self) -> list[str]:
-        name = self.attributes.get("map") or "motion"
-        lines = [f"Result: {name}, robot {self.settings['robot']['name']}" if self._has_robot else f"Result: {name}"]
-        for axis, points in self.axes.items():
-            unit = self.units.get(axis, "").replace("1", "")
-            lines.append(f"  {axis}: {len(points)} from {points.min():.6g} to {points.max():.6g} {unit}".rstrip())
-        return [*lines, f"  {', '.join(self.data)}"]
-
-    @property
-    def _has_robot(self) -> bool:
-        return isinstance(self.settings.get("robot"), dict) and "name" in self.settings["robot"]
-
-    def _picture(self) -> "Figure":
-        from cspr_jax.api.pictures import plot  # likewise
-
-        return plot(self)
 
 
 def plan_summary(plan: Any) -> list[str]:

@@ -24,7 +24,6 @@ from cspr_jax.store.publishing import publish
 
 if TYPE_CHECKING:
     import xarray
-    from matplotlib.figure import Figure
 
     from cspr_jax.store.result import Result
 
@@ -203,10 +202,8 @@ class Plan(Displayed, planning.PlannedMotions):
     def _summary(self) -> list[str]:
         return plan_summary(self)
 
-    def _picture(self) -> "Figure":
-        from cspr_jax.api.pictures import plot  # matplotlib takes time
-
-        return plot(self.to_result())
+    def _drawn_result(self) -> "Result":
+        return self.to_result()
 
     @property
     def launch(self) -> LaunchOutcome | None:

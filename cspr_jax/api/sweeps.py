@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cspr_jax.api.argument_checks import checked
-from cspr_jax.api.notebooks import DisplayedResult
+from cspr_jax.api.notebooks import Displayed
 from cspr_jax.config.mappings import plain, text_of
 from cspr_jax.errors import ConfigError
 from cspr_jax.outputs.volumes import WorkspaceVolume, volume_of
@@ -33,6 +33,25 @@ if TYPE_CHECKING:
 NAME = Path("sweep")
 
 keep_compiled_code = checked(_keep_compiled_code, "keep_compiled_code", __name__)
+
+
+class DisplayedResult(Displayed, Result):
+    """Result that shows itself; see `store.result.Result`."""
+
+    def _summary(self) -> list[str]:
+        name = self.attributes.get("map") or "motion"
+        lines = [f"Result: {name}, robot {self.settings['robot']['name']}" if self._has_robot else f"Result: {name}"]
+        for axis, points in self.axes.items():
+            unit = self.units.get(axis, "").replace("1", "")
+            lines.append(f"  {axis}: {len(points)} from {points.min():.6g} to {points.max():.6g} {unit}".rstrip())
+        return [*lines, f"  {', '.join(self.data)}"]
+
+    @property
+    def _has_robot(self) -> bool:
+        return isinstance(self.settings.get("robot"), dict) and "name" in self.settings["robot"]
+
+    def _drawn_result(self) -> Result:
+        return self
 
 
 @checked

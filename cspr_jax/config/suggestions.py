@@ -99,7 +99,7 @@ def did_you_mean(text: str, allowed: Iterable[str]) -> str:
 
 
 def one_of(text: str, names: Iterable[str], allowed: str = "") -> str:
-    """What an error's line demands in place of a name: the one that was probably meant, then all of them.
+    """Demand of an error's line about a name: the one that was probably meant, then all of them.
 
     Args:
         allowed: in words, where these are not "one of" them all.
