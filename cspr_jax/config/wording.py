@@ -2,7 +2,7 @@
 
 import datetime
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from typing import Any
 
 from pydantic import BaseModel, PlainValidator
@@ -63,7 +63,7 @@ def either(names: Iterable[str]) -> str:
     return f"{', '.join(others)} or {last}" if others else last
 
 
-def name_of(rows: Callable[[], Iterable[str]]) -> PlainValidator:
+def name_of(rows: Callable[[], Collection[str]]) -> PlainValidator:
     """Validator of a key whose values are names of rows of a table, which may grow.
 
     Returns:
@@ -71,8 +71,9 @@ def name_of(rows: Callable[[], Iterable[str]]) -> PlainValidator:
     """
 
     def check(value: Any) -> str:
-        names = list(rows())
-        if value not in names:
+        table = rows()
+        if not (isinstance(value, str) and value in table):
+            names = list(table)
             raise PydanticCustomError("literal_error", "{expected}", {"expected": either(names).replace('"', "'")})
         return value
 

@@ -9,6 +9,8 @@ import importlib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from cspr_jax.schema.plugins import ExtensibleRows
+
 
 @dataclasses.dataclass(frozen=True)
 class Family:
@@ -189,7 +191,15 @@ _ROWS = (
         end_keys=("velocity",),
     ),
 )
-FAMILIES: dict[str, Family] = {row.name: row for row in _ROWS}
+
+
+def _add(row: Family) -> None:
+    if not isinstance(row, Family) or row.name in [own.name for own in _ROWS]:
+        raise TypeError("must be a Family with a name of its own")
+    FAMILIES[row.name] = row
+
+
+FAMILIES: dict[str, Family] = ExtensibleRows({row.name: row for row in _ROWS}, "cspr_jax.families", _add)
 
 
 def moving(pattern: str) -> list[str]:

@@ -16,6 +16,7 @@ from cspr_jax.errors import InputError
 from cspr_jax.schema import map_columns as columns
 from cspr_jax.schema import workspace_columns as of_workspaces
 from cspr_jax.schema.families import ANY_PATTERN
+from cspr_jax.schema.plugins import ExtensibleRows
 from cspr_jax.schema.quantities import (
     EVERY,
     MOTION_CLEARANCE,
@@ -131,7 +132,7 @@ class MapKind:
 _DEPTHS = ("axes.z0", "axes.inclination", "trajectory.inclination")
 _OF_PLATFORMS = ("hypocycloid", "hypocycloid-standard")
 
-MAP_KINDS: dict[str, MapKind] = {
+_ROWS: dict[str, MapKind] = {
     kind.name: kind
     for kind in (
         MapKind(
@@ -410,6 +411,9 @@ MAP_KINDS: dict[str, MapKind] = {
         ),
     )
 }
+MAP_KINDS: ExtensibleRows[MapKind] = ExtensibleRows(
+    _ROWS, "cspr_jax.maps", lambda module: register(module.KIND, *module.QUANTITIES)
+)
 
 
 def quantity_of(kind: object, name: str) -> Quantity:

@@ -23,7 +23,8 @@ from typing import Any, NamedTuple, Self, cast
 
 import numpy as np
 
-from cspr_jax.errors import StoreError, printable
+from cspr_jax.errors import ConfigError, StoreError, printable
+from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.schema.quantities import from_outside
 from cspr_jax.store.consolidation import Content
 from cspr_jax.store.documents import Header
@@ -209,6 +210,8 @@ class Reader:
     def _start(self, path: Path) -> None:
         home = str(Path(__file__).parents[2])
         settings = {"OPENBLAS_NUM_THREADS": "1", "HDF5_PLUGIN_PRELOAD": "::", "HDF5_USE_FILE_LOCKING": "FALSE"}
+        with contextlib.suppress(ConfigError):  # told where its map is asked for
+            MAP_KINDS.complete()
         rows = json.dumps([dataclasses.asdict(quantity) for quantity in from_outside()])
         command = [sys.executable, "-I", "-c", _CODE, "\n".join(_places()), home, rows]
         here, there = socket.socketpair()

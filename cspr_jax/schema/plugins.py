@@ -1,0 +1,49 @@
+"""Rows of other packages, which they offer as entry points; these are read when a name is asked for that no row has."""
+
+from collections.abc import Callable
+from importlib import metadata
+from typing import Any, TypeVar
+
+from cspr_jax.errors import ConfigError
+
+Row = TypeVar("Row")
+
+
+class ExtensibleRows(dict[str, Row]):
+    """Rows by name, with those of installed packages as soon as they are needed."""
+
+    def __init__(self, rows: dict[str, Row], group: str, add: Callable[[Any], None]) -> None:
+        """Keep the group of entry points, and what adds the object that one of them names."""
+        super().__init__(rows)
+        self._group, self._add, self._is_complete = group, add, False
+
+    def __contains__(self, name: object) -> bool:
+        if super().__contains__(name):
+            return True
+        self.complete()
+        return super().__contains__(name)
+
+    def __missing__(self, name: str) -> Row:
+        if name in self:
+            return self[name]
+        raise KeyError(name)
+
+    def complete(self) -> None:
+        """Add the rows of installed packages, if they are not there yet.
+
+        Raises:
+            ConfigError: one of them cannot be used; those of the others are added.
+        """
+        if self._is_complete:
+            return
+        errors = []
+        for entry in metadata.entry_points(group=self._group):
+            try:
+                self._add(entry.load())
+            except Exception as error:  # noqa: BLE001 - code of others may raise anything
+                package = entry.dist.name if entry.dist else "unknown"
+                words = f"{entry.name} = {entry.value}: cannot be used: {type(error).__name__}: {error}"
+                errors.append(ConfigError(f"package {package}, entry points {self._group}", words))
+        if errors:
+            raise errors[0]
+        self._is_complete = True
