@@ -56,10 +56,10 @@ def test_a_kind_of_map_from_file_to_picture(sweep, tmp_path, workers):
     path = tmp_path / "run" / "distances.h5"
     assert out.splitlines()[-1] == str(path)
     with h5py.File(path) as file:
-        assert file.attrs["map"] == b"spool-distances"
+        assert file.attrs["map"] == "spool-distances"
         assert file.attrs["title"].startswith("Distances from the spools, robot prototype")
         data = file["spool_distance"]
-        assert (data.attrs["units"], data.attrs["long_name"]) == (b"m", b"distance from the nearest spool")
+        assert (data.attrs["units"], data.attrs["long_name"]) == ("m", "distance from the nearest spool")
         assert data.shape == (6, 3, 1) and np.prod(data.chunks) <= 8 and file["nearest_spool"].dtype == np.int16
         found = data[...]
     spools = np.array(resolve_robot("prototype", "", tmp_path).base_points)
