@@ -368,7 +368,8 @@ def test_the_motion(tmp_path):
     heads, *rows = csv.reader(line for line in lines if line[0] != "#")
     vectors = [f"{n}_{k}" for n in ("position", "velocity", "acceleration") for k in "xyz"]
     turns = [*(f"quaternion_{k}" for k in "wxyz"), *(f"{n}_{k}" for n in ("omega", "omega_dot") for k in "xyz")]
-    assert heads == ["t", *vectors, *turns, *(f"{n}_{k}" for n in ("length", "rate", "tension") for k in range(1, 7))]
+    of_cables = [f"{n}_{k}" for n in ("length", "rate", "tension") for k in range(1, 7)]
+    assert heads == ["t", *vectors, *turns, *of_cables, "binding", "binding_cable"]
     table = dict(zip(heads, np.array(rows, float).T, strict=True))
     tau, target = np.linspace(0.0, 1.0, 400), np.array([0.0, 1.732, 1.7])
     orientation = oracle.pose_quaternion(target, (np.pi / 2, -np.pi / 6, 0.0))

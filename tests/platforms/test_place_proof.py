@@ -39,7 +39,8 @@ def seen(robot, segment, p, beta, tau):
     shortest, _ = oracle.cable_vectors(robot, m.position, m.rotation)
     lines = oracle.cables(robot, m.position, m.rotation)
     lengths = np.linalg.norm(lines, axis=2)
-    depth = m.position[:, 2]
+    points = m.position[:, None] + np.einsum("nij,kj->nki", m.rotation, robot.platform)
+    depth = np.maximum(m.position[:, 2], points[:, :, 2].max(1))  # of all of the platform
     slacks = np.array(
         [
             below_spools(robot, m.position) / Z0,

@@ -240,7 +240,7 @@ def test_files_hold_residuals_and_pictures_limits(example, tmp_path):
     assert result.data["tension_residual"].shape == (3 * ROWS,) and result.data["tension"].shape == (3 * ROWS, 8)
     assert example.to_xarray()["tension_residual"].dims == ("t",)
     head = example.save(tmp_path / "motion.csv").read_text().partition("\n")[0].split(",")
-    assert head[-2:] == ["tension_8", "tension_residual"]
+    assert head[-4:] == ["tension_8", "tension_residual", "binding", "binding_cable"]
     figure = cspr_jax.plot(path)
     panel = next(axes for axes in figure.axes if axes.get_ylabel().startswith("tension (N)"))
     assert panel.get_ylabel() == "tension (N)\ncentred"

@@ -217,6 +217,6 @@ def test_corners_of_a_platform():
     """Depths of the corners of a box that hangs level, and of one that is tilted."""
     robot, around = surrounded("cogiro", shapes.box([0.0, 0.0, 0.2], [0.4, 0.4, 0.4]), 0.0)
     body = bodies_of(robot, around).body
-    depths = corner_depths(body, lifted(0.05, height=2.0))
+    depths = corner_depths(body.corners, lifted(0.05, height=2.0))
     np.testing.assert_allclose(depths.slope, 0.05 * body.corners[:, 1], atol=1e-15)
     assert float(depths.middle.max()) == pytest.approx(2.4) and float(depths.high().max()) > 2.4 + 0.05 * 0.2

@@ -321,4 +321,4 @@ def test_a_sweep_is_that_of_the_equivalent(tmp_path, kind):
     assert len(settings_of["base_points"]) == 6 and settings_of["translation_only"] is True
     if kind == "least-time":
         with h5py.File(tmp_path / "six" / "six.h5") as file:
-            assert file["active_up"].attrs["flag_meanings"] == b"none cables_1_2 cables_1_3 cables_2_3 max_acceleration"
+            assert file["active_up"].attrs["flag_meanings"] == "none cables_1_2 cables_1_3 cables_2_3 max_acceleration"

@@ -260,7 +260,7 @@ def test_a_limit_is_one_row():
     """Keys in files, fields of `Limits`, closed forms of point masses and values of a state: of each row one."""
     names, other = [row.name for row in LIMITS], {"uncertainty"}
     assert {field.name for field in dataclasses.fields(Limits)} - other == set(names)
-    assert set(limit_slacks.CLOSED) == {row.name for row in LIMITS if not row.of_mass_centre}
+    assert set(limit_slacks.CLOSED) == {row.name for row in LIMITS}
     assert set(LimitTable.model_fields) - other - {"tension_margin"} == set(names) <= set(PlanFile.model_fields)
     assert {field.name for field in dataclasses.fields(Uncertainty)} == {row.name for row in UNCERTAINTIES}
     assert set(LimitKeys.model_fields) == {row.name for row in LIMITS if row.per_cable} <= set(RobotFile.model_fields)

@@ -65,7 +65,9 @@ def test_interference_and_the_floor_of_a_map(tmp_path):
     with h5py.File(out.strip()) as file:
         clearance, verdict, z = file["clearance"][...], file["verdict"][...], file["z"][...]
     assert (((verdict & Verdict.CABLE_CABLE) != 0) == (clearance <= 0.0)).all()
-    below = np.broadcast_to((z < 0.0)[None, None], verdict.shape)
+    robot = cspr_jax.load_robot("caspr-seven")
+    lowest = min(0.0, float(np.min(robot.platform_points[:, 2])))  # of the mass centre and the attachment points
+    below = np.broadcast_to((z + lowest < 0.0)[None, None], verdict.shape)
     assert (((verdict & Verdict.BELOW_FLOOR) != 0) == below).all()
 
 
