@@ -83,9 +83,8 @@ def vertex_values(times: np.ndarray, values: np.ndarray) -> np.ndarray:
     least = np.array(values, float)
     gaps = np.diff(times)[..., None]
     before, after = gaps[..., :-1, :], gaps[..., 1:, :]
-    slopes = np.diff(values, axis=-2)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        slopes = slopes / gaps
+    with np.errstate(divide="ignore", invalid="ignore"):  # values may be infinite
+        slopes = np.diff(values, axis=-2) / gaps
         fall, rise = slopes[..., :-1, :], slopes[..., 1:, :]
         square, slope = (rise - fall) / (before + after), (fall * after + rise * before) / (before + after)
         drop = slope**2 / (4.0 * square)
