@@ -200,7 +200,7 @@ def test_a_robot_in_space_fills_its_place(motions, figures, capsys, size, quanti
 @pytest.mark.thorough
 def test_presets_and_titles(motions, figures, capsys):
     """A title of a narrow picture has one line; none is drawn if none is wanted, but what is not proved is said."""
-    for words, width in ((["--column"], 8.5), (["--page"], 17.5)):
+    for words, width in ((["--column"], 8.89), (["--page"], 17.5)):
         for quantity in ("tensions", "summary", "trajectory"):
             figure = drawn(figures, str(motions / "first.h5"), "--quantity", quantity, *words)
             assert figure.get_figwidth() * 2.54 == pytest.approx(width)

@@ -249,7 +249,7 @@ def test_a_motion_file_has_the_tensions_of_all_six(tmp_path):
     with h5py.File(tmp_path / "m.h5") as file:
         data = {name: file[name][...] for name in ("position", "acceleration", "tension", "tension_each")}
         dims = [dim.label or next(iter(dim.keys())) for dim in file["tension_each"].dims]
-        assert file["tension_each"].attrs["units"] == b"N" and dims == ["t", "each"]
+        assert file["tension_each"].attrs["units"] == "N" and dims == ["t", "each"]
     assert data["tension"].shape == (9, 3) and data["tension_each"].shape == (9, 6)
     robot, signs = cspr_jax.load_robot("launch-robot"), np.array([1.0, -1.0, -1.0])
     down = made(
