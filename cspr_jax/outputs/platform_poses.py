@@ -9,6 +9,7 @@ from cspr_jax.arithmetic.rotations import products
 from cspr_jax.build.robots import build_robot
 from cspr_jax.curves.files import reference_of
 from cspr_jax.plans.planning import PlannedMotions
+from cspr_jax.schema.quantities import TRAJECTORY
 
 
 def at_origin(plan: PlannedMotions, columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -32,4 +33,5 @@ def at_origin(plan: PlannedMotions, columns: dict[str, np.ndarray]) -> dict[str,
         "acceleration": columns["acceleration"] - np.cross(columns["omega_dot"], arm) - np.cross(omega, speed),
         "quaternion": quaternion,
     }
-    return columns | moved | {"mass_centre": columns["position"]}
+    both = columns | moved | {"mass_centre": columns["position"]}
+    return {name: both[name] for name in TRAJECTORY if name in both}  # the order that readers of tables expect

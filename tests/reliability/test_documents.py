@@ -145,7 +145,7 @@ def test_logs_of_any_content(finished, tmp_path):
     for word in ("\x1b[31m", "\u009b31m", "\ud800", "two\nlines", "[/x]"):
         log.write_text(json.dumps({"event": word, "time": word}) + "\n")
         code, out, _ = cspr("status", tmp_path / "run")
-        assert code == 0 and len(out.splitlines()) == 4 and all(line.isprintable() for line in out.splitlines())
+        assert code == 0 and len(out.splitlines()) == 5 and all(line.isprintable() for line in out.splitlines())
         assert json.loads(cspr("status", tmp_path / "run", "--json")[1])["last"]["event"] == word
 
 
