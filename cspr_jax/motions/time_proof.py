@@ -188,6 +188,7 @@ def _proofs(blocks: TimeBlocks, totals: np.ndarray) -> list[TimeProof]:
     for i, (first, last) in enumerate(itertools.pairwise(firsts)):
         when = 0.5 * (blocks.start + blocks.end)[first + blocks.slacks.high[first:last].argmin(0)]
         near = blocks.taken(first + np.flatnonzero((blocks.slacks.low[first:last] <= high[i]).any(1)))
+        near = near._replace(motion=np.zeros_like(near.motion))  # the one motion of its proof
         sides = [parts[i] for parts in failing], [parts[i] for parts in is_open]
         proofs.append(TimeProof(low[i], high[i], when, *sides, int(totals[i]), near))
     return proofs
