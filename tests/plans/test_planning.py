@@ -52,12 +52,14 @@ def free(tmp_path_factory):
 
 
 def columns(path: Path) -> dict[str, np.ndarray]:
-    """A motion file by name: t (n,), the rest (n, 3)."""
+    """A motion file by name: t (n,), "binding" and "binding_cable" (n,), the rest (n, 3)."""
     heads, *rows = csv.reader(line for line in path.read_text("utf-8").splitlines() if line[0] != "#")
     names = ("position", "velocity", "acceleration", "length", "rate", "tension")
-    assert heads == ["t", *(f"{n}_{k}" for n in names for k in ("xyz" if n in names[:3] else "123"))]
+    parts = [f"{n}_{k}" for n in names for k in ("xyz" if n in names[:3] else "123")]
+    assert heads == ["t", *parts, "binding", "binding_cable"]
     table = np.array(rows, float)
-    return {"t": table[:, 0], **{name: table[:, 3 * i + 1 : 3 * i + 4] for i, name in enumerate(names)}}
+    binding = {"binding": table[:, -2], "binding_cable": table[:, -1]}
+    return {"t": table[:, 0], **{name: table[:, 3 * i + 1 : 3 * i + 4] for i, name in enumerate(names)}, **binding}
 
 
 def oracle_motion(i: int, arcs: int, tau: np.ndarray):
