@@ -199,7 +199,10 @@ def test_a_picture_says_that_it_shows_the_first(capsys, tmp_path, figures):
         (["--best", "z9"], '--best = "z9": must be one of x, y, z, z0'),
         (["--best", "z0", "--best", "z0"], '--best = "z0": must be one of x, y, z'),
         (["--best", "z0", "--at", "z0=1.4"], '--at = "z0": did you mean z? must be one of x, y, z'),
-        (["--best", "z0", "--lines", "z0"], '--lines = "z0": did you mean z? must be one of two or more axes that vary'),
+        (
+            ["--best", "z0", "--lines", "z0"],
+            '--lines = "z0": did you mean z? must be one of two or more axes that vary',
+        ),
         (["--quantity", "best_z0"], '--quantity = "best_z0": must be one of arcs'),
     ],
 )
