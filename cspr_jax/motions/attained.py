@@ -24,6 +24,7 @@ from cspr_jax.robots.clearance import Scene
 STARTS, FOLLOWED, POINTS, ROUNDS = 6, 2, 9, 11
 # Blocks of a criterion that are sampled at most: those with the smallest upper bounds.
 MOST_BLOCKS = 1000
+SAME = 1e-9  # of a slack, by which one seen by samples may lie above that of a proof
 Slacks = Callable[[np.ndarray], np.ndarray]
 AnyProved = TypeVar("AnyProved", bound=ProvedAnswers)
 
@@ -73,8 +74,9 @@ def attained(
     joints = duration * np.asarray(motion.breaks(), float)
     smallest, when = _minima(slacks, proof.near, proof.high, columns, joints, duration)
     high, times = proof.high.copy(), proof.when.copy()
-    # A touch between two floats is proved but not attained.
+    # A touch between two floats is proved but not attained, and what a proof has seen may lie lower.
     is_seen = np.isfinite(smallest) & ~((high[columns] < 0.0) & (smallest >= 0.0))
+    is_seen &= smallest <= high[columns] + SAME * np.abs(high[columns])
     high[columns[is_seen]], times[columns[is_seen]] = smallest[is_seen], when[is_seen]
     return case._replace(proof=dataclasses.replace(proof, high=high, when=times))
 

@@ -100,7 +100,10 @@ def sampler(robot, limits: Limits):
             (abs(bend), limits.cable_acceleration_max),
         ):
             parts += [] if limit is None else [limit - value]
-        return jax.numpy.concatenate([*parts, *of_pose(robot, state)])
+        parts += of_pose(robot, state)
+        if hasattr(robot, "platform_points"):  # the lowest attachment point
+            parts.append((limits.floor - state.position[2] - (robot.platform_points @ state.rotation[2]).max())[None])
+        return jax.numpy.concatenate(parts)
 
     slacks = jax.jit(jax.vmap(one, (None, 0)))
     return lambda spline: np.asarray(slacks(spline, np.linspace(0.0, 1.0, SAMPLES)))

@@ -221,7 +221,9 @@ class Judge:
         floor = self.limits.get("floor")
         if floor is not None:
             sign = 1.0 if self.robot["z_axis"] == "down" else -1.0
-            slack["floor"] = sign * (floor - state.position[:, 2])
+            # All of the platform: its mass centre and its attachment points.
+            heights = np.concatenate([state.position[:, None, 2], found.attachments[:, :, 2]], axis=1)
+            slack["floor"] = (sign * (floor - heights)).min(1)
         demands = {
             "cable_length_max": found.lengths,
             "cable_speed_max": np.abs(found.rates),
