@@ -208,7 +208,7 @@ def test_positions_of_the_origin_of_a_platform():
     assert by_origin.margin == pytest.approx(by_centre.margin, rel=1e-3)
     assert other.margin != pytest.approx(by_centre.margin, rel=1e-2) and "mass centre" in other.plan.warnings[0]
     rows = by_origin.plan.rows()
-    np.testing.assert_allclose(rows["position"][0], origin[0] + centre, atol=1e-9)
+    np.testing.assert_allclose(rows["mass_centre"][0], origin[0] + centre, atol=1e-9)
 
 
 @pytest.mark.parametrize("share", [-1e-7, 1e-7])
