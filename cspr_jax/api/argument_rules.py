@@ -196,6 +196,6 @@ def word(*words: str) -> Rule:
 
     def check(key: str, value: Any) -> None:
         if value is not None and not (isinstance(value, str) and value in words):
-            raise InputError(key, value, one_of(value, words, allowed) if isinstance(value, str) else allowed)
+            raise InputError(key, value, one_of(value, words, allowed))
 
     return check

@@ -63,7 +63,7 @@ def table(
     from cspr_jax.published.tables import TABLES, chosen, table_cells
 
     if name not in TABLES:
-        raise ConfigError("table", f"{shown(name)}: {demand(one_of(str(name), TABLES))}")
+        raise ConfigError("table", f"{shown(name)}: {demand(one_of(name, TABLES))}")
     check_count(workers)
     options: dict[str, Any] = {"--definition": definition, "--amplitude": amplitude, "--fine": fine or None}
     options |= {"--max-arcs": max_arcs, "--values": values}

@@ -98,10 +98,11 @@ def did_you_mean(text: str, allowed: Iterable[str]) -> str:
     return f"did you mean {near}? " if near else ""
 
 
-def one_of(text: str, names: Iterable[str], allowed: str = "") -> str:
+def one_of(value: object, names: Iterable[str], allowed: str = "") -> str:
     """Demand of an error's line about a name: the one that was probably meant, then all of them.
 
     Args:
+        value: that was given; only a text is like a name.
         allowed: in words, where these are not "one of" them all.
 
     Returns:
@@ -109,7 +110,7 @@ def one_of(text: str, names: Iterable[str], allowed: str = "") -> str:
     """
     names = list(names)
     allowed = allowed or f"one of {', '.join(names)}"
-    question = did_you_mean(text, names)
+    question = did_you_mean(value, names) if isinstance(value, str) else ""
     return f"{question}{demand(allowed)}" if question else allowed
 
 

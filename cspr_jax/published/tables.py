@@ -233,7 +233,7 @@ def chosen(name: str, options: dict[str, Any]) -> TableSettings | None:
     def values_of(option: str, names: Iterable[str], otherwise: tuple[str, ...]) -> tuple[str, ...]:
         value, known = options[option], tuple(names)
         if value not in (None, "all", *known):
-            raise ConfigError(option, f"{shown(value)}: {demand(one_of(str(value), known))}, all")
+            raise ConfigError(option, f"{shown(value)}: {demand(one_of(value, known))}, all")
         return otherwise if value is None else known if value == "all" else (value,)
 
     return TableSettings(
