@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import jax.numpy as jnp
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import (
@@ -163,9 +164,9 @@ def bezier_durations(
 @checked
 def launch_range(
     robot: PointMassRobot,
-    targets: np.ndarray,
+    targets: ArrayLike,
     *,
-    start: np.ndarray,
+    start: ArrayLike,
     release_x: Sequence[float] | None = None,
     release_y: Sequence[float] | None = None,
     release_z: Sequence[float] | None = None,

@@ -3,6 +3,7 @@
 import jax
 import jax.numpy as jnp
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import check_in_plane, check_point_mass
@@ -65,7 +66,7 @@ def ellipse(
 
 
 @checked
-def ellipse_frequencies(robot: PointMassRobot, centres: np.ndarray, a: np.ndarray, b: np.ndarray) -> list[np.ndarray]:
+def ellipse_frequencies(robot: PointMassRobot, centres: ArrayLike, a: ArrayLike, b: ArrayLike) -> list[np.ndarray]:
     """Frequencies at which all cables stay taut on ellipses, by formulas.
 
     Args:
@@ -93,7 +94,7 @@ def ellipse_frequencies(robot: PointMassRobot, centres: np.ndarray, a: np.ndarra
 
 @checked
 def ellipse_margins(
-    robot: PointMassRobot, centres: np.ndarray, a: np.ndarray, b: np.ndarray, frequencies: np.ndarray
+    robot: PointMassRobot, centres: ArrayLike, a: ArrayLike, b: ArrayLike, frequencies: ArrayLike
 ) -> np.ndarray:
     """Margins of motions on ellipses, by formulas: positive exactly where all cables stay taut.
 

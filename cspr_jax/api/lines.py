@@ -2,6 +2,7 @@
 
 import jax.numpy as jnp
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import check_point_mass, starts_and_ends
@@ -52,9 +53,9 @@ def straight_line(
 @checked
 def least_time(
     robot: PointMassRobot,
-    targets: np.ndarray,
+    targets: ArrayLike,
     *,
-    start: np.ndarray,
+    start: ArrayLike,
     max_acceleration: float | None = None,
     limits: Limits | None = None,
 ) -> LeastTimes:

@@ -5,6 +5,7 @@ from functools import partial
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import batched, depths, kernel_problem, points_of, quaternions
@@ -40,11 +41,11 @@ class PlatformAnswers(PlatformMotionAnswers, WithMotions):
 @checked
 def minimum_pose_arcs(  # noqa: PLR0913
     robot: PlatformRobot,
-    positions: np.ndarray,
-    orientations: np.ndarray | None = None,
+    positions: ArrayLike,
+    orientations: ArrayLike | None = None,
     *,
-    start: tuple[np.ndarray, np.ndarray] | None = None,
-    z0: np.ndarray | float,
+    start: tuple[ArrayLike, ArrayLike] | None = None,
+    z0: ArrayLike,
     beta_hat: float | Literal["preferred"] | None = None,
     amplitude: str | Amplitude = "quintic",
     limits: Limits | None = None,

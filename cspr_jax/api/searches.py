@@ -10,6 +10,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import batched, check_point_mass, depths, kernel_problem, points_of
@@ -82,10 +83,10 @@ class TransitionAnswers(OscillationAnswers, WithMotions):
 @checked
 def minimum_arcs(
     robot: PointMassRobot,
-    targets: np.ndarray,
+    targets: ArrayLike,
     *,
-    start: np.ndarray | None = None,
-    z0: np.ndarray | float,
+    start: ArrayLike | None = None,
+    z0: ArrayLike,
     amplitude: str | Amplitude | None = None,
     limits: Limits | None = None,
     max_arcs: int = 30,
@@ -141,9 +142,9 @@ def _motions_between(
 @checked
 def minimum_oscillations(
     robot: PointMassRobot,
-    targets: np.ndarray,
+    targets: ArrayLike,
     *,
-    z0: np.ndarray | float,
+    z0: ArrayLike,
     amplitude: str | Amplitude = "quintic",
     limits: Limits | None = None,
     max_arcs: int = 30,

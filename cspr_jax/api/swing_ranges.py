@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-import numpy as np
+from numpy.typing import ArrayLike
 
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import release_ranges, starts_and_ends
@@ -20,9 +20,9 @@ from cspr_jax.robots.point_mass import PointMassRobot
 @checked
 def swing_range(
     robot: PointMassRobot,
-    targets: np.ndarray,
+    targets: ArrayLike,
     *,
-    start: np.ndarray,
+    start: ArrayLike,
     release_x: Sequence[float] | None = None,
     release_y: Sequence[float] | None = None,
     release_z: Sequence[float] | None = None,

@@ -1,6 +1,6 @@
 """Ellipses of a point mass: verdicts and intervals of frequencies a second, beside NumPy's version of the formulas."""
 
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from cspr_jax.ellipses import harmonics
 from cspr_jax.ellipses.harmonics import Ellipse
 from cspr_jax.ellipses.hull import SpoolHull, hull_of
 from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.point_mass import PointMassRobot
 
 COUNT = 1 << 20
 
@@ -36,7 +35,7 @@ def work(count: int) -> EllipseWork:
     Returns:
         the ellipses.
     """
-    rng, robot = np.random.default_rng(0), cast(PointMassRobot, load_robot("prototype"))
+    rng, robot = np.random.default_rng(0), load_robot("prototype")
     centre = rng.normal(size=(count, 3)) * [0.08, 0.08, 0.2] + [0.0, 0.0, 2.0]
     axes = rng.normal(size=(2, count, 3)) * [0.3, 0.3, 0.1]
     return EllipseWork(hull_of(centred(robot)[0]), Ellipse(centre, *axes), 2.2 * np.exp(rng.uniform(-0.1, 0.1, count)))

@@ -6,7 +6,7 @@ printed formulas, (3.1) to (3.11), (3.44) and (3.80), on whole arrays, and solve
 
 import math
 from functools import partial
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -63,7 +63,7 @@ def work(count: int) -> SixCableWork:
     axis = rng.normal(size=(3, count))
     axis /= np.linalg.norm(axis, axis=0)
     angle, arcs = rng.uniform(0.0, 2.0, count), rng.integers(FEWEST_ARCS, MOST_ARCS + 1, count)
-    robot = cast(PlatformRobot, load_robot("laval-mssm"))
+    robot = load_robot("laval-mssm")
     return SixCableWork(aligned(robot)[0], axis.T, angle, arcs, rng.uniform(-15.0, 0.0, count))
 
 

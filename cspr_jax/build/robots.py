@@ -1,7 +1,7 @@
 """Robots for the kernels, built from checked files."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, overload
 
 import numpy as np
 
@@ -18,6 +18,34 @@ from cspr_jax.robots.point_mass import STANDARD_GRAVITY, PointMassRobot, point_m
 from cspr_jax.robots.reference_pose import reference_pose
 from cspr_jax.robots.robot import MOVED, check_moved
 from cspr_jax.robots.static_equilibrium import slack_at_rest
+
+# Names of the catalogue, by which type checkers tell what `load_robot` returns.
+PointMassName = Literal[
+    "boralugoda-planar-three",
+    "boralugoda-planar-two",
+    "boralugoda-rectangle",
+    "boralugoda-triangle",
+    "cdpyr-3t",
+    "laval-large",
+    "prototype",
+    "transition-planar",
+    "transition-prototype",
+]
+PlatformName = Literal[
+    "caspr-seven",
+    "cogiro",
+    "cogiro-500",
+    "fast",
+    "greenline",
+    "ipanema-1",
+    "ipanema-1-iros",
+    "ipanema-2",
+    "ipanema-2-iros",
+    "kntu-planar",
+    "launch-robot",
+    "laval-mssm",
+    "nist-robocrane",
+]
 
 
 def gravity_of(robot_file: RobotFile, keys: TrajectoryKeys) -> float:
@@ -59,6 +87,12 @@ def _of_cables(robot_file: RobotFile) -> dict[str, Any]:
     return {name: getattr(robot_file, name) for name in ("cable_diameter", "pulley_radius", "pulley_axes")}
 
 
+@overload
+def load_robot(reference: PointMassName) -> PointMassRobot: ...
+@overload
+def load_robot(reference: PlatformName) -> PlatformRobot: ...
+@overload
+def load_robot(reference: str | Path) -> Any: ...
 def load_robot(reference: str | Path) -> PointMassRobot | PlatformRobot:
     """Load a robot of the catalogue, or of a file, with its axes and its limits.
 

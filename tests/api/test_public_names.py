@@ -8,6 +8,7 @@ import re
 import sys
 import tomllib
 from pathlib import Path
+from typing import get_args
 
 import pytest
 from outputs.test_outputs import made
@@ -16,7 +17,10 @@ from support.folder import PLAN, SWEEP, folder
 import cspr_jax
 from cspr_jax import cli
 from cspr_jax.api import plans
+from cspr_jax.build.robots import PlatformName, PointMassName
 from cspr_jax.errors import ConfigError, CsprError, StoreError
+from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.point_mass import PointMassRobot
 
 __all__ = ["folder"]  # a fixture
 
@@ -98,6 +102,14 @@ def test_type_checkers_see_what_is_loaded():
     assert modules == cspr_jax._MODULES and aliases == cspr_jax._ALIASES
     assert cspr_jax.__all__ == sorted(cspr_jax._MODULES)
     assert stub.with_name("py.typed").is_file()
+
+
+def test_type_checkers_know_the_kinds_of_catalogue_robots():
+    for name in get_args(PointMassName):
+        assert isinstance(cspr_jax.load_robot(name), PointMassRobot), name
+    for name in get_args(PlatformName):
+        assert isinstance(cspr_jax.load_robot(name), PlatformRobot), name
+    assert {*get_args(PointMassName), *get_args(PlatformName)} == {row["name"] for row in cspr_jax.list_robots()}
 
 
 def test_older_names_work():

@@ -248,7 +248,8 @@ def test_no_assert_and_no_print(name):
 def _public(tree: ast.Module) -> Iterator[tuple[ast.AST, bool]]:
     """Public functions and classes of a module, methods with True; not the arithmetic of a class on itself."""
     for node in tree.body:
-        if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
+        decorators = [ast.unparse(decorator) for decorator in getattr(node, "decorator_list", ())]
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name[0] != "_" and "overload" not in decorators:
             yield node, False
             if isinstance(node, ast.ClassDef):
                 methods = [n for n in node.body if isinstance(n, ast.FunctionDef) and n.name[0] != "_"]

@@ -7,6 +7,7 @@ import shutil
 import sys
 from pathlib import Path
 
+import mypy.api
 import pytest
 
 import cspr_jax
@@ -83,6 +84,20 @@ def test_the_page_of_python_runs(checkout, capsys, small_bench):
             printed = capsys.readouterr().out
             following = shown[i + 1] if i + 1 < len(shown) else ("", "")
             assert printed == (following[1] if following[0] == "text" else ""), text
+
+
+@pytest.mark.thorough
+def test_types_of_the_python_of_the_documents(tmp_path):
+    """Type checkers accept what the documents show, as one module a page."""
+    modules = []
+    for page in PAGES:
+        if shown := blocks(page, "python"):
+            modules.append(tmp_path / f"page_{len(modules)}.py")
+            modules[-1].write_text("\n".join(shown), "utf-8")
+    assert len(modules) > 5
+    settings = ["--config-file", str(ROOT / "pyproject.toml"), "--cache-dir", str(ROOT / ".mypy_cache")]
+    found, _, code = mypy.api.run([*settings, *map(str, modules)])
+    assert code == 0, found
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
