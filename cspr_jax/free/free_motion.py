@@ -191,9 +191,9 @@ def _searched(
     return list(best.values()), False
 
 
-def _starts(question: FreeQuestion, single: Tasks, rows: np.ndarray, lines: Sequence[ClosedForm]) -> Starts:
-    usual = starts(single.taken(rows), question.poses.z0, question.settings.starts)
-    return joined_starts([usual, form_starts(single, rows, lines)])
+def _starts(question: FreeQuestion, single: Tasks, chosen: np.ndarray, lines: Sequence[ClosedForm]) -> Starts:
+    usual = starts(single.taken(chosen), question.poses.z0, question.settings.starts)
+    return joined_starts([usual, form_starts(single, chosen, lines)])
 
 
 def _said(best: dict[int, SegmentMotion], objective: str) -> str:

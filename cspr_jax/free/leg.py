@@ -151,8 +151,8 @@ class FreeMotions(Leg):
         # Which motions are those of other families; lines take the place of single segments.
         lines = []
         for family in dict.fromkeys(source for source in sources if source):
-            rows = [i for i, source in enumerate(sources) if source == family]
-            names, jumps = ", ".join(self.stops.name(i + 1) for i in rows), [motions[i].jumps(JUMP) for i in rows]
+            indices = [i for i, source in enumerate(sources) if source == family]
+            names, jumps = ", ".join(self.stops.name(i + 1) for i in indices), [motions[i].jumps(JUMP) for i in indices]
             is_line = FAMILIES[family].precedes_searches
             why = JUMPING if any(map(len, jumps)) else ""
             lines.append(LINES.format(family, names, why) if is_line else FOLLOWED.format(family))
@@ -207,9 +207,9 @@ class FreeMotions(Leg):
             return free_motion(problem, scene, poses, settings)
         stage("free motion: lines")
         straight = lines()
-        whole = [line for line in straight if fits(line, problem, requested, settings).all()]
-        if whole and time.monotonic() > settings.until:
-            return stood_in(problem, scene, poses, settings, whole[0])
+        usable = [line for line in straight if fits(line, problem, requested, settings).all()]
+        if usable and time.monotonic() > settings.until:
+            return stood_in(problem, scene, poses, settings, usable[0])
         free = None
         try:
             free = free_motion(problem, scene, poses, settings, None, (), straight)
@@ -217,9 +217,9 @@ class FreeMotions(Leg):
             if not free.is_stopped and can_be_faster(free, problem, poses, settings):
                 free = self._from_others(problem, scene, poses, settings, free, others())
         except KeyboardInterrupt:
-            if not whole and (free is None or not free.answers.feasible.all()):
+            if not usable and (free is None or not free.answers.feasible.all()):
                 raise
-            free = stood_in(problem, scene, poses, settings, whole[0]) if free is None else free
+            free = stood_in(problem, scene, poses, settings, usable[0]) if free is None else free
             free = dataclasses.replace(free, is_stopped=True)
         return no_slower_than_lines(free, problem, scene, requested, settings, straight)
 

@@ -118,20 +118,20 @@ def no_slower_than_lines(
         is_better = ~free.answers.feasible
         if settings.objective == "time":
             is_better |= line.duration < free.answers.duration
-        rows = np.flatnonzero(is_better & fits(line, problem, poses, settings))
-        if len(rows):
-            free = _with(free, stood_in(problem, scene, poses, settings, line), rows)
+        indices = np.flatnonzero(is_better & fits(line, problem, poses, settings))
+        if len(indices):
+            free = _with(free, stood_in(problem, scene, poses, settings, line), indices)
     return free
 
 
-def _with(free: FreeMotion, line: FreeMotion, rows: np.ndarray) -> FreeMotion:
+def _with(free: FreeMotion, line: FreeMotion, indices: np.ndarray) -> FreeMotion:
     # The segments of a motion, some of them along lines.
-    chosen, count = set(rows.tolist()), len(free.motions)
+    chosen, count = set(indices.tolist()), len(free.motions)
     motions = [(line if k in chosen else free).motions[k] for k in range(count)]
     families = tuple(line.families[k] if k in chosen else (free.families or [None] * count)[k] for k in range(count))
     energy, level = free.energy.copy(), free.level.copy()
-    energy[rows], level[rows] = line.energy[rows], line.level[rows]
-    answers = replaced(free.answers, rows, line.answers, rows)
+    energy[indices], level[indices] = line.energy[indices], line.level[indices]
+    answers = replaced(free.answers, indices, line.answers, indices)
     return dataclasses.replace(free, motions=motions, answers=answers, energy=energy, level=level, families=families)
 
 

@@ -33,12 +33,12 @@ def first_refused(problem: Problem, scene: Scene | None, poses: FreePoses, frame
         its number, and the worst reason; None where there is no such pose.
     """
     units = [None] * len(poses.positions) if poses.quaternions is None else list(poses.quaternions)
-    still = [
-        Spline(leaf(np.array([0.0, 1.0])), leaf(place[None, None]), None if unit is None else leaf(unit[None, None]))
-        for place, unit in zip(poses.positions, units, strict=True)
+    at_rest = [
+        Spline(leaf(np.array([0.0, 1.0])), leaf(position[None, None]), None if unit is None else leaf(unit[None, None]))
+        for position, unit in zip(poses.positions, units, strict=True)
     ]
-    answers = proved_answers(planned_problem(problem), still, scene)
-    for i in range(len(still)):
+    answers = proved_answers(planned_problem(problem), at_rest, scene)
+    for i in range(len(at_rest)):
         rests = not (poses.accelerations[i].any() or poses.velocities[i].any())
         causes = answers.proved_causes(i, frame) if answers.proof[i].broken.any() else ()
         for cause in causes:

@@ -23,7 +23,7 @@ from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.schema.verdicts import Verdict
 
-# By what part of their length lines are bent half-way. Time in which accelerations rise and fall where poses ask for
+# By what part of their length lines are bent. Time in which accelerations rise and fall where poses ask for
 # accelerations, s; else they jump.
 BENT, RAMP_TIME = 0.1, 0.05
 
@@ -33,22 +33,24 @@ class FastestLines(Leg):
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the poses; see `Leg.join`."""
-        stops = self.stops
-        scene = scene_of(problem.robot, stops.robot_file, stops.frame, stops.keys, stops.path, trajectory=stops.keys)
-        places, units = np.array(stops.frame.outward(stops.points(z0))), None
+        frame, keys = self.stops.frame, self.stops.keys
+        scene = scene_of(problem.robot, self.stops.robot_file, frame, keys, self.stops.path, trajectory=keys)
+        positions, units = np.array(frame.outward(self.stops.points(z0))), None
         if isinstance(problem.robot, PlatformRobot):
-            units = continuous(stops.frame.turned_quaternions(pose_quaternions(stops, stops.points(z0))))
-        lines = [self._lines(places[i : i + 2], None if units is None else units[i : i + 2]) for i in range(len(self))]
-        asks = stops.keys.end_accelerations not in (None, "free") or any(pose.rest for pose in stops.poses)
+            units = continuous(frame.turned_quaternions(pose_quaternions(self.stops, self.stops.points(z0))))
+        lines = [
+            self._lines(positions[i : i + 2], None if units is None else units[i : i + 2]) for i in range(len(self))
+        ]
+        asks = keys.end_accelerations not in (None, "free") or any(pose.rest for pose in self.stops.poses)
         ramp_time = RAMP_TIME if asks else 0.0
-        left = [_in_order(problem, several) for several in lines]
-        first = [several[0].curve for several in lines]
+        left = [_in_order(problem, candidates) for candidates in lines]
+        first = [candidates[0].curve for candidates in lines]
         answers, motions = proved_answers(problem, first, scene), list[Motion](first)
         answers.verdict[:] = Verdict.UNDECIDED  # until a line is there
-        while rows := [k for k, several in enumerate(left) if several and answers.verdict[k]]:
-            times = least_times(problem, scene, [[left[k].pop(0)] for k in rows], GRID, ramp_time)
-            answers = replaced(answers, np.array(rows), times.answers, np.arange(len(rows)))
-            for k, motion in zip(rows, times.motions, strict=True):
+        while unproved := [k for k, candidates in enumerate(left) if candidates and answers.verdict[k]]:
+            times = least_times(problem, scene, [[left[k].pop(0)] for k in unproved], GRID, ramp_time)
+            answers = replaced(answers, np.array(unproved), times.answers, np.arange(len(unproved)))
+            for k, motion in zip(unproved, times.motions, strict=True):
                 motions[k] = motion
         return answers, motions
 
@@ -58,11 +60,11 @@ class FastestLines(Leg):
         turning = None
         if units is not None:
             turning = np.stack([units[0], units.sum(0) / np.linalg.norm(units.sum(0)), units[1]])
-        bent = [
-            course_through(PathTable(kind="quintic"), np.stack([ends[0], place, ends[1]]), turning).sections()
-            for place in _beside(ends, len(PATTERNS[self.stops.robot_file.own_pattern].forces))
+        curves = [
+            course_through(PathTable(kind="quintic"), np.stack([ends[0], point, ends[1]]), turning).sections()
+            for point in _beside(ends, len(PATTERNS[self.stops.robot_file.own_pattern].forces))
         ]
-        return [self._placed(section) for section in (*straight, *(section for one in bent for section in one))]
+        return [self._placed(section) for section in (*straight, *(section for one in curves for section in one))]
 
     def _placed(self, section: Section) -> Section:
         curve = kept_to(self.stops.robot_file.own_pattern, section.curve, is_planar=False)
@@ -81,11 +83,11 @@ def _in_order(problem: Problem, lines: list[Section]) -> list[Section]:
 
 def _beside(ends: np.ndarray, dimensions: int) -> list[np.ndarray]:
     # Places (3,) beside the middle of a line with two ends (2, 3), to both sides in a vertical plane and across it.
-    way, middle = ends[1] - ends[0], ends.mean(0)
-    length = float(np.linalg.norm(way))
+    along, middle = ends[1] - ends[0], ends.mean(0)
+    length = float(np.linalg.norm(along))
     if length <= SAME_PLACE:
         return []
-    level = np.array([-way[1], way[0], 0.0]) if np.hypot(*way[:2]) > SAME_PLACE else np.array([0.0, 1.0, 0.0])
+    level = np.array([-along[1], along[0], 0.0]) if np.hypot(*along[:2]) > SAME_PLACE else np.array([0.0, 1.0, 0.0])
     level /= np.linalg.norm(level)
-    across = [np.cross(level, way) / length, level][: dimensions - 1]
+    across = [np.cross(level, along) / length, level][: dimensions - 1]
     return [middle + sign * BENT * length * side for side in across for sign in (1.0, -1.0)]

@@ -9,6 +9,7 @@ ones in the middle; of bodies that meet, by how deep a fixed point of one is bel
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -55,14 +56,32 @@ class Features(NamedTuple):
     """The nearest features of two bodies.
 
     Fields:
+        bodies: their edges and faces.
         kind: 0: edges; 1: a corner of the first and a face of the second; 2: the other way round.
         first: number of that of the first body.
         second: likewise.
     """
 
+    bodies: tuple[Solid, Solid]
     kind: Any
     first: Any
     second: Any
+
+    def nearest_on_edges(self, p: Array, q: Array) -> tuple[list[Array], Array, Array]:
+        """Corners of the two edges that are the nearest ones, and the nearest points as fractions of these edges.
+
+        Args:
+            p: (m, 3) corners of the first body, m.
+            q: (k, 3) corners of the second, m.
+
+        Returns:
+            (2,) numbers of corners of each edge; of other features any edges; () and () fractions.
+        """
+        edges = [
+            body.edges[0] if len(body.edges) == 1 else jnp.asarray(body.edges)[jnp.minimum(k, len(body.edges) - 1)]
+            for body, k in zip(self.bodies, (self.first, self.second), strict=True)
+        ]
+        return edges, *nearest(*_ends(p, edges[0]), *_ends(q, edges[1]))
 
 
 SEGMENT = np.array([[0, 1]]), np.zeros((0, 3), int)
@@ -90,12 +109,12 @@ def clearance_bounds(first: Solid, second: Solid) -> tuple[Array, Array]:
     """
     corners = first.corners.middle, second.corners.middle
     features = nearest_features(*corners, first, second)
-    line = turning(lambda p, q: parting_direction(p, q, first, second, features), first.corners, second.corners)
+    line = turning(partial(parting_direction, features), first.corners, second.corners)
     between = second.corners.each(lambda x: x[None]) - first.corners.each(lambda x: x[:, None])
     low = along(line, between.each(lambda x: x.reshape(-1, 3)))
     place, other = (
         dot(body.corners.each(jnp.transpose), weights[None])
-        for body, weights in zip((first, second), nearest_weights(*corners, first, second, features), strict=True)
+        for body, weights in zip((first, second), nearest_weights(features, *corners), strict=True)
     )
     return low, distance_bound(place, other)
 
@@ -217,7 +236,7 @@ def nearest_features(p: Array, q: Array, first: Solid, second: Solid) -> Feature
         the features.
     """
     if len(first.edges) == len(second.edges) == 1:
-        return Features(0, 0, 0)
+        return Features((first, second), 0, 0, 0)
     (a, u), (b, v) = _ends(p, first.edges), _ends(q, second.edges)
     a, u, b, v = a[:, None], u[:, None], b[None], v[None]
     s, t = nearest(a, u, b, v)
@@ -234,34 +253,22 @@ def nearest_features(p: Array, q: Array, first: Solid, second: Solid) -> Feature
         jnp.stack([place // part.shape[1], place % part.shape[1]]) for part, place in zip(parts, places, strict=True)
     ]
     kinds = jnp.asarray([0] + [1] * bool(len(second.faces)) + [2] * bool(len(first.faces)))
-    return Features(kinds[best], *jnp.stack(numbers)[best])
+    return Features((first, second), kinds[best], *jnp.stack(numbers)[best])
 
 
-def _edges_at(features: Features, first: Solid, second: Solid) -> list[Array]:
-    # Corners of the two edges that are the nearest ones; of other features any edges.
-    chosen = (first, features.first), (second, features.second)
-    return [
-        body.edges[0] if len(body.edges) == 1 else jnp.asarray(body.edges)[jnp.minimum(k, len(body.edges) - 1)]
-        for body, k in chosen
-    ]
-
-
-def parting_direction(p: Array, q: Array, first: Solid, second: Solid, features: Features) -> Array:
-    """Direction from the first body to the second along the shortest way between them.
+def parting_direction(features: Features, p: Array, q: Array) -> Array:
+    """Direction from the first body to the second along the shortest line between them.
 
     Args:
+        features: their nearest ones.
         p: (m, 3) corners of the first, m.
         q: (k, 3) corners of the second, m.
-        first: its edges and faces.
-        second: likewise.
-        features: their nearest ones.
 
     Returns:
         (3,) unit vector.
     """
-    one, two = _edges_at(features, first, second)
-    (a, u), (b, v) = _ends(p, one), _ends(q, two)
-    s, t = nearest(a, u, b, v)
+    (first, second), (edges, s, t) = features.bodies, features.nearest_on_edges(p, q)
+    (a, u), (b, v) = _ends(p, edges[0]), _ends(q, edges[1])
     gap, normal = b + t * v - a - s * u, jnp.cross(u, v)
     inside = (s > 0.0) & (s < 1.0) & (t > 0.0) & (t < 1.0)
     inside &= jnp.dot(normal, normal) > PARALLEL_SQUARE * jnp.dot(u, u) * jnp.dot(v, v)
@@ -278,21 +285,18 @@ def parting_direction(p: Array, q: Array, first: Solid, second: Solid, features:
     return way
 
 
-def nearest_weights(p: Array, q: Array, first: Solid, second: Solid, features: Features) -> tuple[Array, Array]:
+def nearest_weights(features: Features, p: Array, q: Array) -> tuple[Array, Array]:
     """Weights of corners, which make the nearest points.
 
     Args:
+        features: the nearest ones of two bodies.
         p: (m, 3) corners of the first, m.
         q: (k, 3) corners of the second, m.
-        first: its edges and faces.
-        second: likewise.
-        features: their nearest ones.
 
     Returns:
         (m,) and (k,).
     """
-    one, two = _edges_at(features, first, second)
-    s, t = nearest(*_ends(p, one), *_ends(q, two))
+    (first, second), (edges, s, t) = features.bodies, features.nearest_on_edges(p, q)
 
     def spread(count: int, corners: Array, shares: list[Array]) -> Array:
         return sum(jnp.where(jnp.arange(count) == corners[k], share, 0.0) for k, share in enumerate(shares))  # type: ignore[return-value]
@@ -312,7 +316,7 @@ def nearest_weights(p: Array, q: Array, first: Solid, second: Solid, features: F
     def at_corner(count: int, corner: Array) -> Array:
         return jnp.where(jnp.arange(count) == corner, 1.0, 0.0)
 
-    of_first, of_second = on_edge(len(p), one, s), on_edge(len(q), two, t)
+    of_first, of_second = on_edge(len(p), edges[0], s), on_edge(len(q), edges[1], t)
     if len(second.faces):
         is_this = features.kind == 1
         of_first = jnp.where(is_this, at_corner(len(p), features.first), of_first)

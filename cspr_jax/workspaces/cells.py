@@ -16,7 +16,7 @@ Arrays are (cells, ...); coefficients of first order in x have one axis of lengt
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -104,18 +104,18 @@ def reach(linear: np.ndarray) -> np.ndarray:
     return np.abs(linear).sum(-1)
 
 
-def least_quadratic(quadratic: np.ndarray) -> np.ndarray:
+def least_quadratic(quadratic: Any) -> Any:
     """Lower bound of a quadratic form over the cells, each product of two components on its own.
 
     Args:
-        quadratic: (..., 3, 3) coefficients, not symmetric.
+        quadratic: (..., 3, 3) coefficients, not symmetric; of NumPy or of jax.
 
     Returns:
         (...) at most 0.
     """
-    squares = np.minimum(np.diagonal(quadratic, axis1=-2, axis2=-1), 0.0).sum(-1)
-    both = quadratic + np.swapaxes(quadratic, -1, -2)
-    return squares - np.abs(both[..., (0, 0, 1), (1, 2, 2)]).sum(-1)
+    squares = quadratic.diagonal(axis1=-2, axis2=-1).clip(max=0.0).sum(-1)
+    both = quadratic + quadratic.swapaxes(-1, -2)
+    return squares - abs(both[..., (0, 0, 1), (1, 2, 2)]).sum(-1)
 
 
 def norm_reach(vectors: np.ndarray) -> np.ndarray:

@@ -34,6 +34,7 @@ from cspr_jax.robots.convex_gaps import (
     parting_direction,
 )
 from cspr_jax.runtime import compile_options
+from cspr_jax.workspaces.cells import least_quadratic
 
 BATCH = 512
 # Over the largest coordinate: far above the rounding of bounds, far below what anybody measures.
@@ -46,26 +47,26 @@ Range = tuple[Array, Array]
 
 
 class CellPoints(NamedTuple):
-    """Points (m, ...) while a robot moves within a cell: `middle` + `slope` x, up to `radius`.
+    """Points (m, ...) while a robot moves within a cell: `middle` + `jacobian` x, up to `radius`.
 
     Fields:
         middle: (m, 3) m.
-        slope: (m, 3, 3) changes with each component of x, in columns, m.
+        jacobian: (m, 3, 3) changes with each component of x, in columns, m.
         radius: (m,) m.
     """
 
     middle: Any
-    slope: Any
+    jacobian: Any
     radius: Any
 
     def minus(self, other: "CellPoints") -> "CellPoints":
         """Differences from other points, which move independently up to their radius."""
-        return CellPoints(self.middle - other.middle, self.slope - other.slope, self.radius + other.radius)
+        return CellPoints(self.middle - other.middle, self.jacobian - other.jacobian, self.radius + other.radius)
 
     def weighted(self, weights: Array) -> "CellPoints":
         """Sums (k, ...) of points, weights (k, m) not negative."""
         return CellPoints(
-            weights @ self.middle, jnp.einsum("km,mij->kij", weights, self.slope), weights @ jnp.asarray(self.radius)
+            weights @ self.middle, jnp.einsum("km,mij->kij", weights, self.jacobian), weights @ jnp.asarray(self.radius)
         )
 
 
@@ -101,8 +102,8 @@ def clearance_bounds(
     """
     bodies, rotation = bodies_of(robot, scene), np.asarray(matrix(jnp.asarray(quaternion)))
     body = None if bodies.body is None else _rotated(bodies.body, rotation)
-    turned = bodies._replace(points=bodies.points @ rotation.T, body=body)
-    low, high = in_batches(partial(_kernel, turned), _CellLanes(positions, half, exits, shifts), size=BATCH)
+    rotated = bodies._replace(points=bodies.points @ rotation.T, body=body)
+    low, high = in_batches(partial(_kernel, rotated), _CellLanes(positions, half, exits, shifts), size=BATCH)
     return np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high)
 
 
@@ -118,9 +119,9 @@ def _kernel(bodies: Bodies, cells: _CellLanes) -> Range:
 
 def _of_cell(bodies: Bodies, cell: _CellLanes) -> Range:
     count, moved = len(bodies.points), jnp.diag(cell.half)
-    slope = jnp.broadcast_to(jnp.stack([jnp.zeros((3, 3)), moved]), (count, 2, 3, 3))
+    jacobian = jnp.broadcast_to(jnp.stack([jnp.zeros((3, 3)), moved]), (count, 2, 3, 3))
     middle = jnp.stack([cell.exits, cell.position[None] + bodies.points], axis=1)
-    cables = CellPoints(middle, slope, jnp.stack([cell.shifts, jnp.zeros(count)], axis=1))
+    cables = CellPoints(middle, jacobian, jnp.stack([cell.shifts, jnp.zeros(count)], axis=1))
     parts: list[Range] = []
     if len(bodies.pairs):
         one, other = (_at(cables, bodies.pairs[:, k]) for k in range(2))
@@ -135,7 +136,7 @@ def _of_cell(bodies: Bodies, cell: _CellLanes) -> Range:
         moving = jnp.broadcast_to(moved, (len(shape.corners), 3, 3))
         placed = CellPoints(shape.corners + cell.position[None], moving, jnp.zeros(len(shape.corners)))
         planes = FacePlanes(shape.planes.normals, shape.planes.offsets + shape.planes.normals @ cell.position)
-        solids = jax.tree.map(lambda leaf: leaf[None], placed)
+        solids = jax.tree.map(lambda array: array[None], placed)
         parts.append(_from_obstacles(bodies, solids, lambda points: Solid(points, shape.edges, shape.faces), planes))
     low, high = (jnp.min(jnp.concatenate([side.ravel() for side in sides])) for sides in zip(*parts, strict=True))
     allowance = ROUNDING * (bodies.size + jnp.max(jnp.abs(cell.position)))
@@ -143,7 +144,7 @@ def _of_cell(bodies: Bodies, cell: _CellLanes) -> Range:
 
 
 def _at(points: CellPoints, index: Any) -> CellPoints:
-    return jax.tree.map(lambda leaf: leaf[index], points)
+    return jax.tree.map(lambda array: array[index], points)
 
 
 def _fixed(corners: Array) -> CellPoints:
@@ -155,33 +156,28 @@ def _gap(first: Solid, second: Solid) -> Range:
     p, q = first.corners, second.corners
     features = nearest_features(p.middle, q.middle, first, second)
 
-    def direction(one: Array, other: Array) -> Array:
-        return parting_direction(one, other, first, second, features)
-
     def moving(one: Array, other: Array) -> tuple[Array, Array]:
-        return jax.jvp(direction, (p.middle, q.middle), (one, other))
+        return jax.jvp(partial(parting_direction, features), (p.middle, q.middle), (one, other))
 
-    normal, turns = jax.vmap(moving, in_axes=(2, 2), out_axes=(None, 1))(p.slope, q.slope)
+    normal, turns = jax.vmap(moving, in_axes=(2, 2), out_axes=(None, 1))(p.jacobian, q.jacobian)
     turns = jnp.where(jnp.sum(turns**2) <= 1.0, turns, 0.0)
-    each = [CellPoints(*(jnp.expand_dims(leaf, axis) for leaf in x)) for x, axis in ((p, 1), (q, 0))]
+    each = [CellPoints(*(jnp.expand_dims(array, axis) for array in x)) for x, axis in ((p, 1), (q, 0))]
     between = each[1].minus(each[0])
-    linear = between.middle @ turns + jnp.einsum("i,pqik->pqk", normal, between.slope)
-    quadratic = jnp.einsum("ik,pqil->pqkl", turns, between.slope)
-    size = jnp.sqrt(jnp.sum(normal**2) + 2.0 * jnp.sum(jnp.abs(normal @ turns)) + jnp.sum(jnp.abs(turns.T @ turns)))
-    low = between.middle @ normal - jnp.sum(jnp.abs(linear), axis=-1) + _smallest(quadratic) - size * between.radius
+    linear = between.middle @ turns + jnp.einsum("i,pqik->pqk", normal, between.jacobian)
+    quadratic = jnp.einsum("ik,pqil->pqkl", turns, between.jacobian)
+    longest = jnp.sqrt(jnp.sum(normal**2) + 2.0 * jnp.sum(jnp.abs(normal @ turns)) + jnp.sum(jnp.abs(turns.T @ turns)))
+    low = (
+        between.middle @ normal
+        - jnp.sum(jnp.abs(linear), axis=-1)
+        + least_quadratic(quadratic)
+        - longest * between.radius
+    )
     low = jnp.min(low)
-    weights = nearest_weights(p.middle, q.middle, first, second, features)
+    weights = nearest_weights(features, p.middle, q.middle)
     nearest = q.weighted(weights[1][None]).minus(p.weighted(weights[0][None]))
-    ends = nearest.middle + SIGNS @ nearest.slope[0].T
+    ends = nearest.middle + SIGNS @ nearest.jacobian[0].T
     high = jnp.max(jnp.sqrt(jnp.sum(ends**2, axis=1))) + nearest.radius[0]
-    return jnp.where(low > 0.0, low / size, -jnp.inf), high
-
-
-def _smallest(quadratic: Array) -> Array:
-    # Bound quadratic forms (..., 3, 3) from below over a cell, each product of two components on its own.
-    squares = jnp.sum(jnp.minimum(jnp.diagonal(quadratic, axis1=-2, axis2=-1), 0.0), axis=-1)
-    both = quadratic + jnp.swapaxes(quadratic, -1, -2)
-    return squares - jnp.sum(jnp.abs(both[..., (0, 0, 1), (1, 2, 2)]), axis=-1)
+    return jnp.where(low > 0.0, low / longest, -jnp.inf), high
 
 
 def _depth(body: Solid, planes: FacePlanes) -> Array:
@@ -192,9 +188,9 @@ def _depth(body: Solid, planes: FacePlanes) -> Array:
     weights = (1.0 - part) * jnp.eye(count)[body.edges[:, 0]] + part * jnp.eye(count)[body.edges[:, 1]]
     points = body.corners.weighted(weights)
     heights = points.middle @ planes.normals.T - planes.offsets[None] + points.radius[:, None]
-    heights = heights + jnp.sum(jnp.abs(jnp.einsum("fi,mik->mfk", planes.normals, points.slope)), axis=-1)
-    least = jnp.min(jnp.max(heights, axis=1))
-    return jnp.where(least < 0.0, least, jnp.inf)
+    heights = heights + jnp.sum(jnp.abs(jnp.einsum("fi,mik->mfk", planes.normals, points.jacobian)), axis=-1)
+    deepest = jnp.min(jnp.max(heights, axis=1))
+    return jnp.where(deepest < 0.0, deepest, jnp.inf)
 
 
 def _from_obstacles(bodies: Bodies, points: CellPoints, solid: Any, planes: FacePlanes | None = None) -> Range:
@@ -223,17 +219,17 @@ def _from_obstacles(bodies: Bodies, points: CellPoints, solid: Any, planes: Face
 
 def _seen(corners: Array, platform: CellPoints) -> CellPoints:
     # Points fixed in space, as a platform sees them that moves as its first corner does.
-    slope = jnp.broadcast_to(-platform.slope[0], (len(corners), 3, 3))
-    return CellPoints(corners, slope, jnp.zeros(len(corners)))
+    jacobian = jnp.broadcast_to(-platform.jacobian[0], (len(corners), 3, 3))
+    return CellPoints(corners, jacobian, jnp.zeros(len(corners)))
 
 
 def _from_platform(bodies: Bodies, shape: Shape, cell: _CellLanes) -> Range:
     # Seen from the platform its shape and the attachment points do not move.
     ray, moved = cell.exits - cell.position[None] - bodies.points, -jnp.diag(cell.half)
-    length, reach = jnp.sqrt(jnp.sum(ray**2, axis=1)), jnp.sqrt(jnp.sum(cell.half**2)) + cell.shifts
-    unit, shortest = ray / length[:, None], length - reach
+    length, radius = jnp.sqrt(jnp.sum(ray**2, axis=1)), jnp.sqrt(jnp.sum(cell.half**2)) + cell.shifts
+    unit, shortest = ray / length[:, None], length - radius
     across = (jnp.eye(3)[None] - unit[:, :, None] * unit[:, None, :]) / length[:, None, None]
-    rest = cell.shifts / length + UNIT_CURVATURE * (reach / shortest) ** 2
+    rest = cell.shifts / length + UNIT_CURVATURE * (radius / shortest) ** 2
     count = len(ray)
     ends = CellPoints(
         jnp.stack([bodies.points + bodies.leave * unit, cell.exits - cell.position[None]], axis=1),

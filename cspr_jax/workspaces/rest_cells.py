@@ -14,7 +14,7 @@ from cspr_jax.workspaces.rest_poses import RestPoses
 from cspr_jax.workspaces.shifts import Shifts, leaving_points, shifts
 from cspr_jax.workspaces.whole_cells import ROUND, proved_sides, sides_of
 
-# How often an open cell is halved along each axis.
+# How often open cells are halved along each axis.
 DEPTH = 2
 # Rounding of distances, m: far above what coordinates below 1e6 m have, far below what anybody measures.
 CLOSE = 1e-9
@@ -38,12 +38,13 @@ class RestCells:
         self._names += ["clearances"] * self._has_contacts
         self._names += [LIMITS[name] for name, _, _ in poses.limited(np.zeros((1, 3)), self._turns(1))]
 
-    def __call__(self, origins: np.ndarray, half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def __call__(self, origins: np.ndarray, half: np.ndarray, *, depth: int = DEPTH) -> tuple[np.ndarray, np.ndarray]:
         """Tell which cells are proved to lie wholly on one side of the workspace.
 
         Args:
             origins: (n, 3) of the platform at the centres of the cells, kernels' coordinates, m.
             half: (n, 3) half sizes of the cells, m.
+            depth: how often open cells are halved along each axis.
 
         Returns:
             (n,) 0: neither side is proved; 1: inside; 2: outside, as in `schema.meanings.CELL_SIDES`; (n,) what leaves
@@ -53,17 +54,17 @@ class RestCells:
         numbers = np.array([OPEN_CONDITIONS.index(name) for name in self._names])
         with double_precision():
             for first in range(0, len(origins), ROUND):
-                rows = slice(first, first + ROUND)
-                centres = self.at(origins[rows])
+                part = slice(first, first + ROUND)
+                centres = self.at(origins[part])
                 held = np.zeros((len(centres), len(numbers)), bool)
-                result = proved_sides(self, origins[rows], half[rows], centres, held, DEPTH)
-                sides[rows] = np.where(result.proved, np.where(centres > 0, 1, 2), 0)
+                result = proved_sides(self, origins[part], half[part], centres, held, depth)
+                sides[part] = np.where(result.proved, np.where(centres > 0, 1, 2), 0)
                 # The first of several conditions.
                 open_condition = numbers[np.argmin(result.held, axis=1)]
                 is_border = result.mixed | (centres == 0)
                 reason = np.where(is_border, OPEN_CONDITIONS.index("boundary"), open_condition)
                 outside = OPEN_CONDITIONS.index("outside")
-                reasons[rows] = np.where(result.proved, 0, np.where(is_border | (centres > 0), reason, outside))
+                reasons[part] = np.where(result.proved, 0, np.where(is_border | (centres > 0), reason, outside))
         return sides, reasons
 
     def _turns(self, count: int) -> np.ndarray:
@@ -80,20 +81,22 @@ class RestCells:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Proofs of cells without halving; see `whole_cells.CellConditions`."""
         held, is_broken = held.copy(), np.zeros(len(positions), bool)
-        turns, reach = self._turns(len(positions)), np.linalg.norm(half, axis=1)
+        turns, radius = self._turns(len(positions)), np.linalg.norm(half, axis=1)
         positions = self._poses.origins(positions, turns)
-        places = mass_centres(self._robot, positions, turns)
-        moved = shifts(self._robot, places, turns, reach)
+        mass_positions = mass_centres(self._robot, positions, turns)
+        moved = shifts(self._robot, mass_positions, turns, radius)
         for k, (search, proofs) in enumerate(self._searches):
-            answers = search(places, turns)
+            answers = search(mass_positions, turns)
             chosen = np.flatnonzero((sides > 0) & ~held[:, k])
             if len(chosen):
-                bounds = proofs.least_margins(places[chosen], half[chosen], answers.margin[chosen])
+                bounds = proofs.least_margins(mass_positions[chosen], half[chosen], answers.margin[chosen])
                 held[chosen, k] = bounds > 0.0
             chosen = np.flatnonzero((sides < 0) & ~is_broken & (sides_of(answers) < 0))
             if len(chosen):
-                is_broken[chosen] = proofs.outside(places[chosen], half[chosen])
-        for k, (low, high) in enumerate(self._distances(positions, places, half, moved, sides), len(self._searches)):
+                is_broken[chosen] = proofs.outside(mass_positions[chosen], half[chosen])
+        for k, (low, high) in enumerate(
+            self._distances(positions, mass_positions, half, moved, sides), len(self._searches)
+        ):
             held[:, k] |= low > CLOSE
             is_broken |= high < -CLOSE
         if self._robot.pulleys is not None:
@@ -101,19 +104,19 @@ class RestCells:
             held &= (moved.free > 0.0).all(1, keepdims=True)
         return held, is_broken
 
-    def _distances(self, positions, places, half, moved: Shifts, sides: np.ndarray):
+    def _distances(self, positions, mass_positions, half, moved: Shifts, sides: np.ndarray):
         # Yield bounds (n,) of the smallest slack of clearances and of each limit.
         poses, turns = self._poses, self._turns(len(positions))
         if poses.around is not None and self._has_contacts:
-            yield self._clearances(poses.around, places, half, moved)
+            yield self._clearances(poses.around, mass_positions, half, moved)
         changes = {} if poses.speeds is None else {"speed_margin": poses.speeds.changes(moved)}
         for name, _, slack in poses.limited(positions, turns):
             change = changes.get(name, moved.robot[:, None])
             yield (slack - change).min(1), (slack + change).min(1)
 
     def _clearances(
-        self, around: Scene, places: np.ndarray, half: np.ndarray, moved: Shifts
+        self, around: Scene, mass_positions: np.ndarray, half: np.ndarray, moved: Shifts
     ) -> tuple[np.ndarray, np.ndarray]:
-        exits = leaving_points(self._robot, places, self._quaternion)
+        exits = leaving_points(self._robot, mass_positions, self._quaternion)
         moves = np.broadcast_to(moved.exits[:, None], exits.shape[:2])
-        return clearance_bounds(self._robot, around, self._quaternion, places, half, exits, moves)
+        return clearance_bounds(self._robot, around, self._quaternion, mass_positions, half, exits, moves)

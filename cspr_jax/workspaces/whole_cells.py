@@ -5,16 +5,9 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.arithmetic.frames import IDENTITY
-from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.workspaces.cell_proofs import CellProofs
-from cspr_jax.workspaces.questions import Requirement
-from cspr_jax.workspaces.search import WorkspaceAnswers, WorkspaceSearch
+from cspr_jax.workspaces.search import WorkspaceAnswers
 
-# How often an open cell is halved along each axis: the first halving decides most cells that can be decided.
-DEPTH = 1
 # Cells that are proved at a time.
 ROUND = 65536
 
@@ -99,78 +92,6 @@ def proved_sides(
         )
         result.held[halved] = parts.held.reshape(*shape, -1).all(1)
     return result
-
-
-class WorkspaceCells:
-    """Proofs that whole cells of a robot lie inside or outside a workspace.
-
-    In a cell that is proved inside, the robot meets the requirement at each position; in a cell that is proved outside,
-    at none. Both allow for rounding.
-    """
-
-    def __init__(self, robot: AnyRobot, requirement: Requirement) -> None:
-        """Prepare the proofs for a robot, centred, z down."""
-        self._robot, self._search = robot, WorkspaceSearch(robot, requirement)
-
-    def __call__(
-        self,
-        positions: np.ndarray,
-        half: np.ndarray,
-        quaternion: np.ndarray | None,
-        answers: WorkspaceAnswers,
-        *,
-        depth: int = DEPTH,
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Tell which cells lie wholly inside, and which wholly outside.
-
-        Args:
-            positions: (n, 3) centres of the cells, of the mass centre, or of the joint, m.
-            half: (3,) or (n, 3) half sizes along the axes, at least 0, m.
-            quaternion: (4,) unit quaternion of all cells, scalar first; None: no rotation.
-            answers: of `WorkspaceSearch` at the centres. Centres that are undecided or singular prove nothing.
-            depth: how often open cells are halved along each axis.
-
-        Returns:
-            (n,) whether each cell is proved inside; (n,) whether it is proved outside.
-        """
-        side = sides_of(answers)
-        proved = np.zeros(len(positions), bool)
-        chosen = np.flatnonzero(side)
-        if len(chosen):
-            quaternion = np.array(IDENTITY) if quaternion is None else np.asarray(quaternion)
-            sizes = np.broadcast_to(np.asarray(half, float), positions.shape)[chosen]
-            with double_precision():
-                condition = _Condition(CellProofs(self._robot, self._search, quaternion), self._search, quaternion)
-                for first in range(0, len(chosen), ROUND):
-                    rows = slice(first, first + ROUND)
-                    numbers = chosen[rows]
-                    open_cells = side[numbers], np.zeros((len(numbers), 1), bool)
-                    result = proved_sides(condition, positions[numbers], sizes[rows], *open_cells, depth)
-                    proved[numbers] = result.proved
-        return proved & (side > 0), proved & (side < 0)
-
-
-class _Condition:
-    # One condition on the cables, at one orientation.
-
-    def __init__(self, proofs: CellProofs, search: WorkspaceSearch, quaternion: np.ndarray) -> None:
-        self._proofs, self._search, self._quaternion = proofs, search, quaternion
-
-    def _answers(self, positions: np.ndarray) -> WorkspaceAnswers:
-        return self._search(positions, np.tile(self._quaternion, (len(positions), 1)))
-
-    def at(self, positions: np.ndarray) -> np.ndarray:
-        return sides_of(self._answers(positions))
-
-    def proved(self, positions, half, sides, held) -> tuple[np.ndarray, np.ndarray]:
-        held, is_broken = held.copy(), np.zeros(len(positions), bool)
-        inside, outside = np.flatnonzero(sides > 0), np.flatnonzero(sides < 0)
-        if len(inside):
-            margin = self._answers(positions[inside]).margin
-            held[inside, 0] = self._proofs.least_margins(positions[inside], half[inside], margin) > 0.0
-        if len(outside):
-            is_broken[outside] = self._proofs.outside(positions[outside], half[outside])
-        return held, is_broken
 
 
 def sides_of(answers: WorkspaceAnswers) -> np.ndarray:

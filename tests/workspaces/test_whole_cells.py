@@ -20,11 +20,25 @@ from cspr_jax.workspaces.cell_proofs import CellProofs
 from cspr_jax.workspaces.geometry import mass_centres
 from cspr_jax.workspaces.questions import CONDITIONS, required_wrenches, requirement
 from cspr_jax.workspaces.required import RequiredWrenches
+from cspr_jax.workspaces.rest_cells import RestCells
+from cspr_jax.workspaces.rest_poses import RestPoses
 from cspr_jax.workspaces.search import WorkspaceSearch
-from cspr_jax.workspaces.whole_cells import WorkspaceCells
 
 NONE = np.array([1.0, 0.0, 0.0, 0.0])
 CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+
+
+class WorkspaceCells:
+    """Cells of one condition on the cables: which are proved inside, and which outside."""
+
+    def __init__(self, robot, search):
+        searches = {search.requirement.condition: search}
+        self.poses = RestPoses(robot, searches, None, Limits(), of_mass_centre=True)
+
+    def __call__(self, places, half, quaternion=NONE, *, depth=1):
+        half = np.broadcast_to(half, places.shape)
+        sides, _ = RestCells(self.poses, quaternion)(places, half, depth=depth)
+        return sides == 1, sides == 2
 
 
 class Asked:
@@ -42,7 +56,8 @@ class Asked:
             given = Rotation.from_matrix(turn).as_quat(scalar_first=True)
             self.quaternion = self.frame.turned_quaternions(given[None])[0]
         with double_precision():
-            self.search, self.cells = WorkspaceSearch(self.own, self.question), WorkspaceCells(self.own, self.question)
+            self.search = WorkspaceSearch(self.own, self.question)
+        self.cells = WorkspaceCells(self.own, self.search)
 
     def inner(self, places):
         """Of origins, what the search takes."""
@@ -69,7 +84,7 @@ def check(asked, rng, count, *, largest=0.3, samples=8, programs=1, depth=0):
     half[:, drawn.space == 0.0] = 0.0
     inner = asked.inner(places)
     answers = asked.at(inner)
-    inside, outside = asked.cells(inner, half, asked.quaternion, answers, depth=depth)
+    inside, outside = asked.cells(inner, half, asked.quaternion, depth=depth)
     assert not (inside & outside).any()
     assert (inside <= (answers.verdict == 0)).all() and (outside <= (answers.verdict != 0)).all()
     spots = np.concatenate([np.tile(CORNERS, (count, 1, 1)), rng.uniform(-1.0, 1.0, (count, samples, 3))], axis=1)
@@ -146,7 +161,8 @@ def given(robot, condition, limits=None, wrenches=None):
     required = None if wrenches is None else RequiredWrenches(wrenches)
     asked = requirement(own, condition, robot.limits if limits is None else limits, required)
     with double_precision():
-        return WorkspaceSearch(own, asked), WorkspaceCells(own, asked), own, frame
+        search = WorkspaceSearch(own, asked)
+    return search, WorkspaceCells(own, search), own, frame
 
 
 def answered(search, places, quaternion=NONE):
@@ -163,26 +179,25 @@ def prism():
 
 def test_the_prism_below_the_spools(prism):
     """Cells inside of it and outside of it are proved, those that its faces cut never."""
-    search, cells = prism
+    _, cells = prism
     rng = np.random.default_rng(1)
     places = np.array([3.0, 2.0, 0.0]) * rng.uniform(-1.0, 1.0, (400, 3)) + np.array([0.0, 0.0, 2.0])
     half = rng.uniform(0.02, 0.3, (400, 3))
-    inside, outside = cells(places, half, None, answered(search, places), depth=1)
+    inside, outside = cells(places, half, depth=1)
     gap = np.abs(places[:, :2]) - np.array([2.0, 1.0])
     is_in, is_out = (gap + half[:, :2] < 0.0).all(1), (gap - half[:, :2] > 0.0).any(1)
     assert (inside <= is_in).all() and (outside <= is_out).all()
     assert inside.sum() > 0.93 * is_in.sum() > 50 and outside.sum() > 0.93 * is_out.sum() > 50
     # A cell that a face touches with its side only is no better than one that it cuts.
     touching = np.array([[1.5, 0.0, 2.0], [2.5, 0.0, 2.0]])
-    assert not np.any(cells(touching, np.array([0.5, 0.1, 0.1]), None, answered(search, touching), depth=2))
+    assert not np.any(cells(touching, np.array([0.5, 0.1, 0.1]), depth=2))
 
 
 def test_halving_decides_more_and_nothing_else(prism):
-    search, cells = prism
+    _, cells = prism
     rng = np.random.default_rng(2)
     places = np.array([3.0, 2.0, 0.5]) * rng.uniform(-1.0, 1.0, (150, 3)) + np.array([0.0, 0.0, 1.5])
-    answers = answered(search, places)
-    found = [np.array(cells(places, np.full(3, 0.5), None, answers, depth=depth)) for depth in (0, 1, 2)]
+    found = [np.array(cells(places, np.full(3, 0.5), depth=depth)) for depth in (0, 1, 2)]
     gap = np.abs(places[:, :2]) - np.array([2.0, 1.0])
     whole = np.array([(gap + 0.5 < 0.0).all(1), (gap - 0.5 > 0.0).any(1)])
     for less, more in itertools.pairwise(found):
@@ -195,11 +210,11 @@ def test_a_cell_of_no_size_is_its_centre(prism):
     rng = np.random.default_rng(3)
     places = np.array([3.0, 2.0, 1.0]) * rng.uniform(-1.0, 1.0, (300, 3)) + np.array([0.0, 0.0, 2.0])
     answers = answered(search, places)
-    inside, outside = cells(places, np.zeros(3), None, answers)
+    inside, outside = cells(places, np.zeros(3))
     clear = np.abs(answers.margin) > 1e-6
     assert (inside == (answers.verdict == 0))[clear].all() and (outside == (answers.verdict != 0))[clear].all()
     edge = np.array([[2.0, 0.3, 1.0]])
-    assert not np.any(cells(edge, np.zeros(3), None, answered(search, edge)))
+    assert not np.any(cells(edge, np.zeros(3)))
 
 
 def test_a_set_of_wrenches_needs_every_one():
@@ -213,8 +228,8 @@ def test_a_set_of_wrenches_needs_every_one():
     half = rng.uniform(0.0, 0.1, (150, 3))
 
     def cells_of(wrenches):
-        search, cells, _, _ = given(robot, "wrench-feasible", limits, wrenches)
-        return cells(places, half, None, answered(search, places), depth=0)
+        _, cells, _, _ = given(robot, "wrench-feasible", limits, wrenches)
+        return cells(places, half, depth=0)
 
     inside, outside = cells_of(loads)
     each = [cells_of(load[None]) for load in loads]
@@ -225,20 +240,19 @@ def test_a_set_of_wrenches_needs_every_one():
 
 
 def test_a_base_point_or_a_pulley_in_the_cell_proves_nothing(prism):
-    search, cells = prism
+    _, cells = prism
     place = np.array([[1.9, 0.9, 0.3]])
-    assert not np.any(cells(place, np.full(3, 0.5), None, answered(search, place), depth=0))
+    assert not np.any(cells(place, np.full(3, 0.5), depth=0))
     spools = [[-2.0, -1.0, 0.0], [2.0, -1.0, 0.0], [2.0, 1.0, 0.0], [-2.0, 1.0, 0.0]]
     search, cells, _, _ = given(with_cables(cspr_jax.point_mass(spools, mass=2.0), pulley_radius=0.3), "static")
     place = np.array([[1.2, 0.5, 0.6]])
     answers = answered(search, place)
-    assert answers.verdict[0] == 0 and not np.any(cells(place, np.full(3, 0.5), None, answers, depth=0))
+    assert answers.verdict[0] == 0 and not np.any(cells(place, np.full(3, 0.5), depth=0))
 
 
 def agree_with_samples(search, cells, frame, places, half, samples, rng):
     """Proved cells beside samples of them: shares of cells proved inside, outside, and of those not contradicted."""
-    answers = answered(search, places)
-    inside, outside = cells(places, half, None, answers)
+    inside, outside = cells(places, half)
     steps = np.concatenate(
         [np.tile(CORNERS, (len(places), 1, 1)), rng.uniform(-1.0, 1.0, (len(places), samples, 3))], 1
     )
@@ -272,7 +286,8 @@ def test_a_ball_of_accelerations_is_proved_by_the_box_about_it():
     required = required_wrenches(own, frame, acceleration=1.0)
     with double_precision():
         asked = requirement(own, "wrench-feasible", limits, required)
-        search, cells = WorkspaceSearch(own, asked), WorkspaceCells(own, asked)
+        search = WorkspaceSearch(own, asked)
+    cells = WorkspaceCells(own, search)
     places = np.asarray(frame.inward(rng.uniform([-2.5, -1.5, 0.0], [2.5, 1.5, 1.5], (60, 3))))
     half = rng.uniform(0.0, 0.1, (60, 3))
     inside, outside, whole = agree_with_samples(search, cells, frame, places, half, 8, rng)
@@ -287,7 +302,7 @@ def whole_cells(name, condition, size, count, turn=NONE):
     turn = frame.turned_quaternions(np.asarray(turn)[None])[0]
     places = mass_centres(own, np.asarray(frame.inward(rng.uniform(low, high, (count, 3)))), turn[None])
     answers = answered(search, places, turn)
-    inside, outside = cells(places, np.full(3, 0.5 * size), turn, answers)
+    inside, outside = cells(places, np.full(3, 0.5 * size), turn)
     spots = places[:, None] + 0.5 * size * np.concatenate([CORNERS, rng.uniform(-1.0, 1.0, (20, 3))])
     seen = answered(search, spots.reshape(-1, 3), turn).verdict.reshape(count, -1)
     assert (seen[inside] == 0).all() and (seen[outside] != 0).all()
