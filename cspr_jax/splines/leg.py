@@ -89,9 +89,10 @@ class Splines(Leg):
         source = stops.keys.source(name)
         if source is None:
             source = read_motion(stops.path.parent / name, stops.poses[i].trajectory)
-        if isinstance(source, Placed):
-            return source.motion
         try:
+            self._refuse_keys_of_samples(source)
+            if isinstance(source, Placed):
+                return source.motion
             if not isinstance(source, MotionTable | MotionPieces | Spline):
                 source = pieces_of(source)
             source = self._cleaned(name, source)
@@ -124,23 +125,27 @@ class Splines(Leg):
         self.point = point if len(self._points) == 1 else None
         return point or "mass-centre"
 
+    def _refuse_keys_of_samples(self, source: Any) -> None:
+        for key in ("interpolation", "ends", "smooth") if not isinstance(source, MotionTable) else ():
+            if getattr(self.stops.keys, key) is not None:
+                raise InputError(key, getattr(self.stops.keys, key), "absent for a motion without samples")
+        if isinstance(source, Placed) and self.stops.keys.point == "origin":
+            raise InputError("point", "origin", '"mass-centre", whose positions functions and motions give')
+
     def _cleaned(self, name: str, source: Any) -> Any:
         # Take the noise off that the plan names, else tell it.
         lines: list[str] = []
         if isinstance(source, MotionTable):
             lines += [f"hint: {line}" for line in unit_hints(source, np.asarray(self.stops.robot_file.base_points))]
-            noise: list[str] = []
-            keys = self.stops.keys
-            if keys.smooth is not None:
+            noise, settings = list[str](), self.stops.keys
+            if settings.smooth is not None:
                 from cspr_jax.curves.smoothing import smoothed  # takes time, and few records are noisy
 
-                source = smoothed(source, keys.smooth, interpolation=keys.interpolation, ends=keys.ends)
+                source = smoothed(source, settings.smooth, interpolation=settings.interpolation, ends=settings.ends)
             elif source.velocities is None:
                 noise = noise_notes(source)
             # Speeds at the ends of a noisy record say nothing.
-            lines += noise or moving_ends(source, self.stops.keys.ends)
-        elif self.stops.keys.smooth is not None:
-            raise InputError("smooth", self.stops.keys.smooth, "absent for a motion without samples")
+            lines += noise or moving_ends(source, settings.ends)
         self._notes += [f"{name}: {line}" for line in (*getattr(source, "notes", ()), *lines)]
         return source
 

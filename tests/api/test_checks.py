@@ -144,6 +144,23 @@ def test_motions_of_this_package():
     np.testing.assert_allclose(motion.state(0.5).position, CubicSpline(TIMES, PLACES, bc_type="clamped")(3.0))
 
 
+@pytest.mark.parametrize("kind", ["function", "motion", "curve"])
+def test_keys_of_samples_are_not_ignored(kind):
+    """What says how samples become a curve is refused where there are none."""
+    robot = cspr_jax.load_robot("prototype")
+    more = {"duration": 1.0} if kind == "function" else {}
+    if kind == "function":
+        source = lambda t: jnp.array([0.0, 0.0, 1.0])  # noqa: E731
+    else:
+        source = CubicSpline(TIMES, PLACES) if kind == "curve" else cspr_jax.spline(robot, TIMES, PLACES)
+    for key, value in {"interpolation": "quintic", "ends": "natural", "smooth": 1e-3}.items():
+        with pytest.raises(ConfigError, match=f"{key} = .*: must be absent for a motion without samples"):
+            cspr_jax.check(robot, source, **more, **{key: value})
+    if kind != "curve":
+        with pytest.raises(ConfigError, match='point = "origin": must be "mass-centre", whose positions'):
+            cspr_jax.check(robot, source, **more, point="origin")
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", ["laval-mssm", "kntu-planar", "cogiro"])
 def test_platforms_keep_their_own_axes(name):
