@@ -2,7 +2,7 @@
 
 import dataclasses
 import itertools
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +18,8 @@ from cspr_jax.paths.section import Section, SectionSettings
 from cspr_jax.paths.smooth import SectionEnds, Smooth, below_ramps, smooth
 from cspr_jax.paths.tightening import BindingName, CellSlacks, Trial, together
 from cspr_jax.paths.timed import PathSpeeds, cell_times, distance_from_path, moving, timed
+from cspr_jax.runtime.progress import Pace
+from cspr_jax.runtime.stages import within
 
 # Rounds of proof and tightening; how often ramps are shortened by half where none of their length exist.
 ROUNDS, SHORTER = 8, 4
@@ -29,6 +31,8 @@ FINER, APART = (2, 4), 0.002
 # Shares of x of the motion without ramps from which the search for one with ramps begins; optima, each with tangents
 # at the one before.
 STARTS, TANGENTS = (0.8, 0.4), 3
+# Sections that are solved together.
+TOGETHER = 64
 
 
 class PhasePlane(NamedTuple):
@@ -95,6 +99,26 @@ def least_time_motion(
         the motion; where tightening ends before all is proved, the last one.
     """
     return least_time_motions(problem, [section], [settings], [pace])[0]
+
+
+def least_times_along(
+    problem: Problem, sections: Sequence[Section], settings: Sequence[SectionSettings], batch: int = TOGETHER
+) -> Iterator[LeastTime]:
+    """Find the fastest motions along sections, however many, and announce how far that is.
+
+    Args:
+        batch: of how many sections are solved together.
+
+    Yields:
+        the motions, as `least_time_motion` finds them.
+    """
+    count, pace = len(sections), Pace()
+    for first in range(0, count, batch):
+        pace.advance(first, count)
+        part, left = slice(first, first + batch), pace.left()
+        with within(f"least time, section {first + 1} of {count}" + f", {left}" * bool(left)):
+            motions = least_time_motions(problem, sections[part], settings[part])
+        yield from motions
 
 
 def least_time_motions(

@@ -2,7 +2,6 @@
 
 import dataclasses
 import itertools
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -24,14 +23,15 @@ from cspr_jax.motions.waypoints import Waypoints
 from cspr_jax.paths.answers import PathAnswers, SectionAnswer, feeds_of
 from cspr_jax.paths.courses import Course, CourseEnds, FileAxes, course_of, course_through
 from cspr_jax.paths.fastest_lines import FastestLines
-from cspr_jax.paths.least_time import LeastTime, least_time_motions
+from cspr_jax.paths.least_time import TOGETHER, LeastTime, least_times_along
 from cspr_jax.paths.section import Section, SectionSettings
 from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.runtime.stages import stage
 
 # Directions of a motion that runs on through a pose differ by no more.
 SAME_DIRECTION = 1e-6
-# Sections that are solved one by one, at most, and those that are solved together, if there are more.
-FEW, TOGETHER = 16, 64
+# Sections that are solved one by one, at most; more are solved together.
+FEW = 16
 # Cells of the grids of all sections: a proof looks at no more blocks.
 MOST_CELLS = 100_000
 
@@ -89,7 +89,9 @@ class Paths(Leg):
         through = np.empty(len(self), object)
         through[:] = [[] for _ in range(len(self))]
         rides = self._rides(problem, z0)
-        for ride, fastest in zip(rides, _least_times(problem, rides), strict=True):
+        sections, settings = [ride.section for ride in rides], [ride.settings for ride in rides]
+        along = least_times_along(problem, sections, settings, TOGETHER if len(rides) > FEW else 1)
+        for ride, fastest in zip(rides, along, strict=True):
             for segment, motion in cut(fastest, ride):
                 parts[segment].append(motion)
             section = section_answer(fastest, ride, stops.first)
@@ -97,6 +99,7 @@ class Paths(Leg):
                 through[segment].append(section)
         motions = [chained(splines) for splines in parts]
         feeds = [feeds_of(sections, segment) for segment, sections in enumerate(through)]
+        stage("proof of all sections")
         answers = proved_answers(problem, motions, scene, feeds)
         columns = {field.name: getattr(answers, field.name) for field in dataclasses.fields(answers)}
         paths = PathAnswers(**columns, sections=through)
@@ -242,14 +245,6 @@ def _settled(run: CourseRun, sections: list[Section], segments: np.ndarray) -> l
         rides.append(Ride(section, SectionSettings(grid, ramp_time, start, end), segments[first:last]))
         first = last
     return rides
-
-
-def _least_times(problem: Problem, rides: list[Ride]) -> Iterator[LeastTime]:
-    # A few sections one by one, and many together.
-    size = TOGETHER if len(rides) > FEW else 1
-    for first in range(0, len(rides), size):
-        part = rides[first : first + size]
-        yield from least_time_motions(problem, [ride.section for ride in part], [ride.settings for ride in part])
 
 
 def section_answer(fastest: LeastTime, ride: Ride, before: int = 0) -> SectionAnswer:

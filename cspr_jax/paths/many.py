@@ -8,12 +8,9 @@ import numpy as np
 from cspr_jax.curves.spline import Spline, chained
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import ProvedAnswers, proved_answers
-from cspr_jax.paths.least_time import LeastTime, least_time_motions
+from cspr_jax.paths.least_time import LeastTime, least_times_along
 from cspr_jax.paths.section import Section, SectionSettings
 from cspr_jax.robots.clearance import Scene
-
-# Sections that are computed together.
-PART = 64
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,11 +48,7 @@ def least_times(
         the motions.
     """
     flat = [section for path in paths for section in path]
-    settings = SectionSettings(grid, ramp_time)
-    motions_along: list[LeastTime] = []
-    for first in range(0, len(flat), PART):
-        part = flat[first : first + PART]
-        motions_along += least_time_motions(problem, part, [settings] * len(part))
+    motions_along = list(least_times_along(problem, flat, [SectionSettings(grid, ramp_time)] * len(flat)))
     ends = np.cumsum([len(path) for path in paths])
     sections = [motions_along[end - len(path) : end] for path, end in zip(paths, ends.tolist(), strict=True)]
     motions = [chained([section.motion for section in path]) for path in sections]

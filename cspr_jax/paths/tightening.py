@@ -15,6 +15,7 @@ from cspr_jax.motions.piece_slacks import Sides, close_bounds
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import TENSIONS
 from cspr_jax.paths.discrete import GridMargins
+from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.verdicts import Verdict, criterion_words
 
 # Slack, over its scale, that is left where a limit is met; by what more than is missed, and by how
@@ -148,8 +149,8 @@ def cell_slacks(problem: Problem, trials: Sequence[Trial]) -> list[CellSlacks]:
         if not has_feed:
             return below, above
         # The lower end of a line above a slack is above its smallest value.
-        speeds, most = speed_slacks(states), feed[cell, None]
-        sides = 1.0 + speeds.low / most, 1.0 + (speeds.high - np.abs(speeds.high_rise)) / most
+        speeds, scale = speed_slacks(states), feed[cell, None]
+        sides = 1.0 + speeds.low / scale, 1.0 + (speeds.high - np.abs(speeds.high_rise)) / scale
         return np.hstack([below, sides[0]]), np.hstack([above, sides[1]])
 
     low, high = close_bounds(bounded, (start, end), STEP, HALVINGS)
@@ -162,24 +163,26 @@ def together(problem: Problem, searches: Sequence[Generator[Trial, CellSlacks, A
     """Results of searches that go on with the bounds of the slacks of their motions, bounded together round by round.
 
     Args:
-        searches: each yields motions, of one degree, and receives their bounds.
+        searches: each yields trials, of motions of one degree, and receives their bounds.
 
     Returns:
         what they return.
     """
     answers: dict[int, Answer] = {}
-    motions: dict[int, Trial] = {}
+    trials: dict[int, Trial] = {}
 
     def resumed(k: int, following: Callable[[], Trial]) -> None:
         try:
-            motions[k] = following()
+            trials[k] = following()
         except StopIteration as end:
             answers[k] = end.value
 
     for k, search in enumerate(searches):
         resumed(k, partial(next, search))
-    while motions:
-        going = list(motions)
-        for k, slacks in zip(going, cell_slacks(problem, [motions.pop(k) for k in going]), strict=True):
+    number = 0
+    while trials:
+        number, going = number + 1, list(trials)
+        stage(f"proof {number}")
+        for k, slacks in zip(going, cell_slacks(problem, [trials.pop(k) for k in going]), strict=True):
             resumed(k, partial(searches[k].send, slacks))
     return [answers[k] for k in range(len(searches))]

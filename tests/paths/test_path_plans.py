@@ -1,5 +1,7 @@
 """Plans of paths: what stands in a file becomes the path of the motion, whatever it takes of time."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -9,6 +11,7 @@ import cspr_jax
 from cspr_jax.config.catalogue import CATALOGUE
 from cspr_jax.config.reading import read_toml
 from cspr_jax.errors import ConfigError
+from cspr_jax.runtime import stages
 
 ROBOT = {"schema": 1, "robot": "prototype", "family": "path", "samples": 201}
 PLATFORM = ROBOT | {"robot": "cogiro"}
@@ -52,6 +55,16 @@ def test_a_path_of_its_own_is_that_between_poses(kind, corner):
     steps = np.diff(walked(each), axis=0) / np.maximum(np.diff(times), 1e-12)[:, None]
     mean = 0.5 * (each.rows()["velocity"][1:] + each.rows()["velocity"][:-1])
     np.testing.assert_allclose(steps[np.diff(times) > 1e-9], mean[np.diff(times) > 1e-9], atol=5e-3)
+
+
+def test_it_says_how_far_it_is():
+    """The section of all, how much time is left from the second one on, and the round of its proof."""
+    heard = []
+    with stages.heard(heard.append):
+        cspr_jax.plan(ROBOT | {"path": {"kind": "line", "grid": 50}, "pose": poses(PLACES)})
+    assert "least time, section 1 of 3: proof 1" in heard
+    assert any(re.fullmatch(r"least time, section 3 of 3, \d:\d\d:\d\d left: proof 1", line) for line in heard)
+    assert heard.index("proof of all sections") > max(i for i, line in enumerate(heard) if "section 3" in line)
 
 
 def test_blends_and_rest():
