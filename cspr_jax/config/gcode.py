@@ -35,7 +35,7 @@ class Move(NamedTuple):
         speed: largest speed, m/s; inf without one.
         feed: the same as the file has it, such as "F600"; "" without one.
         normal: number of the axis about which an arc turns.
-        stops: whether the program pauses behind it.
+        ends_at_rest: whether the program pauses behind it.
     """
 
     line: int
@@ -46,7 +46,7 @@ class Move(NamedTuple):
     speed: float = math.inf
     feed: str = ""
     normal: int = 2
-    stops: bool = False
+    ends_at_rest: bool = False
 
 
 class GcodeProgram(NamedTuple):
@@ -121,8 +121,9 @@ class _GcodeReader:
     def check(self) -> None:
         unknown = [letter for letter, x in zip("XYZ", self.place, strict=True) if x is None]
         if not self.moves and unknown:
-            fault = f"{' and '.join(unknown)}: must be given, absolute: the path begins where X, Y and Z are known"
-            raise ConfigError(self.path, f"no move: {fault}")
+            names = " and ".join(unknown)
+            allowed = "must be given, absolute: the path begins where X, Y and Z are known"
+            raise ConfigError(self.path, f"no move: {names}: {allowed}")
         if not self.moves:
             raise ConfigError(self.path, "no move: must have two places at least, with G0, G1, G2 or G3")
 
@@ -202,9 +203,9 @@ class _GcodeReader:
         for letter, length in self._lengths(axes).items():
             i = "XYZ".find(letter)
             if i >= 0:
-                known = self.place[i]
-                self.place[i] = length if known is None else known
-                self.shift[i] = 0.0 if known is None else length - known
+                before = self.place[i]
+                self.place[i] = length if before is None else before
+                self.shift[i] = 0.0 if before is None else length - before
         self._begin()
 
     def _go_home(self, name: str, axes: dict[str, Word]) -> None:
@@ -219,7 +220,7 @@ class _GcodeReader:
 
     def _pause(self) -> None:
         if self.moves:
-            self.moves[-1] = self.moves[-1]._replace(stops=True)
+            self.moves[-1] = self.moves[-1]._replace(ends_at_rest=True)
             self.paused.append(self.line)
 
     def _move(self, axes: dict[str, Word], line: GcodeLine) -> None:
@@ -256,11 +257,11 @@ class _GcodeReader:
         return self.feed if self.override == 1.0 or not self.feed else f"{self.feed} at {100.0 * self.override:g} %"
 
     def _set_axis(self, i: int, length: float | None) -> None:
-        known = self.place[i]
+        before = self.place[i]
         if length is None:
             return
         if self.modes["distances"] == 91.0:
-            self.place[i] = None if known is None else known + length
+            self.place[i] = None if before is None else before + length
         else:
             self.place[i] = length - self.shift[i]
 

@@ -4,7 +4,7 @@ import math
 from typing import NamedTuple
 
 # By which radii at start and end may differ, of the radius: as controllers have it.
-SHARE = 0.001
+RADIUS_TOLERANCE = 0.001
 # Places that are nearer to each other are one, m.
 SAME_PLACE = 1e-9
 
@@ -57,13 +57,13 @@ def arc_of_radius(start: list[float], end: list[float], radius: float, sign: flo
         ArcError: an arc that there is not.
     """
     across, up = end[0] - start[0], end[1] - start[1]
-    chord, size = math.hypot(across, up), abs(radius)
+    chord, length = math.hypot(across, up), abs(radius)
     if chord <= SAME_PLACE:
         raise ArcError("R", "must be I or J where an arc ends above or at its start")
-    if 0.5 * chord > size + max(missed(half), SHARE * size):
+    if 0.5 * chord > length + max(missed(half), RADIUS_TOLERANCE * length):
         raise ArcError("R", f"must be at least half of the distance, {0.5 * chord:.6g} m")
     # The centre of the shorter arc to the left is on the left.
-    height = math.sqrt(max(size**2 - 0.25 * chord**2, 0.0)) * (sign if radius > 0.0 else -sign)
+    height = math.sqrt(max(length**2 - 0.25 * chord**2, 0.0)) * (sign if radius > 0.0 else -sign)
     return _about(_beside(start, end, height), start, end, sign)
 
 
@@ -84,10 +84,10 @@ def arc_about(start: list[float], end: list[float], centre: list[float], sign: f
         ArcError: radii at start and end that differ too much.
     """
     radius, other = math.dist(start, centre), math.dist(end, centre)
-    allowed = max(missed(half), SHARE * radius)
+    allowed = max(missed(half), RADIUS_TOLERANCE * radius)
     if radius <= SAME_PLACE or not abs(other - radius) <= allowed:
-        fault = f"radius {radius:.6g} m at the start, {other:.6g} m at the end"
-        raise ArcError(fault, f"must be above 0 and differ by at most {allowed:.3g} m")
+        radii = f"radius {radius:.6g} m at the start, {other:.6g} m at the end"
+        raise ArcError(radii, f"must be above 0 and differ by at most {allowed:.3g} m")
     chord = math.dist(start, end)
     if chord <= SAME_PLACE:
         return PlaneArc(centre, sign * 2.0 * math.pi, start)

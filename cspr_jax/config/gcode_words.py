@@ -156,8 +156,8 @@ def _take_code(line: GcodeLine, word: Word, rest: str) -> bool:
             raise WordError(word.text, "must be left out: write the coordinates that it leads to")
         line.skipped.append(word.text)
         return value in (10.0, 11.0, 28.1, 30.1)
-    known = kind is not None or value in SYSTEMS or value in HOME or value in (DWELL, SHIFT, *END_SHIFT)
-    if not known:
+    is_read = kind is not None or value in SYSTEMS or value in HOME or value in (DWELL, SHIFT, *END_SHIFT)
+    if not is_read:
         raise WordError(word.text, f"must be one of {READ}")
     line.codes.append(word)
     return False

@@ -202,12 +202,12 @@ class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys, FreeMotionKeys):
         # A plan of one file is a plan of two poses, which the file decides.
         if not isinstance(data, dict):
             return data
-        keys = {key: data[key] for key in ("motion", "trajectory") if data.get(key) is not None}
-        if "trajectory" in keys and "motion" not in keys:
-            raise fault("trajectory", shown(keys["trajectory"]), "beside motion, the file that holds it")
-        if keys and "pose" in data:
+        source = {key: data[key] for key in ("motion", "trajectory") if data.get(key) is not None}
+        if "trajectory" in source and "motion" not in source:
+            raise fault("trajectory", shown(source["trajectory"]), "beside motion, the file that holds it")
+        if source and "pose" in data:
             raise fault("motion", shown(data["motion"]), "absent beside [[pose]] tables: its file has the whole motion")
-        return data | {"pose": [{}, keys]} if keys else data
+        return data | {"pose": [{}, source]} if source else data
 
     @model_validator(mode="before")
     @classmethod

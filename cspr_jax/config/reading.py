@@ -185,11 +185,11 @@ def refuse_long_numbers(text: str, path: Path) -> None:
     Raises:
         ConfigError: there is one.
     """
-    most = sys.get_int_max_str_digits()
-    number = re.search(rf"[0-9](?:_?[0-9]){{{most},}}", text) if most else None
+    longest = sys.get_int_max_str_digits()
+    number = re.search(rf"[0-9](?:_?[0-9]){{{longest},}}", text) if longest else None
     if number is not None:
         line, digits = text.count("\n", 0, number.start()) + 1, len(number[0].replace("_", ""))
-        raise ConfigError(path, f"line {line}: a number of {digits} digits: must have at most {most}")
+        raise ConfigError(path, f"line {line}: a number of {digits} digits: must have at most {longest}")
 
 
 def _stop(text: str, message: str) -> int:

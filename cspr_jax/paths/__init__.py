@@ -25,7 +25,7 @@ Files, each importing only from those above it:
     tightening          what a motion misses between nodes, and what binds it
     jumping             the fastest motions of several sections, whose accelerations jump
     row_names           names of half-planes
-    still               tension that keeps a robot from standing still
+    static_tension      tension that keeps a robot from standing still
     refusals            the place that no path speed passes
     least_time          the fastest motion along a section
     many                least times along many paths

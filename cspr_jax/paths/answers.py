@@ -14,7 +14,7 @@ from cspr_jax.motions.cause import Cause
 from cspr_jax.motions.proved_answers import ProvedAnswers
 from cspr_jax.paths.least_time import LeastTime
 from cspr_jax.paths.refusals import NoMotion
-from cspr_jax.paths.still import StaticTension
+from cspr_jax.paths.static_tension import StaticTension
 from cspr_jax.paths.tightening import BindingName
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import Verdict, criterion_words
@@ -130,7 +130,7 @@ class PathCause(Cause):
         against: flag and cable of the other one; None: the speeds from which the rest of the path can be run along.
         end: "start" or "end" of the section, else "".
         speeds: smallest and largest possible speed of such an end, m/s.
-        still: tension that keeps the robot from standing still there; None: it can.
+        static_tension: tension that keeps the robot from standing still there; None: it can.
     """
 
     s: float = math.nan
@@ -139,12 +139,12 @@ class PathCause(Cause):
     against: tuple[str, int | None] | None = None
     end: str = ""
     speeds: tuple[float, float] = (math.nan, math.nan)
-    still: StaticTension | None = None
+    static_tension: StaticTension | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The cause as a plan's JSON has it; see `Cause.to_dict`."""
         table = super().to_dict() | {"s": self.s, "position": list(self.position)}
-        table["still"] = None if self.still is None else self.still.to_dict()
+        table["still"] = None if self.static_tension is None else self.static_tension.to_dict()
         if self.end:
             return table | {"end": self.end, "speeds": list(self.speeds)}
         criterion, cable = self.against or (None, None)
@@ -153,20 +153,15 @@ class PathCause(Cause):
     @property
     def text(self) -> str:
         """The cause in words, in one line."""
-        place = ", ".join(_shown(round(value, PLACES)) for value in self.position)
-        still = ""
-        if self.still is not None:
-            where = ", ".join(_shown(round(value, PLACES)) for value in self.still.position.tolist())
-            still = f"cannot stand still at ({where}): {self.still.text}; "
+        position, static, line = _coordinates(self.position), self.static_tension, ""
+        if static is not None:
+            line = f"cannot stand still at ({_coordinates(static.position.tolist())}): {static.text}; "
         if self.end:
             low, high = (_shown(speed) for speed in self.speeds)
-            return still + (
-                f"{self.end}_speed = {_shown(self.needed)} m/s is not possible at ({place}): from {low} to {high} m/s "
-                "are"
-            )
+            speed = f"{self.end}_speed = {_shown(self.needed)} m/s"
+            return f"{line}{speed} is not possible at ({position}): from {low} to {high} m/s are"
         one = _limit(self.criterion, self.cables[0] if self.cables else None)
-        line = f"no path speed passes s = {_shown(self.s)} m at ({place})"
-        line = f"{still}{line}"
+        line += f"no path speed passes s = {_shown(self.s)} m at ({position})"
         if not math.isfinite(self.needed):
             return f"{line}: {one} cannot be kept there"
         other = "the way on" if self.against is None else _limit(*self.against)
@@ -179,6 +174,10 @@ class PathCause(Cause):
 
 def _limit(criterion: str, cable: int | None) -> str:
     return f"the {criterion_words(Verdict[criterion.upper()], cable)}"
+
+
+def _coordinates(position: Iterable[float]) -> str:
+    return ", ".join(_shown(round(value, PLACES)) for value in position)
 
 
 def _shown(value: float) -> str:
@@ -255,6 +254,7 @@ def _cause_of(failure: NoMotion, t: float, usual: Cause, frame: Frame) -> PathCa
     needs = names[0] is not None
     (criterion, cable), *others = [name for name in names if name is not None]
     against = (others[0][0].text, others[0][1]) if others else None
+    static = failure.static_tension
     return PathCause(
         criterion=criterion.text,
         cables=() if cable is None else (cable,),
@@ -268,5 +268,5 @@ def _cause_of(failure: NoMotion, t: float, usual: Cause, frame: Frame) -> PathCa
         against=against,
         end=failure.end,
         speeds=failure.speeds,
-        still=None if failure.still is None else failure.still._replace(position=frame.outward(failure.still.position)),
+        static_tension=None if static is None else static._replace(position=frame.outward(static.position)),
     )

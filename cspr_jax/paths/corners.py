@@ -39,7 +39,7 @@ def tracks_of(elements: Sequence[Element], corners: Corners = "stop", tolerance:
     Returns:
         the tracks.
     """
-    cuts = [None if corners == "every" else _cut(*pair, corners, tolerance) for pair in itertools.pairwise(elements)]
+    cuts = _cuts(elements, corners, tolerance)
     stops = [i + 1 for i, cut in enumerate(cuts) if cut is None]
     tracks = []
     for first, last in zip([0, *stops], [*stops, len(elements)], strict=True):
@@ -47,12 +47,20 @@ def tracks_of(elements: Sequence[Element], corners: Corners = "stop", tolerance:
     return tracks
 
 
-def _cut(before: Element, after: Element, corners: Corners, tolerance: float) -> float | None:
-    # Length that a blend takes off both elements; 0 where the direction goes on, None where the motion stops.
-    if before.stops or not (before.moves and after.moves):
-        return None
-    one, other = _end(before), after.nodes(0.0, after.length).first[0]
-    angle = float(np.arctan2(np.linalg.norm(np.cross(one, other)), one @ other))
+def _cuts(elements: Sequence[Element], corners: Corners, tolerance: float) -> list[float | None]:
+    # Lengths that blends take off both elements; 0 where the direction goes on, None where the motion stops.
+    directions = np.array([element.directions for element in elements])
+    one, other = directions[:-1, 1], directions[1:, 0]
+    angles = np.arctan2(np.linalg.norm(np.cross(one, other), axis=1), np.sum(one * other, axis=1)).tolist()
+    return [
+        None
+        if corners == "every" or before.ends_at_rest or not (before.moves and after.moves)
+        else _cut(before, after, angle, corners, tolerance)
+        for (before, after), angle in zip(itertools.pairwise(elements), angles, strict=True)
+    ]
+
+
+def _cut(before: Element, after: Element, angle: float, corners: Corners, tolerance: float) -> float | None:
     if angle <= SAME_DIRECTION:
         return 0.0
     if angle <= ROUNDED_DIRECTION:
@@ -66,10 +74,6 @@ def _cut(before: Element, after: Element, corners: Corners, tolerance: float) ->
     while (distance := float(np.linalg.norm(_blend(before, after, length)(length) - corner))) > tolerance:
         length *= max(0.5, 0.99 * tolerance / distance)
     return length
-
-
-def _end(element: Element) -> np.ndarray:
-    return element.nodes(0.0, element.length).first[-1]
 
 
 def _blend(before: Element, after: Element, length: float) -> BPoly:
@@ -102,14 +106,8 @@ def _track(elements: Sequence[Element], cuts: Sequence[float]) -> Track:
             middle = s
         marks.append(middle)
     joined = Nodes(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
-    place, first = _met(joined)
-    return Track(joined.s, place, first, joined.second, np.concatenate(speeds), np.array(marks))
-
-
-def _met(nodes: Nodes) -> tuple[np.ndarray, np.ndarray]:
-    # Places and directions where two elements meet, without the rounding by which they miss each other.
-    twice = np.flatnonzero(np.diff(nodes.s) == 0.0)
-    place, first = nodes.place.copy(), nodes.first.copy()
-    for values in (place, first):
+    twice = np.flatnonzero(joined.s[1:] == joined.s[:-1])
+    for values in (joined.place, joined.first) if len(twice) else ():
+        # Elements miss each other by rounding.
         values[twice] = values[twice + 1] = 0.5 * (values[twice] + values[twice + 1])
-    return place, first
+    return Track(joined.s, joined.place, joined.first, joined.second, np.concatenate(speeds), np.array(marks))

@@ -144,9 +144,9 @@ def discretes(problem: Problem, sections: Sequence[Section], settings: Sequence[
         the sections, without margins.
     """
     robot = problem.robot
-    most = np.inf if problem.limits.speed_max is None else float(problem.limits.speed_max)
+    speed_max = np.inf if problem.limits.speed_max is None else float(problem.limits.speed_max)
     grids = [
-        grid_of(section, each.grid, (each.start_speed == 0.0, each.end_speed == 0.0), most)
+        grid_of(section, each.grid, (each.start_speed == 0.0, each.end_speed == 0.0), speed_max)
         for section, each in zip(sections, settings, strict=True)
     ]
     sides = side_rows(robot, problem.limits, [section.curve for section in sections], grids)

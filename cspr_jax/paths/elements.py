@@ -1,6 +1,7 @@
 """Elements of paths: straight lines and arcs, over their travelled length."""
 
 import dataclasses
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -36,24 +37,30 @@ class Straight:
         end: (3,) m.
         turn: travelled length of one that only turns on the spot, in place of m; rad.
         speed: largest speed, m/s.
-        stops: whether the motion stops behind it in any case.
+        ends_at_rest: whether the motion stops behind it in any case.
     """
 
     start: np.ndarray
     end: np.ndarray
     turn: float = 0.0
     speed: float = np.inf
-    stops: bool = False
+    ends_at_rest: bool = False
 
-    @property
+    @cached_property
     def moves(self) -> bool:
         """Tell whether it has a direction."""
         return bool(np.linalg.norm(self.end - self.start) > SAME_PLACE)
 
-    @property
+    @cached_property
     def length(self) -> float:
         """Travelled length, m; of one that only turns its angle, rad."""
         return float(np.linalg.norm(self.end - self.start)) if self.moves else self.turn
+
+    @property
+    def directions(self) -> np.ndarray:
+        """Directions at its start and at its end, (2, 3) unit vectors."""
+        step = (self.end - self.start) / self.length
+        return np.array([step, step])
 
     def nodes(self, first: float, last: float) -> Nodes:
         """Nodes between two lengths.
@@ -66,10 +73,9 @@ class Straight:
             two nodes.
         """
         s, length = np.array([first, last]), self.length
-        step = (self.end - self.start) / length
         # Whole lines meet their ends without rounding.
         place = self.start * (1.0 - s / length)[:, None] + self.end * (s / length)[:, None]
-        return Nodes(s, place, np.tile(step, (2, 1)), np.zeros((2, 3)))
+        return Nodes(s, place, self.directions, np.zeros((2, 3)))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,7 +89,7 @@ class Arc:
         angle: by which it turns, by the rule of the right hand, rad; not zero.
         rise: along the axis, from start to end, m.
         speed: largest speed, m/s.
-        stops: whether the motion stops behind it in any case.
+        ends_at_rest: whether the motion stops behind it in any case.
     """
 
     centre: np.ndarray
@@ -93,9 +99,9 @@ class Arc:
     rise: float = 0.0
     speed: float = np.inf
     moves: bool = True
-    stops: bool = False
+    ends_at_rest: bool = False
 
-    @property
+    @cached_property
     def length(self) -> float:
         """Travelled length, m."""
         return float(np.hypot(self.angle * np.linalg.norm(self.start - self.centre), self.rise))
@@ -104,6 +110,11 @@ class Arc:
     def end(self) -> np.ndarray:
         """Place of its end, (3,) m."""
         return self.nodes(0.0, self.length).place[-1]
+
+    @property
+    def directions(self) -> np.ndarray:
+        """Directions at its start and at its end; see `Straight.directions`."""
+        return self.nodes(0.0, self.length).first[[0, -1]]
 
     def nodes(self, first: float, last: float) -> Nodes:
         """Nodes between two lengths, near enough to each other for quintic pieces; see `Straight.nodes`."""

@@ -64,14 +64,14 @@ class Places(NamedTuple):
     offset: Any
 
 
-def grid_of(section: Section, count: int, slow: tuple[bool, bool], most: float = np.inf) -> PathGrid:
+def grid_of(section: Section, count: int, slow: tuple[bool, bool], speed_max: float = np.inf) -> PathGrid:
     """Nodes of a section: close together where it is slow, as instants of a motion that speeds up and slows down are.
 
     Args:
         section: NumPy leaves.
         count: number of cells; more where two such places are closer than nodes.
         slow: whether it begins, and whether it ends, at zero speed.
-        most: largest speed of the mass centre anywhere, m/s.
+        speed_max: largest speed of the mass centre anywhere, m/s.
 
     Returns:
         the nodes.
@@ -87,7 +87,7 @@ def grid_of(section: Section, count: int, slow: tuple[bool, bool], most: float =
         else:
             nodes = np.insert(nodes, np.searchsorted(nodes, place), place)
     speed = section.speed[_pieces(knots, 0.5 * (nodes[1:] + nodes[:-1]))]
-    return PathGrid(nodes, np.minimum(speed, most), np.where(speed < most, speed, np.inf))
+    return PathGrid(nodes, np.minimum(speed, speed_max), np.where(speed < speed_max, speed, np.inf))
 
 
 def _pieces(knots: np.ndarray, places: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from cspr_jax.paths.controllable import FLAT, GridSolution
 from cspr_jax.paths.discrete import Discrete
 from cspr_jax.paths.nodes import places_on, state_at
 from cspr_jax.paths.row_names import RowName, row_names
-from cspr_jax.paths.still import StaticTension, static_tension
+from cspr_jax.paths.static_tension import StaticTension, static_tension
 from cspr_jax.robots.state import State
 
 # Names of what no half-plane of a place is: speeds from which the rest of the path can be run along.
@@ -31,7 +31,7 @@ class NoMotion(NamedTuple):
             nearest, m/s.
         end: "start" or "end" where the speed there is not possible, else "".
         speeds: smallest and largest possible speed of such an end, m/s.
-        still: tension that keeps the robot from standing still there; None: it can.
+        static_tension: tension that keeps the robot from standing still there; None: it can.
     """
 
     coordinate: float
@@ -41,7 +41,7 @@ class NoMotion(NamedTuple):
     allowed: float
     end: str = ""
     speeds: tuple[float, float] = (np.nan, np.nan)
-    still: StaticTension | None = None
+    static_tension: StaticTension | None = None
 
 
 def refusal(problem: Problem, path: Discrete, solution: GridSolution) -> NoMotion:
@@ -59,35 +59,31 @@ def refusal(problem: Problem, path: Discrete, solution: GridSolution) -> NoMotio
     position = np.asarray(state.position)
     # A body that turns on the spot has no acceleration along its path in m/s^2.
     slope, coordinate = float(np.linalg.norm(state.velocity)) or np.nan, float(path.grid.nodes[node])
+    static = _static_tension(problem, path, node)
     if 0 <= cell < n_cells:
         needed, allowed, rows = _meeting(path, solution, cell)
         known = row_names(problem, state, *(np.asarray(share[cell]) for share in path.start[:2]))
         # Half-planes of both ends of a cell follow each other; those beyond lead into the next set.
         names = tuple(known[row % len(known)] if row < 2 * len(known) else WAY_ON for row in rows)
-        still = _still(problem, path, node)
-        return NoMotion(coordinate, position, names, slope * needed, slope * allowed, still=still)
+        return NoMotion(coordinate, position, names, slope * needed, slope * allowed, static_tension=static)
     is_start = cell < 0
     ends = (solution.low[0], solution.high[0]) if is_start else (0.0, path.cap()[-1])
     low, high = (slope * float(np.sqrt(max(x, 0.0))) for x in ends)
     speed = slope * float(np.sqrt(path.ends[0 if is_start else 1]))
     nearest = low if speed < low else high
-    still = _still(problem, path, node)
-    return NoMotion(coordinate, position, (), speed, nearest, "start" if is_start else "end", (low, high), still)
+    return NoMotion(coordinate, position, (), speed, nearest, "start" if is_start else "end", (low, high), static)
 
 
 def _state(path: Discrete, node: int) -> State:
-    place = places_on(path.section.curve, path.grid.nodes[[node]], ahead=node < len(path.grid.width))
-    return state_at(jax.tree.map(lambda leaf: leaf[0], place))
+    places = places_on(path.section.curve, path.grid.nodes[[node]], ahead=node < len(path.grid.width))
+    return state_at(jax.tree.map(lambda leaf: leaf[0], places))
 
 
-def _still(problem: Problem, path: Discrete, node: int) -> StaticTension | None:
+def _static_tension(problem: Problem, path: Discrete, node: int) -> StaticTension | None:
     # The tension at the place itself, or else at an end at which the motion is to rest.
     ends = [end for end, x in zip((0, len(path.grid.width)), path.ends, strict=True) if x == 0.0]
-    for each in (node, *ends):
-        still = static_tension(problem, _state(path, each))
-        if still is not None:
-            return still
-    return None
+    tensions = (static_tension(problem, _state(path, each)) for each in (node, *ends))
+    return next((tension for tension in tensions if tension is not None), None)
 
 
 def _meeting(path: Discrete, solution: GridSolution, cell: int) -> tuple[float, float, tuple[int, ...]]:

@@ -128,11 +128,11 @@ def retraced(
 
 def _feed(motions: MotionSequence, part: SmoothPart, feeds: Sequence[np.ndarray | None]) -> float:
     # Feed in a smooth part, which lies in one piece of its motion.
-    known = feeds[part.motion] if feeds else None
-    if known is None:
+    pieces = feeds[part.motion] if feeds else None
+    if pieces is None:
         return np.inf
     ends = motions.ends(part.motion)
-    return float(known[np.searchsorted(ends, 0.5 * (part.start + part.end), side="right") - 1])
+    return float(pieces[np.searchsorted(ends, 0.5 * (part.start + part.end), side="right") - 1])
 
 
 def _path(motions: MotionSequence, parts: list[SmoothPart], cells: int, feeds: Sequence[np.ndarray | None]) -> Retraced:

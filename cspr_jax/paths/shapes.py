@@ -50,9 +50,9 @@ def elements_of(moves: Sequence[Move]) -> list[Element]:
     for move in moves:
         start, end = np.array(move.start), np.array(move.end)
         if move.centre is None:
-            elements.append(Straight(start, end, speed=move.speed, stops=move.stops))
+            elements.append(Straight(start, end, speed=move.speed, ends_at_rest=move.ends_at_rest))
         else:
             centre, axis = np.roll([*move.centre, move.start[move.normal]], move.normal + 1), np.eye(3)[move.normal]
             rise = float((end - start)[move.normal])
-            elements.append(Arc(centre, start, axis, move.angle, rise, move.speed, stops=move.stops))
+            elements.append(Arc(centre, start, axis, move.angle, rise, move.speed, ends_at_rest=move.ends_at_rest))
     return elements

@@ -210,11 +210,11 @@ G28 X0
 
 def test_what_is_skipped_is_counted(tmp_path):
     first, second = moves(tmp_path, SLICED)
-    assert (first.start, first.stops, first.feed) == ([0.01, 0.02, pytest.approx(0.0003)], True, "F1500")
+    assert (first.start, first.ends_at_rest, first.feed) == ([0.01, 0.02, pytest.approx(0.0003)], True, "F1500")
     assert second.end == [0.02, 0.03, pytest.approx(0.0003)]
     # The motion stops for a pause although the corner could be blended.
     assert len(tracks_of(elements_of([first, second]), "blend", 0.001)) == 2
-    assert len(tracks_of(elements_of([first._replace(stops=False), second]), "blend", 0.001)) == 1
+    assert len(tracks_of(elements_of([first._replace(ends_at_rest=False), second]), "blend", 0.001)) == 1
     skipped, *others = notes(tmp_path, SLICED)
     assert "9 words that change no path are skipped" in skipped
     for words in ("E (3 times)", "G28 (2 times)", "M140", "M104", "M82", "M106"):

@@ -166,13 +166,13 @@ def _average(points: list[Element], times: np.ndarray, values: np.ndarray, path:
     return np.vstack([ends[0], (means[1:] + means[:-1]) / 2.0, ends[1]])
 
 
-def _check_turns(angles: np.ndarray, path: Path, place: str) -> None:
+def _check_turns(angles: np.ndarray, path: Path, name: str) -> None:
     largest = 2.0 * math.pi * MOST_TURNS
     far = np.flatnonzero((np.abs(angles) > largest).any(axis=1))
     if len(far):
         angle = float(np.abs(angles[far[0]]).max())
         allowed = f"at most {MOST_TURNS} turns, {largest:.6g} rad"
-        raise ConfigError(path, f"{place}, point {far[0] + 1}.q: an angle of {angle:g} rad: must be {allowed}")
+        raise ConfigError(path, f"{name}, point {far[0] + 1}.q: an angle of {angle:g} rad: must be {allowed}")
 
 
 def _curves(

@@ -53,6 +53,18 @@ MOST_LISTED = 24  # columns in a message
 MOST_SUGGESTIONS = 5  # columns that are not read, each of which gets a line
 
 
+def plain_names(count: int, has_times: bool) -> tuple[str, ...]:
+    """Names of columns that nothing names.
+
+    Args:
+        has_times: whether the table is that of a motion, and not of a path.
+
+    Returns:
+        the names; empty: so many columns say nothing.
+    """
+    return (PLAIN if has_times else PLAIN_PATH).get(count, ())
+
+
 @dataclasses.dataclass(frozen=True)
 class MotionColumns:
     """Columns of a table.
@@ -170,17 +182,17 @@ def columns(
         raise ConfigError(
             path, f"line {line}: {count} columns without a header: must be {counts}, or name them: {words}"
         )
-    parts, placed = ([Head(name, "") for name in plain[count]], {}) if heads is None else taken(heads, has_times)
+    parts, placed = ([Head(name, "") for name in plain[count]], {}) if heads is None else identified(heads, has_times)
     texts = list(plain[count]) if heads is None else heads
     names, factors = list[str](), list[float]()
     for column, (name, unit) in enumerate(parts):
-        place, other = f"line {line}, column {column + 1}", (own_units or {}).get(column, "")
+        location, other = f"line {line}, column {column + 1}", (own_units or {}).get(column, "")
         if name and name in names:
-            raise ConfigError(path, f"{place}: {shown(texts[column])} stands twice: must stand once")
+            raise ConfigError(path, f"{location}: {shown(texts[column])} stands twice: must stand once")
         if name and not {unit, other}.intersection(NO_UNIT) and unit_of(unit) != unit_of(other):
-            raise ConfigError(path, f"{place}: units {shown(unit)} and {shown(other)}: must be one")
+            raise ConfigError(path, f"{location}: units {shown(unit)} and {shown(other)}: must be one")
         names.append(name)
-        factors.append(_factor(name, other if unit in NO_UNIT else unit, common, place, path) if name else 1.0)
+        factors.append(_factor(name, other if unit in NO_UNIT else unit, common, location, path) if name else 1.0)
     is_written = "position_x" in texts and "velocity_x" in texts
     lines = [*notes, *_unread(texts, names)]
     if placed:
@@ -198,7 +210,7 @@ def columns(
     return result
 
 
-def taken(heads: list[str], has_times: bool) -> tuple[list[Head], dict[int, str]]:
+def identified(heads: list[str], has_times: bool) -> tuple[list[Head], dict[int, str]]:
     """Names and units of heads; and the names, by the numbers of columns, that units and positions alone give.
 
     The one column of times has another name, or columns stand in the order of `PLAIN` and all have units.
@@ -209,7 +221,7 @@ def taken(heads: list[str], has_times: bool) -> tuple[list[Head], dict[int, str]
     Returns:
         one for each head, and those names.
     """
-    parts, plain = resolved(heads), (PLAIN if has_times else PLAIN_PATH).get(len(heads), ())
+    parts, plain = resolved(heads), plain_names(len(heads), has_times)
     names, placed = [part.name for part in parts], dict[int, str]()
     timed = [k for k, part in enumerate(parts) if not part.name and kind_of_unit(part.unit) == "time"]
     if has_times and "t" not in names and len(timed) == 1:
@@ -295,7 +307,7 @@ def _check(result: MotionColumns, path: Path, line: int, has_times: bool) -> Non
             if needed:
                 unread = [head for head, name in zip(result.heads, result.names, strict=True) if not name and head]
                 question = did_you_mean(needed[0], unread)
-                plain = (PLAIN if has_times else PLAIN_PATH).get(len(result.heads), ())
+                plain = plain_names(len(result.heads), has_times)
                 called = f", which would have to be called {', '.join(plain)}" if plain and unread else ""
                 raise ConfigError(
                     path,

@@ -101,8 +101,8 @@ def unit_of(word: str) -> str:
         if parts is not None:
             above, below = parts[1], parts[2] + ("^2" if parts[3] in "2²" else "")
     above, below = above.strip(), below.strip().strip("()")
-    head, mark, power = below.partition("^")
-    below = _UNIT_WORDS.get(head, head) + mark + power
+    head, caret, power = below.partition("^")
+    below = _UNIT_WORDS.get(head, head) + caret + power
     return _UNIT_WORDS.get(above, above) + (f"/{below}" if below else "")
 
 
@@ -122,8 +122,8 @@ def is_unit(word: str) -> bool:
     Returns:
         True if it is one.
     """
-    above, mark, below = unit_of(word).partition("/")
-    return kind_of_unit(above) is not None and (not mark or below.rstrip("2").rstrip("^") in TIMES)
+    above, slash, below = unit_of(word).partition("/")
+    return kind_of_unit(above) is not None and (not slash or below.rstrip("2").rstrip("^") in TIMES)
 
 
 def resolved(heads: list[str]) -> list[Head]:
@@ -196,13 +196,13 @@ def _time(stem: str) -> str:
     return "t" if _TIME_WORDS.intersection(_words(stem)) else ""
 
 
-def _lettered(stem: str, known: set[str], joined: re.Pattern, letters: str, prefix: str) -> str:
+def _lettered(stem: str, group_words: set[str], joined: re.Pattern, letters: str, prefix: str) -> str:
     # The letter of an axis in a name such as tx, pos_x, pose.position.x, p_RS_R_x or X-Position.
     words = _words(stem)
     match = joined.fullmatch(words[0]) if len(words) == 1 else None
     if match is not None:
         return prefix + next(filter(None, match.groups()))
-    for k in (-1, 0) if len(words) > 1 and known.intersection(words) else ():
+    for k in (-1, 0) if len(words) > 1 and group_words.intersection(words) else ():
         if words[k] in set(letters):
             return prefix + words[k]
     return ""

@@ -9,7 +9,7 @@ import math
 import re
 from pathlib import Path
 
-from cspr_jax.config.motions.columns import PLAIN, PLAIN_PATH, MotionColumns, columns, directives, taken
+from cspr_jax.config.motions.columns import MotionColumns, columns, directives, identified, plain_names
 from cspr_jax.config.motions.heads import NO_UNIT, is_unit, kind_of_unit, mentioned, units_within
 from cspr_jax.errors import ConfigError, shown
 
@@ -37,11 +37,11 @@ class Preamble:
         self.directives: dict[str, str] = {}
         self.columns: MotionColumns
         self._comments: list[tuple[int, str]] = []
-        self._size = 0
+        self._comment_length = 0
         self._names: tuple[int, str] | None = None
-        self._units: tuple[int, list[str]] | None = None
+        self._units: list[str] | None = None
 
-    def takes(self, line: int, row: str) -> bool:
+    def takes(self, line: int, text: str) -> bool:
         """Take a line.
 
         Returns:
@@ -50,22 +50,22 @@ class Preamble:
         Raises:
             ConfigError: columns that are missing, ambiguous or too many.
         """
-        if is_comment(row):
-            self._size += len(row)
-            if self._size > LARGEST_COMMENTS:
+        if is_comment(text):
+            self._comment_length += len(text)
+            if self._comment_length > LARGEST_COMMENTS:
                 raise ConfigError(
                     self.path, f"line {line}: more than {LARGEST_COMMENTS} letters of comments: must be above fewer"
                 )
-            self._comments.append((line, row.strip(' \t"').rstrip(",;").lstrip("#%! \t")))
+            self._comments.append((line, text.strip(' \t"').rstrip(",;").lstrip("#%! \t")))
             return True
-        if not has_content(row):
+        if not has_content(text):
             return True
         if self._names is None and self._units is None:
-            return self._first(line, row)
-        if self._units is None and self._is_row_of_units(row):
-            self._units = (line, cells_of(row, self.delimiter))
+            return self._first(line, text)
+        if self._units is None and self._is_row_of_units(text):
+            self._units = cells_of(text, self.delimiter)
             return True
-        self._finish(row)
+        self._finish(text)
         return False
 
     def end(self) -> None:
@@ -77,41 +77,40 @@ class Preamble:
         if self._names is not None:
             self._finish(None)
 
-    def _first(self, line: int, row: str) -> bool:
-        match = _SEPARATOR_LINE.fullmatch(row.strip(" \n"))
+    def _first(self, line: int, text: str) -> bool:
+        match = _SEPARATOR_LINE.fullmatch(text.strip(" \n"))
         if match is not None:
             self.delimiter = match[1]
             return True
-        cells = cells_of(row, self._delimiter_of(row))
-        while len(cells) > 1 and not cells[-1]:
-            cells.pop()
+        cells = cells_of(text, self._delimiter_of(text))
+        cells = cells[: len(cells) - _empty_at_end(cells)]
         is_row = all(is_number(cell) for cell in cells)
         if is_row or (any(is_number(cell) for cell in cells) and self._names_row(cells)):
-            self._finish(row, line)
+            self._finish(text, line)
             return False
-        self._names = (line, row)
+        self._names = (line, text)
         return True
 
-    def _delimiter_of(self, row: str) -> str | None:
-        if self.delimiter is not None and self.delimiter in row:
+    def _delimiter_of(self, text: str) -> str | None:
+        if self.delimiter is not None and self.delimiter in text:
             return self.delimiter
-        return next((mark for mark in SEPARATORS if mark in row), None)
+        return next((separator for separator in SEPARATORS if separator in text), None)
 
     def _names_row(self, cells: list[str]) -> bool:
         # Tell whether comments name the columns of a row that has text too, in columns that are not read.
         _, heads = self._named_by_comment(len(cells))
         if heads is None:
             return False
-        parts, _ = taken(heads, self.has_times)
+        parts, _ = identified(heads, self.has_times)
         return all(is_number(cell) for cell, part in zip(cells, parts, strict=True) if part.name)
 
     def _is_row_of_units(self, row: str) -> bool:
-        names = self._names[1] if self._names is not None else ""
+        _, names = self._names or (0, "")
         self._set_delimiter(names, row)
         heads, cells = self._heads(names), cells_of(row, self.delimiter)
         if len(cells) > len(heads) or any(is_number(cell) and cell not in NO_UNIT for cell in cells):
             return False
-        return _are_units(cells, [part.name for part in taken(heads, self.has_times)[0]])
+        return _are_units(cells, [part.name for part in identified(heads, self.has_times)[0]])
 
     def _set_delimiter(self, names: str | None, row: str | None) -> None:
         # Rows may have another separator than the names above them.
@@ -125,18 +124,17 @@ class Preamble:
 
     def _heads(self, names: str) -> list[str]:
         text = _COMMENT_BEHIND.split(names)[0].strip(" \n")
-        is_inside = self.delimiter is not None and self.delimiter in text
-        return _split(text, self.delimiter if is_inside else _separator_of(text))
+        return _split(text, self._delimiter_of(text))
 
     def _finish(self, row: str | None, line: int = 0) -> None:
         self.directives = directives(self._comments, self.path)
-        names = None if self._names is None else self._names[1]
+        line, names = self._names or (line, None)
         self._set_delimiter(names, row)
         cells = [] if row is None else cells_of(row, self.delimiter)
         heads = None if names is None else self._heads(names)
         empty = _empty_at_end(cells)
         if heads is not None:
-            line, spare = self._names[0], _empty_at_end(heads)  # type: ignore[index]
+            spare = _empty_at_end(heads)
             heads = heads[: len(heads) - spare]
             # Empty cells of columns with a name are values that are missing.
             self.tail = max(spare, min(empty, len(cells) - len(heads)))
@@ -148,8 +146,7 @@ class Preamble:
         named, names_line = line, heads
         if heads is None:
             named, names_line = self._named_by_comment(count)
-        units = {} if self._units is None else dict(enumerate(self._units[1]))
-        units = units or self._commented_units(count, names_line)
+        units = dict(enumerate(self._units or ())) or self._commented_units(count, names_line)
         notes = self._refuse_contradictions(count, heads is None, names_line is None, bool(units), names_line or [])
         common = self.directives.get("units", "")
         self.columns = columns(
@@ -160,7 +157,7 @@ class Preamble:
         # Number and heads of the last comment that has a name for each column.
         for line, text in reversed(self._comments):
             for heads in _readings(text, count):
-                names = {part.name for part in taken(heads, self.has_times)[0]}
+                names = {part.name for part in identified(heads, self.has_times)[0]}
                 needed = ("t", "x", "z") if self.has_times else ("x", "z")
                 if names.issuperset(needed) and not _are_units(heads, heads):
                     return line, heads
@@ -168,15 +165,15 @@ class Preamble:
 
     def _commented_units(self, count: int, heads: list[str] | None) -> dict[int, str]:
         # Units of the last comment that has nothing but one for each column, or the names of a header with units.
-        plain = (PLAIN if self.has_times else PLAIN_PATH).get(count, ())
-        names = list(plain) if heads is None else [part.name for part in taken(heads, self.has_times)[0]]
+        plain = plain_names(count, self.has_times)
+        names = list(plain) if heads is None else [part.name for part in identified(heads, self.has_times)[0]]
         if len(names) != count:
             return {}
         for _, text in reversed(self._comments):
             for words in _readings(text, count):
                 if _are_units(words, names):
                     return dict(enumerate(words))
-                parts = taken(words, self.has_times)[0]
+                parts = identified(words, self.has_times)[0]
                 if heads is not None and {part.name for part in parts} == set(names):
                     units = {part.name: part.unit for part in parts}
                     return {k: units[name] for k, name in enumerate(names)}
@@ -187,7 +184,7 @@ class Preamble:
     ) -> list[str]:
         # Comments that speak of columns or units where nothing says it in a way that is read; notes about others.
         free = [(line, text) for line, text in self._comments if len(text) <= LONGEST_COMMENT and not _is_said(text)]
-        plain = (PLAIN if self.has_times else PLAIN_PATH).get(count, ())
+        plain = plain_names(count, self.has_times)
         spoken = [(line, text, mentioned(text)) for line, text in free]
         if is_unnamed:
             for line, text, names in spoken:
@@ -202,7 +199,11 @@ class Preamble:
             for line, text, names in spoken
             if names and is_unnamed
         ][:MOST_HINTS]
-        if has_units or "units" in self.directives or any(kind_of_unit(part.unit) for part in taken(heads, True)[0]):
+        if (
+            has_units
+            or "units" in self.directives
+            or any(kind_of_unit(part.unit) for part in identified(heads, True)[0])
+        ):
             return notes
         for line, text, names in spoken:
             units = units_within(text)
@@ -229,22 +230,22 @@ class Preamble:
         )
 
 
-def is_comment(row: str) -> bool:
+def is_comment(text: str) -> bool:
     """Tell whether a line is a comment as a whole, also one that a spreadsheet has quoted.
 
     Returns:
         True if it is.
     """
-    return row.lstrip(' \t"').startswith(MARKS)
+    return text.lstrip(' \t"').startswith(MARKS)
 
 
-def has_content(row: str) -> bool:
+def has_content(text: str) -> bool:
     """Tell whether a line has a cell with content.
 
     Returns:
         True if it has.
     """
-    return not row.lstrip().startswith("%") and bool(row.split("#")[0].strip(" \t,;\n"))
+    return not text.lstrip().startswith("%") and bool(text.split("#")[0].strip(" \t,;\n"))
 
 
 def cells_of(row: str, delimiter: str | None) -> list[str]:
@@ -280,10 +281,6 @@ def number_of(cell: str) -> float:
         return math.nan
 
 
-def _separator_of(text: str) -> str | None:
-    return next((mark for mark in SEPARATORS if mark in text), None)
-
-
 def _split(text: str, delimiter: str | None) -> list[str]:
     # Heads; blanks part names, but not a name and its unit.
     if delimiter is not None:
@@ -292,10 +289,8 @@ def _split(text: str, delimiter: str | None) -> list[str]:
 
 
 def _empty_at_end(cells: list[str]) -> int:
-    count = 0
-    while count < len(cells) - 1 and not cells[-1 - count]:
-        count += 1
-    return count
+    filled = [k for k, cell in enumerate(cells) if cell]
+    return max(len(cells) - 1, 0) - max(filled, default=0)
 
 
 def _readings(text: str, count: int) -> list[list[str]]:
@@ -305,7 +300,7 @@ def _readings(text: str, count: int) -> list[list[str]]:
     readings = []
     for body in dict.fromkeys((text, text.partition(":")[2], text.partition("=")[2])):
         plain = body.strip()
-        if plain[:1] + plain[-1:] in ("[]", "()", "{}") and not any(mark in plain[1:-1] for mark in "[](){}"):
+        if plain[:1] + plain[-1:] in ("[]", "()", "{}") and not any(bracket in plain[1:-1] for bracket in "[](){}"):
             plain = plain[1:-1]
         for delimiter in (*SEPARATORS, "|", None):
             if delimiter is not None and delimiter not in plain:

@@ -208,8 +208,8 @@ class _Reader:
         if plain[:1] in EMPTY or any(f"\n{mark}" in plain for mark in EMPTY):
             plain = _EMPTY_LINE.sub("", plain)
         if self.preamble.tail:
-            mark = re.escape(str(self.delimiter))
-            plain = re.sub(rf"(?:{mark} *){{1,{self.preamble.tail}}}$", "", plain, flags=re.MULTILINE)
+            separator = re.escape(str(self.delimiter))
+            plain = re.sub(rf"(?:{separator} *){{1,{self.preamble.tail}}}$", "", plain, flags=re.MULTILINE)
         try:
             rows = self._loaded(plain)
         except ValueError as error:

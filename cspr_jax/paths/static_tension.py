@@ -45,8 +45,7 @@ class StaticTension(NamedTuple):
         Returns:
             plain values.
         """
-        place = np.asarray(self.position).tolist()
-        return {"cable": self.cable, "needed": self.needed, "allowed": self.allowed, "unit": "N", "position": place}
+        return self._asdict() | {"position": self.position.tolist(), "unit": "N"}
 
 
 def static_tension(problem: Problem, state: State) -> StaticTension | None:
