@@ -23,6 +23,8 @@ EPILOGUE = (
     "5 numerical self-check failed; 70 internal error; 130, 143 stopped, run the command again to resume"
 )
 
+# Environment variable of a command that has begun anew once.
+ANEW = "CSPR_BEGUN_ANEW"
 # Set only in a process that is ours: Python's passes over the many objects of jax take a tenth of a command's time.
 FEWER_COLLECTIONS = (200_000, 20, 50)
 
@@ -49,6 +51,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         the exit code.
     """
+    environment = dict(os.environ)
     if arguments is None:
         gc.set_threshold(*FEWER_COLLECTIONS)
         surroundings.settle()
@@ -68,13 +71,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         warn(error)
         return _flushed(error.exit_code)
     with prompt_end(compile_cache.hand_over if arguments is None else None) as prompt:
-        code = _answered(options, prompt)
+        code = _answered(options, prompt, environment if arguments is None else None)
     if arguments is None:
         gc.freeze()  # the end of the process frees all memory at once: a last look for what nobody needs takes 0.2 s
     return _flushed(code)
 
 
-def _answered(options: argparse.Namespace, prompt: Prompt) -> int:
+def _answered(options: argparse.Namespace, prompt: Prompt, environment: dict[str, str] | None) -> int:
     try:
         return int(options.command(options))
     except CsprError as error:
@@ -93,20 +96,29 @@ def _answered(options: argparse.Namespace, prompt: Prompt) -> int:
         warn(surroundings.shortage(error) or f"{place}{error.strerror or error}")
         return int(ExitCode.INPUT_OUTPUT)
     except Exception as error:
-        return _unexpected(error)
+        return _unexpected(error, environment)
 
 
-def _unexpected(error: Exception) -> int:
+def _unexpected(error: Exception, environment: dict[str, str] | None) -> int:
     lacking = surroundings.shortage(error)
     if lacking is not None:
         warn(lacking)
         return int(ExitCode.INPUT_OUTPUT)
+    if environment is not None and ANEW not in environment and compile_cache.set_aside(""):
+        warn("kept compiled code, which may be at fault, is removed: the command begins anew")
+        with contextlib.suppress(OSError):
+            _begin_anew(environment)
     with contextlib.suppress(OSError, ValueError):
         sys.stderr.write("".join(f"{printable(line)}\n" for line in traceback.format_exc().splitlines()))
         sys.stderr.write(f"cspr {__version__}: internal error; please report it with the lines above and your file\n")
-        if compile_cache.set_aside(""):
-            sys.stderr.write("cspr: kept compiled code, which may be at fault, is removed: run the command once more\n")
     return int(ExitCode.INTERNAL)
+
+
+def _begin_anew(environment: dict[str, str]) -> NoReturn:
+    # In a process that is new: jax holds in memory what it has loaded.
+    compile_cache.hand_over()
+    sys.stderr.flush()
+    os.execve(sys.executable, [sys.executable, *sys.orig_argv[1:]], environment | {ANEW: "1"})
 
 
 def _mend_streams() -> None:

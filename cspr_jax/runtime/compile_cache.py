@@ -2,8 +2,9 @@
 
 jax writes an entry straight to its name, and never again: a run that is killed then would leave half an entry for ever.
 So each run has a folder of its own, with links to all whole entries (copies, where the disk has no links), and hands
-its new ones over when it ends. Kept entries bear a checksum of name and content in their names: one that was damaged,
-or lies under another's name, is removed before jax sees it; one that cannot be used gives way to what is compiled then.
+its new ones over when it ends. A kept entry ends with its name, and bears a checksum of all of it there: one that was
+damaged, or is a copy of another, is removed before jax sees it; one that cannot be used gives way to what is compiled
+then.
 Entries are code that is executed: a folder in which others can place some is refused.
 """
 
@@ -22,18 +23,18 @@ import stat
 import sys
 import threading
 import warnings
-import zlib
 from collections.abc import Callable
 from pathlib import Path
+
+from cspr_jax.runtime.packed import is_too_large, is_whole
 
 # Entries kept, the newest ones; one is a kernel for one shape, some 0.1 to 1 MB, or its program, a tenth of that.
 LARGEST = 512
 LARGEST_ENTRY = 1 << 28  # bytes
-LARGEST_CODE = 1 << 28  # bytes, not compressed
-# zlib packs zeros so many times; entries that are smaller than that cannot be too large.
-_DENSEST = 1032
-_STEP, _ZSTD = 1 << 20, b"\x28\xb5\x2f\xfd"
-_FORMER_LENGTH = 8  # of checksums of versions before 0.3
+# Frame that readers of zstd skip (RFC 8878, 3.1.2); those of zlib read no further than its end.
+_SKIPPED = b"\x50\x2a\x4d\x18"
+# Part of the name of the folder: kept entries of another form lie in another one.
+FORMAT = 2
 # With a largest size, jax notes beside each entry when it was used last.
 MAX_SIZE = "JAX_COMPILATION_CACHE_MAX_SIZE"
 _ENTRY, _USED = "-cache", "-atime"
@@ -160,9 +161,7 @@ def _take(run: _KeptEntries) -> int:
         except OSError:
             data, checksum = b"", "unreadable"
         with contextlib.suppress(OSError):
-            if name.endswith(_USED) or len(checksum) == _FORMER_LENGTH:  # which earlier versions kept
-                entry.unlink()
-            elif checksum != checksum_of(name, data) or _is_too_large(data):
+            if checksum != checksum_of(name, data) or not data.endswith(_ending(name)) or is_too_large(data):
                 entry.unlink()
                 damaged += 1
             else:
@@ -272,10 +271,14 @@ def _hand_over(run: _KeptEntries) -> None:
             if entry.name in names and (before is None or _mark_of(entry) == mark):
                 continue
             data = plain_bytes(entry)
-            if _is_whole(data):
+            if is_whole(data):
                 if before is not None:
                     before.unlink(missing_ok=True)
-                entry.replace(run.whole / f"{entry.name}{_MARK}{checksum_of(entry.name, data)}")
+                ending = _ending(entry.name)
+                data = data.removesuffix(ending) + ending
+                ended = entry.with_name(f".{entry.name}")
+                ended.write_bytes(data)
+                ended.replace(run.whole / f"{entry.name}{_MARK}{checksum_of(entry.name, data)}")
     _trim(run.whole)
 
 
@@ -293,6 +296,12 @@ def _trim(whole: Path) -> None:
             entry.unlink(missing_ok=True)
 
 
+def _ending(name: str) -> bytes:
+    # A kept entry says whose it is: a copy under the name of another is found out.
+    words = os.fsencode(f"{__name__}: {name}")
+    return _SKIPPED + len(words).to_bytes(4, "little") + words
+
+
 def checksum_of(name: str, data: bytes) -> str:
     """Checksum in the name of a kept entry.
 
@@ -303,78 +312,6 @@ def checksum_of(name: str, data: bytes) -> str:
         16 hexadecimal digits.
     """
     return hashlib.sha256(os.fsencode(name) + b"\0" + data).hexdigest()[:16]
-
-
-def inflated(data: bytes, most: int) -> bytes:
-    """Content of what zlib has packed, if it is all there and no larger than it may be.
-
-    Args:
-        most: largest size of the content, bytes.
-
-    Returns:
-        the content.
-
-    Raises:
-        ValueError: it is not all there, is larger, or something else.
-    """
-    reader = zlib.decompressobj()
-    try:
-        content = reader.decompress(data, most)
-    except zlib.error as error:
-        raise ValueError(str(error)) from error
-    if not reader.eof:
-        raise ValueError("it is not whole, or too large")
-    return content
-
-
-def _is_whole(data: bytes) -> bool:
-    # A full disk, or the end of the process, may have left half of it.
-    if data[:1] == b"x":  # zlib's
-        return _is_whole_zlib(data)
-    for module in ("compression.zstd", "zstandard"):
-        if (zstd := sys.modules.get(module)) is not None:
-            return _is_whole_zstd(zstd, data)
-    return bool(data)
-
-
-def _is_whole_zlib(data: bytes) -> bool:
-    reader, size = zlib.decompressobj(), 0
-    try:
-        while not reader.eof and size <= LARGEST_CODE:
-            part = reader.decompress(data, _STEP)
-            data, size = reader.unconsumed_tail, size + len(part)
-            if not part and not data:
-                break
-    except zlib.error:
-        return False
-    return reader.eof and size <= LARGEST_CODE
-
-
-def _is_whole_zstd(zstd, data: bytes) -> bool:
-    # Two libraries of nearly the same interface; jax takes the one that there is.
-    reader = zstd.ZstdDecompressor()
-    try:
-        if hasattr(reader, "decompressobj"):
-            reader = reader.decompressobj()
-        reader.decompress(data)
-    except zstd.ZstdError:
-        return False
-    return bool(reader.eof)
-
-
-def _is_too_large(data: bytes) -> bool:
-    # jax would inflate it at one go.
-    if data.startswith(_ZSTD):
-        return _size_of_zstd(data) > LARGEST_CODE
-    return len(data) > LARGEST_CODE // _DENSEST and not _is_whole(data)
-
-
-def _size_of_zstd(data: bytes) -> int:
-    # The head of a frame says the size of its content (RFC 8878, 3.1.1.1), or not: 0.
-    head = data[len(_ZSTD)] if len(data) > len(_ZSTD) else 0
-    is_single, width = head >> 5 & 1, (head >> 5 & 1, 2, 4, 8)[head >> 6]
-    start = len(_ZSTD) + 2 - is_single + (0, 1, 2, 4)[head & 3]
-    return int.from_bytes(data[start : start + width], "little") + (256 if width == 2 else 0)
 
 
 def _remove_leftovers(folder: Path) -> None:

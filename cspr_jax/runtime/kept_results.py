@@ -19,9 +19,11 @@ import jaxlib.version
 import numpy as np
 
 from cspr_jax.runtime.compile_cache import PROGRAMS, plain_bytes
+from cspr_jax.runtime.packed import inflated
 
 # Files of the package that decide what it computes.
 _SOURCES = (".py", ".toml", ".csv")
+LARGEST_RESULT = 1 << 24  # bytes, not compressed
 
 
 def kept_result(name: str, settings: Any, compute: Callable[[], Any], *, again: bool = False) -> Any:
@@ -43,8 +45,8 @@ def kept_result(name: str, settings: Any, compute: Callable[[], Any], *, again: 
     key = json.dumps([name, settings, versions, os.environ.get("XLA_FLAGS", ""), _sources()])
     path = Path(folder) / f"{name}-{hashlib.sha256(key.encode()).hexdigest()}"
     if not again:
-        with contextlib.suppress(OSError, zlib.error, ValueError):
-            kept_key, result = json.loads(zlib.decompress(plain_bytes(path)))
+        with contextlib.suppress(OSError, ValueError, TypeError, RecursionError):
+            kept_key, result = json.loads(inflated(plain_bytes(path), LARGEST_RESULT))
             if kept_key == key:
                 return result
     result = compute()

@@ -27,6 +27,7 @@ import numpy as np
 
 from cspr_jax.runtime import compile_cache
 from cspr_jax.runtime.compile_cache import PROGRAMS
+from cspr_jax.runtime.packed import inflated
 from cspr_jax.runtime.program_keys import Undescribed, described, described_tree, tree_of
 
 # It is part of each key: a change of what is written makes former programs those of nobody.
@@ -230,7 +231,7 @@ def _sources() -> str:
 def _read(path: Path, key: str) -> tuple[Any, bytes] | None:
     # None where it is not there, or is not whole, or is another one's; then it is made again.
     try:
-        data = compile_cache.inflated(compile_cache.plain_bytes(path), LARGEST_PROGRAM)
+        data = inflated(compile_cache.plain_bytes(path), LARGEST_PROGRAM)
         checksum, _, content = data.partition(b"\n")
         if checksum != hashlib.sha256(content).hexdigest().encode():
             return None

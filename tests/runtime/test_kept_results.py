@@ -1,5 +1,8 @@
 """Results that one run leaves to the next."""
 
+import json
+import zlib
+
 import pytest
 
 from cspr_jax.runtime import kept_results
@@ -35,7 +38,8 @@ def test_what_is_damaged_or_another_s_is_computed_again(folder):
     kept_result("table", 1, lambda: ["good"])
     (entry,) = folder.iterdir()
     data = entry.read_bytes()
-    for bad in (b"", data[:-3], b"x" * 50, data[:20] + b"?" + data[21:]):
+    forged = (b"3", b"[" * 50_000, json.dumps([json.loads(zlib.decompress(data))[0], "x" * (1 << 24)]).encode())
+    for bad in (b"", data[:-3], b"x" * 50, data[:20] + b"?" + data[21:], *(zlib.compress(one) for one in forged)):
         entry.write_bytes(bad)
         assert kept_result("table", 1, lambda: ["new"]) == ["new"]
     kept_result("table", 2, lambda: ["two"])

@@ -21,7 +21,7 @@ from cspr_jax.arithmetic import batches
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.cli import main
 from cspr_jax.errors import ConfigError
-from cspr_jax.runtime import compile_cache, compile_options, xla
+from cspr_jax.runtime import compile_cache, compile_options, packed, xla
 
 ROOT = Path(__file__).parents[2]
 
@@ -148,8 +148,20 @@ def test_commands_set_it_before_they_import_jax(tmp_path, words):
     assert Path(seen.splitlines()[-1]).is_relative_to(kept)
 
 
-def kept_name(name, data):
-    return f"{name}~{compile_cache.checksum_of(name, data)}"
+def keep(folder, name, data):
+    """Write an entry as a run that ends keeps it."""
+    data += compile_cache._ending(name)
+    entry = folder / f"{name}~{compile_cache.checksum_of(name, data)}"
+    entry.write_bytes(data)
+    return entry
+
+
+def content_of(entry):
+    """What jax or the program of an entry has written, whatever the entry is called."""
+    name, _, checksum = entry.name.rpartition("~")
+    data = entry.read_bytes()
+    assert checksum == compile_cache.checksum_of(name, data) and data.endswith(compile_cache._ending(name))
+    return data.removesuffix(compile_cache._ending(name))
 
 
 KEEP = """
@@ -265,7 +277,7 @@ def test_what_killed_runs_left_is_swept(tmp_path, monkeypatch):
         place.mkdir()
         (place / "entry").write_text("half")
     (tmp_path / "whole").mkdir()
-    (tmp_path / "whole" / kept_name("known", b"whole")).write_text("whole")
+    keep(tmp_path / "whole", "known", b"whole")
     monkeypatch.setattr(compile_cache, "_quiet", lambda *_: None)
     lines = []
     own = compile_cache.opened(tmp_path, lines.append)
@@ -284,8 +296,7 @@ def entries(tmp_path, monkeypatch):
     (folder / "whole").mkdir(parents=True, mode=0o700)
     folder.chmod(0o700)
     for name in ("one-cache", "two-cache"):
-        data = zlib.compress(name.encode())
-        (folder / "whole" / kept_name(name, data)).write_bytes(data)
+        keep(folder / "whole", name, zlib.compress(name.encode()))
     monkeypatch.setattr(compile_cache, "_quiet", lambda *_: None)
     monkeypatch.setattr(compile_cache, "_pending", [])
     lines: list[str] = []
@@ -307,7 +318,7 @@ def test_entries_are_copied_where_there_are_no_links(entries, monkeypatch, code)
     monkeypatch.setattr(os, "link", refused)
     own, lines = entries.opened()
     assert sorted(entry.name for entry in own.iterdir()) == ["one-cache", "two-cache"] and not lines
-    assert (own / "one-cache").read_bytes() == zlib.compress(b"one-cache")
+    assert (own / "one-cache").read_bytes() == next(entries.whole.glob("one-cache~*")).read_bytes()
     (own / "new-cache").write_bytes(zlib.compress(b"new"))
     compile_cache.hand_over()
     assert {entry.name.partition("~")[0] for entry in entries.whole.iterdir()} == {
@@ -321,8 +332,6 @@ def test_what_jax_notes_beside_entries_is_no_entry(entries, monkeypatch):
     """With a largest size jax notes when each entry was used, in a file that it needs and writes again."""
     monkeypatch.setattr(compile_cache, "largest_size", lambda: 1_000_000)
     monkeypatch.setattr(compile_cache.importlib.util, "find_spec", lambda name: name)
-    for old in ("one-atime~12345678", "gone-atime~00000000"):  # as earlier versions kept them
-        (entries.whole / old).write_bytes(b"12345678")
     own, lines = entries.opened()
     assert not lines and len(list(entries.whole.iterdir())) == 2
     assert sorted(entry.name for entry in own.iterdir()) == ["one-atime", "one-cache", "two-atime", "two-cache"]
@@ -367,16 +376,16 @@ def test_pipes_and_links_in_the_folder_hold_up_nobody(entries, tmp_path):
 
 
 def test_an_entry_under_the_name_of_another_is_removed(entries):
-    """With the checksum of its own name, or that of versions before, which did not know the name."""
+    """With the checksum of its own name, or a new one: an entry says inside whose it is."""
     one, two = (next(entries.whole.glob(f"{name}-cache~*")) for name in ("one", "two"))
-    (entries.whole / f"three-cache~{one.name.partition('~')[2]}").write_bytes(one.read_bytes())
-    (entries.whole / f"four-cache~{zlib.crc32(one.read_bytes()):08x}").write_bytes(one.read_bytes())
-    content = two.read_bytes()
-    two.write_bytes(one.read_bytes())
+    data, content = one.read_bytes(), two.read_bytes()
+    (entries.whole / f"three-cache~{one.name.partition('~')[2]}").write_bytes(data)
+    (entries.whole / f"four-cache~{compile_cache.checksum_of('four-cache', data)}").write_bytes(data)
+    two.write_bytes(data)
     own, lines = entries.opened()
     assert [entry.name for entry in own.iterdir()] == ["one-cache"]
-    assert len(lines) == 1 and "2 damaged entries" in lines[0] and len(list(entries.whole.iterdir())) == 1
-    (own / "two-cache").write_bytes(content)
+    assert len(lines) == 1 and "3 damaged entries" in lines[0] and len(list(entries.whole.iterdir())) == 1
+    (own / "two-cache").write_bytes(zlib.compress(b"two-cache"))
     compile_cache.hand_over()
     assert two.read_bytes() == content
 
@@ -389,7 +398,7 @@ def test_an_entry_that_cannot_be_used_gives_way(entries):
     (own / "one-cache").write_bytes(zlib.compress(b"anew"))
     compile_cache.hand_over()
     (entry,) = entries.whole.iterdir()
-    assert entry.name == kept_name("one-cache", zlib.compress(b"anew"))
+    assert entry.name.startswith("one-cache~") and content_of(entry) == zlib.compress(b"anew")
 
 
 @pytest.mark.parametrize("is_program", [False, True])
@@ -406,11 +415,11 @@ def test_an_entry_that_is_replaced_is_handed_over(entries, is_program):
 
 def test_entries_that_grow_without_bound_are_removed(entries, monkeypatch):
     """Packed zeros, and a frame of zstd that says what it holds; small entries are not inflated."""
-    monkeypatch.setattr(compile_cache, "LARGEST_CODE", 1 << 21)
+    monkeypatch.setattr(packed, "LARGEST_CODE", 1 << 21)
     bomb, fits = zlib.compress(bytes(3 << 20), 9), zlib.compress(bytes(2 << 20), 9)
     frames = [b"\x28\xb5\x2f\xfd\xa0" + size.to_bytes(4, "little") for size in (1 << 20, 1 << 22)]
     for name, data in zip(("bomb", "fits", "frame", "large"), (bomb, fits, *frames), strict=True):
-        (entries.whole / kept_name(f"{name}-cache", data)).write_bytes(data)
+        keep(entries.whole, f"{name}-cache", data)
     own, lines = entries.opened()
     names = ["fits-cache", "frame-cache", "one-cache", "two-cache"]
     assert sorted(entry.name for entry in own.iterdir()) == names and "2 damaged entries" in lines[0]
@@ -418,8 +427,8 @@ def test_entries_that_grow_without_bound_are_removed(entries, monkeypatch):
     compile_cache.hand_over()
     assert sorted(entry.name.partition("~")[0] for entry in entries.whole.iterdir()) == names
     with pytest.raises(ValueError, match="too large"):
-        compile_cache.inflated(bomb, 1 << 21)
-    assert len(compile_cache.inflated(fits, 1 << 21)) == 2 << 20
+        packed.inflated(bomb, 1 << 21)
+    assert len(packed.inflated(fits, 1 << 21)) == 2 << 20
 
 
 def test_what_jax_cannot_read_is_removed_unless_the_system_is_to_blame(entries, monkeypatch):
@@ -445,12 +454,34 @@ def test_entries_that_are_not_code_are_made_again_once(tmp_path):
     for fault in (zlib.compress(b"\0\0\0\0no code"), b"no code"):
         for entry in list(whole.iterdir()):
             entry.unlink()
-            name = entry.name.partition("~")[0]
-            (whole / kept_name(name, fault)).write_bytes(fault)
+            keep(whole, entry.name.partition("~")[0], fault)
         answer, lines = lines_told(tmp_path, code)
         assert answer == first and len(lines) == 1 and "it is removed and compiled again" in lines[0]
         assert lines_told(tmp_path, code) == (first, [])
         assert sorted(entry.name.partition("~")[0] for entry in whole.iterdir()) == names
+
+
+@pytest.mark.thorough
+def test_code_of_another_function_that_claims_to_be_its_own_is_made_again(tmp_path):
+    """Neither jax nor we can tell before it runs: the command begins anew, with one line and its usual answer."""
+    words = [sys.executable, "-m", "cspr_jax", "plan", "sweeps/straight_line.toml", "--json"]
+
+    def answer():
+        here = os.environ | {"CSPR_CACHE_DIR": str(with_known_flags(tmp_path))}
+        done = subprocess.run(words, env=here, cwd=ROOT, capture_output=True, text=True, timeout=300)
+        assert done.returncode == 0, done.stderr
+        return done.stdout, done.stderr
+
+    first, _ = answer()
+    (whole,) = tmp_path.glob("*/whole")
+    kept = sorted(entry for entry in whole.iterdir() if entry.name.partition("~")[0].endswith("-cache"))
+    contents = [content_of(entry) for entry in kept]
+    for entry, content in zip(kept, [*contents[1:], contents[0]], strict=True):
+        entry.unlink()
+        keep(whole, entry.name.partition("~")[0], content)
+    line = "cspr: kept compiled code, which may be at fault, is removed: the command begins anew\n"
+    assert len(kept) > 2 and answer() == (first, line)
+    assert answer() == (first, "")
 
 
 MANY = """
@@ -481,7 +512,7 @@ def test_many_processes_share_one_folder(tmp_path, monkeypatch, count, turns):
     running = [subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, text=True) for _ in range(count)]
     assert [process.communicate(timeout=300)[0] for process in running] == ["[]\n"] * count
     kept = list((tmp_path / "whole").iterdir())
-    assert kept and all(entry.name == kept_name(entry.name.partition("~")[0], entry.read_bytes()) for entry in kept)
+    assert kept and all(zlib.decompress(content_of(entry))[:5] == b"entry" for entry in kept)
     assert not list(tmp_path.glob("run-*"))
 
 
