@@ -15,10 +15,8 @@ from cspr_jax.errors import ConfigError
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.point_mass import AT_P0, plane_normal, rest_point, spool_radius
 from cspr_jax.schema.tiles import Grid
-from cspr_jax.schema.verdicts import FLAGS, Verdict
+from cspr_jax.schema.verdicts import FLAGS, NOT_PROVED, Verdict
 
-# Answers that are not proved, or not proved to be the smallest ones.
-_NOT_PROVED = FLAGS(Verdict.UNDECIDED.value | Verdict.FEWER_ARCS_UNDECIDED.value)
 # How far a refined margin may lie below the bound proved for it.
 ROUNDING = 1e-8
 # Limits may be touched: a slack within the tolerances of proofs counts as met.
@@ -98,7 +96,7 @@ class GridMap(abc.ABC):
         Returns:
             the number; None: the map proves nothing.
         """
-        return int(((answers["verdict"] & _NOT_PROVED) != 0).sum()) if self.proves else None
+        return int(((answers["verdict"] & NOT_PROVED) != 0).sum()) if self.proves else None
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse a grid in which no cell can have an answer, as where all targets are out of reach.

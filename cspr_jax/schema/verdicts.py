@@ -43,6 +43,8 @@ class Verdict(enum.IntFlag):
 
 # Flags that do not name the criterion that is broken.
 NO_REASON = Verdict.FEWER_ARCS_UNDECIDED | Verdict.NO_ARCS
+# Answers that are not proved, or not proved to be the smallest ones.
+NOT_PROVED = FLAGS(Verdict.UNDECIDED.value | Verdict.FEWER_ARCS_UNDECIDED.value)
 # Flags that leave a verdict open.
 OPEN = Verdict.UNDECIDED | Verdict.NOT_FINITE
 SENTENCES = {

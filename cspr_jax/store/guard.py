@@ -30,6 +30,8 @@ _ATTRIBUTES = (
     *("units", "long_name", "description", "flag_masks", "flag_values", "flag_meanings"),
     *("CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "DIMENSION_LABELS"),
 )
+# Attributes of other programs that change what numbers mean.
+_SCALING = ("scale_factor", "add_offset")
 _FILTERS = {h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32}
 _TYPES = {
     "float64": (h5t.IEEE_F64LE, h5t.IEEE_F64BE),
@@ -72,8 +74,11 @@ class ReadableDataset(NamedTuple):
         return array
 
 
-def datasets(file: h5py.File, names: Iterable[str]) -> dict[str, ReadableDataset]:
+def datasets(file: h5py.File, names: Iterable[str], *, is_joined: bool = False) -> dict[str, ReadableDataset]:
     """Open the named datasets that a file holds; nothing else of the file is looked at.
+
+    Args:
+        is_joined: whether another program has written it, whose attributes do not matter.
 
     Returns:
         the datasets by name.
@@ -81,7 +86,7 @@ def datasets(file: h5py.File, names: Iterable[str]) -> dict[str, ReadableDataset
     Raises:
         DamagedError: one is a link, lies in another file, or is not plain numbers of a fitting size.
     """
-    return {name: _dataset(file, name) for name in names if file.id.links.exists(name.encode())}
+    return {name: _dataset(file, name, is_joined) for name in names if file.id.links.exists(name.encode())}
 
 
 def refuse_dense(datasets: Iterable[ReadableDataset], size: int, *, densest: int = DENSEST) -> None:
@@ -175,6 +180,7 @@ def numbers(item: h5py.HLObject, name: str, dtype: str, shape: tuple[int | None,
     attribute = h5a.open(item.id, name.encode())
     space = attribute.get_space()
     extent = () if space.get_simple_extent_type() == h5s.NULL else tuple(int(n) for n in space.get_simple_extent_dims())
+    extent = () if extent == (1,) and not shape else extent  # netCDF has lists of one number
     fits = len(extent) == len(shape) and space.get_simple_extent_type() != h5s.NULL
     fits = fits and all(1 <= n <= MOST_ROWS if m is None else n == m for n, m in zip(extent, shape, strict=True))
     if not fits or _dtype(attribute.get_type()) != dtype:
@@ -184,14 +190,15 @@ def numbers(item: h5py.HLObject, name: str, dtype: str, shape: tuple[int | None,
     return array
 
 
-def _dataset(file: h5py.File, name: str) -> ReadableDataset:
+def _dataset(file: h5py.File, name: str, is_joined: bool) -> ReadableDataset:
     key = name.encode()
     if file.id.links.get_info(key).type != h5l.TYPE_HARD:
         raise DamagedError(f"{name} is a link: must be a dataset of this file")
     if h5o.get_info(file.id, key).type != h5o.TYPE_DATASET:
         raise DamagedError(f"{name} is not a dataset")
     data = h5d.open(file.id, key)
-    if h5a.get_num_attrs(data) > sum(h5a.exists(data, one.encode()) for one in _ATTRIBUTES):
+    known = sum(h5a.exists(data, one.encode()) for one in _ATTRIBUTES)
+    if any(h5a.exists(data, one.encode()) for one in _SCALING) or (not is_joined and h5a.get_num_attrs(data) > known):
         raise DamagedError(f"{name} has attributes that are none of cspr")
     creation = data.get_create_plist()
     # Asked before the dataspace: HDF5 opens the other files of a virtual dataset to find its shape.

@@ -28,7 +28,7 @@ from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.schema.quantities import from_outside
 from cspr_jax.store.consolidation import Content
 from cspr_jax.store.documents import Header
-from cspr_jax.store.seal import DamagedError, check_mark, check_open, open_regular
+from cspr_jax.store.seal import UNSEALED, DamagedError, check_open, has_mark, open_regular
 from cspr_jax.store.shards import LARGEST_SHARD, Layout, Shard, decode
 
 # Hashing so many bytes takes a moment; larger files are inspected before they are hashed.
@@ -58,7 +58,8 @@ _ENDS = {
 class _Opened(NamedTuple):
     path: Path
     file: int
-    seal: bytes | None  # None: not compared yet, since the file is large
+    seal: bytes | None  # None: not compared yet, since the file is large, or there is none
+    is_sealed: bool
 
 
 class Reader:
@@ -87,25 +88,28 @@ class Reader:
         """The process ends."""
         self._end()
 
-    def result(self, path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-        """Attributes, axes and quantities of a sealed file, as far as this program writes them.
+    def result(self, path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray], dict[str, list[str]] | None]:
+        """Attributes, axes and quantities of a file, as far as this program writes them.
 
         Args:
-            path: the file, or a link to one.
+            path: the file, or a link to one; without a seal it must be a map that was written anew as netCDF.
 
         Returns:
-            its attributes, and its arrays by name.
+            its attributes, its arrays by name, and of a file without a seal the dimensions of each array.
 
         Raises:
             DamagedError: it is no file, is damaged, or holds what no file of this program does.
             StoreError: the system refuses to read anything at the moment.
         """
-        with self._opened(path, follow=True) as opened, self._answered(opened, {"what": "result"}) as (answer, pipe):
+        with (
+            self._opened(path, follow=True, is_unsealed_too=True) as opened,
+            self._answered(opened, {"what": "result", "is_sealed": opened.is_sealed}) as (answer, pipe),
+        ):
             arrays = {}
             for name, dtype, shape in answer["arrays"]:
                 self._header(pipe, patience=None)
                 arrays[name] = _array(pipe, dtype, shape)
-            return answer["attributes"], arrays
+            return answer["attributes"], arrays, answer["dimensions"]
 
     def content(self, path: Path, *, follow: bool = False) -> Content | None:
         """Content of a result, from `store.consolidation.content_of`.
@@ -164,24 +168,28 @@ class Reader:
             return Header(**answer["header"])
 
     @contextlib.contextmanager
-    def _opened(self, path: Path, *, follow: bool = False, most: int | None = None) -> Iterator["_Opened"]:
+    def _opened(
+        self, path: Path, *, follow: bool = False, most: int | None = None, is_unsealed_too: bool = False
+    ) -> Iterator["_Opened"]:
         file = open_regular(path, follow=follow)
         try:
             size = os.fstat(file).st_size
             if most is not None and size > most:
                 raise DamagedError("it is not a file of a fitting size")
-            check_mark(path, file)
-            yield _Opened(path, file, None if size > _QUICK else check_open(path, file))
+            is_sealed = has_mark(path, file)
+            if not (is_sealed or is_unsealed_too):
+                raise DamagedError(UNSEALED)
+            yield _Opened(path, file, check_open(path, file) if is_sealed and size <= _QUICK else None, is_sealed)
         finally:
             os.close(file)
 
     @contextlib.contextmanager
     def _answered(self, opened: "_Opened", words: dict[str, Any]) -> Iterator[tuple[dict[str, Any], RawIOBase]]:
-        path, file, seal = opened
+        path, file, seal, is_sealed = opened
         try:
             pipe = self._sent(path, file, words)
             answer = self._header(pipe, patience=_PATIENCE)
-            if seal is None:
+            if seal is None and is_sealed:
                 check_open(path, file)
             yield answer, pipe
         except EOFError as error:

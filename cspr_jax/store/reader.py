@@ -1,5 +1,6 @@
 """Work of the process that reads files for another one: see `store.isolated`."""
 
+import contextlib
 import dataclasses
 import json
 import math
@@ -13,6 +14,7 @@ from typing import Any, BinaryIO
 
 import h5py
 import numpy as np
+from h5py import h5a
 
 from cspr_jax.errors import StoreError
 from cspr_jax.schema.quantities import (
@@ -29,7 +31,7 @@ from cspr_jax.schema.quantities import (
 from cspr_jax.store import guard
 from cspr_jax.store.consolidation import content_of
 from cspr_jax.store.netcdf import UNREADABLE, reason
-from cspr_jax.store.seal import DamagedError
+from cspr_jax.store.seal import UNSEALED, DamagedError
 from cspr_jax.store.shards import Layout, decode, header_of
 
 # A result is read into memory as a whole. A byte of a file stands for a few bytes of data, unless these are all alike.
@@ -39,6 +41,8 @@ _LOOK, _PER_BYTE, _PER_CHUNK = 1.0, 1.0 / 25e6, 1e-4
 _MEMORY = 256 << 20
 # Names of parts of vectors, for other programs.
 _MARKS = (b"axis", b"cable", b"component", b"each", b"couple", b"bound", b"level", b"edge", b"speed")
+# Attribute that libraries of netCDF add to the files that they write.
+_OF_NETCDF = b"_NCProperties"
 _LONG = ("settings", "environment_settings", "plan", "robot_settings")
 _TEXTS = (
     *("Conventions", "title", "map", "identity", "z_axis", "robot", "software", "environment", "environments"),
@@ -98,19 +102,41 @@ def _exactly(channel: socket.socket, count: int) -> bytes:
     return data
 
 
+def _check_netcdf(path: Path) -> None:
+    # Another program's files have no seal; one of this program that is not whole has none either.
+    with contextlib.suppress(*UNREADABLE), h5py.File(path, "r") as file:
+        if h5a.exists(file.id, _OF_NETCDF):
+            return
+    raise DamagedError(UNSEALED)
+
+
+def _dimensions(data: h5py.Dataset) -> list[str]:
+    # The axes themselves are scales, which have none.
+    if data.is_scale:
+        return [Path(data.name).name]
+    return [Path(dimension[0].name).name for dimension in data.dims if len(dimension)]
+
+
 def _result(path: Path, words: dict[str, Any], out: BinaryIO) -> None:
+    if not words["is_sealed"]:
+        _check_netcdf(path)
     with h5py.File(path, "r") as file:
         attributes = _attributes(file)
         tables = (AXES, QUANTITIES) if "map" in attributes else (TRAJECTORY, SEGMENTS, FLIGHT, FAILURES, PATHS)
-        datasets = guard.datasets(file, [name for table in tables for name in table])
+        is_joined = not words["is_sealed"]
+        if is_joined and not {"map", "settings"} <= attributes.keys():
+            raise DamagedError("a joined map must keep the attributes of one of them: combine_attrs='override'")
+        datasets = guard.datasets(file, [name for table in tables for name in table], is_joined=is_joined)
         marks = [name for name in _MARKS if "map" not in attributes and file.id.links.exists(name)]
-        guard.refuse_others(file, len(datasets) + len(marks), len(attributes))
+        if not is_joined:
+            guard.refuse_others(file, len(datasets) + len(marks), len(attributes))
         guard.refuse_dense(datasets.values(), path.stat().st_size, densest=DENSEST)
         total = sum(one.size for one in datasets.values())
         if total > LARGEST_DATA:
             raise DamagedError(f"it holds {total / 1e9:.3g} GB of data: must be at most {LARGEST_DATA / 1e9:.3g} GB")
         arrays = [[name, one.dtype, one.shape] for name, one in datasets.items()]
-        _tell(out, {"attributes": attributes, "arrays": arrays})
+        dimensions = {name: _dimensions(file[name]) for name in datasets} if is_joined else None
+        _tell(out, {"attributes": attributes, "arrays": arrays, "dimensions": dimensions})
         _grant_for(datasets.values())
         for one in datasets.values():
             values = one.values()

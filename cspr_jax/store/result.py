@@ -17,6 +17,7 @@ from cspr_jax.schema.map_kinds import MAP_KINDS, quantity_of
 from cspr_jax.schema.quantities import ACROSS, AXES, EVERY, OTHER_DIMS, PARTS, QUANTITIES, SEGMENTS, TRAJECTORY
 from cspr_jax.store.documents import plain_json
 from cspr_jax.store.isolated import Reader
+from cspr_jax.store.joined import joined_map
 from cspr_jax.store.motion_table import read_table
 from cspr_jax.store.seal import DamagedError
 
@@ -136,7 +137,7 @@ class Result:
 
 
 def open_result(path: Path) -> Result:
-    """Read a result of `cspr run` or a motion of `cspr plan -o`.
+    """Read a result of `cspr run`, one that xarray has joined of several, or a motion of `cspr plan -o`.
 
     A motion in a .csv file has neither robot nor plan nor segments; it is named after its file.
 
@@ -151,9 +152,11 @@ def open_result(path: Path) -> Result:
     """
     try:
         is_table = Path(path).suffix.lower() == ".csv"
-        attributes, arrays = read_table(Path(path)) if is_table else _content(Path(path))
-        arrays = dict(sorted(arrays.items()))
+        attributes, arrays, dimensions = (*read_table(Path(path)), None) if is_table else _content(Path(path))
         settings = _settings(attributes, path) if "map" in attributes else {}
+        if dimensions is not None:
+            attributes, settings, arrays = joined_map(attributes, settings, arrays, dimensions)
+        arrays = dict(sorted(arrays.items()))
         _check_robot(attributes, path)
         if settings:
             axes, data = _map(settings, arrays)
@@ -187,7 +190,7 @@ def motion_result(attributes: dict[str, Any], arrays: dict[str, np.ndarray]) -> 
     return Result(axes, data, *_described(None, [*axes, *data]), attributes, {})
 
 
-def _content(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+def _content(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray], dict[str, list[str]] | None]:
     with Reader() as reader:
         return reader.result(path)
 

@@ -16,7 +16,7 @@ from cspr_jax.store.disk import Disk, write_all
 _MARK = b"\ncspr_jax, sha256 of all before this line: "
 LENGTH = len(_MARK) + 64 + 1
 _STEP = 1 << 20
-_NONE = "it is not whole, or not of cspr"
+UNSEALED = "it is not whole, or not of cspr"
 
 
 # These errors mean that nothing is there, or that it is no file. Every other refusal comes from the system or the disk,
@@ -129,23 +129,25 @@ def read_regular(path: Path, most: int, *, last: bool = False) -> bytes:
         os.close(file)
 
 
-def check_mark(path: Path, file: int) -> None:
-    """Look whether an open file ends with a seal; files of others need not be read whole.
+def has_mark(path: Path, file: int) -> bool:
+    """Tell whether an open file ends with a seal; files of others need not be read whole.
 
     Args:
         path: named in errors.
         file: descriptor.
 
+    Returns:
+        whether it does.
+
     Raises:
-        DamagedError: it does not, or cannot be read.
+        DamagedError: it cannot be read.
         StoreError: the system refuses to read anything at the moment.
     """
     try:
         line = os.pread(file, LENGTH, max(os.fstat(file).st_size - LENGTH, 0))
     except OSError as error:
         raise unreadable(path, error) from error
-    if not line.startswith(_MARK):
-        raise DamagedError(_NONE)
+    return line.startswith(_MARK)
 
 
 def check_open(path: Path, file: int) -> bytes:
@@ -177,7 +179,7 @@ def _line(digest: str) -> bytes:
 
 def _check(line: bytes, digest: str) -> None:
     if not line.startswith(_MARK):
-        raise DamagedError(_NONE)
+        raise DamagedError(UNSEALED)
     if line != _line(digest):
         raise DamagedError("its bytes have changed")
 

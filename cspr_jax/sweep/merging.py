@@ -17,6 +17,7 @@ import numpy as np
 from cspr_jax.errors import InputError, RefusedError, StoreError, printable
 from cspr_jax.schema.identity import differences, digest
 from cspr_jax.schema.tiles import Tiling
+from cspr_jax.schema.verdicts import NOT_PROVED
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.documents import plain_json
 from cspr_jax.store.folder import RunFolder
@@ -45,6 +46,7 @@ class Part:
         data: quantities over the whole grid.
         present: cells that are finished, of the shape of the grid.
         shards: of finished tiles, by index, without their values; a result has none.
+        says_proved: whether it says how much of it is proved.
     """
 
     path: Path
@@ -53,6 +55,7 @@ class Part:
     data: dict[str, np.ndarray]
     present: np.ndarray
     shards: dict[int, Shard]
+    says_proved: bool
 
 
 def read_part(path: Path) -> Part:
@@ -92,7 +95,8 @@ def _run_part(path: Path) -> Part:
             shards[index] = dataclasses.replace(shard, values={})
     if not present.all() and folder.result.is_file():  # its shards were pruned
         return _result_part(path, folder.result)
-    return Part(path, sweep, record.environment, data, present, shards)
+    says_proved = all(shard.undecided is not None for shard in shards.values())
+    return Part(path, sweep, record.environment, data, present, shards, says_proved)
 
 
 def _result_part(path: Path, file: Path) -> Part:
@@ -107,7 +111,8 @@ def _result_part(path: Path, file: Path) -> Part:
     except DamagedError as error:
         raise StoreError(printable(f"{file}: its environment: {error}")) from error
     data = {name: result.data[name] for name in sweep.store}
-    return Part(path, sweep, environment, data, np.ones(sweep.grid.shape, bool), {})
+    whole = np.ones(sweep.grid.shape, bool)
+    return Part(path, sweep, environment, data, whole, {}, "proved" in result.attributes)
 
 
 class Merged:
@@ -187,7 +192,15 @@ class Merged:
                 return dataclasses.replace(part.shards[index], values=values)
         owners = sorted({digest(self._parts[number].environment) for number in np.unique(self._owner[place])})
         near_zero = int((np.abs(values["margin"]) < _NEAR_ZERO).sum()) if "margin" in values else 0
-        return Shard(index, owners[0] if len(owners) == 1 else digest(owners), near_zero, values)
+        undecided = _undecided(values) if all(part.says_proved for part in self._parts) else None
+        return Shard(index, owners[0] if len(owners) == 1 else digest(owners), near_zero, values, undecided)
+
+
+def _undecided(values: dict[str, np.ndarray]) -> int | None:
+    # Number of cells whose answer is not proved, as `maps.grid_map` counts them; None: what tells it is not stored.
+    if "undecided_fraction" in values:
+        return int((values["undecided_fraction"] > 0.0).sum())
+    return int(((values["verdict"] & NOT_PROVED) != 0).sum()) if "verdict" in values else None
 
 
 def _refuse_conflicts(parts: Sequence[Part], accept: bool) -> None:

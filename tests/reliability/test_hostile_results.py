@@ -419,7 +419,7 @@ def test_a_process_that_fails_says_so(tmp_path, monkeypatch):
 def test_the_limits_hold(tmp_path, monkeypatch, code, words):
     """Of time and of memory, were the checks of what a file holds to miss something."""
     path = forged(tmp_path / "map.h5", a_map)
-    body = f"import cspr_jax.store.guard as g\ndef datasets(*a):\n    {code}\ng.datasets = datasets\n"
+    body = f"import cspr_jax.store.guard as g\ndef datasets(*a, **k):\n    {code}\ng.datasets = datasets\n"
     monkeypatch.setattr(isolated, "_CODE", isolated._CODE.replace("serve()", body + "serve()"))
     with pytest.raises(StoreError, match=words):
         cspr_jax.open_result(path)

@@ -12,9 +12,11 @@ import cspr_jax
 from cspr_jax.cli import main
 from cspr_jax.errors import ConfigError, RefusedError, StoreError
 from cspr_jax.schema.map_kinds import registered
+from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.sweep.definition import sweep_of_settings
 from cspr_jax.sweep.engine import Options, Run
 from cspr_jax.sweep.merging import Merged, read_part
+from cspr_jax.sweep.signals import Stop
 
 TILES = 6
 
@@ -111,6 +113,44 @@ def test_maps_that_differ_in_one_axis(tmp_path, kind):
     assert joined.settings["axes"]["x"] == joined.axes["x"].tolist()
     assert sweep_of_settings(joined.settings, tmp_path / "a.toml").identity == joined.attributes["identity"]
     assert cspr_jax.verify(tmp_path / "joined")["faults"] == []
+
+
+class DoubtfulMap(toy.ToyMap):
+    """Verdicts that are open at some x."""
+
+    proves = True
+
+    def contradictions(self, answers):
+        return {}
+
+    def __call__(self, cells):
+        return {"verdict": np.where(cells["x"] > 0.25, Verdict.UNDECIDED, Verdict(0)).astype(np.uint32)}
+
+
+def test_a_joined_map_says_how_much_is_proved_if_all_its_parts_do(tmp_path):
+    columns = dict.fromkeys(("quantities", "stored", "pictured", "motionless"), ("verdict",))
+    with registered(dataclasses.replace(toy.KIND, implementation=f"{__name__}:DoubtfulMap", **columns)):
+        files = [written(tmp_path, "a", x="[0.0, 0.1, 0.4]"), written(tmp_path, "b", x="[0.1, 0.2, 0.3, 0.5]")]
+        parts = [read_part(cspr_jax.run(file, tmp_path / file.stem)) for file in files]
+        pruned = cspr_jax.run(files[1], tmp_path / "pruned", prune=True).parent
+        assert (
+            cspr_jax.open_result(cspr_jax.merge([tmp_path / "a", pruned], tmp_path / "c")).attributes["proved"] == 0.5
+        )
+        silent = dataclasses.replace(parts[1], says_proved=False)
+        for others, undecided in ((parts[1], [6, 6, 6]), (silent, [None] * 3)):
+            joined = Merged([parts[0], others])
+            shards = [tile.shard for tile in joined.tiles(range(len(joined.sweep.grid.tiling)), Stop())]
+            assert [shard.undecided for shard in shards if shard.values["verdict"].any()] == undecided
+
+
+def test_joined_directories_are_drawn_and_reported(tmp_path, kind, capsys):
+    parts = [
+        cspr_jax.run(written(tmp_path, name, x=x), tmp_path / name) for name, x in (("a", "[0.0]"), ("b", "[0.1, 0.3]"))
+    ]
+    folder = cspr_jax.merge(parts, tmp_path / "joined").parent
+    assert main(["plot", str(folder), "-o", str(tmp_path / "map.png"), "--dpi", "30"]) == 0
+    assert main(["report", str(folder), "-o", str(tmp_path / "page.html"), "--trajectories", "0"]) == 0
+    assert capsys.readouterr().err == "" and all((tmp_path / name).stat().st_size for name in ("map.png", "page.html"))
 
 
 def test_what_does_not_fit_is_told_line_by_line(tmp_path, kind):

@@ -51,7 +51,7 @@ def motion_figure(result: Result) -> Figure:
         name
         for name, is_shown in (
             ("velocity", "flight_position" in result.data),
-            ("acceleration", z0 is None),
+            ("acceleration", z0 is None and "acceleration" in result.data),
             ("bounds", "path_acceleration" in result.data),
             ("couple", "tension_couple" in result.data),
         )
