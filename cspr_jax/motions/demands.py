@@ -13,7 +13,7 @@ from jax import Array
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.minima import narrowed_places
 from cspr_jax.motions.limits import lowest_depth
-from cspr_jax.motions.motion import Motion, common_shape, sample_times
+from cspr_jax.motions.motion import Motion, common_shape, has_pieces, sample_times
 from cspr_jax.robots import cables
 from cspr_jax.robots.limits import NO_LIMITS, Limits
 from cspr_jax.robots.point_mass import plane_normal
@@ -132,9 +132,11 @@ def demands(
     times = [sample_times(motion, count) for motion, count in zip(motions, samples, strict=True)]
     alike: dict[Any, list[int]] = {}
     for i, (motion, tau) in enumerate(zip(motions, times, strict=True)):
-        # Motions of one structure and one number of samples are computed together.
+        # Motions of one structure and one number of samples are computed together, but for those that may have very
+        # many pieces, which would be copied for each instant.
+        own = i if has_pieces(motion) else None
         shapes = tuple(np.shape(leaf) for leaf in jax.tree.leaves(motion))
-        alike.setdefault((jax.tree.structure(motion), shapes, len(tau)), []).append(i)
+        alike.setdefault((own, jax.tree.structure(motion), shapes, len(tau)), []).append(i)
     for (*_, count), members in alike.items():
         size = max(ROOM // count, 1)
         for first in range(0, len(members), size):
@@ -157,7 +159,6 @@ def _of_alike(
 ) -> np.ndarray:
     # Extremes of motions of one structure, their normalised times and their cables, (n, 3, n_extremes).
     if len(motions) == 1:
-        # One motion may have very many pieces, and is not copied for each instant.
         of_one = partial(_values_of_one, robot, limits, corners, common_shape(motions[0]), rule=rule)
 
         def along(tau: np.ndarray) -> np.ndarray:

@@ -176,10 +176,15 @@ def common_shape(motion: Kind) -> Kind:
     Returns:
         the motion; where nothing in it has pieces, itself.
     """
-    return jax.tree.map(lambda part: part.padded() if _has_pieces(part) else part, motion, is_leaf=_has_pieces)
+    return jax.tree.map(lambda part: part.padded() if _is_in_pieces(part) else part, motion, is_leaf=_is_in_pieces)
 
 
-def _has_pieces(part: Any) -> bool:
+def has_pieces(motion: Motion) -> bool:
+    """Whether anything in a motion has pieces, of which there may be very many."""
+    return any(map(_is_in_pieces, jax.tree.leaves(motion, is_leaf=_is_in_pieces)))
+
+
+def _is_in_pieces(part: Any) -> bool:
     return hasattr(part, "padded")
 
 
