@@ -20,6 +20,7 @@ from cspr_jax.arithmetic.function_bounds import sincospi
 from cspr_jax.motions.amplitude_bounds import normalised
 from cspr_jax.robots.state import State
 from cspr_jax.robots.state_bounds import StateBounds
+from cspr_jax.runtime.persistent_jit import persistent_jit
 
 # Blocks of which bounds are computed at a time.
 BATCH = 64
@@ -82,7 +83,7 @@ def many_bounds(curves: Bezier, motion: np.ndarray, start: np.ndarray, end: np.n
     return in_batches(_bounds, (each, normalised(each.time, start, end)), size=BATCH)
 
 
-@jax.jit
+@persistent_jit
 def _bounds(blocks: tuple[Bezier, AffineBounds]) -> StateBounds:
     def one(curve: Bezier, tau: AffineBounds) -> StateBounds:
         # 2 c^2 is 1 + cos(2 pi tau), 2 c sin(pi tau) is sin(2 pi tau).

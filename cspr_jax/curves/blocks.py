@@ -1,7 +1,5 @@
 """Affine bounds of a spline's states over blocks of time."""
 
-from functools import partial
-
 import jax
 import numpy as np
 
@@ -10,6 +8,7 @@ from cspr_jax.arithmetic.piecewise_bounds import overlaps, piecewise_bounds
 from cspr_jax.arithmetic.rotation_bounds import rotation_bounds
 from cspr_jax.robots.state_bounds import StateBounds
 from cspr_jax.runtime import compile_options
+from cspr_jax.runtime.persistent_jit import persistent_jit
 
 BATCH = 256
 
@@ -52,6 +51,6 @@ def spline_bounds(
     return StateBounds(*translation, *in_batches(_rotations, turning, size=BATCH))
 
 
-@partial(jax.jit, compiler_options=compile_options.least())
+@persistent_jit(compiler_options=compile_options.least())
 def _rotations(bands):
     return jax.vmap(rotation_bounds)(*bands)

@@ -15,6 +15,7 @@ from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.curves.blocks import spline_bounds
 from cspr_jax.robots.state import State
 from cspr_jax.robots.state_bounds import StateBounds
+from cspr_jax.runtime.persistent_jit import persistent_jit
 
 # Second derivatives that differ by less than this part of the largest one do not jump.
 SAME = 1e-9
@@ -123,7 +124,7 @@ jax.tree_util.register_dataclass(
 )
 
 
-@jax.jit
+@persistent_jit
 def moved(bounds: StateBounds, offset: Array) -> StateBounds:
     """Bounds of another point of a platform, over k blocks.
 

@@ -24,6 +24,7 @@ from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.clearance import Scene
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.state_bounds import StateBounds
+from cspr_jax.runtime.persistent_jit import persistent_jit
 
 # Angles of a turn where there are many frequencies, and for one alone; frequencies of a first look, halvings that
 # follow, and the share by which an end is kept off.
@@ -150,7 +151,7 @@ def sampled_slacks(
     return least.min((1, 2))
 
 
-@jax.jit
+@persistent_jit
 def _rotations(rotation: Rotation, angles: Array, rates: Array) -> tuple[Array, ...]:
     # Rotations, angular velocities and accelerations at angles of turns with rates, leaves (n, ...).
     still = (jnp.ones(()), jnp.zeros(()), jnp.zeros(()))

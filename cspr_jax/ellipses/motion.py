@@ -27,6 +27,7 @@ from cspr_jax.motions.amplitude_bounds import TimeBounds, time_bounds
 from cspr_jax.motions.amplitudes import Amplitude, derivatives, from_pieces, named
 from cspr_jax.robots.state import State
 from cspr_jax.robots.state_bounds import StateBounds
+from cspr_jax.runtime.persistent_jit import persistent_jit
 
 # Blocks of which bounds are computed at a time.
 BATCH = 64
@@ -118,7 +119,7 @@ def _oscillation(rotation: Rotation, s: tuple, turns: tuple, rates: tuple) -> tu
     return _kinematics(first, last, s, turns, rates)
 
 
-@jax.jit
+@persistent_jit
 def _bounds(motion: EllipseMotion, blocks: tuple[TimeBounds, AffineBounds]) -> StateBounds:
     start, change = motion.frequencies[0], motion.frequencies[1] - motion.frequencies[0]
     time = motion.time

@@ -16,6 +16,7 @@ from cspr_jax.ellipses.harmonics import Ellipse
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import MotionProof, proofs_of
 from cspr_jax.robots.state_bounds import StateBounds
+from cspr_jax.runtime.persistent_jit import persistent_jit
 
 # Blocks of which bounds are computed at a time, and turns that are proved together.
 BATCH, TOGETHER = 64, 1024
@@ -50,7 +51,7 @@ class Turns:
         return in_batches(_bounds, (chosen, self.frequencies[motion], start, end), size=BATCH)
 
 
-@jax.jit
+@persistent_jit
 def _bounds(blocks: tuple) -> StateBounds:
     def one(block: tuple) -> StateBounds:
         (centre, a, b), rate, start, end = block

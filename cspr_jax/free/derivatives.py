@@ -19,6 +19,7 @@ from cspr_jax.free.instants import residual_at, state_of
 from cspr_jax.motions.criteria import judged_poses
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
+from cspr_jax.runtime.persistent_jit import persistent_jit
 
 BATCH = 128
 # Entries of x behind the coordinates.
@@ -49,7 +50,7 @@ class InstantValues(NamedTuple):
     mixed: Any
 
 
-@jax.jit
+@persistent_jit
 def _residual_kernel(robot: AnyRobot, limits: Limits, longest: Array | None, instants: tuple[Array, ...]) -> Array:
     def one(reference: Array, place: Array, duration: Array, tensions: Array) -> Array:
         missed = residual_at(robot, limits, reference, _motion(place, duration), tensions)
@@ -68,7 +69,7 @@ def _motion(place: Array, duration: Array) -> tuple[Array, Array, Array]:
     return tuple(place * (duration**-POWERS)[:, None])
 
 
-@jax.jit
+@persistent_jit
 def _kernel(robot: AnyRobot, limits: Limits, longest: Array | None, instants: tuple[Array, ...]) -> InstantValues:
     def one(reference: Array, place: Array, duration: Array, tensions: Array, multipliers: Array) -> InstantValues:
         def missed(*motion: Array) -> Array:

@@ -19,6 +19,7 @@ from cspr_jax.motions.amplitude_bounds import TimeBounds, time_bounds
 from cspr_jax.motions.amplitudes import Amplitude, derivatives
 from cspr_jax.robots.state import State
 from cspr_jax.robots.state_bounds import StateBounds
+from cspr_jax.runtime.persistent_jit import persistent_jit
 
 # Blocks of which bounds are computed at a time.
 BATCH = 64
@@ -125,7 +126,7 @@ class TimedLine:
         return in_batches(partial(_bounds, self), blocks, size=BATCH)
 
 
-@jax.jit
+@persistent_jit
 def _bounds(line: TimedLine, blocks: TimeBounds) -> StateBounds:
     def one(block: TimeBounds) -> StateBounds:
         s, s1, s2 = (value.each(lambda x: x[None]) for value in block.values)

@@ -29,6 +29,7 @@ from cspr_jax.robots.witness_tensions import witness_tensions
 from cspr_jax.robots.wrench_balance import SINGULAR
 from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.runtime import compile_options
+from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.verdicts import Verdict
 
 # Blocks that are bounded together, with contacts and without.
@@ -84,7 +85,7 @@ def _edges(slack: AffineBounds) -> tuple[Pair, Pair]:
     return below, above
 
 
-@partial(jax.jit, static_argnames=("passes", "contacts_alone"), compiler_options=compile_options.least())
+@persistent_jit(static_argnames=("passes", "contacts_alone"), compiler_options=compile_options.least())
 def _kernel(
     robot: AnyRobot,
     limits: Limits,
@@ -126,12 +127,12 @@ def _joined(parts: list[Part]) -> Part:
     return low, high, *(jnp.where(jnp.isfinite(rise), rise, 0.0) for rise in rises)
 
 
-@partial(jax.jit, compiler_options=compile_options.least())
+@persistent_jit(compiler_options=compile_options.least())
 def _speeds_kernel(velocity: AffineBounds) -> Part:
     return jax.vmap(lambda each: _joined([_part(-norm(each.each(lambda x: x[None])))]))(velocity)
 
 
-@partial(jax.jit, compiler_options=compile_options.least())
+@persistent_jit(compiler_options=compile_options.least())
 def _rates_kernel(robot: AnyRobot, limits: Limits, states: StateBounds) -> tuple[Array, Array]:
     # Bound the smallest slacks: the lower end of a line above a slack is above its smallest value.
     def one(state: StateBounds) -> tuple[Array, Array]:

@@ -20,6 +20,7 @@ from cspr_jax.robots import state as states
 from cspr_jax.robots import state_bounds
 from cspr_jax.robots.state import State
 from cspr_jax.robots.state_bounds import StateBounds
+from cspr_jax.runtime.persistent_jit import persistent_jit
 
 # States that are computed at once.
 STATES = 64
@@ -180,7 +181,11 @@ def common_shape(motion: Kind) -> Kind:
 
 
 def has_pieces(motion: Motion) -> bool:
-    """Whether anything in a motion has pieces, of which there may be very many."""
+    """Whether a motion has pieces, of which there may be very many.
+
+    Returns:
+        true if anything in it has.
+    """
     return any(map(_is_in_pieces, jax.tree.leaves(motion, is_leaf=_is_in_pieces)))
 
 
@@ -198,14 +203,13 @@ def states_at(motion: Motion, tau: np.ndarray, size: int = STATES) -> State:
     Returns:
         the states, leaves (k, ...).
     """
-    leaves, structure = jax.tree.flatten(common_shape(motion))
-    state: Any = in_batches(partial(_states, structure, leaves), tau, size=size)
+    state: Any = in_batches(partial(_states, common_shape(motion)), tau, size=size)
     return state
 
 
-@partial(jax.jit, static_argnums=0)
-def _states(structure: Any, leaves: Any, tau: Array) -> State:
-    return jax.vmap(jax.tree.unflatten(structure, leaves).state)(tau)
+@persistent_jit
+def _states(motion: Motion, tau: Array) -> State:
+    return jax.vmap(motion.state)(tau)
 
 
 def inward(frame: Frame, state: State) -> State:

@@ -21,6 +21,7 @@ from cspr_jax.motions.uncertain_slacks import blocks_hold, instants_fail, share_
 from cspr_jax.robots.clearance import Scene
 from cspr_jax.robots.contact_bodies import Bodies, bodies_of, default_scene
 from cspr_jax.robots.state_bounds import StateBounds
+from cspr_jax.runtime.persistent_jit import persistent_jit
 
 INSTANTS = 256  # in one batch
 
@@ -76,9 +77,9 @@ def _pool(
     return _StatePool(problem, bodies, motion, contacts_alone, blocks, states, instants, ways)
 
 
-@partial(jax.jit, static_argnums=0)
-def _instants(structure, leaves, tau):
-    states = jax.vmap(jax.tree.unflatten(structure, leaves).state)(tau)
+@persistent_jit
+def _instants(motion: Motion, tau) -> StateBounds:
+    states = jax.vmap(motion.state)(tau)
     names = [name for name in StateBounds._fields if getattr(states, name) is not None]
     return StateBounds(**{name: constant(getattr(states, name)) for name in names})
 
@@ -92,8 +93,7 @@ def instant_states(motion: Motion, tau: np.ndarray) -> StateBounds:
     Returns:
         the states, leaves (k, ...).
     """
-    leaves, structure = jax.tree.flatten(common_shape(motion))
-    return in_batches(partial(_instants, structure, leaves), tau, size=INSTANTS)
+    return in_batches(partial(_instants, common_shape(motion)), tau, size=INSTANTS)
 
 
 def motion_tolerances(

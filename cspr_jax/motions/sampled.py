@@ -11,14 +11,14 @@ from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.motion import Motion, common_shape
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.slacks import flags, slacks
+from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
 BATCH = 512
 
 
-@partial(jax.jit, static_argnums=0)
-def _slacks(structure, leaves, problem: Problem, tau) -> jax.Array:
-    motion = jax.tree.unflatten(structure, leaves)
+@persistent_jit
+def _slacks(motion: Motion, problem: Problem, tau) -> jax.Array:
     return jax.vmap(lambda t: slacks(problem, motion, t))(tau)
 
 
@@ -35,8 +35,7 @@ def sampled_answers(problem: Problem, motions: list[Motion], samples: int = 400)
     tau = np.linspace(0.0, 1.0, samples + 1)
     least, duration = [], []
     for motion in motions:
-        leaves, structure = jax.tree.flatten(common_shape(motion))
-        kernel = partial(_slacks, structure, leaves, problem)
+        kernel = partial(_slacks, common_shape(motion), problem)
 
         def at(points: np.ndarray, kernel=kernel) -> np.ndarray:
             return in_batches(kernel, points.ravel(), size=BATCH).reshape(*points.shape, -1)

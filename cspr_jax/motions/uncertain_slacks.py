@@ -30,6 +30,7 @@ from cspr_jax.robots.state_bounds import CableBounds, StateBounds, attachments, 
 from cspr_jax.robots.uncertain_tensions import UncertainTensions, centre_wrench, uncertain_tensions, with_mass
 from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.runtime import compile_options
+from cspr_jax.runtime.persistent_jit import persistent_jit
 
 # Displacement by which differences are taken, over the length of a cable; criteria of which the worst one is sought.
 STEP, NEAREST = 1e-6, 2
@@ -67,7 +68,7 @@ def share_of(limits: Limits, multiple: np.ndarray) -> Share:
     return Share(spools, centre, factor)
 
 
-@partial(jax.jit, static_argnames="contacts_alone", compiler_options=compile_options.least())
+@persistent_jit(static_argnames="contacts_alone", compiler_options=compile_options.least())
 def blocks_hold(
     robot: AnyRobot, limits: Limits, bodies: Bodies, cases: tuple[StateBounds, Share], *, contacts_alone: bool = False
 ) -> Array:
@@ -98,7 +99,7 @@ def blocks_hold(
     return jax.vmap(one)(*cases)
 
 
-@partial(jax.jit, compiler_options=compile_options.least())
+@persistent_jit(compiler_options=compile_options.least())
 def lower_slacks(robot: AnyRobot, limits: Limits, cases: tuple[StateBounds, Share]) -> Array:
     """Lower bounds of the slacks of tensions and limits of all robots over blocks.
 
@@ -165,7 +166,7 @@ def _largest(
     return lengths | {"speed": speed + faster, "acceleration": cables.acceleration.size() + more}
 
 
-@partial(jax.jit, static_argnames="contacts_alone", compiler_options=compile_options.least())
+@persistent_jit(static_argnames="contacts_alone", compiler_options=compile_options.least())
 def _upper_slacks(
     robot: AnyRobot,
     limits: Limits,

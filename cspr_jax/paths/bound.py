@@ -18,6 +18,7 @@ from cspr_jax.robots.cables import AnyRobot, cable_motion
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.witness_tensions import right_inverse
 from cspr_jax.runtime import compile_options
+from cspr_jax.runtime.persistent_jit import persistent_jit
 
 # x at which the search for multipliers begins, at least, over its largest value.
 LEAST = 1e-9
@@ -43,7 +44,7 @@ def path_bound(problem: Problem, path: Discrete, x: np.ndarray) -> float:
     return lower_bound(robot, limits, path, Multipliers(*values), SpeedMultipliers(*rates))
 
 
-@partial(jax.jit, compiler_options=compile_options.least())
+@persistent_jit(compiler_options=compile_options.least())
 def _of_nodes(robot: AnyRobot, limits: Limits, nodes: tuple[Places, Array]) -> tuple[Array, Array, Array]:
     # Multipliers of what the half-planes are made of, from those of the half-planes.
     def one(place: Places, pressures: Array) -> tuple[Array, Array, Array]:
@@ -62,7 +63,7 @@ def _of_nodes(robot: AnyRobot, limits: Limits, nodes: tuple[Places, Array]) -> t
     return jax.vmap(one)(*nodes)
 
 
-@partial(jax.jit, compiler_options=compile_options.least())
+@persistent_jit(compiler_options=compile_options.least())
 def _of_cells(robot: AnyRobot, limits: Limits, cells: tuple[Places, Array, Array]) -> tuple[Array, Array]:
     # The cap of a cell is that of the cable, or of the mass centre, whose limit is nearest in its middle.
     def one(place: Places, most: Array, pressure: Array) -> tuple[Array, Array]:

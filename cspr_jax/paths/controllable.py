@@ -9,16 +9,15 @@ Within a cell u changes at a constant rate that is chosen before; half-planes ho
 the last axis of all arrays, and are solved together.
 """
 
-from functools import partial
 from typing import NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
 from cspr_jax.paths.rows import Rows
 from cspr_jax.runtime import compile_options
+from cspr_jax.runtime.persistent_jit import persistent_jit
 
 # A half-plane whose share of u is smaller bounds x alone. Steps of Newton, at most.
 FLAT, STEPS = 1e-12, 40
@@ -134,7 +133,7 @@ def _flat_range(u: Array, x_share: Array, most: Array, cap: Array) -> tuple[Arra
     return jnp.maximum(low, 0.0), jnp.where(never, -1.0, jnp.minimum(high, cap))
 
 
-@partial(jax.jit, compiler_options=compile_options.least())
+@persistent_jit(compiler_options=compile_options.least())
 def fastest(sides: tuple[Rows, Rows], width: Array, bend: Array, cap: Array, ends: tuple[Array, Array]) -> GridSolution:
     """Fastest motions along paths.
 

@@ -37,6 +37,7 @@ from cspr_jax.robots.platform import RIGID
 from cspr_jax.robots.state_bounds import CableBounds, StateBounds, balance_bounds, balanced_part, cable_bounds
 from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.runtime import compile_options
+from cspr_jax.runtime.persistent_jit import persistent_jit
 
 BATCH = 64
 # Part of the sums by which the bound is lowered: more than the rounding of what is summed here.
@@ -153,7 +154,7 @@ def _evened(robot: AnyRobot, path: Discrete, multipliers: Multipliers, short: np
     return multipliers._replace(wrench=multipliers.wrench + change)
 
 
-@partial(jax.jit, compiler_options=compile_options.least())
+@persistent_jit(compiler_options=compile_options.least())
 def _momentum(robot: AnyRobot, nodes: tuple[Places]) -> Array:
     return jax.vmap(lambda place: unit_wrenches(robot, state_at(place)).momentum)(*nodes)
 
@@ -179,7 +180,7 @@ def _along(start: Array, end: Array, width: Array, momentum: AffineBounds, bend:
     return dot(_line(start, end), bend) - dot(_steep(start, end, width), momentum)
 
 
-@partial(jax.jit, compiler_options=compile_options.least())
+@persistent_jit(compiler_options=compile_options.least())
 def _kernel(robot: AnyRobot, limits: Limits, blocks: tuple[StateBounds, _Cell]) -> tuple[Array, Array, Array, Array]:
     # Tell what each cell adds to the bound, what it takes from it, how much weight its multipliers lack, and by how
     # much y . a' - y' . a is negative.

@@ -16,6 +16,7 @@ from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.state import State
 from cspr_jax.runtime import compile_options
+from cspr_jax.runtime.persistent_jit import persistent_jit
 
 # Part of the nodes over which cells become wider, from an end at zero speed on; cells there that are narrower still.
 RAMP, SMALLER = 0.25, 5
@@ -156,7 +157,7 @@ def state_at(place: Places) -> State:
     return piece_state(*place)
 
 
-@partial(jax.jit, compiler_options=compile_options.least())
+@persistent_jit(compiler_options=compile_options.least())
 def _rows(robot: AnyRobot, limits: Limits, arguments: tuple[Places, Array]) -> Rows:
     return jax.vmap(lambda place, speed: path_rows(robot, limits, state_at(place), speed))(*arguments)
 
@@ -206,7 +207,7 @@ def _ended(start: np.ndarray, before: np.ndarray, jumps: np.ndarray) -> np.ndarr
     return end
 
 
-@partial(jax.jit, compiler_options=compile_options.least())
+@persistent_jit(compiler_options=compile_options.least())
 def _derivatives(places: Places) -> Any:
     def one(place: Places):
         rates = [piece_values(place.position, place.share, place.width)]

@@ -36,6 +36,7 @@ from cspr_jax.robots.state import State
 from cspr_jax.robots.state_bounds import StateBounds
 from cspr_jax.robots.wrench_balance import normalised_determinant
 from cspr_jax.runtime import compile_options
+from cspr_jax.runtime.persistent_jit import persistent_jit
 
 # Blocks of which bounds are computed at a time.
 BATCH = 64
@@ -122,7 +123,7 @@ def _share(segment: PlatformSegment, arcs: Array) -> Array:
     return (1.0 - ratio) * (1.0 + ratio)
 
 
-@partial(jax.jit, static_argnames="kind")
+@persistent_jit(static_argnames="kind")
 def motion(
     segment: PlatformSegment, amplitude: Amplitude, arcs: Array, tau: Array, *, kind: PlatformMotionKind = USUAL
 ) -> State:
@@ -253,12 +254,12 @@ class PlatformMotion:
         return in_batches(partial(_bounds, self.segment, self.arcs, kind=self.kind), blocks, size=BATCH)
 
 
-@partial(jax.jit, static_argnames="kind", compiler_options=compile_options.least())
+@persistent_jit(static_argnames="kind", compiler_options=compile_options.least())
 def _bounds(segment: PlatformSegment, arcs: Array, blocks: TimeBounds, *, kind: PlatformMotionKind) -> StateBounds:
     return jax.vmap(partial(_block_bounds, kind, segment, arcs))(blocks)
 
 
-@partial(jax.jit, static_argnames="kind")
+@persistent_jit(static_argnames="kind")
 def several_bounds(cases: tuple[PlatformSegment, Array, TimeBounds], *, kind: PlatformMotionKind) -> StateBounds:
     """Bounds of the states of several motions, over one block of each.
 

@@ -36,6 +36,7 @@ from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.robots.state import State
 from cspr_jax.robots.state_bounds import StateBounds
 from cspr_jax.runtime import compile_options
+from cspr_jax.runtime.persistent_jit import persistent_jit
 
 # Blocks of which bounds are computed at a time.
 BATCH = 64
@@ -281,7 +282,7 @@ class Hypocycloid:
         return in_batches(partial(_bounds, self.segment, self.arcs), blocks, size=BATCH)
 
 
-@partial(jax.jit, compiler_options=compile_options.least())
+@persistent_jit(compiler_options=compile_options.least())
 def _bounds(segment: Segment, arcs: Array, blocks: TimeBounds) -> StateBounds:
     return jax.vmap(partial(_block_bounds, segment, arcs))(blocks)
 
