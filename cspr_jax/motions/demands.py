@@ -134,9 +134,9 @@ def demands(
     for i, (motion, tau) in enumerate(zip(motions, times, strict=True)):
         # Motions of one structure and one number of samples are computed together, but for those that may have very
         # many pieces, which would be copied for each instant.
-        own = i if has_pieces(motion) else None
+        group = i if has_pieces(motion) else None
         shapes = tuple(np.shape(leaf) for leaf in jax.tree.leaves(motion))
-        alike.setdefault((own, jax.tree.structure(motion), shapes, len(tau)), []).append(i)
+        alike.setdefault((group, jax.tree.structure(motion), shapes, len(tau)), []).append(i)
     for (*_, count), members in alike.items():
         size = max(ROOM // count, 1)
         for first in range(0, len(members), size):

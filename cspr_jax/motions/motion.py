@@ -181,7 +181,7 @@ def common_shape(motion: Kind) -> Kind:
 
 
 def has_pieces(motion: Motion) -> bool:
-    """Whether a motion has pieces, of which there may be very many.
+    """Tell whether a motion has pieces, of which there may be very many.
 
     Returns:
         true if anything in it has.
