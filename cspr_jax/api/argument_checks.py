@@ -330,7 +330,7 @@ ARGUMENTS: dict[str, Rule] = {
     "wrench_ellipsoid": real("finite numbers, one a degree of freedom, or None", (ANY,), none=True),
     "wrenches": real("finite numbers of shape (k, dof), or None", (ANY, ANY), none=True),
     "z0": real(f"{DEPTH_WORDS}, or (n,) of them", (), (ANY,), **DEPTH),
-    "z_axis": _TEXT,
+    "z_axis": choice(kind_of('"down" or "up"'), "down", "up"),
 }
 # These rules hold for functions whose argument differs from the usual one of the same name.
 _ONE_DEPTH = real(DEPTH_WORDS, (), traced=True, **DEPTH)

@@ -14,6 +14,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.elementary import leaf, polynomial
+from cspr_jax.config.suggestions import one_of
 from cspr_jax.errors import InputError
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
@@ -181,7 +182,7 @@ def named(name: str, epsilon: float | None = None) -> Amplitude:
             raise InputError("epsilon", epsilon, f'no epsilon with "{name}"')
         return from_pieces(name, (), (0.0,), (polynomials[name],))
     if name not in NAMES:
-        raise InputError("name", name, "one of " + ", ".join(NAMES))
+        raise InputError("name", name, one_of(name, NAMES))
     if epsilon is None or not SMALLEST_EPSILON <= epsilon <= 0.5:
         raise InputError("epsilon", epsilon, f"a number from {SMALLEST_EPSILON} to 0.5")
     return _with_straight_middle(name, epsilon)

@@ -274,6 +274,8 @@ def test_names_that_nearly_fit_are_asked_about(good, tmp_path):
         ),
         r"did you mean wrench-feasible\? must": lambda: cspr_jax.workspace(robot, points, condition="wrench-feasble"),
         r"did you mean quintic\? must be one of .*; those": lambda: cspr_jax.make_problem(robot, amplitude="quintc"),
+        r"did you mean quintic\? must be one of A1": lambda: cspr_jax.amplitude("quintc"),
+        r'did you mean up\? must be "down" or "up"': lambda: cspr_jax.point_mass(np.eye(3), mass=1.0, z_axis="Up"),
         r"did you mean 3\.2\? must be one of 1\.1": lambda: cspr_jax.table("3.22"),
         r"did you mean sweep\? must be one of robot": lambda: cspr_jax.new_file("sweeep", tmp_path / "a.toml"),
         r"did you mean minimum-arcs\? must": lambda: cspr_jax.new_file("sweep", tmp_path / "a.toml", map="minimum_arc"),
