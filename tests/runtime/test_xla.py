@@ -516,6 +516,25 @@ def test_many_processes_share_one_folder(tmp_path, monkeypatch, count, turns):
     assert not list(tmp_path.glob("run-*"))
 
 
+@pytest.mark.parametrize(
+    "count", [pytest.param(3, marks=pytest.mark.thorough), pytest.param(20, marks=pytest.mark.soak)]
+)
+def test_many_commands_share_one_cold_folder(tmp_path, count):
+    """All answer alike, without a word of kept code; what they leave is whole, and the next one has the same answer."""
+    words = [sys.executable, "-m", "cspr_jax", "plan", "sweeps/straight_line.toml", "--json"]
+    here = os.environ | {"CSPR_CACHE_DIR": str(with_known_flags(tmp_path))}
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    running = [subprocess.Popen(words, env=here, cwd=ROOT, **pipes) for _ in range(count)]
+    told_by_all = [process.communicate(timeout=1200) for process in running]
+    done = subprocess.run(words, env=here, cwd=ROOT, capture_output=True, text=True, timeout=300)
+    assert {(out, process.returncode) for (out, _), process in zip(told_by_all, running, strict=True)} == {
+        (done.stdout, 0)
+    }
+    assert not [err for _, err in told_by_all if "compiled code" in err]  # others say at which stage they are
+    (whole,) = tmp_path.glob("*/whole")
+    assert len([content_of(entry) for entry in whole.iterdir()]) > 2 and not list(whole.parent.glob("run-*"))
+
+
 @pytest.mark.parametrize("record", ["pipe", "deep", "large", "list"])
 def test_a_record_of_flags_that_is_none(tmp_path, record, monkeypatch):
     """It is made again."""
