@@ -11,8 +11,9 @@ GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 # Places that are refined for each function, points at each place, and rounds, each eight times as fine as the last.
 PLACES, POINTS, ROUNDS = 3, 17, 4
-# Samples whose distances differ by less than this ratio tell how a function bends.
+# Distances of samples whose ratio is at least this tell the curvature of a function.
 EVEN = 1e-6
+CLOSE = 1e-12  # between samples of one place, on both sides of a joint
 
 
 class Bracket(NamedTuple):
@@ -80,19 +81,37 @@ def vertex_values(times: np.ndarray, values: np.ndarray) -> np.ndarray:
     Returns:
         (..., n, n_functions) vertices of the parabolas, at samples that are no minima their values.
     """
-    least = np.array(values, float)
+    vertices = np.array(values, float)
     gaps = np.diff(times)[..., None]
     before, after = gaps[..., :-1, :], gaps[..., 1:, :]
     with np.errstate(divide="ignore", invalid="ignore"):  # values may be infinite
-        slopes = np.diff(values, axis=-2) / gaps
-        fall, rise = slopes[..., :-1, :], slopes[..., 1:, :]
-        square, slope = (rise - fall) / (before + after), (fall * after + rise * before) / (before + after)
-        drop = slope**2 / (4.0 * square)
+        rates = np.diff(values, axis=-2) / gaps
+        earlier, later = rates[..., :-1, :], rates[..., 1:, :]
+        square, rate = (later - earlier) / (before + after), (earlier * after + later * before) / (before + after)
+        drop = rate**2 / (4.0 * square)
     # Both sides of a joint tell nothing of how values change.
     is_even = np.minimum(before, after) > EVEN * np.maximum(before, after)
-    is_low = (fall <= 0.0) & (rise >= 0.0) & np.isfinite(drop) & is_even
-    least[..., 1:-1, :] -= np.where(is_low, drop, 0.0)
-    return least
+    is_low = (earlier <= 0.0) & (later >= 0.0) & np.isfinite(drop) & is_even
+    vertices[..., 1:-1, :] -= np.where(is_low, drop, 0.0)
+    return vertices
+
+
+def lowest_samples(values: np.ndarray, estimates: np.ndarray, count: int) -> np.ndarray:
+    """Samples around which the smallest values are looked for: the smallest one, then minima by their estimates.
+
+    Args:
+        values: (..., n, n_functions) samples.
+        estimates: (..., n, n_functions) of the smallest values near them; inf where there is none.
+
+    Returns:
+        (..., count, n_functions) indices.
+    """
+    earlier, later = np.array(values, float), np.array(values, float)
+    earlier[..., 1:, :], earlier[..., :1, :] = values[..., :-1, :], np.inf
+    later[..., :-1, :], later[..., -1:, :] = values[..., 1:, :], np.inf
+    ranks = np.where((values <= earlier) & (values <= later), estimates, np.inf)
+    np.put_along_axis(ranks, values.argmin(-2)[..., None, :], -np.inf, axis=-2)
+    return np.argsort(ranks, axis=-2, kind="stable")[..., :count, :]
 
 
 def narrowed(function: Callable[[np.ndarray], np.ndarray], tau: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -123,28 +142,43 @@ def narrowed_places(
         (n_motions, n_functions) values, and (n_motions, n_functions) instants.
     """
     tau = np.broadcast_to(tau, values.shape[:2])
-    padded = np.pad(values, ((0, 0), (1, 1), (0, 0)), constant_values=np.inf)
-    is_low = (values <= padded[:, :-2]) & (values <= padded[:, 2:])
-    order = np.argsort(np.where(is_low, vertex_values(tau, values), np.inf), axis=1)[
-        :, :PLACES
-    ]  # (n_motions, PLACES, n_functions)
-    gaps = np.diff(tau, axis=1, prepend=tau[:, :1], append=tau[:, -1:])
-    place, width = (
-        np.take_along_axis(np.broadcast_to(table[..., None], values.shape), order, axis=1)
-        for table in (tau, np.maximum(gaps[:, 1:], gaps[:, :-1]))
-    )
-    smallest = values.min(1)
-    when = np.take_along_axis(tau, values.argmin(1), axis=1)
-    column = np.arange(values.shape[2])
-    for _ in range(ROUNDS):
-        points = np.clip(place[..., None] + width[..., None] * np.linspace(-1.0, 1.0, POINTS), 0.0, 1.0)
+    starts = lowest_samples(values, vertex_values(tau, values), PLACES)
+    return followed(function, tau, starts, ROUNDS)
+
+
+def followed(
+    function: Callable[[np.ndarray], np.ndarray], tau: np.ndarray, starts: np.ndarray, rounds: int, kept: int = PLACES
+) -> tuple[np.ndarray, np.ndarray]:
+    """Smallest value of each function near some of its samples, and the time at which it is attained.
+
+    Args:
+        function: as for `narrowed`.
+        tau: (n_motions, n) times of the samples.
+        starts: (n_motions, n_starts, n_functions) indices of samples.
+        kept: of the starts that are followed after the first round.
+
+    Returns:
+        (n_motions, n_functions) values, and (n_motions, n_functions) times.
+    """
+    motion, column = np.arange(len(tau))[:, None, None], np.arange(starts.shape[2])
+    centers, width = tau[motion, starts], _distances(tau)[motion, starts]
+    for _ in range(rounds):
+        points = np.clip(centers[..., None] + width[..., None] * np.linspace(-1.0, 1.0, POINTS), 0.0, 1.0)
         samples = function(points.reshape(len(points), -1)).reshape(*points.shape, -1)
-        # At each place of a function keep only the values of this function: (n_motions, PLACES, n_functions, POINTS).
-        own_samples = np.moveaxis(samples[:, :, column, :, column], 0, 2)
-        lowest = own_samples.min((1, 3))
-        place = np.take_along_axis(points, own_samples.argmin(3)[..., None], axis=3)[..., 0]
-        best = np.take_along_axis(place, own_samples.min(3).argmin(1)[:, None], axis=1)[:, 0]
-        when = np.where(lowest < smallest, best, when)
-        smallest = np.minimum(smallest, lowest)
+        # Around each start of a function only the values of this function count: (n_motions, n_starts, n_functions, n).
+        own = np.moveaxis(samples[:, :, column, :, column], 0, 2)
+        lowest = own.min(3)
+        centers = np.take_along_axis(points, own.argmin(3)[..., None], axis=3)[..., 0]
+        # What is not a number counts as the smallest value, as for NumPy.
+        best = np.argsort(np.where(np.isnan(lowest), -np.inf, lowest), axis=1, kind="stable")[:, :kept]
+        lowest, centers, width = (np.take_along_axis(table, best, axis=1) for table in (lowest, centers, width))
         width = 2.0 * width / (POINTS - 1)
-    return smallest, when
+    return lowest[:, 0], centers[:, 0]
+
+
+def _distances(tau: np.ndarray) -> np.ndarray:
+    # Distance of each sample (n_motions, n) from the farther of the samples before and after its place.
+    first, last, is_apart = tau[:, :1], tau[:, -1:], np.diff(tau, axis=1) > CLOSE
+    before = np.maximum.accumulate(np.where(is_apart, tau[:, :-1], first), axis=1)
+    after = np.minimum.accumulate(np.where(is_apart, tau[:, 1:], last)[:, ::-1], axis=1)[:, ::-1]
+    return np.maximum(tau - np.hstack([first, before]), np.hstack([after, last]) - tau)

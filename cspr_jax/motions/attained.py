@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from cspr_jax.arithmetic.minima import vertex_values
+from cspr_jax.arithmetic.minima import followed, lowest_samples, vertex_values
 from cspr_jax.motions.block_parts import TimeBlocks
 from cspr_jax.motions.block_slacks import block_slacks
 from cspr_jax.motions.motion import BESIDE, Motion
@@ -20,11 +20,10 @@ from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import MotionProof, ProvedAnswers, margins_of
 from cspr_jax.robots.clearance import Scene
 
-# Times that are followed for each criterion at first, and then; points at each; rounds, each four times as fine.
-STARTS, FOLLOWED, POINTS, ROUNDS = 6, 2, 9, 11
+# Samples that are followed for each criterion at first, and then; rounds, each eight times as fine.
+STARTS, FOLLOWED, ROUNDS = 6, 2, 7
 # Blocks of a criterion that are sampled at most: those with the smallest upper bounds.
 MOST_BLOCKS = 1000
-SAME = 1e-9  # of a slack, by which one seen by samples may lie above that of a proof
 Slacks = Callable[[np.ndarray], np.ndarray]
 AnyProved = TypeVar("AnyProved", bound=ProvedAnswers)
 
@@ -65,20 +64,19 @@ def attained(
     if proof.near is None or not len(columns) or not np.isfinite(duration):
         return case
 
-    def slacks(times: np.ndarray) -> np.ndarray:
-        states = instant_states(motion, times / duration)
+    def slacks(tau: np.ndarray) -> np.ndarray:
+        times = tau[0]
+        states = instant_states(motion, times)
         bounds = problem.robot, problem.limits, lambda *_: states, times, times, scene
-        return block_slacks(*bounds, contacts_alone=contacts_alone).high
+        return block_slacks(*bounds, contacts_alone=contacts_alone).high[None, :, columns]
 
     columns = columns[columns < proof.near.slacks.low.shape[1]]  # feeds come last, from another proof
-    joints = duration * np.asarray(motion.breaks(), float)
-    smallest, when = _minima(slacks, proof.near, proof.high, columns, joints, duration)
-    high, times = proof.high.copy(), proof.when.copy()
-    # A touch between two floats is proved but not attained, and what a proof has seen may lie lower.
+    smallest, tau = _minima(slacks, _blocks(proof.near, proof.high, columns, duration), np.asarray(motion.breaks()))
+    high, when = proof.high.copy(), proof.when.copy()
+    # A touch between two floats is proved but not attained.
     is_seen = np.isfinite(smallest) & ~((high[columns] < 0.0) & (smallest >= 0.0))
-    is_seen &= smallest <= high[columns] + SAME * np.abs(high[columns])
-    high[columns[is_seen]], times[columns[is_seen]] = smallest[is_seen], when[is_seen]
-    return case._replace(proof=dataclasses.replace(proof, high=high, when=times))
+    high[columns[is_seen]], when[columns[is_seen]] = smallest[is_seen], duration * tau[is_seen]
+    return case._replace(proof=dataclasses.replace(proof, high=high, when=when))
 
 
 def _nearest(case: MotionProof) -> np.ndarray:
@@ -89,51 +87,27 @@ def _nearest(case: MotionProof) -> np.ndarray:
     return np.flatnonzero((low <= least) & np.isfinite(high))
 
 
-def _minima(
-    slacks: Slacks, near: TimeBlocks, high: np.ndarray, columns: np.ndarray, joints: np.ndarray, duration: float
-) -> tuple[np.ndarray, np.ndarray]:
-    # Smallest slack of each of the chosen criteria, (m,), and when, by samples of blocks and then around the best.
-    edges, may_hold = _sampled_blocks(near, high, columns)
-    inner = joints[(np.searchsorted(edges[0], joints, "right") > np.searchsorted(edges[1], joints))]
-    sides = (inner[:, None] * [1.0 - BESIDE, 1.0]).ravel()
-    times = np.unique(np.clip(np.concatenate([*edges, edges.mean(0), sides]), 0.0, duration))
-    values = slacks(times)[:, columns]
-    before, after = np.maximum(np.arange(len(times)) - 1, 0), np.minimum(np.arange(len(times)) + 1, len(times) - 1)
-    # Samples in blocks that cannot hold the smallest slack of a criterion do not count for it.
-    first, last = (np.searchsorted(times, side) for side in edges)
-    inside = np.zeros((len(times) + 1, len(columns)), int)
-    np.add.at(inside, first, may_hold)
-    np.subtract.at(inside, last + 1, may_hold)
-    ranks = np.where(inside.cumsum(0)[:-1] > 0, vertex_values(times, values), np.inf)
-    is_low = (values <= values[before]) & (values <= values[after])
-    ranks = np.where(is_low | (ranks == ranks.min(0)), ranks, np.inf)
-    starts = np.argsort(ranks, axis=0, kind="stable")[:STARTS]
-    width = np.maximum(times[after] - times, times - times[before])[starts]
-    return _followed(slacks, columns, times[starts], width, duration)
-
-
-def _followed(
-    slacks: Slacks, columns: np.ndarray, places: np.ndarray, width: np.ndarray, duration: float
-) -> tuple[np.ndarray, np.ndarray]:
-    # Minima of the criteria around places (k, m), within widths (k, m).
-    column = np.arange(len(columns))
-    for step in range(ROUNDS):
-        points = np.clip(places[..., None] + width[..., None] * np.linspace(-1.0, 1.0, POINTS), 0.0, duration)
-        values = slacks(points.ravel())[:, columns].reshape(*points.shape, len(columns))[:, column, :, column]
-        values = np.moveaxis(values, 0, 1)
-        chosen = values.argmin(2)[..., None]
-        places, lowest = (np.take_along_axis(table, chosen, 2)[..., 0] for table in (points, values))
-        width = 2.0 * width / (POINTS - 1)
-        best = np.argsort(lowest, axis=0, kind="stable")[: FOLLOWED if step else STARTS]
-        places, width, lowest = (np.take_along_axis(table, best, 0) for table in (places, width, lowest))
-    return lowest[0], places[0]
-
-
-def _sampled_blocks(near: TimeBlocks, high: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    # Starts and ends (2, k) of the blocks to sample, s, and which criteria (k, m) each may be the worst of.
+def _blocks(near: TimeBlocks, high: np.ndarray, columns: np.ndarray, duration: float) -> tuple[np.ndarray, np.ndarray]:
+    # Starts and ends (2, k) of the blocks to sample, tau, and which criteria (k, m) each may be the worst of.
     may_hold = near.slacks.low[:, columns] <= high[columns]
     upper = np.where(may_hold, near.slacks.high[:, columns], np.inf)
     for column in np.flatnonzero(may_hold.sum(0) > MOST_BLOCKS):
         may_hold[np.argsort(upper[:, column], kind="stable")[MOST_BLOCKS:], column] = False
-    rows = np.flatnonzero(may_hold.any(1))
-    return np.stack([near.start[rows], near.end[rows]]), may_hold[rows]
+    chosen = may_hold.any(1)
+    return np.stack([near.start[chosen], near.end[chosen]]) / duration, may_hold[chosen]
+
+
+def _minima(slacks: Slacks, blocks: tuple[np.ndarray, np.ndarray], joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    # Smallest slack of each of m criteria, and when, tau, by samples of blocks and then around the best.
+    edges, may_hold = blocks
+    inner = joints[(np.searchsorted(edges[0], joints, "right") > np.searchsorted(edges[1], joints))]
+    knots = np.unique(np.concatenate([*edges, inner, inner * (1.0 - BESIDE)]))
+    tau = np.clip(np.sort(np.concatenate([knots, 0.5 * (knots[1:] + knots[:-1])])), 0.0, 1.0)
+    # Samples in blocks that cannot hold the smallest slack of a criterion, and between blocks, do not count for it.
+    inside = np.zeros((len(tau) + 1, len(may_hold[0])), int)
+    np.add.at(inside, np.searchsorted(tau, edges[0]), may_hold)
+    np.subtract.at(inside, np.searchsorted(tau, edges[1], side="right"), may_hold)
+    values = np.where(inside.cumsum(0)[:-1] > 0, slacks(tau[None])[0], np.inf)
+    starts = lowest_samples(values, vertex_values(tau, values), STARTS)
+    smallest, when = followed(slacks, tau[None], starts[None], ROUNDS, FOLLOWED)
+    return smallest[0], when[0]
