@@ -1,18 +1,23 @@
 """Poses of a platform's own axes, of their origin and of how they turn, in place of those of its mass centre."""
 
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.arithmetic.rotations import products
 from cspr_jax.build.robots import build_robot
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.curves.files import reference_of
-from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.schema.quantities import TRAJECTORY
 
+if TYPE_CHECKING:  # pictures need no plans
+    from cspr_jax.plans.planning import PlannedMotions
 
-def at_origin(plan: PlannedMotions, columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+
+def at_origin(plan: "PlannedMotions", columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Rows of a plan whose point is the origin of a platform's axes, of that point and of these axes.
 
     Args:
@@ -22,8 +27,7 @@ def at_origin(plan: PlannedMotions, columns: dict[str, np.ndarray]) -> dict[str,
     Returns:
         the rows, with the mass centre as a column of its own.
     """
-    reference = plan.frame.turned_quaternions(reference_of(build_robot(plan.robot_file, plan.keys, Path("plan"))))
-    quaternion = products(columns["quaternion"], reference[None])
+    quaternion = of_own_axes(plan.robot_file, columns["quaternion"])
     centre = np.asarray(plan.robot_file.centre_of_mass or [0.0] * 3)
     arm = Rotation.from_quat(np.roll(quaternion, -1, axis=1)).apply(centre)
     speed, omega = np.cross(columns["omega"], arm), columns["omega"]
@@ -35,3 +39,17 @@ def at_origin(plan: PlannedMotions, columns: dict[str, np.ndarray]) -> dict[str,
     }
     both = columns | moved | {"mass_centre": columns["position"]}
     return {name: both[name] for name in TRAJECTORY if name in both}  # the order that readers of tables expect
+
+
+def of_own_axes(robot_file: RobotFile, quaternions: np.ndarray) -> np.ndarray:
+    """Orientations of a platform's axes in its file, of those from its reference orientation.
+
+    Args:
+        quaternions: (n, 4) in the axes of the robot file.
+
+    Returns:
+        (n, 4) likewise.
+    """
+    reference = reference_of(build_robot(robot_file, TrajectoryKeys(), robot_file.name))
+    turned = frame_of(robot_file.base_points, robot_file.z_axis).turned_quaternions(reference)
+    return products(quaternions, turned[None])

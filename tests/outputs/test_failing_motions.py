@@ -231,3 +231,52 @@ def test_a_platform_has_its_shape(shape):
         own = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
     placed = (own - robot_file.centre_of_mass) @ shapes.rotation_matrix(turn[0]).T + columns["position"]
     np.testing.assert_allclose(np.unique(corners.round(9), axis=0), np.unique(placed.round(9), axis=0))
+
+
+RING = 0.5 * np.pi + 2.0 * np.pi * np.arange(3) / 3.0
+CORNERS = np.stack([np.cos(RING), np.sin(RING), 0.0 * RING], axis=1)
+TURN = shapes.rotation_matrix(np.array([0.9, 0.1, -0.2, np.sqrt(1.0 - 0.81 - 0.01 - 0.04)]))
+
+
+def six_cables(turn, z_axis):
+    """A platform that hangs on two cables from each corner, its axes turned from those in which it hangs."""
+    signs = np.array([1.0, 1.0, 1.0] if z_axis == "down" else [1.0, -1.0, -1.0])
+    own = (0.3 * (-CORNERS[[2, 1, 0, 2, 1, 0]]) + [0.0, 0.0, 0.02]) @ turn.T
+    inertia = turn @ np.diag([0.02, 0.03, 0.04]) @ turn.T
+    return {
+        "name": "turned",
+        "z_axis": z_axis,
+        "base_points": (np.repeat(CORNERS, 2, axis=0) * signs).tolist(),
+        "platform_points": (own * signs).tolist(),
+        "mass": 2.0,
+        "inertia": (0.5 * (inertia + inertia.T) * np.outer(signs, signs)).tolist(),
+        "centre_of_mass": (turn @ [0.0, 0.0, 0.05] * signs).tolist(),
+    }
+
+
+@pytest.mark.parametrize("z_axis", ["down", "up"])
+def test_six_cables_are_drawn_where_they_are_whatever_the_axes_of_the_file(z_axis):
+    """Orientations of a motion count from that in which the platform hangs, not from the axes of its file."""
+    columns = {"position": np.array([[0.1, 0.2, 1.3]]), "quaternion": np.array([[0.96, 0.0, 0.28, 0.0]])}
+    plain, turned = (resolve_robot(six_cables(turn, z_axis), "", None) for turn in (np.eye(3), TURN))
+    expected, drawn = (moving(columns, robot_file, np.arange(1)) for robot_file in (plain, turned))
+    np.testing.assert_allclose(drawn.attached, expected.attached, atol=1e-9)
+    np.testing.assert_allclose(
+        np.unique(drawn.corners[0].round(6), axis=0), np.unique(expected.corners[0].round(6), axis=0)
+    )
+
+
+@pytest.mark.thorough
+def test_drawn_cables_have_the_lengths_of_the_motion(tmp_path):
+    """From the mass centre and from the origin of the axes, and with the robot beside a table."""
+    poses = [
+        {"position": [0.0, 0.0, 1.2]},
+        {"position": [0.1, 0.05, 1.3], "time": 3.0, "quaternion": [0.96, 0.28, 0.0, 0.0]},
+    ]
+    data = {"schema": 1, "family": "spline", "robot": six_cables(TURN, "down"), "pose": poses}
+    for point in ("mass-centre", "origin"):
+        cspr_jax.plan(data | {"point": point}).save(tmp_path / "motion.csv")
+        result = cspr_jax.open_result(tmp_path / "motion.csv")
+        robot = moving(result.data, resolve_robot(data["robot"], "", None), np.arange(len(result.axes["t"])))
+        length = np.linalg.norm(robot.attached - robot.base, axis=2)
+        np.testing.assert_allclose(length, result.data["length"], atol=1e-7)

@@ -52,13 +52,18 @@ def moving(
         return Moving(np.empty((0, 3)), position, nothing, np.empty((len(rows), 0, 2, 3)), nothing)
     base = np.asarray(robot_file.base_points, float)
     body = np.zeros_like(base) if robot_file.platform_points is None else np.asarray(robot_file.platform_points, float)
-    # A motion holds the positions of the mass centre, unless it says that they are those of the axes' origin.
+    # A motion holds poses of the mass centre from the reference orientation, unless it says that they are of the axes.
     centre = np.zeros(3) if "mass_centre" in columns else np.asarray(robot_file.centre_of_mass or [0.0] * 3, float)
     body = body - centre
     edges, rotations = np.empty((0, 2, 3)), np.eye(3)[None]
     if quaternion is not None:
-        edges = _edges(robot_file, keys, body, centre)
-        rotations = np.array([rotation_matrix(one) for one in np.asarray(quaternion)[rows]])
+        edges, quaternion = _edges(robot_file, keys, body, centre), np.asarray(quaternion)[rows]
+        # With more cables the reference orientation is that of the axes, and jax need not be loaded.
+        if "mass_centre" not in columns and len(base) <= 6:
+            from cspr_jax.outputs.platform_poses import of_own_axes
+
+            quaternion = of_own_axes(robot_file, quaternion)
+        rotations = np.array([rotation_matrix(one) for one in quaternion])
     # These points turn with the platform, at each row.
     attached, corners = (
         position[:, None] + np.einsum("rij,kj->rki", rotations, x) for x in (body, edges.reshape(-1, 3))
