@@ -254,11 +254,16 @@ def check(  # noqa: PLR0913
         plan = plan_keys(keys, NAME)
         if positions is not None:
             source: Any = samples_of(times, positions, quaternions, velocities, accelerations)
-        elif hasattr(times, "state") or hasattr(times, "x") or hasattr(times, "t"):
+        elif hasattr(times, "state") or _is_curve(times):
             source = times
         else:
             source = _function(times, duration, plan)
         return _check_of(plan.with_source(str(NAME), source), text_of(keys))
+
+
+def _is_curve(times: Any) -> bool:
+    # Piecewise polynomials of SciPy have x, B-splines t.
+    return hasattr(times, "x") or hasattr(times, "t")
 
 
 def _check_source(times: Any, samples: Mapping[str, Any], duration: float | None) -> None:
@@ -269,7 +274,7 @@ def _check_source(times: Any, samples: Mapping[str, Any], duration: float | None
         for name in (name for name, rows in samples.items() if rows is not None):
             fault = f"given beside {kind} in place of times"
             raise InputError(name, None, "must be absent; with an array of times (n,) s, samples", fault=fault)
-    if duration is not None and (is_file or is_motion or hasattr(times, "x") or not callable(times)):
+    if duration is not None and (is_file or is_motion or _is_curve(times) or not callable(times)):
         raise InputError("duration", duration, "absent but for a function of time")
 
 

@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import BSpline, CubicSpline
 from scipy.spatial.transform import Rotation
 
 import cspr_jax
@@ -261,7 +261,7 @@ def test_what_is_given_beside_a_source_of_its_own_is_refused():
         for name, rows in samples.items():
             with pytest.raises(InputError, match=f"^{name}: given beside .*must be absent"):
                 cspr_jax.check("prototype", source, **{name: rows})
-    for source in (motion, "own.csv", CubicSpline(TIMES, PLACES)):
+    for source in (motion, "own.csv", CubicSpline(TIMES, PLACES), BSpline([0, 0, 6, 6], PLACES[:2], 1)):
         with pytest.raises(InputError, match=r"duration = 2\.0: must be absent"):
             cspr_jax.check("prototype", source, duration=2.0)
     with pytest.raises(InputError, match="positions: missing"):
