@@ -147,7 +147,11 @@ def narrowed_places(
 
 
 def followed(
-    function: Callable[[np.ndarray], np.ndarray], tau: np.ndarray, starts: np.ndarray, rounds: int, kept: int = PLACES
+    function: Callable[[np.ndarray], np.ndarray],
+    tau: np.ndarray,
+    starts: np.ndarray,
+    rounds: int,
+    n_followed: int = PLACES,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Smallest value of each function near some of its samples, and the time at which it is attained.
 
@@ -155,7 +159,7 @@ def followed(
         function: as for `narrowed`.
         tau: (n_motions, n) times of the samples.
         starts: (n_motions, n_starts, n_functions) indices of samples.
-        kept: of the starts that are followed after the first round.
+        n_followed: of the starts that are followed after the first round.
 
     Returns:
         (n_motions, n_functions) values, and (n_motions, n_functions) times.
@@ -166,11 +170,11 @@ def followed(
         points = np.clip(centers[..., None] + width[..., None] * np.linspace(-1.0, 1.0, POINTS), 0.0, 1.0)
         samples = function(points.reshape(len(points), -1)).reshape(*points.shape, -1)
         # Around each start of a function only the values of this function count: (n_motions, n_starts, n_functions, n).
-        own = np.moveaxis(samples[:, :, column, :, column], 0, 2)
-        lowest = own.min(3)
-        centers = np.take_along_axis(points, own.argmin(3)[..., None], axis=3)[..., 0]
-        # What is not a number counts as the smallest value, as for NumPy.
-        best = np.argsort(np.where(np.isnan(lowest), -np.inf, lowest), axis=1, kind="stable")[:, :kept]
+        of_start = np.moveaxis(samples[:, :, column, :, column], 0, 2)
+        lowest = of_start.min(3)
+        centers = np.take_along_axis(points, of_start.argmin(3)[..., None], axis=3)[..., 0]
+        # NaN counts as the smallest value, as for NumPy.
+        best = np.argsort(np.where(np.isnan(lowest), -np.inf, lowest), axis=1, kind="stable")[:, :n_followed]
         lowest, centers, width = (np.take_along_axis(table, best, axis=1) for table in (lowest, centers, width))
         width = 2.0 * width / (POINTS - 1)
     return lowest[:, 0], centers[:, 0]

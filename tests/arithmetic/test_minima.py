@@ -23,7 +23,7 @@ def test_the_smallest_sample_is_followed_whatever_others_promise():
     counts = np.isin(tau, edges)
     for masked, starts in ((values, 1), (np.where(counts[:, None], values, np.inf), 2)):
         chosen = lowest_samples(masked, vertex_values(tau, masked), starts)
-        smallest, when = followed(kinked, tau[None], chosen[None], rounds=7, kept=1)
+        smallest, when = followed(kinked, tau[None], chosen[None], rounds=7, n_followed=1)
         np.testing.assert_allclose(smallest[0, 0], DEPTHS.min(), atol=1e-6)
         np.testing.assert_allclose(when[0, 0], KINKS[DEPTHS.argmin()], atol=1e-6)
     np.testing.assert_allclose([smallest[0, 1], when[0, 1]], [0.0, 0.123], atol=1e-6)
