@@ -1,5 +1,6 @@
 """Texts that interactive sessions show of plans, checks and results, with pictures in notebooks."""
 
+import abc
 import base64
 import html
 from typing import TYPE_CHECKING, Any
@@ -15,14 +16,14 @@ MOST_LINES = 8
 DPI = 80  # of pictures in notebooks
 
 
-class Displayed:
+class Displayed(abc.ABC):
     """Object that shows itself in a few lines; its picture is drawn only when a notebook asks for it."""
 
-    def _summary(self) -> list[str]:
-        raise NotImplementedError
+    @abc.abstractmethod
+    def _summary(self) -> list[str]: ...
 
-    def _drawn_result(self) -> "Result":
-        raise NotImplementedError
+    @abc.abstractmethod
+    def _drawn_result(self) -> "Result": ...
 
     def __repr__(self) -> str:
         lines = [printable(line) for text in self._summary() for line in text.splitlines()]
