@@ -34,6 +34,19 @@ def polynomial(coefficients, x: Array) -> Array:
     return value
 
 
+def unit_vectors(vectors: np.ndarray) -> np.ndarray:
+    """Vectors scaled to length 1; a zero vector stays zero.
+
+    Args:
+        vectors: (..., k).
+
+    Returns:
+        (..., k).
+    """
+    sizes = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors / np.where(sizes > 0.0, sizes, 1.0)
+
+
 @jax.jit
 def sincospi(x: Array) -> tuple[Array, Array]:
     """sin(pi x) and cos(pi x), by range reduction and a polynomial.

@@ -142,8 +142,8 @@ class LimitTable(_Heights):
 
     uncertainty: UncertaintyTable | None = Field(
         None,
-        description="hypocycloids, transitions and splines: feasible then means feasible for every robot within this "
-        "uncertainty",
+        description="hypocycloids, transitions, splines and workspaces: feasible then means feasible for every robot "
+        "within this uncertainty",
     )
 
     tension_margin: NotNegative | None = Field(

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from cspr_jax.motions.enclosures import TOUCHED, Enclosure, Influence, unit_vectors
+from cspr_jax.arithmetic.elementary import unit_vectors
+from cspr_jax.motions.enclosures import TOUCHED, Enclosure, Influence
 from cspr_jax.robots.limits import Limits
 
 

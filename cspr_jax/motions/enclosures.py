@@ -156,19 +156,6 @@ def largest_moves(way: np.ndarray, bent: np.ndarray) -> np.ndarray:
     return np.linalg.norm(way, axis=-1) + bent
 
 
-def unit_vectors(vectors: np.ndarray) -> np.ndarray:
-    """Vectors scaled to length 1; a zero vector stays zero.
-
-    Args:
-        vectors: (..., 3).
-
-    Returns:
-        (..., 3).
-    """
-    sizes = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return vectors / np.where(sizes > 0.0, sizes, 1.0)
-
-
 def structure(rays: np.ndarray, arms: np.ndarray, *, is_platform: bool) -> np.ndarray:
     """Structure matrices: the wrenches per mass of tensions per mass and length.
 

@@ -17,8 +17,9 @@ from typing import NamedTuple
 import jax
 import numpy as np
 
+from cspr_jax.arithmetic.elementary import unit_vectors
 from cspr_jax.motions.cable_rates import rates_fail, rates_hold
-from cspr_jax.motions.enclosures import TOUCHED, Enclosure, Influence, inverted, structure, unit_vectors
+from cspr_jax.motions.enclosures import TOUCHED, Enclosure, Influence, inverted, structure
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.limits import Limits, Uncertainty
 

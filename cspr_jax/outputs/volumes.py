@@ -33,6 +33,8 @@ class WorkspaceVolume:
         most: (...) volume of all cells except those proved outside as a whole.
         proved_fraction: (...) part of the grid whose side is proved.
         undecided_fraction: (...) part of the grid whose points are undecided.
+        uncertain: (...) volume of the cells that are inside for the robot as it is described, but not for every robot
+            within its uncertainty, and so not part of `volume`, m^3, m^2 or m.
         open_fractions: (...) part of the grid whose cells are not proved, for each of their reasons (`cell_open`); none
             where nothing was to be proved.
     """
@@ -45,6 +47,7 @@ class WorkspaceVolume:
     most: np.ndarray
     proved_fraction: np.ndarray
     undecided_fraction: np.ndarray
+    uncertain: np.ndarray
     open_fractions: dict[str, np.ndarray] = dataclasses.field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
@@ -82,6 +85,11 @@ class WorkspaceVolume:
             words = ", ".join(f"{100.0 * part:.3g} % {word}" for part, word in sorted(parts)[::-1] if part > 0.0)
             if words:
                 text += f"; open: {words}"
+            if self.uncertain[place] > 0.0:
+                text += (
+                    f"; {self.uncertain[place]:.4g} {self.units} more for the robot as it is described, but not for "
+                )
+                text += "every robot within its uncertainty"
             if self.undecided_fraction[place] > 0.0:
                 text += f"; {100.0 * self.undecided_fraction[place]:.4g} % of the grid undecided"
             texts.append(f"{at}: {text}" if at else text)
@@ -137,6 +145,7 @@ def volume_of(result: Result) -> WorkspaceVolume:
         most=total - volume(side == OUTSIDE),
         proved_fraction=volume(side != 0) / total,
         undecided_fraction=volume(verdict == Verdict.UNDECIDED) / total,
+        uncertain=volume(verdict == Verdict.UNCERTAINTY),
         open_fractions=open_fractions,
     )
 

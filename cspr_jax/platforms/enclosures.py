@@ -12,9 +12,10 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.arithmetic.elementary import unit_vectors
 from cspr_jax.arithmetic.lanes import stored
 from cspr_jax.motions.blocks import Blocks, parts_of_arcs
-from cspr_jax.motions.enclosures import TOUCHED, Distances, Enclosure, Rates, largest_moves, unit_vectors
+from cspr_jax.motions.enclosures import TOUCHED, Distances, Enclosure, Rates, largest_moves
 from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.tolerances import Tolerated, tolerated

@@ -407,7 +407,7 @@ _ROWS: dict[str, MapKind] = {
             pictured=("wrench_margin", "closure_margin", "clearance", "verdict"),
             motionless=of_workspaces.QUANTITIES,
             families=(),
-            takes=("workspace", "limits", "axes.tilt_azimuth", "axes.tilt", "axes.torsion"),
+            takes=("workspace", "limits", "limits.uncertainty", "axes.tilt_azimuth", "axes.tilt", "axes.torsion"),
         ),
     )
 }

@@ -24,15 +24,6 @@ _SPECIAL = (
     *("limits", "limits.uncertainty", "orientations", "orientations.values", "launch", "workspace", "ellipse"),
     *SurroundingsKeys.model_fields,
 )
-# Keys to use in place of some that a kind of map does not have.
-_INSTEAD = {
-    (
-        "workspace",
-        "limits.uncertainty",
-    ): ", whose cells are proved for the robot as it is described: a wrench_box holds "
-    "what an uncertain mass or mass centre adds, and `cspr check` proves a motion for every robot within limits."
-    "uncertainty",
-}
 # A hint names at most so many kinds.
 _FEW = 3
 
@@ -59,11 +50,7 @@ def check_map(kind: MapKind, keys: SweepFile, path: Path) -> None:
     for name in _SPECIAL:
         if name not in kind.keys and _missing(keys, name) is None:
             others = any(name in form.keys for form in MAP_KINDS[keys.map].forms)
-            where = (
-                f'with family = "{keys.trajectory.family}"'
-                if others
-                else f"in this map{_INSTEAD.get((keys.map, name)) or _hint(kinds_with(name))}"
-            )
+            where = f'with family = "{keys.trajectory.family}"' if others else f"in this map{_hint(kinds_with(name))}"
             raise ConfigError(path, f"{name}: must be absent {where}")
     if keys.orientations is not None and keys.orientations.definition is not None:
         _check_choice(keys.orientations.definition, "orientations.definition", kind.definitions, path)

@@ -25,6 +25,7 @@ Files, each importing only from those above it:
     cells                   boxes of positions, and bounds over them
     inside_cells            cells in which tensions stay within limits at every position
     outside_cells           cells in which no tensions within limits suffice at any position
+    all_robots              requirements of all robots within an uncertainty
     cell_proofs             proofs of many cells
     contact_cells           clearances over cells
     clearances              clearances of robots at rest

@@ -6,6 +6,7 @@ import numpy as np
 
 from cspr_jax.arithmetic import lanes
 from cspr_jax.arithmetic.batches import in_batches, in_parts
+from cspr_jax.arithmetic.elementary import unit_vectors
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot, across_line
@@ -24,21 +25,28 @@ PART, BATCH = 256, 1024
 # Tensions at the centre keep this part of the margin from their limits. At the whole margin only one point is left,
 # which rounding can miss.
 KEPT = 0.98
+# Rounds in which displacements of spools are sought with which a wrench is out of reach.
+ROUNDS = 2
 
 
 class CellProofs:
-    """Proofs of cells at one orientation, without halving."""
+    """Proofs of cells at one orientation, without halving.
 
-    def __init__(self, robot: AnyRobot, search: WorkspaceSearch, quaternion: np.ndarray) -> None:
-        """Prepare the proofs of the requirement of a search, for its robot."""
-        self._robot, self._quaternion = robot, quaternion
+    What is inside is so for all robots whose spools are within a distance of their places; what is outside, for one.
+    """
+
+    def __init__(self, search: WorkspaceSearch, quaternion: np.ndarray, spools: float = 0.0) -> None:
+        """Prepare the proofs of the requirement of a search, for its robot; a distance of spools excludes pulleys."""
+        robot = search.robot
+        self._robot, self._search, self._quaternion, self._spools = robot, search, quaternion, spools
         self._requirement, self._is_closure = search.requirement, search.requirement.condition == CLOSURE
         self._unbounded = tuple(np.isinf(search.requirement.high).tolist())
-        self._arms, self._forces = _geometry(robot, quaternion, search.unit)
+        self._arms, self._forces = cable_wrenches(robot, quaternion, search.unit)
         # The required wrenches are the same at every place, for the robot does not turn.
         required = search.required(np.zeros(3), quaternion)
         self._wrenches, self._enclosing = required.corners, required.enclosing.corners
-        self._boxed = None
+        self._spreads = np.reshape(required.ellipsoids, (-1, robot.dof))
+        self._boxed = search
         if required.ellipsoids:
             # Margins of all wrenches of the boxes about the ellipsoids.
             loads = search.requirement.wrenches.enclosing
@@ -57,28 +65,38 @@ class CellProofs:
         return self._matrices(positions, self._exits(positions))
 
     def _matrices(self, positions: np.ndarray, exits: np.ndarray) -> np.ndarray:
-        rays = exits - positions[:, None]
-        units = rays / np.linalg.norm(rays, axis=2, keepdims=True)
-        return np.einsum("nik,kmi->nmi", units, self._forces)
+        return np.einsum("nik,kmi->nmi", unit_vectors(exits - positions[:, None]), self._forces)
 
-    def least_margins(self, positions: np.ndarray, half: np.ndarray, margin: np.ndarray) -> np.ndarray:
+    def inside(self, positions: np.ndarray, half: np.ndarray) -> np.ndarray:
+        """Tell whether cells lie wholly inside.
+
+        Args:
+            positions: (n, 3) centres, m.
+            half: (n, 3) half sizes, m.
+
+        Returns:
+            (n,) whether this is proved.
+        """
+        if not (self._spools or half.any()):
+            return self._search(positions, np.tile(self._quaternion, (len(positions), 1))).verdict == 0
+        return self.least_margins(positions, half) > 0.0
+
+    def least_margins(self, positions: np.ndarray, half: np.ndarray) -> np.ndarray:
         """Lower bounds of margins over cells.
 
         Args:
             positions: (n, 3) centres, m.
             half: (n, 3) half sizes, m.
-            margin: (n,) at the centres, positive.
 
         Returns:
             (n,) distance that tensions keep from their limits at every position, N, or -inf; for wrench closure a
             number that is positive where closure is proved in the whole cell. In place of ellipsoids of wrenches the
             boxes about them count.
         """
-        exits, moves = self._exits(positions), self._moves(positions, half)
+        exits, moves = self._exits(positions), self._moves(positions, half) + self._spools
         units, count = self._matrices(positions, exits), len(self._arms)
         low, high, loads = self._requirement.low, self._requirement.high, self._enclosing
-        if self._boxed is not None:
-            margin = self._boxed(positions, np.tile(self._quaternion, (len(positions), 1))).margin
+        margin = self._boxed(positions, np.tile(self._quaternion, (len(positions), 1))).margin
         if self._is_closure:  # tensions without a wrench
             low, high, loads = np.zeros(count), np.full(count, np.inf), np.zeros((1, units.shape[1]))
             room = np.ones((1, 1))
@@ -109,12 +127,18 @@ class CellProofs:
         condition = "closure" if self._is_closure else "tensions"
 
         def kernel(matrices):
-            loads, unbounded = self._wrenches, self._unbounded
-            return worst_cocircuits(matrices, loads, low, finite, condition=condition, unbounded=unbounded)
+            loads, unbounded = (self._wrenches, self._spreads), self._unbounded
+            return worst_cocircuits(matrices, *loads, low, finite, condition=condition, unbounded=unbounded)
 
         exits, moves = self._exits(positions), self._moves(positions, half)
-        worst = in_batches(kernel, self._matrices(positions, exits), size=BATCH)
-        held, loads = self._subsets[worst.subset], self._wrenches[worst.load]
+        for left in range(ROUNDS if self._spools else 0, -1, -1):
+            worst = in_batches(kernel, self._matrices(positions, exits), size=BATCH)
+            held, along = self._subsets[worst.subset], np.asarray(worst.normal)[:, None] * self._spreads
+            loads = self._wrenches[worst.load] + (self._spreads * unit_vectors(along)).sum(1)
+            if left:
+                exits = self._exits(positions) + self._displacements(
+                    positions, exits, np.asarray(worst.normal), held, loads
+                )
 
         def proved(chosen, normals, held):
             cells = cells_about(positions[chosen], half[chosen], exits[chosen], self._forces, moves[chosen])
@@ -129,6 +153,27 @@ class CellProofs:
             return is_outside
 
         return np.concatenate(in_parts(part, len(positions), PART))
+
+    def _displacements(
+        self, positions: np.ndarray, exits: np.ndarray, normals: np.ndarray, held: np.ndarray, loads: np.ndarray
+    ) -> np.ndarray:
+        # Displacements of spools, (n, n_cables, 3) m, by which, to first order, tensions give the least along normals.
+        # Cables to which these are normal have the tensions with which the others, each at its limit, come nearest to
+        # the wrench.
+        matrices, units = self._matrices(positions, exits), unit_vectors(exits - positions[:, None])
+        effects = np.einsum("nm,kmi->nik", normals, self._forces)
+        products = (effects * units).sum(2)
+        if self._is_closure:
+            tensions = -np.ones(products.shape)
+            np.put_along_axis(tensions, held, 0.0, axis=1)
+        else:
+            bounds = np.where(self._unbounded, self._requirement.low, self._requirement.high)
+            tensions = np.where(products > 0.0, bounds, self._requirement.low)
+            np.put_along_axis(tensions, held, 0.0, axis=1)
+            missing = loads - (matrices @ tensions[..., None])[..., 0]
+            balancing = np.linalg.pinv(np.take_along_axis(matrices, held[:, None], axis=2)) @ missing[..., None]
+            np.put_along_axis(tensions, held, balancing[..., 0], axis=1)
+        return -self._spools * unit_vectors(tensions[..., None] * (effects - products[..., None] * units))
 
     def _exits(self, positions: np.ndarray) -> np.ndarray:
         # Points at which cables leave, less the arms of their attachment points, (n, n_cables, 3).
@@ -149,8 +194,17 @@ def _tensions(units: np.ndarray, wrench: np.ndarray, low: np.ndarray, high: np.n
     return np.asarray(distributions(units, np.broadcast_to(wrench, (len(units), len(wrench))), *limits).tensions)
 
 
-def _geometry(robot: AnyRobot, quaternion: np.ndarray, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Arms of the attachment points, (n_cables, 3) m; (3, dof, n_cables) wrenches of unit forces at these points."""
+def cable_wrenches(robot: AnyRobot, quaternion: np.ndarray, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Wrenches of forces at the attachment points.
+
+    Args:
+        quaternion: (4,) unit quaternion, scalar first.
+        unit: (dof,) divisors of the components.
+
+    Returns:
+        (n_cables, 3) arms of the attachment points, fixed axes, m; (3, dof, n_cables) wrenches of unit forces there
+        along the axes.
+    """
     row, count = PATTERNS[robot.pattern], robot.n_cables
     axes = np.eye(3)
     forces = np.repeat(axes[list(row.forces)].T[..., None], count, axis=2)

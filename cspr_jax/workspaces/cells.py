@@ -9,8 +9,8 @@ sizes and |x_k| <= 1,
     Z(p) = Z0 - sum_k x_k N_k,        N_k = H_k [A_1 e_k, ..., A_n e_k],
 
 and a solution with a fixed basis is a power series in x. `inside_cells` and `outside_cells` keep its terms of first and
-second order and bound the rest by norms. Behind a pulley e_i moves with p, by no more than is known: within the cell it
-stays at its value at the centre, and the rest counts like rounding of the columns and of the lengths.
+second order and bound the rest by norms. Exits e_i may lie anywhere in balls: behind a pulley e_i moves with p, by no
+more than is known, and robots within an uncertainty have their spools elsewhere.
 
 Arrays are (cells, ...); coefficients of first order in x have one axis of length 3, those of second order two.
 """
@@ -35,8 +35,9 @@ class Cells(NamedTuple):
         steps: (n, n_cables, 3) products of unit vectors of the cables with the half sizes, by which lengths fall, m.
         lengths: (n, n_cables) L_i at the centres, m.
         radius: (n,) from centre to corner, m.
-        rounding: (n, n_cables) bound of the rounding of a column of Z, and of what moves of exits change in it, m.
-        moves: (n, n_cables) how far exits move within the cells, m; 0 without pulleys.
+        rounding: (n, n_cables) bound of the rounding of a column of Z, m.
+        moves: (n, n_cables) how far exits may be from their places at the centres, m.
+        wrenches: (n, 3, m, n_cables) A_i.
     """
 
     matrices: np.ndarray
@@ -47,6 +48,12 @@ class Cells(NamedTuple):
     radius: np.ndarray
     rounding: np.ndarray
     moves: np.ndarray
+    wrenches: np.ndarray
+
+    @property
+    def column_changes(self) -> np.ndarray:
+        """Bound of the change of a column of Z by moves of its exit, (n, n_cables), m."""
+        return self.moves * np.sqrt((self.wrenches**2).sum((1, 2)))
 
     @property
     def shortest(self) -> np.ndarray:
@@ -76,7 +83,7 @@ def cells_about(
         exits: (n, n_cables, 3) e_i at the centres, m.
         wrenches: (3, m, n_cables) wrenches of unit forces along the axes at the attachment points, moments over a
             length.
-        moves: (n, n_cables) how far e_i moves from there within the cells, m.
+        moves: (n, n_cables) how far from there e_i may be within the cells, m.
 
     Returns:
         the cells.
@@ -87,9 +94,9 @@ def cells_about(
         steps = rays * half[:, None] / lengths[..., None]
     matrices = (rays.transpose(0, 2, 1)[:, :, None] * wrenches).sum(1)
     spans = np.linalg.norm(exits, axis=2) + np.linalg.norm(centres, axis=1)[:, None]
-    rounding = np.sqrt((wrenches**2).sum((0, 1))) * (ROUNDING * spans + moves)
-    changes = half[:, :, None, None] * wrenches
-    return Cells(matrices, changes, rays, steps, lengths, np.linalg.norm(half, axis=1), rounding, moves)
+    rounding = ROUNDING * np.sqrt((wrenches**2).sum((0, 1))) * spans
+    changes, each = half[:, :, None, None] * wrenches, np.broadcast_to(wrenches, (len(centres), *wrenches.shape))
+    return Cells(matrices, changes, rays, steps, lengths, np.linalg.norm(half, axis=1), rounding, moves, each)
 
 
 def reach(linear: np.ndarray) -> np.ndarray:

@@ -1,10 +1,12 @@
 """Clearance of robots at rest among obstacles, for maps of workspaces. Arrays in, answers out."""
 
+from collections.abc import Iterator
 from typing import get_args
 
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.arithmetic.elementary import unit_vectors
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.clearance import Clearances, Kind, Scene, clearances
 from cspr_jax.robots.patterns import PATTERNS
@@ -12,11 +14,19 @@ from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.workspaces import geometry
 
 BATCH = 4096
+# Step of differences, over the size of the robot.
+STEP = 1e-7
 # Numbers of `schema.meanings.NEAREST_BODIES`; a pose with no body that could be met takes 0.
 KINDS = dict(zip(get_args(Kind), range(1, 5), strict=True))
 
 
-def at_rest(robot: AnyRobot, around: Scene, positions: np.ndarray, quaternions: np.ndarray) -> Clearances:
+def at_rest(
+    robot: AnyRobot,
+    around: Scene,
+    positions: np.ndarray,
+    quaternions: np.ndarray,
+    exits: np.ndarray | None = None,
+) -> Clearances:
     """Clearances of poses.
 
     Args:
@@ -24,15 +34,51 @@ def at_rest(robot: AnyRobot, around: Scene, positions: np.ndarray, quaternions: 
         around: of `build.surroundings`.
         positions: (n, 3) of the mass centre, or of the joint, m.
         quaternions: (n, 4) unit quaternions, scalar first.
+        exits: (n, n_cables, 3) points at which cables leave, m; None: those of the robot.
 
     Returns:
         the clearances.
     """
-    body_quaternions, ends = quaternions if PATTERNS[robot.pattern].is_body else None, None
-    pulleys = robot.pulleys
-    if pulleys is not None:
-        ends = in_batches(lambda x: geometry.exit_points(robot, pulleys, *x), (positions, quaternions), size=BATCH)
-    return clearances(around, positions, body_quaternions, ends=ends)
+    body_quaternions, pulleys = quaternions if PATTERNS[robot.pattern].is_body else None, robot.pulleys
+    if exits is None and pulleys is not None:
+        exits = in_batches(lambda x: geometry.exit_points(robot, pulleys, *x), (positions, quaternions), size=BATCH)
+    return clearances(around, positions, body_quaternions, ends=exits)
+
+
+def nearer_exits(
+    robot: AnyRobot,
+    around: Scene,
+    positions: np.ndarray,
+    quaternions: np.ndarray,
+    exits: np.ndarray,
+    distance: float,
+) -> Iterator[np.ndarray]:
+    """Exits displaced so that, to first order, bodies come as near to each other as they can.
+
+    Args:
+        robot: as for `at_rest`.
+        around: likewise.
+        positions: likewise, m.
+        quaternions: likewise.
+        exits: (n, n_cables, 3) m.
+        distance: of each from its place, m.
+
+    Yields:
+        (n, n_cables, 3) m: for two cables, for obstacles, and for cables and the platform.
+    """
+    step = STEP * float(np.ptp(exits, axis=(0, 1)).max())
+
+    def at(exits: np.ndarray) -> np.ndarray:
+        distances = at_rest(robot, around, positions, quaternions, exits)
+        return np.stack([distances.cables, distances.obstacles, distances.platform])
+
+    middle, gradients = at(exits), np.zeros((3, *exits.shape))
+    for i, k in np.ndindex(exits.shape[1:]):
+        moved = exits.copy()
+        moved[:, i, k] += step
+        with np.errstate(invalid="ignore"):  # infinite where nothing can meet
+            gradients[:, :, i, k] = np.nan_to_num(at(moved) - middle, posinf=0.0, neginf=0.0)
+    yield from exits - distance * unit_vectors(gradients)
 
 
 def flags(distances: Clearances) -> np.ndarray:

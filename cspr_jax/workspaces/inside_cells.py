@@ -12,8 +12,10 @@ Then
     f_i(x) = f0_i + D_i (U_i . j + U_i . T j + e_i),    |e_i| <= |U_i| |T| |T j| / (1 - |T|),
 
 and the tension is its product with L_i(x), which lies between L0_i - u_i . dp and the same plus
-|dp|^2 / (2 (L0_i - |dp|)). The bounds allow for rounding of C, so that C^-1 Z0 D U^T is not quite I and Z0 f0 not quite
-w. Where |T| < 1 the rank of Z(x) is full, too, since C^-1 Z(x) D U^T = I - T.
+|dp|^2 / (2 (L0_i - |dp|)). Where exits may be off by s_i, -A_i s_i f0_i adds to C j, and u_i . s_i to the length: the
+effects of each exit on a tension are added as vectors, so that one that moves along its own cable changes nothing to
+first order; all else that they do is bounded by norms. The bounds allow for rounding of C, so that C^-1 Z0 D U^T is not
+quite I and Z0 f0 not quite w. Where |T| < 1 the rank of Z(x) is full, too, since C^-1 Z(x) D U^T = I - T.
 """
 
 from typing import NamedTuple
@@ -24,9 +26,11 @@ from cspr_jax.workspaces.cells import ROUNDING, Cells, inverse_factor, least_qua
 
 
 class _Way(NamedTuple):
-    # Relative change of the force densities over a cell: terms of first and second order in x, and a bound of the rest.
+    # Relative change of the force densities over a cell: terms of first and second order in x, of first order in what
+    # exits are off, and a bound of the rest.
     linear: np.ndarray  # (n, n_cables, 3)
     quadratic: np.ndarray  # (n, n_cables, 3, 3)
+    exits: np.ndarray  # (n, n_cables, n_exits, 3) 1/m
     rest: np.ndarray  # (n, n_cables)
 
     @property
@@ -94,7 +98,15 @@ def _way(cells: Cells, densities: np.ndarray, weights: np.ndarray, wrench: np.nd
     size = np.linalg.norm(inverse, axis=(1, 2))
     parts = np.linalg.norm(weighted, axis=(1, 2)) + norm_reach(cells.changes * weights[:, None, None])
     lost = size * np.linalg.norm(rows, axis=(1, 2)) * (ROUNDING * parts + _length(cells.rounding * weights))
-    defect = np.linalg.norm(rows @ back - np.eye(rows.shape[1]), axis=(1, 2)) + lost
+    defect = np.linalg.norm(rows @ back - np.eye(rows.shape[1]), axis=(1, 2))
+    off, exits = np.zeros(len(size)), np.zeros((*densities.shape, densities.shape[1], 3))
+    if cells.moves.any():
+        moved = -inverse[:, None] @ cells.wrenches  # (n, 3, m, n_exits)
+        most = np.linalg.norm(moved, axis=(1, 2)) * cells.moves
+        off = (most * densities).sum(1)
+        exits = (back[:, None] @ (moved * densities[:, None, None])).transpose(0, 2, 3, 1)
+        lost = lost + np.sqrt(1.0 + defect) * _length(most * weights)
+    defect = defect + lost
     supplied = (cells.matrices @ densities[..., None])[..., 0]
     sizes = np.abs(cells.matrices) @ np.abs(densities)[..., None]
     hidden = ROUNDING * (_length(sizes[..., 0]) + _length(wrench)) + (cells.rounding * np.abs(densities)).sum(1)
@@ -102,9 +114,15 @@ def _way(cells: Cells, densities: np.ndarray, weights: np.ndarray, wrench: np.nd
     norm, start = norm_reach(operators) + defect, norm_reach(first)
     after = np.where(norm < 1.0, 1.0 / (1.0 - norm), np.inf)
     late = np.minimum(pair_norm(second), norm_reach(operators) * start) + defect * start
-    rest = defect * start + norm * after * late + after * residual
+    rest = defect * start + norm * after * (late + off) + after * residual
     columns = _length(back)
-    return _Way((first @ rows).transpose(0, 2, 1), _by_cable(second @ rows[:, None]), columns * rest[:, None])
+    linear, quadratic = (first @ rows).transpose(0, 2, 1), _by_cable(second @ rows[:, None])
+    return _Way(linear, quadratic, exits, columns * rest[:, None])
+
+
+def _over_exits(cells: Cells, effects: np.ndarray) -> np.ndarray:
+    # Largest sums, (n, n_cables), of effects (n, n_cables, n_exits, 3) of exits anywhere within their balls.
+    return (_length(effects) * cells.moves[:, None]).sum(2)
 
 
 def _length(vectors: np.ndarray) -> np.ndarray:
@@ -121,20 +139,22 @@ def _tension_range(
     """Smallest and largest tensions over cells, (n, n_cables) each."""
     lengths, shortening = cells.lengths, reach(cells.steps)
     second = way.second
-    spread = weights * (reach(way.linear) + second + way.rest)
+    moved = _over_exits(cells, way.exits)
+    spread = weights * (reach(way.linear) + second + moved + way.rest)
     lowest, highest = densities - spread, densities + spread
     # Expand (L0 - u . dp) f, in which terms of first order may cancel each other.
     relative = weights * lengths
     linear = relative[..., None] * way.linear - densities[..., None] * cells.steps
     mixed = cells.steps[..., :, None] * way.linear[..., None, :]
     quadratic = relative[..., None, None] * way.quadratic - weights[..., None, None] * mixed
-    rest = weights * (shortening * second + (lengths + shortening) * way.rest)
+    rest = weights * (shortening * (second + moved) + (lengths + shortening) * way.rest)
     middle = lengths * densities
-    rest = rest + cells.moves * np.maximum(np.abs(lowest), np.abs(highest))
+    lengthened = np.eye(lengths.shape[1])[None, ..., None] * (cells.rays * (densities / lengths)[..., None])[:, :, None]
+    rest = rest + _over_exits(cells, relative[..., None, None] * way.exits + lengthened) + cells.moves * spread
     least = middle - reach(linear) + least_quadratic(quadratic) - rest
     most = middle + reach(linear) - least_quadratic(-quadratic) + rest
     radius = cells.radius[:, None]
     longest = lengths + radius + cells.moves
     least = np.where(lowest >= 0.0, np.maximum(least, cells.shortest * lowest), longest * lowest)
-    most = np.minimum(most + 0.5 * radius**2 / cells.shortest * highest, longest * highest)
+    most = np.minimum(most + 0.5 * (radius + cells.moves) ** 2 / cells.shortest * highest, longest * highest)
     return least, np.where(highest >= 0.0, most, 0.0)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from cspr_jax.config.sweep import SweepFile, axis_points
 from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.maps.grid_map import GridMap
+from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.clearance import Scene
 from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.orientation_grids import cone_grid, equal_volume_grid, planar_grid
@@ -23,7 +25,8 @@ from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.quantities import TILT_TORSION
 from cspr_jax.schema.tiles import Grid
-from cspr_jax.workspaces.questions import FEASIBLE, check_cables, required_wrenches, requirement
+from cspr_jax.workspaces.all_robots import AllRobots, mass_searches
+from cspr_jax.workspaces.questions import FEASIBLE, Requirement, check_cables, required_wrenches, requirement
 from cspr_jax.workspaces.rest_cells import RestCells
 from cspr_jax.workspaces.rest_poses import MARGINS, OrientationSet, RestPoses, over_orientations
 from cspr_jax.workspaces.search import WorkspaceSearch
@@ -62,14 +65,19 @@ class WorkspaceMap(GridMap):
             raise ConfigError(file, str(error)) from error
         try:
             names = [name for name in self._workspace.conditions if name != INTERFERENCE]
-            searches = {name: self._search(name) for name in names}
-            length = self._workspace.capacity_length
-            capacity = None if length is None else self._search(FEASIBLE, length)
+            searches = {name: WorkspaceSearch(self._robot, self._condition(name, self._robot)) for name in names}
+            length, capacity = self._workspace.capacity_length, None
+            if length is not None:
+                capacity = WorkspaceSearch(self._robot, self._condition(FEASIBLE, self._robot, length))
+            all_robots = self._all_robots(robot_file, names)
         except InputError as error:
             raise ConfigError(file, f"workspace.{error}") from error
         around, speeds = self._surroundings(robot_file), self._speeds(robot_file)
         is_centre = self._workspace.point == "mass-centre"
         self._poses = RestPoses(self._robot, searches, around, self._limits, speeds, capacity, is_centre)
+        self._cells = None
+        if self._workspace.prove or all_robots is not None:
+            self._cells = RestCells(self._poses, self._quaternion[0], all_robots)
 
     def _refuse_unused(self) -> None:
         for limit in LIMITS:
@@ -133,19 +141,44 @@ class WorkspaceMap(GridMap):
             angles, volume = cone_grid(divisions, tilt, workspace.torsion_max or 0.0)
         return products(self._frame.turned_quaternions(from_tilt_torsion(angles)), self._quaternion), volume
 
-    def _search(self, name: str, capacity_length: float | None = None) -> WorkspaceSearch:
+    def _all_robots(self, robot_file: RobotFile, conditions: Sequence[str]) -> AllRobots | None:
+        # All robots within the uncertainty, without which there are none.
+        uncertainty, workspace = self._limits.uncertainty, self._workspace
+        if uncertainty is None:
+            return None
+        if self._samples is not None:
+            raise ConfigError(self._file, "limits.uncertainty: cannot be combined with workspace.orientations")
+        is_in_pairs = robot_file.translation_only or robot_file.pairs is not None
+        if uncertainty.spool_positions and (is_in_pairs or self._robot.pulleys is not None):
+            allowed = "must be 0 on pairs of cables and with pulleys; mass_factor and mass_centre are known there"
+            raise ConfigError(self._file, f"limits.uncertainty.spool_positions: {allowed}")
+        if not self._row.is_body and uncertainty.mass_centre:
+            allowed = "must be absent: a point mass has no other one"
+            raise ConfigError(self._file, f"limits.uncertainty.mass_centre: {allowed}")
+        searches = {}
+        for name in conditions:
+            is_given = name == FEASIBLE and workspace.wrenches is not None
+            acceleration = (workspace.acceleration or 0.0) if name == FEASIBLE else 0.0
+            ask = partial(self._condition, name)
+            searches[name] = mass_searches(
+                self._robot, uncertainty, ask, has_weight=not is_given, acceleration=acceleration
+            )
+        return AllRobots(float(uncertainty.spool_positions), searches)
+
+    def _condition(self, name: str, robot: AnyRobot, capacity_length: float | None = None) -> Requirement:
+        # Requirement of a condition on a robot.
         loads = None
         if name == FEASIBLE:
             workspace = self._workspace
             loads = required_wrenches(
-                self._robot,
+                robot,
                 self._frame,
                 points=workspace.wrenches,
                 box=workspace.wrench_box,
                 ellipsoid=workspace.wrench_ellipsoid,
                 acceleration=workspace.acceleration,
             )
-        return WorkspaceSearch(self._robot, requirement(self._robot, name, self._limits, loads, capacity_length))
+        return requirement(robot, name, self._limits, loads, capacity_length)
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
@@ -162,8 +195,10 @@ class WorkspaceMap(GridMap):
             quaternions = products(self._frame.turned_quaternions(from_tilt_torsion(angles)), quaternions)
         answers = self._poses(places, quaternions)
         sides, reasons = np.zeros((2, len(places)), np.int16)
-        if self._workspace.prove:
-            sides, reasons = RestCells(self._poses, self._quaternion[0])(places, self._half_sizes(cells))
+        if self._cells is not None:
+            answers["verdict"] = self._cells.verdicts(places, answers["verdict"])
+            if self._workspace.prove:
+                sides, reasons = self._cells(places, self._half_sizes(cells))
         fraction = (answers["verdict"] == 0).astype(float)
         return answers | {"orientation_fraction": fraction, "cell_side": sides, "cell_open": reasons}
 
@@ -187,6 +222,8 @@ class WorkspaceMap(GridMap):
             raise ConfigError(self._file, f"axes.{turning[0]}: must be absent: a point mass has no orientation")
         if turning and self._samples is not None:
             raise ConfigError(self._file, f"axes.{turning[0]}: cannot be combined with workspace.orientations")
+        if self._limits.uncertainty is not None and turning:
+            raise ConfigError(self._file, f"axes.{turning[0]}: cannot be combined with limits.uncertainty")
         if self._workspace.prove and (turning or "radius" in grid.axes):
             name = turning[0] if turning else "radius"
             raise ConfigError(self._file, f"axes.{name}: cannot be combined with workspace.prove")

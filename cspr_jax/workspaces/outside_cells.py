@@ -123,7 +123,9 @@ def products_of(cells: Cells, normals: np.ndarray, held: np.ndarray | None, wren
     changes = cells.changes / cells.lengths[:, None, None]
     none = np.zeros((*changes.shape[:3], 1))
     changes = np.concatenate([changes, none], axis=3)
-    rounding = np.concatenate([cells.rounding / cells.lengths, np.zeros((len(normals), 1))], axis=1)
+    rounding = np.concatenate(
+        [(cells.rounding + cells.column_changes) / cells.lengths, np.zeros((len(normals), 1))], axis=1
+    )
     rounding = rounding + ROUNDING * np.maximum(np.linalg.norm(units, axis=1), 1.0)
     if held is None:
         return _still(normals, units, changes, rounding)

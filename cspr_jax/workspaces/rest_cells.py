@@ -1,17 +1,23 @@
 """Whole cells of maps of workspaces against all conditions of a workspace. Arrays in, answers out."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.robots.clearance import Scene
 from cspr_jax.schema.meanings import OPEN_CONDITIONS
-from cspr_jax.schema.verdicts import FLAGS, OPEN
+from cspr_jax.schema.verdicts import FLAGS, OPEN, Verdict
+from cspr_jax.workspaces.all_robots import AllRobots, MassSearch
 from cspr_jax.workspaces.cell_proofs import CellProofs
+from cspr_jax.workspaces.clearances import nearer_exits
 from cspr_jax.workspaces.contact_cells import clearance_bounds
 from cspr_jax.workspaces.geometry import mass_centres
 from cspr_jax.workspaces.questions import CLOSURE
 from cspr_jax.workspaces.rest_poses import RestPoses
-from cspr_jax.workspaces.shifts import Shifts, leaving_points, shifts
+from cspr_jax.workspaces.search import WorkspaceSearch
+from cspr_jax.workspaces.shifts import Shifts, leaving_points, shifts, unit_changes
+from cspr_jax.workspaces.speeds import CableSpeeds
 from cspr_jax.workspaces.whole_cells import ROUND, proved_sides, sides_of
 
 # How often open cells are halved along each axis.
@@ -25,18 +31,29 @@ class RestCells:
     """Proofs, at one orientation, that whole cells lie on one side of a workspace.
 
     While a robot moves by a distance without turning, its heights and the lengths of its cables change by no more than
-    this distance; speeds of cables change as `workspaces.shifts` says.
+    this distance; speeds of cables change as `workspaces.shifts` says. With an uncertainty, robots are inside where all
+    of them are, and outside where one is, and single poses are cells of no size.
     """
 
-    def __init__(self, poses: RestPoses, quaternion: np.ndarray) -> None:
-        """Prepare the proofs, for a unit quaternion (4,), scalar first."""
-        self._poses, self._robot, self._quaternion = poses, poses.robot, quaternion
+    def __init__(self, poses: RestPoses, quaternion: np.ndarray, all_robots: AllRobots | None = None) -> None:
+        """Prepare the proofs, for a unit quaternion (4,), scalar first; without pulleys if for all robots."""
+        self._poses, self._robot, self._quaternion, self._all_robots = poses, poses.robot, quaternion, all_robots
+        self._spools = 0.0 if all_robots is None else all_robots.spools
+        single = {name: [MassSearch(one, one)] for name, one in poses.searches.items()}
+        searches = single if all_robots is None else all_robots.searches
         with double_precision():
-            self._searches = [(s, CellProofs(self._robot, s, quaternion)) for s in poses.searches.values()]
-        self._names = ["closure" if s.requirement.condition == CLOSURE else "tensions" for s, _ in self._searches]
+            self._proofs = [self._mass_proofs(one) for each in searches.values() for one in each]
+        self._names = ["closure" if name == CLOSURE else "tensions" for name, each in searches.items() for _ in each]
         self._has_contacts = poses.around is not None and bool(poses.around.meetings)
         self._names += ["clearances"] * self._has_contacts
         self._names += [LIMITS[name] for name, _, _ in poses.limited(np.zeros((1, 3)), self._turns(1))]
+
+    def _mass_proofs(self, searches: MassSearch) -> tuple[CellProofs, CellProofs, WorkspaceSearch]:
+        # Proofs that cells are inside, and outside, and the search for what may be outside.
+        enclosing, attained = searches
+        outside = CellProofs(attained, self._quaternion, self._spools)
+        inside = outside if enclosing is attained else CellProofs(enclosing, self._quaternion, self._spools)
+        return inside, outside, attained
 
     def __call__(self, origins: np.ndarray, half: np.ndarray, *, depth: int = DEPTH) -> tuple[np.ndarray, np.ndarray]:
         """Tell which cells are proved to lie wholly on one side of the workspace.
@@ -72,9 +89,37 @@ class RestCells:
 
     def at(self, positions: np.ndarray) -> np.ndarray:
         """Sides of positions; see `whole_cells.CellConditions`."""
-        verdict = self._poses(positions, self._turns(len(positions)))["verdict"]
+        verdict = self.verdicts(positions, self._poses(positions, self._turns(len(positions)))["verdict"])
         is_open = (verdict & ~FLAGS(OPEN.value)) == 0
         return np.where(verdict == 0, 1, np.where(is_open, 0, -1))
+
+    def verdicts(self, positions: np.ndarray, verdict: np.ndarray) -> np.ndarray:
+        """Verdicts about all robots.
+
+        Args:
+            positions: (n, 3) of the platform, kernels' coordinates, m.
+            verdict: (n,) of the robot as it is described.
+
+        Returns:
+            (n,) the same, but `Verdict.UNCERTAINTY` where it is 0, and not of all robots; where neither is proved,
+            `Verdict.UNDECIDED`.
+        """
+        if self._all_robots is None:
+            return verdict
+        verdict, chosen = verdict.copy(), np.flatnonzero(verdict == 0)
+        # These hold for all robots where they do for one.
+        are_same = [name == "floor" or (not self._spools and name != "tensions") for name in self._names]
+        for side in (1, -1):
+            if len(chosen) == 0:
+                break
+            held, none = np.tile(are_same, (len(chosen), 1)), np.zeros((len(chosen), 3))
+            with double_precision():
+                held, is_broken = self.proved(positions[chosen], none, np.full(len(chosen), side), held)
+            verdict[chosen] = np.where(is_broken, Verdict.UNCERTAINTY, Verdict.UNDECIDED)
+            if side > 0:
+                verdict[chosen[held.all(1)]] = 0
+                chosen = chosen[~held.all(1)]
+        return verdict
 
     def proved(
         self, positions: np.ndarray, half: np.ndarray, sides: np.ndarray, held: np.ndarray
@@ -85,18 +130,17 @@ class RestCells:
         positions = self._poses.origins(positions, turns)
         mass_positions = mass_centres(self._robot, positions, turns)
         moved = shifts(self._robot, mass_positions, turns, radius)
-        for k, (search, proofs) in enumerate(self._searches):
-            answers = search(mass_positions, turns)
+        for k, (inside, outside, search) in enumerate(self._proofs):
             chosen = np.flatnonzero((sides > 0) & ~held[:, k])
             if len(chosen):
-                bounds = proofs.least_margins(mass_positions[chosen], half[chosen], answers.margin[chosen])
-                held[chosen, k] = bounds > 0.0
-            chosen = np.flatnonzero((sides < 0) & ~is_broken & (sides_of(answers) < 0))
+                held[chosen, k] = inside.inside(mass_positions[chosen], half[chosen])
+            chosen = np.flatnonzero((sides < 0) & ~is_broken)
+            answers = search(mass_positions[chosen], turns[chosen])
+            chosen = chosen[answers.margin > -np.inf if self._spools else sides_of(answers) < 0]
             if len(chosen):
-                is_broken[chosen] = proofs.outside(mass_positions[chosen], half[chosen])
-        for k, (low, high) in enumerate(
-            self._distances(positions, mass_positions, half, moved, sides), len(self._searches)
-        ):
+                is_broken[chosen] = outside.outside(mass_positions[chosen], half[chosen])
+        distances = self._distances(positions, mass_positions, half, moved, sides)
+        for k, (low, high) in enumerate(distances, len(self._proofs)):
             held[:, k] |= low > CLOSE
             is_broken |= high < -CLOSE
         if self._robot.pulleys is not None:
@@ -104,19 +148,52 @@ class RestCells:
             held &= (moved.free > 0.0).all(1, keepdims=True)
         return held, is_broken
 
-    def _distances(self, positions, mass_positions, half, moved: Shifts, sides: np.ndarray):
-        # Yield bounds (n,) of the smallest slack of clearances and of each limit.
+    def _distances(
+        self, positions: np.ndarray, mass_positions: np.ndarray, half: np.ndarray, moved: Shifts, sides: np.ndarray
+    ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        # Yield bounds (n,) of the smallest slack of clearances and of each limit: of all robots, and of one.
         poses, turns = self._poses, self._turns(len(positions))
         if poses.around is not None and self._has_contacts:
-            yield self._clearances(poses.around, mass_positions, half, moved)
-        changes = {} if poses.speeds is None else {"speed_margin": poses.speeds.changes(moved)}
+            yield self._clearances(poses.around, mass_positions, half, moved, sides)
         for name, _, slack in poses.limited(positions, turns):
-            change = changes.get(name, moved.robot[:, None])
-            yield (slack - change).min(1), (slack + change).min(1)
+            change = moved.robot[:, None]
+            low, high = slack - change, slack + change
+            if name == "length_margin":
+                low, high = low - self._spools, high - self._spools
+            if name == "speed_margin" and poses.speeds is not None:
+                low, high = self._speeds(poses.speeds, positions, mass_positions, moved, slack)
+            yield low.min(1), high.min(1)
+
+    def _speeds(
+        self, speeds: CableSpeeds, positions: np.ndarray, mass_positions: np.ndarray, moved: Shifts, slack: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        change = speeds.changes(moved)
+        if not self._spools:
+            return slack - change, slack + change
+        farther = shifts(self._robot, mass_positions, self._turns(len(positions)), moved.robot + self._spools)
+        low, high = slack - speeds.changes(farther), slack + change
+        margins, lengths = speeds.displaced(positions, self._quaternion, self._spools)
+        units = unit_changes(moved.robot[:, None], lengths - moved.robot[:, None])
+        return low, np.minimum(high, margins + speeds.changes(moved._replace(units=units)))
 
     def _clearances(
-        self, around: Scene, mass_positions: np.ndarray, half: np.ndarray, moved: Shifts
+        self, around: Scene, mass_positions: np.ndarray, half: np.ndarray, moved: Shifts, sides: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         exits = leaving_points(self._robot, mass_positions, self._quaternion)
         moves = np.broadcast_to(moved.exits[:, None], exits.shape[:2])
-        return clearance_bounds(self._robot, around, self._quaternion, mass_positions, half, exits, moves)
+
+        def bounds(chosen: np.ndarray, exits: np.ndarray, moves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            place = mass_positions[chosen], half[chosen]
+            return clearance_bounds(self._robot, around, self._quaternion, *place, exits, moves[chosen])
+
+        if not self._spools:
+            return bounds(np.arange(len(half)), exits, moves)
+        low, high = np.full(len(half), -np.inf), np.full(len(half), np.inf)
+        inside, outside = np.flatnonzero(sides > 0), np.flatnonzero(sides < 0)
+        if len(inside):
+            low[inside] = bounds(inside, exits[inside], moves + self._spools)[0]
+        if len(outside):
+            turns = self._turns(len(outside))
+            near = nearer_exits(self._robot, around, mass_positions[outside], turns, exits[outside], self._spools)
+            high[outside] = np.min([bounds(outside, one, moves)[1] for one in (exits[outside], *near)], axis=0)
+        return low, high

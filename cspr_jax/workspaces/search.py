@@ -89,6 +89,7 @@ class WorkspaceSearch:
     """Search for poses of one robot that meet a requirement; all that depends on the robot alone is prepared once.
 
     Fields:
+        robot: centred, z down.
         requirement: what each pose has to meet.
         unit: (dof,) divisors of the components of wrenches: for moments a length of the robot, m.
     """
@@ -99,7 +100,7 @@ class WorkspaceSearch:
         With precision "float32" single precision decides poses where it can, with margins accurate to 1e-3 of the
         limits, and float64 the others.
         """
-        self._robot, self.requirement, self._precision, self._length = robot, requirement, precision, _length(robot)
+        self.robot, self.requirement, self._precision, self._length = robot, requirement, precision, _length(robot)
         self.unit = np.where(geometry.scales(robot), self._length, 1.0)
         self._wrenches = requirement.wrenches.over(self.unit)
         self._measure = "tensions" if requirement.capacity_length is None else "capacity"
@@ -148,13 +149,13 @@ class WorkspaceSearch:
     def _trials(self) -> np.ndarray:
         # Return finite wrench matrices of poses among the spools: no cable ends within its pulley there. Large pulleys
         # may leave no such pose among the spools, but do farther out.
-        rng, base, row = np.random.default_rng(1), np.asarray(self._robot.base_points), PATTERNS[self._robot.pattern]
+        rng, base, row = np.random.default_rng(1), np.asarray(self.robot.base_points), PATTERNS[self.robot.pattern]
         low, high = base.min(0), base.max(0)
         middle, half = 0.5 * (low + high), 0.4 * (high - low)
         # If all spools have the same x, some components vanish only in their plane: leave it.
         moves = np.isin(range(3), row.forces or range(3))
         half = np.where(moves, np.maximum(half, 0.2 * half.max() or 1.0), half)
-        regular = np.zeros((0, self._robot.dof, self._robot.n_cables))
+        regular = np.zeros((0, self.robot.dof, self.robot.n_cables))
         for widening in range(WIDENINGS):
             places = middle + 2.0**widening * half * rng.uniform(-1.0, 1.0, (TRIALS, 3))
             quaternions = np.array(IDENTITY) + 0.2 * rng.normal(size=(TRIALS, 4))
@@ -170,7 +171,7 @@ class WorkspaceSearch:
     def _matrices(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
         # Return wrench matrices, moments over the length.
         poses = positions, quaternions
-        matrices = in_batches(lambda x: geometry.wrench_matrices(self._robot, *x), poses, size=TRIALS)
+        matrices = in_batches(lambda x: geometry.wrench_matrices(self.robot, *x), poses, size=TRIALS)
         return matrices / self.unit[:, None]
 
     def _part(self, poses: Poses) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -215,7 +216,7 @@ class WorkspaceSearch:
         Returns:
             a power of two.
         """
-        rows = self._robot.dof * self._robot.n_cables
+        rows = self.robot.dof * self.robot.n_cables
         return 1 << int(np.log2(BYTES / (rows * np.dtype(dtype).itemsize)))
 
     def kernel(self, dtype: type, *, by_null_space: bool = False) -> Callable[..., Array]:
@@ -234,7 +235,7 @@ class WorkspaceSearch:
             return jax.tree.map(lambda x: np.asarray(x, dtype), tree)
 
         options = {"measure": self._measure, "is_bounded": bool(np.isfinite(self.requirement.high).all())}
-        robot, ordered = cast(self._robot), list(self._order) if by_null_space else slice(None)
+        robot, ordered = cast(self.robot), list(self._order) if by_null_space else slice(None)
         limits = leaf(self.requirement.low[ordered]), leaf(self.requirement.high[ordered]), leaf(self._normals_unit)
         tension_limits, length, fixed = cast((kernels.TensionLimits(*limits), leaf(self._length), self._fixed))
         choices = self._relations if by_null_space else self._choices
@@ -251,7 +252,7 @@ class WorkspaceSearch:
         return compiled
 
     def _stage(self, dtype: type, by_null_space: bool) -> Stage:
-        compiled, is_body = self.kernel(dtype, by_null_space=by_null_space), PATTERNS[self._robot.pattern].is_body
+        compiled, is_body = self.kernel(dtype, by_null_space=by_null_space), PATTERNS[self.robot.pattern].is_body
 
         def lanes(array):
             return tuple(np.ascontiguousarray(column, dtype) for column in array.T)
@@ -270,7 +271,7 @@ class WorkspaceSearch:
     def _relations(self) -> cocircuits.CableSubsets:
         # Return only the cables of each cocircuit, in the order of the block.
         table, counts = self._choices
-        places = np.argsort(self._order)[table[:, self._robot.dof - 1 :]].astype(np.int32)
+        places = np.argsort(self._order)[table[:, self.robot.dof - 1 :]].astype(np.int32)
         sorting = np.argsort(places, axis=1)
         ordered = None if counts is None else np.take_along_axis(counts, sorting, 1)
         return cocircuits.CableSubsets(np.take_along_axis(places, sorting, 1), ordered)
@@ -293,7 +294,7 @@ class WorkspaceSearch:
         if self._wrenches.points is not None:
             return None
         poses = positions, quaternions
-        return in_batches(lambda x: geometry.weights(self._robot, *x), poses, size=BATCH) / self.unit
+        return in_batches(lambda x: geometry.weights(self.robot, *x), poses, size=BATCH) / self.unit
 
     @property
     def _fixed(self) -> Wrenches:

@@ -53,7 +53,7 @@ def shifts(robot: AnyRobot, positions: np.ndarray, quaternions: np.ndarray, reac
     rays, most = targets - np.asarray(robot.base_points), reach[:, None]
     if robot.pulleys is None:
         free = np.linalg.norm(rays, axis=2) - most
-        return Shifts(reach, np.zeros(len(reach)), _unit_changes(most, free), free)
+        return Shifts(reach, np.zeros(len(reach)), unit_changes(most, free), free)
     radius, axes = np.asarray(robot.pulleys.radius), np.asarray(robot.pulleys.axes)
     high = (rays * axes).sum(2)
     wide = np.linalg.norm(rays - high[..., None] * axes, axis=2)
@@ -64,7 +64,7 @@ def shifts(robot: AnyRobot, positions: np.ndarray, quaternions: np.ndarray, reac
     with np.errstate(divide="ignore", invalid="ignore"):
         exits = most * np.fmax(radius / free, 2.0 * radius / wide)
     exits = np.where(radius > 0.0, np.fmin(exits, BAND * radius), 0.0)
-    return Shifts(reach, exits.max(1), _unit_changes(most, np.minimum(free, wide)), free)
+    return Shifts(reach, exits.max(1), unit_changes(most, np.minimum(free, wide)), free)
 
 
 def leaving_points(robot: AnyRobot, positions: np.ndarray, quaternion: np.ndarray) -> np.ndarray:
@@ -84,6 +84,14 @@ def leaving_points(robot: AnyRobot, positions: np.ndarray, quaternion: np.ndarra
     return in_batches(lambda x: geometry.exit_points(robot, pulleys, *x), poses, size=BATCH)
 
 
-def _unit_changes(reach: np.ndarray, length: np.ndarray) -> np.ndarray:
-    # Bound the change of unit vectors, which is 2 at most.
+def unit_changes(reach: np.ndarray, length: np.ndarray) -> np.ndarray:
+    """Bound of the changes of unit vectors.
+
+    Args:
+        reach: (n, k) how far an end moves, m.
+        length: (n, k) the least that is left of the vectors, m.
+
+    Returns:
+        (n, k) 2 at most.
+    """
     return np.where(length > 0.0, np.minimum(reach / np.where(length > 0.0, length, 1.0), 2.0), 2.0)

@@ -11,11 +11,12 @@ import dataclasses
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.arithmetic.elementary import leaf, unit_vectors
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.workspaces import geometry
+from cspr_jax.workspaces.cell_proofs import cable_wrenches
 from cspr_jax.workspaces.shifts import Shifts
 
 BATCH = 4096
@@ -52,6 +53,37 @@ class CableSpeeds:
         forces = len(PATTERNS[self.robot.pattern].forces)
         along, about = (np.linalg.norm(part, axis=1) for part in (columns[:, :forces], columns[:, forces:]))
         return self.most - (along * self.speed + about * self.angular_speed)
+
+    def displaced(self, origins: np.ndarray, quaternion: np.ndarray, distance: float) -> tuple[np.ndarray, np.ndarray]:
+        """Margins of robots without pulleys whose spools are displaced so that, to first order, cables are fastest.
+
+        Args:
+            origins: (n, 3) of the platform frame, kernels' coordinates, m.
+            quaternion: (4,) unit quaternion, scalar first.
+            distance: of spools from their places, m.
+
+        Returns:
+            (n, n_cables) m/s; (n, n_cables) lengths of the cables, m.
+        """
+        robot = self.robot
+        arms, wrenches = cable_wrenches(robot, quaternion, np.ones(robot.dof))
+        forces = len(PATTERNS[robot.pattern].forces)
+        parts = (wrenches[:, :forces], self.speed), (wrenches[:, forces:], self.angular_speed)
+        rays = np.asarray(robot.base_points) - arms - origins[:, None]
+
+        def each(rays: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+            # Unit vectors, rates, and derivatives of rates with respect to unit vectors.
+            units = unit_vectors(rays)
+            rates, gradients = np.zeros(units.shape[:2]), np.zeros_like(units)
+            for wrench, speed in parts:
+                columns = np.einsum("nik,kmi->nim", units, wrench)
+                rates += np.linalg.norm(columns, axis=2) * speed
+                gradients += np.einsum("nim,kmi->nik", unit_vectors(columns), wrench) * speed
+            return units, rates, gradients
+
+        units, _, gradients = each(rays)
+        rays = rays + distance * unit_vectors(gradients - (gradients * units).sum(2, keepdims=True) * units)
+        return self.most - each(rays)[1], np.linalg.norm(rays, axis=2)
 
     def changes(self, moved: Shifts) -> np.ndarray:
         """Largest change of `margins` within cells.

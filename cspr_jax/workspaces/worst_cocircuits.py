@@ -39,6 +39,7 @@ class WorstCocircuits(NamedTuple):
 def worst_cocircuits(
     matrices: Array,
     wrenches: Array,
+    spreads: Array,
     low: Array,
     high: Array,
     *,
@@ -48,11 +49,12 @@ def worst_cocircuits(
     """Cocircuits with the least slack, times the volume of the columns that they are normal to.
 
     This weight puts cocircuits of nearly dependent columns last, whose normals turn fast from place to place. Where a
-    single cocircuit is violated, it is that one.
+    single cocircuit is violated, it is that one; where none is, it is the one whose plane is the nearest.
 
     Args:
         matrices: (n, dof, n_cables) unit columns, moments over a length.
         wrenches: (k, dof) wrenches that the cables must supply, N.
+        spreads: (l, dof) semi-axes of ellipsoids of wrenches about each of them, N.
         low: (n_cables,) smallest tensions, N.
         high: (n_cables,) largest tensions, N; any number for cables without one.
         condition: "closure": take the cocircuit whose other components are the most of one sign, positive; any other:
@@ -73,7 +75,8 @@ def worst_cocircuits(
         along = jnp.where(is_own, 0.0, normals @ matrix)
         normals, along = jnp.concatenate([normals, -normals]), jnp.concatenate([along, -along])
         largest = jnp.max(jnp.abs(along), axis=1, keepdims=True)
-        products = normals @ wrenches.T
+        beside = jnp.sum(jnp.linalg.norm(normals[:, None] * spreads[None], axis=2), axis=1)
+        products = normals @ wrenches.T + beside[:, None]
         if condition == "closure":
             others = jnp.where(np.concatenate([is_own, is_own]), jnp.inf, along)
             value = -jnp.min(others, axis=1)
@@ -83,6 +86,7 @@ def worst_cocircuits(
             value = reach - jnp.max(products, axis=1)
             is_void = ((along > ZERO * largest) & free[None]).any(1)
         is_void = is_void | ~(largest[:, 0] > SHORT)
+        value = jnp.where(value > 0.0, value / jnp.linalg.norm(normals, axis=1), value)
         worst = jnp.argmin(jnp.where(is_void, jnp.inf, value))
         if condition != "closure":
             load = jnp.argmax(products[worst])

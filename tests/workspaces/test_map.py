@@ -1,5 +1,6 @@
 """Maps of workspaces: what Python says cell by cell, sets of orientations, and mistakes."""
 
+import dataclasses
 import math
 
 import h5py
@@ -256,7 +257,15 @@ def test_cables_that_are_too_long(tmp_path):
         ({"conditions": '["static"]', "more": "[limits]\ntension_max = 9"}, "limits.tension_max"),
         ({"more": "[limits]\ncable_speed_max = 1"}, "limits.cable_speed_max"),
         ({"more": "[limits]\ntension_min = 100"}, "tension_min"),
-        ({"more": "[limits]\nuncertainty = { spool_positions = 0.01 }"}, "a wrench_box holds"),
+        ({"more": "[limits]\nuncertainty = { }"}, "limits.uncertainty"),
+        (
+            {"more": 'orientations = "total"\ntilt_max = 0.2\n[limits.uncertainty]\nspool_positions = 0.01'},
+            "limits.uncertainty: cannot be combined with workspace.orientations",
+        ),
+        (
+            {"robot": "prototype", "more": "[limits]\nuncertainty = { mass_centre = 0.01 }"},
+            "limits.uncertainty.mass_centre: must be absent: a point mass has no other one",
+        ),
         ({"robot": "prototype", "more": "orientation = [1, 0, 0, 0]"}, "workspace.orientation"),
         ({"robot": "nothing"}, "robot"),
         ({"more": 'orientations = "some"'}, "workspace.orientations"),
@@ -277,6 +286,67 @@ def test_mistakes_are_one_line(tmp_path, changes, words):
     code, out, error = swept(tmp_path, **changes)
     assert (code, out) == (2, "") and words in error and len(error.splitlines()) == 1
     assert not (tmp_path / "run").exists()
+
+
+OFF = "[limits.uncertainty]\nspool_positions = 0.03\nmass_centre = 0.04\nmass_factor = 1.2\n"
+
+
+def test_what_needs_another_orientation_or_pulleys_excludes_an_uncertainty(tmp_path):
+    """Axes of orientations; pulleys, and pairs of cables, if their spools are uncertain."""
+    text = SWEEP.format(robot="kntu-planar", conditions='["static"]', more=OFF)
+    (tmp_path / "axes.toml").write_text(text.replace("[workspace]", "tilt = [0.1]\n[workspace]"))
+    pulleys = PRISM.format(axes="x = [0]\ny = [0]\nz = [1]", more=OFF.replace("mass_centre = 0.04\n", ""))
+    pulleys = pulleys.replace("mass = 1.0", "mass = 1.0\npulley_radius = 0.01")
+    (tmp_path / "pulleys.toml").write_text(pulleys)
+    for name, words in {"axes": "axes.tilt: cannot be combined", "pulleys": "spool_positions: must be 0"}.items():
+        code, out, error = cspr("run", tmp_path / f"{name}.toml", "-o", tmp_path / "run")
+        assert (code, out) == (2, "") and words in error and len(error.splitlines()) == 1
+    (tmp_path / "pulleys.toml").write_text(pulleys.replace("spool_positions = 0.03\n", ""))
+    assert cspr("run", tmp_path / "pulleys.toml", "-o", tmp_path / "run")[0] == 0
+
+
+def test_a_map_of_all_robots_holds_for_other_robots_from_python(tmp_path):
+    """Robots within the uncertainty, each asked alone."""
+    code, out, error = swept(tmp_path, conditions='["wrench-feasible"]', more="prove = true\n" + OFF, finer=2)
+    assert (code, error) == (0, "")
+    rng, robot = np.random.default_rng(4), cspr_jax.load_robot("kntu-planar")
+    places = grid(np.linspace(-1.5, 1.5, 13), [0.0], np.linspace(-1.2, 1.2, 9))
+    with h5py.File(out.strip()) as file:
+        verdict = file["verdict"][...].ravel()
+    answers = cspr_jax.workspace(robot, places)
+    is_more = (verdict == Verdict.UNCERTAINTY) | (verdict == Verdict.UNDECIDED)
+    assert ((answers.verdict == 0) == ((verdict == 0) | is_more)).all()
+    worst = np.full(len(places), np.inf)
+    centre = np.zeros(3) if robot.centre_of_mass is None else np.asarray(robot.centre_of_mass)
+    for _ in range(30):
+        steps = rng.normal(size=(robot.n_cables + 1, 3)) * [1.0, 0.0, 1.0]
+        steps /= np.linalg.norm(steps, axis=1, keepdims=True)
+        other = dataclasses.replace(
+            robot,
+            base_points=np.asarray(robot.base_points) + 0.03 * steps[:-1],
+            mass=float(robot.mass) * rng.choice([1.0 / 1.2, 1.0, 1.2]),
+            centre_of_mass=centre + 0.04 * steps[-1],
+        )
+        # Tilted by nothing: the origin stays where it is.
+        worst = np.minimum(worst, cspr_jax.workspace(other, places).margin)
+    assert (worst[verdict == 0] > 0.0).all()
+
+
+def test_all_masses_that_hang_below_a_square_of_spools_that_are_somewhere(tmp_path):
+    """Two spools at most so much nearer to the middle are the worst; the volume says what the described robot has."""
+    x = [0.0, 0.5, 0.9, 0.99, 1.05, 1.2]
+    more = "prove = true\n" + OFF.replace("mass_centre = 0.04\n", "")
+    found, path = volume_of(tmp_path, "square", f"x = {x}\ny = [-0.2, 0.3]\nz = [0.5, 0.7]", more)
+    with h5py.File(path) as file:
+        verdict, side = file["verdict"][...], file["cell_side"][...]
+    wanted = [0, 0, 0, Verdict.UNCERTAINTY, Verdict.WRENCH_INFEASIBLE, Verdict.WRENCH_INFEASIBLE]
+    assert (verdict == np.reshape(wanted, (6, 1, 1))).all()
+    assert (side[0] == 1).all() and (side[5] == 2).all() and not side[2:4].any()
+    code, said, _ = cspr("volume", path)
+    width = 0.5 * (1.05 - 0.9)
+    assert (
+        found.uncertain == pytest.approx(width * 0.5 * 0.2) and f"{found.uncertain:.4g} m3 more" in said and code == 0
+    )
 
 
 def grid(*axes):

@@ -69,11 +69,11 @@ class Asked:
 
     @property
     def proofs(self):
-        return CellProofs(self.own, self.search, self.quaternion)
+        return CellProofs(self.search, self.quaternion)
 
-    def margins(self, inner, half, margin):
+    def margins(self, inner, half):
         with double_precision():
-            return self.proofs.least_margins(inner, half, margin)
+            return self.proofs.least_margins(inner, half)
 
 
 def check(asked, rng, count, *, largest=0.3, samples=8, programs=1, depth=0):
@@ -95,7 +95,7 @@ def check(asked, rng, count, *, largest=0.3, samples=8, programs=1, depth=0):
     assert (verdict[outside] != 0).all(), drawn.name
     chosen = np.flatnonzero(answers.verdict == 0)
     if len(chosen) and asked.question.condition != "wrench-closure":
-        bound = asked.margins(inner[chosen], half[chosen], answers.margin[chosen])
+        bound = asked.margins(inner[chosen], half[chosen])
         with np.errstate(invalid="ignore"):
             assert (bound <= margin[chosen].min(1) + 1e-9 * drawn.mass * 10.0).all(), drawn.name
         # Of no size: all but what tensions at the centre give up.
