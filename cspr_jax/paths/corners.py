@@ -10,9 +10,7 @@ from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
-from scipy.interpolate import BPoly
 
-from cspr_jax.curves.interpolation import hermite
 from cspr_jax.paths.elements import Element, Nodes
 from cspr_jax.paths.section import Track
 
@@ -39,75 +37,80 @@ def tracks_of(elements: Sequence[Element], corners: Corners = "stop", tolerance:
     Returns:
         the tracks.
     """
-    cuts = _cuts(elements, corners, tolerance)
-    stops = [i + 1 for i, cut in enumerate(cuts) if cut is None]
-    tracks = []
-    for first, last in zip([0, *stops], [*stops, len(elements)], strict=True):
-        tracks.append(_track(elements[first:last], [0.0, *(cut or 0.0 for cut in cuts[first : last - 1]), 0.0]))
-    return tracks
-
-
-def _cuts(elements: Sequence[Element], corners: Corners, tolerance: float) -> list[float | None]:
-    # Lengths that blends take off both elements; 0 where the direction goes on, None where the motion stops.
-    directions = np.array([element.directions for element in elements])
-    one, other = directions[:-1, 1], directions[1:, 0]
-    angles = np.arctan2(np.linalg.norm(np.cross(one, other), axis=1), np.sum(one * other, axis=1)).tolist()
+    lengths = _blend_lengths(elements, corners, tolerance)
+    stops = [0, *(np.flatnonzero(np.isnan(lengths)) + 1).tolist(), len(elements)]
     return [
-        None
-        if corners == "every" or before.ends_at_rest or not (before.moves and after.moves)
-        else _cut(before, after, angle, corners, tolerance)
-        for (before, after), angle in zip(itertools.pairwise(elements), angles, strict=True)
+        _track(elements[first:end], np.array([0.0, *lengths[first : end - 1], 0.0]))
+        for first, end in itertools.pairwise(stops)
     ]
 
 
-def _cut(before: Element, after: Element, angle: float, corners: Corners, tolerance: float) -> float | None:
-    if angle <= SAME_DIRECTION:
-        return 0.0
-    if angle <= ROUNDED_DIRECTION:
-        tolerance = max(tolerance, ROUNDED) if corners == "blend" else ROUNDED
-    elif corners == "stop" or angle > TURNING_BACK:
-        return None
-    corner = after.nodes(0.0, after.length).place[0]
-    length = min(
-        (1.0 - 1e-12) * tolerance / (0.375 * np.sin(0.5 * angle)), LARGEST_SHARE * min(before.length, after.length)
+def _blend_lengths(elements: Sequence[Element], corners: Corners, tolerance: float) -> np.ndarray:
+    # Lengths that blends take off the elements at each corner; 0 where the direction goes on, NaN where motions stop.
+    if corners == "every":
+        return np.full(len(elements) - 1, np.nan)
+    size = np.array([element.length for element in elements])
+    directions = np.array([element.at(np.array([0.0, element.length])).first for element in elements])
+    one, other = directions[:-1, 1], directions[1:, 0]
+    angles = np.arctan2(np.linalg.norm(np.cross(one, other), axis=1), np.sum(one * other, axis=1))
+    turns, is_rounded = angles > SAME_DIRECTION, angles <= ROUNDED_DIRECTION
+    moves = np.array([element.moves for element in elements])
+    ends_at_rest = np.array([element.ends_at_rest for element in elements])[:-1]
+    is_stop = ends_at_rest | ~moves[:-1] | ~moves[1:] | (~is_rounded & ((corners == "stop") | (angles > TURNING_BACK)))
+    allowed = np.where(is_rounded, max(tolerance, ROUNDED) if corners == "blend" else ROUNDED, tolerance)
+    sines = np.sin(0.5 * np.where(turns, angles, 1.0))
+    largest = LARGEST_SHARE * np.minimum(size[:-1], size[1:])
+    lengths = np.where(turns, np.minimum((1.0 - 1e-12) * allowed / (0.375 * sines), largest), 0.0)
+    lengths[is_stop] = np.nan
+    rows = np.flatnonzero(lengths > 0.0)
+    while len(rows):
+        before = [elements[i].at(size[i] - lengths[[i]]) for i in rows]
+        after = [elements[i + 1].at(lengths[[i]]) for i in rows]
+        offsets = _middles(before, after, lengths[rows]).place - np.array([elements[i + 1].start for i in rows])
+        missed = np.linalg.norm(offsets, axis=1) / allowed[rows]
+        rows, missed = rows[missed > 1.0], missed[missed > 1.0]
+        lengths[rows] *= np.maximum(0.5, 0.99 / missed)
+    return lengths
+
+
+def _middles(before: Sequence[Nodes], after: Sequence[Nodes], lengths: np.ndarray) -> Nodes:
+    # Middles of quintics from last nodes to first ones, over twice the lengths.
+    _, place, first, second = (np.array([column[-1] for column in columns]) for columns in zip(*before, strict=True))
+    _, *ends = (np.array([column[0] for column in columns]) for columns in zip(*after, strict=True))
+    length = lengths[:, None]
+    return Nodes(
+        lengths,
+        0.5 * (place + ends[0]) + 0.3125 * length * (first - ends[1]) + 0.0625 * length**2 * (second + ends[2]),
+        0.9375 * (ends[0] - place) / length - 0.4375 * (first + ends[1]) - 0.0625 * length * (second - ends[2]),
+        0.75 * (ends[1] - first) / length - 0.25 * (second + ends[2]),
     )
-    while (distance := float(np.linalg.norm(_blend(before, after, length)(length) - corner))) > tolerance:
-        length *= max(0.5, 0.99 * tolerance / distance)
-    return length
 
 
-def _blend(before: Element, after: Element, length: float) -> BPoly:
-    # Hermite piece over twice the length that it takes off each element.
-    one = before.nodes(0.0, before.length - length)
-    other = after.nodes(length, after.length)
-    ends = [np.stack([getattr(one, name)[-1], getattr(other, name)[0]]) for name in ("place", "first", "second")]
-    s = np.array([0.0, 2.0 * length])
-    return BPoly(np.moveaxis(hermite(s, ends), 1, 0), s)
-
-
-def _track(elements: Sequence[Element], cuts: Sequence[float]) -> Track:
-    # Join elements, of which the cuts, one more than elements, are taken off at both ends.
-    parts, speeds, marks, s = list[Nodes](), list[np.ndarray](), [0.0], 0.0
-    for i, (element, before, after) in enumerate(zip(elements, cuts, cuts[1:], strict=False)):
-        nodes = element.nodes(before, element.length - after)
-        nodes = nodes._replace(s=nodes.s - before + s)
-        parts.append(nodes)
-        speeds.append(np.full(len(nodes.s) - 1, element.speed))
-        s = float(nodes.s[-1])
-        if i + 1 < len(elements):
-            following = elements[i + 1]
-            middle, speed = s + after, min(element.speed, following.speed)
-            if after:
-                values = _blend(element, following, after)
-                parts.append(Nodes(np.array([middle]), *(values([after], order) for order in range(3))))
-            speeds.append(np.full(2 if after else 1, speed))
-            s = s + 2.0 * after
-        else:
-            middle = s
-        marks.append(middle)
+def _track(elements: Sequence[Element], lengths: np.ndarray) -> Track:
+    # Join elements, of which the lengths, one more than elements, are taken off at both ends.
+    lines = [
+        element.nodes(before, element.length - after)
+        for element, (before, after) in zip(elements, itertools.pairwise(lengths.tolist()), strict=True)
+    ]
+    blended = np.flatnonzero(lengths)
+    middles = dict[int, Nodes]()
+    if len(blended):
+        found = _middles([lines[i - 1] for i in blended], [lines[i] for i in blended], lengths[blended])
+        middles = {i: Nodes(*(column[[k]] for column in found)) for k, i in enumerate(blended.tolist())}
+    parts, speeds, marks, s = list[Nodes](), list[np.ndarray](), list[float](), 0.0
+    for i, (element, line, length) in enumerate(zip(elements, lines, lengths.tolist(), strict=False)):
+        slowest = min(element.speed, elements[i - 1].speed)
+        marks.append(s + length)
+        if length:
+            parts.append(middles[i]._replace(s=np.array([s + length])))
+        if i:
+            speeds.append(np.full(2 if length else 1, slowest))
+        parts.append(line._replace(s=line.s - length + (s + 2.0 * length)))
+        speeds.append(np.full(len(line.s) - 1, element.speed))
+        s = float(parts[-1].s[-1])
     joined = Nodes(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
     twice = np.flatnonzero(joined.s[1:] == joined.s[:-1])
     for values in (joined.place, joined.first) if len(twice) else ():
         # Elements miss each other by rounding.
         values[twice] = values[twice + 1] = 0.5 * (values[twice] + values[twice + 1])
-    return Track(joined.s, joined.place, joined.first, joined.second, np.concatenate(speeds), np.array(marks))
+    return Track(joined.s, joined.place, joined.first, joined.second, np.concatenate(speeds), np.array([*marks, s]))

@@ -56,12 +56,6 @@ class Straight:
         """Travelled length, m; of one that only turns its angle, rad."""
         return float(np.linalg.norm(self.end - self.start)) if self.moves else self.turn
 
-    @property
-    def directions(self) -> np.ndarray:
-        """Directions at its start and at its end, (2, 3) unit vectors."""
-        step = (self.end - self.start) / self.length
-        return np.array([step, step])
-
     def nodes(self, first: float, last: float) -> Nodes:
         """Nodes between two lengths.
 
@@ -72,10 +66,21 @@ class Straight:
         Returns:
             two nodes.
         """
-        s, length = np.array([first, last]), self.length
+        return self.at(np.array([first, last]))
+
+    def at(self, s: np.ndarray) -> Nodes:
+        """States at lengths.
+
+        Args:
+            s: (n,) m from its start.
+
+        Returns:
+            the states.
+        """
+        share, step = (s / self.length)[:, None], (self.end - self.start) / self.length
         # Whole lines meet their ends without rounding.
-        place = self.start * (1.0 - s / length)[:, None] + self.end * (s / length)[:, None]
-        return Nodes(s, place, self.directions, np.zeros((2, 3)))
+        place = self.start * (1.0 - share) + self.end * share
+        return Nodes(s, place, np.array([step] * len(s)), np.zeros((len(s), 3)))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -109,22 +114,19 @@ class Arc:
     @property
     def end(self) -> np.ndarray:
         """Place of its end, (3,) m."""
-        return self.nodes(0.0, self.length).place[-1]
-
-    @property
-    def directions(self) -> np.ndarray:
-        """Directions at its start and at its end; see `Straight.directions`."""
-        return self.nodes(0.0, self.length).first[[0, -1]]
+        return self.at(np.array([self.length])).place[0]
 
     def nodes(self, first: float, last: float) -> Nodes:
         """Nodes between two lengths, near enough to each other for quintic pieces; see `Straight.nodes`."""
-        rate = self.angle / self.length
-        count = max(int(np.ceil(abs(rate) * (last - first) / LARGEST_PIECE)), 1)
-        s = np.linspace(first, last, count + 1)
-        radius = self.start - self.centre
+        count = max(int(np.ceil(abs(self.angle) * (last - first) / self.length / LARGEST_PIECE)), 1)
+        return self.at(np.linspace(first, last, count + 1))
+
+    def at(self, s: np.ndarray) -> Nodes:
+        """States at lengths; see `Straight.at`."""
+        rate, radius = self.angle / self.length, self.start - self.centre
         cosine, sine = np.cos(rate * s)[:, None], np.sin(rate * s)[:, None]
-        outward, along = cosine * radius, np.cross(self.axis, radius)
-        outward = outward + sine * along
+        along = np.cross(self.axis, radius)
+        outward = cosine * radius + sine * along
         forward = rate * (cosine * along - sine * radius)
         climb = self.axis * (self.rise / self.length)
         return Nodes(s, self.centre + outward + s[:, None] * climb, forward + climb, -(rate**2) * outward)
