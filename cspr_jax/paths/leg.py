@@ -26,7 +26,7 @@ from cspr_jax.paths.fastest_lines import FastestLines
 from cspr_jax.paths.least_time import TOGETHER, LeastTime, least_times_along
 from cspr_jax.paths.section import Section, SectionSettings
 from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.runtime.stages import stage
+from cspr_jax.runtime.stages import amount, stage
 
 # Directions of a motion that runs on through a pose differ by no more.
 SAME_DIRECTION = 1e-6
@@ -34,6 +34,8 @@ SAME_DIRECTION = 1e-6
 FEW = 16
 # Cells of the grids of all sections: a proof looks at no more blocks.
 MOST_CELLS = 100_000
+# Cells above which their number is said before the work begins.
+MANY_CELLS = 10_000
 
 
 class CourseRun(NamedTuple):
@@ -113,7 +115,7 @@ class Paths(Leg):
     def _rides(self, problem: Problem, z0: float) -> list[Ride]:
         # Sections of all runs, in the axes of the kernels; notes of their files.
         stops, rides = self.stops, list[Ride]()
-        self._notes = []
+        self._notes, cells = [], 0
         places = np.array(stops.frame.outward(stops.points(z0)))
         units = None
         if isinstance(problem.robot, PlatformRobot):
@@ -121,7 +123,7 @@ class Paths(Leg):
         for run in self._runs:
             try:
                 course = self._course(run, places, units)
-                _check_work(course, GRID if run.table.grid is None else run.table.grid)
+                cells += _cells(course, GRID if run.table.grid is None else run.table.grid)
                 sections = [self._placed(section, course) for section in course.sections()]
             except InputError as error:
                 raise ConfigError(stops.path, f"{self._key(run)}.{error}") from error
@@ -133,6 +135,8 @@ class Paths(Leg):
             segments = np.full(count, run.first) if run.table.is_whole else np.arange(run.first, run.last)
             rides += _settled(run, sections, segments)
         self._check_going_on(rides)
+        if cells > MANY_CELLS:
+            amount(f"{_parts(len(rides))} with {cells:,} cells of their grids: their least times and proofs begin")
         return rides
 
     @property
@@ -218,13 +222,18 @@ class Paths(Leg):
                 )
 
 
-def _check_work(course: Course, grid: int) -> None:
-    # Refuse what would not be proved, before it takes hours.
+def _parts(count: int) -> str:
+    return f"{count:,} {'part' if count == 1 else 'parts'} between stops"
+
+
+def _cells(course: Course, grid: int) -> int:
+    # Cells of the grids of a course; what would not be proved is refused before it takes hours.
     cells = sum(max(grid, len(track.s) - 1) for track in course.tracks)
     if cells > MOST_CELLS:
-        fault = f"{len(course.tracks):,} parts between stops have {cells:,} cells"
+        fault = f"{_parts(len(course.tracks))}: {cells:,} cells"
         allowed = f'must be {MOST_CELLS:,} at most: blend corners (corner = "blend"), a smaller grid, or several plans'
         raise InputError("grid", None, allowed, fault=fault)
+    return cells
 
 
 def _direction(curve: Spline, piece: int) -> np.ndarray:

@@ -114,9 +114,7 @@ def _every_minute(line: Callable[[], str]) -> Iterator[None]:
 
     def write_lines() -> None:
         while not over.wait(LINE_SECONDS):
-            with contextlib.suppress(OSError, ValueError):  # nobody may be there to be told
-                sys.stderr.write(f"cspr: {printable(line())}\n")
-                sys.stderr.flush()
+            _write(line())
 
     thread = threading.Thread(target=write_lines, daemon=True)
     thread.start()
@@ -127,25 +125,36 @@ def _every_minute(line: Callable[[], str]) -> Iterator[None]:
         thread.join()
 
 
+def _write(line: str) -> None:
+    with contextlib.suppress(OSError, ValueError):  # nobody may be there to be told
+        sys.stderr.write(f"cspr: {printable(line)}\n")
+        sys.stderr.flush()
+
+
 @contextlib.contextmanager
 def waiting() -> Iterator[None]:
     """Show the stage of the work while the block runs: on a terminal all the time, elsewhere by a line a minute.
 
-    Nothing may be printed meanwhile.
+    How much work begins is written at once. Nothing may be printed meanwhile.
 
     Yields:
         nothing.
     """
     if not sys.stderr.isatty():
         latest = ["starting"]
-        with _every_minute(lambda: latest[0]), stages.heard(lambda text: latest.__setitem__(0, text or "computing")):
+        listener = lambda text: latest.__setitem__(0, text or "computing")  # noqa: E731
+        with _every_minute(lambda: latest[0]), stages.heard(listener, _write):
             yield
         return
     from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn
 
     with _bar(SpinnerColumn("line"), TextColumn("{task.description}", markup=False), TimeElapsedColumn()) as bar:
         task = bar.add_task("starting", total=None)
-        with stages.heard(lambda text: bar.update(task, description=printable(text) or "computing")):
+
+        def show(text: str) -> None:
+            bar.update(task, description=printable(text) or "computing")
+
+        with stages.heard(show, lambda text: bar.console.out(f"cspr: {printable(text)}", highlight=False)):
             yield
 
 

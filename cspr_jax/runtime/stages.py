@@ -12,6 +12,7 @@ class _Board:
 
     def __init__(self) -> None:
         self.listener: Listener | None = None
+        self.amount_listener: Listener | None = None
         self.around: list[str] = []
         self.now = ""
         self.compiling: dict[int, str] = {}
@@ -37,6 +38,16 @@ def stage(text: str) -> None:
     """
     _board.now = text
     _board.tell()
+
+
+def amount(text: str) -> None:
+    """Announce how much work begins now, if that may take minutes.
+
+    Args:
+        text: a line, such as "450 sections with 90,000 cells".
+    """
+    if _board.amount_listener is not None:
+        _board.amount_listener(text)
 
 
 @contextlib.contextmanager
@@ -71,17 +82,19 @@ def compiling(name: str | None) -> None:
 
 
 @contextlib.contextmanager
-def heard(listener: Listener) -> Iterator[None]:
+def heard(listener: Listener, amounts: Listener | None = None) -> Iterator[None]:
     """Listen to the stages while the block runs.
 
     Args:
         listener: called with a line, from any thread.
+        amounts: called with what `amount` announces.
 
     Yields:
         nothing.
     """
-    before, _board.listener = _board.listener, listener
+    before = _board.listener, _board.amount_listener
+    _board.listener, _board.amount_listener = listener, amounts
     try:
         yield
     finally:
-        _board.listener = before
+        _board.listener, _board.amount_listener = before

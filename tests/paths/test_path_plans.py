@@ -11,6 +11,7 @@ import cspr_jax
 from cspr_jax.config.catalogue import CATALOGUE
 from cspr_jax.config.reading import read_toml
 from cspr_jax.errors import ConfigError
+from cspr_jax.paths import leg
 from cspr_jax.runtime import stages
 
 ROBOT = {"schema": 1, "robot": "prototype", "family": "path", "samples": 201}
@@ -57,12 +58,15 @@ def test_a_path_of_its_own_is_that_between_poses(kind, corner):
     np.testing.assert_allclose(steps[np.diff(times) > 1e-9], mean[np.diff(times) > 1e-9], atol=5e-3)
 
 
-def test_it_says_how_far_it_is():
-    """The section of all, how much time is left from the second one on, and the round of its proof."""
-    heard = []
-    with stages.heard(heard.append):
+def test_it_says_how_far_it_is(monkeypatch):
+    """How much work begins; the section of all, the time left from the second one on, the round of its proof."""
+    heard, amounts = [], []
+    monkeypatch.setattr(leg, "MANY_CELLS", 149)
+    with stages.heard(heard.append, lambda text: amounts.append((len(heard), text))):
         cspr_jax.plan(ROBOT | {"path": {"kind": "line", "grid": 50}, "pose": poses(PLACES)})
-    assert "least time, section 1 of 3: proof 1" in heard
+    ((before, amount),) = amounts
+    assert amount.startswith("3 parts between stops with 150 cells of their grids")
+    assert heard.index("least time, section 1 of 3: proof 1") >= before
     assert any(re.fullmatch(r"least time, section 3 of 3, \d:\d\d:\d\d left: proof 1", line) for line in heard)
     assert heard.index("proof of all sections") > max(i for i, line in enumerate(heard) if "section 3" in line)
 

@@ -167,7 +167,7 @@ def test_too_much_work_is_refused_before_it_begins(tmp_path):
     lines = ["G0 X0 Y0 Z1000", *(f"G1 X{100 * (k % 2 == 0)} F6000" for k in range(3000))]
     (tmp_path / "a.nc").write_text("\n".join(lines))
     keys = {"schema": 1, "robot": "prototype", "family": "path"}
-    with pytest.raises(ConfigError, match=r"path\.grid: 3,000 parts between stops have 180,000 cells: must be 100,000"):
+    with pytest.raises(ConfigError, match=r"path\.grid: 3,000 parts between stops: 180,000 cells: must be 100,000"):
         cspr_jax.plan(keys | {"path": {"kind": "gcode", "file": str(tmp_path / "a.nc"), "grid": 60}})
 
 

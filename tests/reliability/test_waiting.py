@@ -148,7 +148,9 @@ def test_a_terminal_is_told_the_stages_and_a_pipe_is_not(monkeypatch, capsys):
     with waiting(), stages.within("table 3.3"):
         stages.stage("arcs 5 of 20 [m]")
         threading.Thread(target=stages.compiling, args=("first look",)).start()
+        stages.amount("450 parts [m]")
     assert "table 3.3: arcs 5 of 20 [m]" in terminal.getvalue()
+    assert "cspr: 450 parts [m]\n" in terminal.getvalue()
 
 
 @pytest.mark.soak
@@ -166,6 +168,14 @@ def test_a_run_shows_what_it_does_until_the_first_tile(monkeypatch):
         on_tile(0, 10)
         on_tile(5, 10)
     assert " left" in terminal.getvalue()
+
+
+def test_a_log_gets_the_amount_of_work_at_once(monkeypatch):
+    monkeypatch.setattr(sys, "stderr", io.StringIO())
+    with waiting():
+        stages.amount("450 parts")
+        assert sys.stderr.getvalue() == "cspr: 450 parts\n"
+    stages.amount("nobody listens")
 
 
 def test_a_log_gets_a_line_now_and_then(monkeypatch):
