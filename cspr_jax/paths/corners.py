@@ -64,9 +64,11 @@ def _blend_lengths(elements: Sequence[Element], corners: Corners, tolerance: flo
     lengths[is_stop] = np.nan
     rows = np.flatnonzero(lengths > 0.0)
     while len(rows):
-        before = [elements[i].at(size[i] - lengths[[i]]) for i in rows]
-        after = [elements[i + 1].at(lengths[[i]]) for i in rows]
-        offsets = _middles(before, after, lengths[rows]).place - np.array([elements[i + 1].start for i in rows])
+        before = [elements[i].at(size[i] - lengths[[i]]) for i in rows.tolist()]
+        after = [elements[i + 1].at(lengths[[i]]) for i in rows.tolist()]
+        offsets = _middles(before, after, lengths[rows]).place - np.array(
+            [elements[i + 1].start for i in rows.tolist()]
+        )
         missed = np.linalg.norm(offsets, axis=1) / allowed[rows]
         rows, missed = rows[missed > 1.0], missed[missed > 1.0]
         lengths[rows] *= np.maximum(0.5, 0.99 / missed)

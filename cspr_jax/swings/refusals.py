@@ -11,7 +11,7 @@ from cspr_jax.swings.criteria import BASIC, flags
 from cspr_jax.swings.hypocycloid import Segment
 from cspr_jax.swings.limit_sieve import broken_at_samples, upcoming
 from cspr_jax.swings.parities import pick
-from cspr_jax.swings.proof import SMALLEST_MARGIN, first_look, is_met_at_samples, prove
+from cspr_jax.swings.proof import SMALL, SMALLEST_MARGIN, first_look, is_met_at_samples, prove
 
 
 def refusals(problem: Problem, parities: dict[int, Segment], upper: np.ndarray, known: np.ndarray) -> Refused:
@@ -38,21 +38,20 @@ def refusals(problem: Problem, parities: dict[int, Segment], upper: np.ndarray, 
             continue
         taut = prove(problem._replace(limits=NO_LIMITS), pick(parities, rows, arcs), arcs).feasible
         rows, arcs = rows[taut], arcs[taut]
-        for rank in range(int(alive.shape[1])):
-            # One candidate of each segment after the other, since one may make the next ones superfluous.
-            turn = _turns(rows) == rank
-            if not turn.any():
-                break
-            due = turn & ~fewest.is_best[rows]
-            due[due] = fewest.may_change(rows[due], known[rows[due], arcs[due] - 1])
-            if due.any():
-                is_clear, broken = _limits_of(problem, parities, rows[due], arcs[due], fewest)
-                fewest.take(rows[due][is_clear], arcs[due][is_clear], broken[is_clear])
-
-
-def _turns(rows: np.ndarray) -> np.ndarray:
-    # Count for each entry the equal ones before it; equal ones stand together.
-    return np.arange(len(rows)) - np.searchsorted(rows, rows)
+        # One candidate of each segment after the other, since one may make the next ones superfluous.
+        rank = np.arange(len(rows)) - np.searchsorted(rows, rows)
+        left = np.argsort(rank, kind="stable")
+        while len(left):
+            left = left[~fewest.is_best[rows[left]]]
+            left = left[fewest.may_change(rows[left], known[rows[left], arcs[left] - 1])]
+            # The next ones of the same segments fill a batch, which takes as long whatever it holds.
+            count = max(int(np.searchsorted(rank[left], rank[left[:1]], side="right").sum()), SMALL)
+            batch, left = left[:count], left[count:]
+            if len(batch):
+                is_clear, broken = _limits_of(problem, parities, rows[batch], arcs[batch], fewest)
+            for number in np.unique(rank[batch]):
+                due = is_clear & (rank[batch] == number)
+                fewest.take(rows[batch][due], arcs[batch][due], broken[due])
 
 
 def _limits_of(
