@@ -64,11 +64,9 @@ def _blend_lengths(elements: Sequence[Element], corners: Corners, tolerance: flo
     lengths[is_stop] = np.nan
     rows = np.flatnonzero(lengths > 0.0)
     while len(rows):
-        before = [elements[i].at(size[i] - lengths[[i]]) for i in rows.tolist()]
-        after = [elements[i + 1].at(lengths[[i]]) for i in rows.tolist()]
-        offsets = _middles(before, after, lengths[rows]).place - np.array(
-            [elements[i + 1].start for i in rows.tolist()]
-        )
+        ends = [elements[i].at(size[i] - lengths[[i]]) for i in rows.tolist()]
+        starts = [elements[i + 1].at(lengths[[i]]) for i in rows.tolist()]
+        offsets = _middles(ends, starts, lengths[rows]).place - np.array([elements[i + 1].start for i in rows.tolist()])
         missed = np.linalg.norm(offsets, axis=1) / allowed[rows]
         rows, missed = rows[missed > 1.0], missed[missed > 1.0]
         lengths[rows] *= np.maximum(0.5, 0.99 / missed)
@@ -97,8 +95,8 @@ def _track(elements: Sequence[Element], lengths: np.ndarray) -> Track:
     blended = np.flatnonzero(lengths)
     middles = dict[int, Nodes]()
     if len(blended):
-        found = _middles([lines[i - 1] for i in blended], [lines[i] for i in blended], lengths[blended])
-        middles = {i: Nodes(*(column[[k]] for column in found)) for k, i in enumerate(blended.tolist())}
+        blends = _middles([lines[i - 1] for i in blended], [lines[i] for i in blended], lengths[blended])
+        middles = {i: Nodes(*(column[[k]] for column in blends)) for k, i in enumerate(blended.tolist())}
     parts, speeds, marks, s = list[Nodes](), list[np.ndarray](), list[float](), 0.0
     for i, (element, line, length) in enumerate(zip(elements, lines, lengths.tolist(), strict=False)):
         slowest = min(element.speed, elements[i - 1].speed)
