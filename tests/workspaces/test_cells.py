@@ -70,6 +70,40 @@ def test_bounds_of_tensions_hold_those_that_are_meant(components, cables):
 
 
 @pytest.mark.parametrize(("components", "cables"), SIZES)
+def test_bounds_of_tensions_hold_wherever_exits_are(components, cables):
+    """Exits displaced in the directions in which they change a tension most, and in drawn ones."""
+    rng, ratios = np.random.default_rng(cables), []
+    centres, half, exits, forces, cells = drawn_cells(rng, 40, components, cables)
+    distance = 10.0 ** rng.uniform(-4.0, -2.0, (40, cables))
+    cells = cells._replace(moves=distance)
+    tensions, low, high = rng.uniform(0.5, 1.0, (40, cables)), np.full(cables, 0.2), np.full(cables, 1.5)
+    for i in range(40):
+        start, lengths = columns(exits, forces, centres[i])
+        density = tensions[i] / lengths
+        wrench = start @ density
+        one = cells.take(np.array([i]))
+        least, most = (side[0] for side in tension_bounds(one, tensions[i : i + 1], wrench, low, high))
+        if not (np.isfinite(least) & (least > 0.0)).all():
+            continue
+        weight = (np.minimum(tensions[i] - low, high - tensions[i]) / lengths) ** 2
+        inverse = weight[:, None] * start.T @ np.linalg.inv(start @ (weight[:, None] * start.T))
+
+        def at(place, displaced):
+            matrix, own = columns(displaced, forces, place)
+            return own * (density + inverse @ np.linalg.solve(matrix @ inverse, wrench - matrix @ density))
+
+        steps = 1e-7 * np.eye(3 * cables).reshape(-1, cables, 3)
+        slopes = np.array([at(centres[i], exits + step) - tensions[i] for step in steps]).T.reshape(cables, cables, 3)
+        slopes = np.concatenate([slopes, -slopes, rng.normal(size=(4, cables, 3))])
+        moved = exits + distance[i, :, None] * slopes / (np.linalg.norm(slopes, axis=2, keepdims=True) + 1e-300)
+        seen = np.array([at(place, d) for place in places_in(rng, centres[i], half[i], 1) for d in moved])
+        assert (seen >= least).all() and (seen <= most).all(), i
+        ratios.append(np.max((most - least) / np.ptp(seen, axis=0)))
+    assert len(ratios) > 15
+    assert np.quantile(ratios, 0.3) < 1.2  # and are not much wider
+
+
+@pytest.mark.parametrize(("components", "cables"), SIZES)
 def test_bounds_of_products_hold_those_of_the_normal_that_moves(components, cables):
     rng, known, ratios = np.random.default_rng(cables), 0, []
     centres, half, exits, forces, cells = drawn_cells(rng, 120, components, cables)
