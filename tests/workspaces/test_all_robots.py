@@ -203,6 +203,22 @@ def test_no_robot_is_on_the_other_side(pattern, n, condition, uncertainty, accel
     assert counts[3] <= 0.5 * counts[2] + 1
 
 
+def test_the_lightest_and_the_heaviest_robot_decide():
+    """Tensions of three cables are proportional to the mass: all robots are inside exactly where these two are."""
+    rng, counts = np.random.default_rng(3), np.zeros(2, int)
+    for _ in range(4):
+        uncertain = draw(rng, "3T", 3, "wrench-feasible", Uncertainty(0.0, 0.0, 2.0))
+        drawn = uncertain.drawn
+        places = np.array([drawn.pose(rng)[0] for _ in range(60)])
+        nominal, verdict = uncertain.verdicts(places)
+        ends = [uncertain.moves(np.zeros((5, 3)), mass) for mass in uncertain.masses]
+        slack = np.array([min(uncertain.slack(place, end) for end in ends) for place in places])
+        expected = np.where(nominal != 0, nominal, np.where(slack > 0.0, 0, Verdict.UNCERTAINTY))
+        assert (verdict == expected)[np.abs(slack) > 1e-6].all()
+        counts += [(verdict == 0).sum(), (verdict == Verdict.UNCERTAINTY).sum()]
+    assert (counts > 10).all(), counts
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("kind", ["lengths", "speeds", "clearances"])
 def test_limits_and_clearances_hold_for_all_robots(kind):

@@ -33,6 +33,22 @@ def columns(exits, forces, place):
     return np.einsum("kmi,ik->mi", forces, rays), np.linalg.norm(rays, axis=1)
 
 
+class Meant:
+    """The force densities that differ from those of the centre by the least weighted sum, solved for exactly."""
+
+    def __init__(self, matrix, density, weight, wrench, forces):
+        self.density, self.wrench, self.forces = density, wrench, forces
+        self.inverse = weight[:, None] ** 2 * matrix.T @ np.linalg.inv(matrix @ (weight[:, None] ** 2 * matrix.T))
+
+    def tensions(self, place, exits):
+        """Tensions at a place, with exits that may have moved."""
+        matrix, lengths = columns(exits, self.forces, place)
+        missing = self.wrench - matrix @ self.density
+        moved = self.density + self.inverse @ np.linalg.solve(matrix @ self.inverse, missing)
+        np.testing.assert_allclose(matrix @ moved, self.wrench, atol=1e-8)
+        return lengths * moved
+
+
 def places_in(rng, centre, half, inner=6):
     """All corners, and some inside."""
     return centre + half * np.concatenate([CORNERS, rng.uniform(-1.0, 1.0, (inner, 3))])
@@ -40,7 +56,6 @@ def places_in(rng, centre, half, inner=6):
 
 @pytest.mark.parametrize(("components", "cables"), SIZES)
 def test_bounds_of_tensions_hold_those_that_are_meant(components, cables):
-    """The force densities that differ from those of the centre by the least weighted sum, solved for exactly."""
     rng, known, ratios = np.random.default_rng(cables), 0, []
     centres, half, exits, forces, cells = drawn_cells(rng, 120, components, cables)
     tensions = rng.uniform(0.5, 1.0, (120, cables))
@@ -54,14 +69,8 @@ def test_bounds_of_tensions_hold_those_that_are_meant(components, cables):
         if not np.isfinite(least).all():
             continue
         known += 1
-        weight = (np.minimum(tensions[i] - low, high - tensions[i]) / lengths) ** 2
-        inverse = weight[:, None] * start.T @ np.linalg.inv(start @ (weight[:, None] * start.T))
-        seen = []
-        for place in places_in(rng, centres[i], half[i]):
-            matrix, own = columns(exits, forces, place)
-            moved = density + inverse @ np.linalg.solve(matrix @ inverse, wrench - matrix @ density)
-            np.testing.assert_allclose(matrix @ moved, wrench, atol=1e-8)
-            seen.append(own * moved)
+        meant = Meant(start, density, np.minimum(tensions[i] - low, high - tensions[i]) / lengths, wrench, forces)
+        seen = [meant.tensions(place, exits) for place in places_in(rng, centres[i], half[i])]
         if (least > 0.0).all():  # lengths are bounded from below by their tangents: of tensions that pull
             assert (np.min(seen, axis=0) >= least).all() and (np.max(seen, axis=0) <= most).all(), i
             ratios.append(np.max((most - least) / np.maximum(np.ptp(seen, axis=0), 1e-9)))
@@ -85,18 +94,14 @@ def test_bounds_of_tensions_hold_wherever_exits_are(components, cables):
         least, most = (side[0] for side in tension_bounds(one, tensions[i : i + 1], wrench, low, high))
         if not (np.isfinite(least) & (least > 0.0)).all():
             continue
-        weight = (np.minimum(tensions[i] - low, high - tensions[i]) / lengths) ** 2
-        inverse = weight[:, None] * start.T @ np.linalg.inv(start @ (weight[:, None] * start.T))
-
-        def at(place, displaced):
-            matrix, own = columns(displaced, forces, place)
-            return own * (density + inverse @ np.linalg.solve(matrix @ inverse, wrench - matrix @ density))
-
+        meant = Meant(start, density, np.minimum(tensions[i] - low, high - tensions[i]) / lengths, wrench, forces)
         steps = 1e-7 * np.eye(3 * cables).reshape(-1, cables, 3)
-        slopes = np.array([at(centres[i], exits + step) - tensions[i] for step in steps]).T.reshape(cables, cables, 3)
-        slopes = np.concatenate([slopes, -slopes, rng.normal(size=(4, cables, 3))])
-        moved = exits + distance[i, :, None] * slopes / (np.linalg.norm(slopes, axis=2, keepdims=True) + 1e-300)
-        seen = np.array([at(place, d) for place in places_in(rng, centres[i], half[i], 1) for d in moved])
+        changes = np.array([meant.tensions(centres[i], exits + step) - tensions[i] for step in steps])
+        changes = changes.T.reshape(cables, cables, 3)
+        changes = np.concatenate([changes, -changes, rng.normal(size=(4, cables, 3))])
+        moved = exits + distance[i, :, None] * changes / (np.linalg.norm(changes, axis=2, keepdims=True) + 1e-300)
+        places = places_in(rng, centres[i], half[i], 1)
+        seen = np.array([meant.tensions(place, displaced) for place in places for displaced in moved])
         assert (seen >= least).all() and (seen <= most).all(), i
         ratios.append(np.max((most - least) / np.ptp(seen, axis=0)))
     assert len(ratios) > 15
