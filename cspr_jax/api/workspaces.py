@@ -44,13 +44,13 @@ def workspace(  # noqa: PLR0913
     acceleration=None,
     capacity_length: float | None = None,
     precision: str = "float64",
+    point: str | None = None,
 ) -> WorkspaceAnswers:
     """Tell whether each of n poses is in the workspace of a robot, of any pattern on any number of cables.
 
     Args:
         robot: a point mass or a body on as many cables as degrees of freedom, or more; pulleys are taken into account.
-        positions: (n, 3) positions of the origin of the platform frame, or of the joint, in the robot's axes, m;
-            n >= 1.
+        positions: (n, 3) positions of `point`, or of the joint, in the robot's axes, m; n >= 1.
         orientations: (n, 4) unit quaternions, scalar first, from the orientation of the robot file; None: this one.
         condition: "static": taut cables of any tension hold the weight; "wrench-feasible": tensions within limits
             supply all wrenches; "wrench-closure": cables that are pulled hard enough resist every wrench.
@@ -66,6 +66,7 @@ def workspace(  # noqa: PLR0913
             (Guay et al. 2014; Ruiz et al. 2015).
         precision: "float64", or "float32", which decides the poses that it can and leaves the others to float64, so
             that verdicts are the same; margins of poses that it decides are good to some 1e-3 of the limits.
+        point: point of a platform whose positions are given: "origin" of its axes, or "mass-centre"; None: the origin.
 
     Returns:
         verdicts, 0 inside, and margins.
@@ -95,7 +96,7 @@ def workspace(  # noqa: PLR0913
         loads = required_wrenches(
             centred_robot, frame, points=wrenches, box=wrench_box, ellipsoid=wrench_ellipsoid, acceleration=acceleration
         )
-        inner, turns = _poses(centred_robot, frame, places, orientations)
+        inner, turns = _poses(centred_robot, frame, places, orientations, point or "origin")
         posed = requirement(centred_robot, condition, limits, loads, capacity_length)
         return WorkspaceSearch(centred_robot, posed, precision=precision)(inner, turns)
 
@@ -112,7 +113,8 @@ def _limits(robot, tension_min, tension_max) -> Limits:
     return limits_over(robot, Limits(tension_min=tension_min, tension_max=tension_max), any_tensions=True)
 
 
-def _poses(robot, frame: Frame, places: np.ndarray, orientations) -> tuple[np.ndarray, np.ndarray | None]:
+def _poses(robot, frame: Frame, places: np.ndarray, orientations, point: str) -> tuple[np.ndarray, np.ndarray | None]:
+    # Positions of the mass centre, and quaternions, (n, 3) and (n, 4).
     row = PATTERNS[robot.pattern]
     inner, turns = np.asarray(frame.inward(places)), None
     if orientations is not None:
@@ -122,7 +124,7 @@ def _poses(robot, frame: Frame, places: np.ndarray, orientations) -> tuple[np.nd
         if row.is_planar and unit_quaternions[:, [1, 3]].any():
             raise InputError("orientations", "not about y", "turns about y: those of a planar robot")
         turns = frame.turned_quaternions(unit_quaternions)
-    return mass_centres(robot, inner, turns), turns
+    return (mass_centres(robot, inner, turns) if point == "origin" else inner), turns
 
 
 @dataclasses.dataclass(frozen=True)
@@ -130,7 +132,7 @@ class Sensitivity:
     """Sensitivities of a robot to errors of its cable lengths at n places, Machines 11 (2), 2023, 224, (7).
 
     Fields:
-        positions: (n, 3) positions of the mass centre, in the robot's axes, m.
+        positions: (n, 3) positions as they were given, in the robot's axes, m.
         sigma_p: (n,) largest displacement over the largest error of a cable length, m/m; infinite at a singular place.
         sigma_r: (n,) largest rotation of a platform over the largest error, rad/m, with six independent errors; NaN for
             a point mass.
@@ -160,18 +162,22 @@ class Sensitivity:
 
 
 @checked
-def sensitivity(robot: PointMassRobot | PlatformRobot, positions, orientations=None) -> Sensitivity:
+def sensitivity(
+    robot: PointMassRobot | PlatformRobot, positions, orientations=None, *, point: str | None = None
+) -> Sensitivity:
     """Sensitivities of a robot to errors of its cable lengths.
 
     Args:
         robot: a point mass on three cables, or two in a plane, or a platform on six.
-        positions: (n, 3) positions of the mass centre, in the robot's axes, m.
+        positions: (n, 3) positions of `point`, in the robot's axes, m.
         orientations: (n, 4) unit quaternions of a platform in the robot's axes, scalar first, from the reference
             orientation, or from that of the robot file if the cables are parallel in three pairs there; None: no
             rotation.
+        point: point of a platform whose positions are given: "origin" of its axes, or "mass-centre"; None: the mass
+            centre.
 
     Returns:
-        the sensitivities.
+        the sensitivities, with displacements of the mass centre.
 
     Raises:
         InputError: more cables than degrees of freedom, pulleys, or another pattern of motion; shapes that do not fit,
@@ -187,7 +193,10 @@ def sensitivity(robot: PointMassRobot | PlatformRobot, positions, orientations=N
         turns = None
         if orientations is not None:
             turns = frame.turned_quaternions(quaternions("orientations", orientations, len(places)))
-        answers = SensitivitySearch(centred_robot)(frame.inward(places), turns)
+        search, inner = SensitivitySearch(centred_robot), np.asarray(frame.inward(places))
+        if point == "origin":
+            inner = mass_centres(search.robot, inner, turns)
+        answers = search(inner, turns)
     return Sensitivity(places, np.asarray(answers.sigma_p), np.asarray(answers.sigma_r))
 
 

@@ -40,7 +40,7 @@ class SensitivitySearch:
     """The sensitivities of a robot.
 
     A platform whose cables form three parallel pairs has the orientation of its file, in which they are parallel; any
-    other platform has its reference orientation.
+    other platform has its reference orientation. `robot` has the axes in which it is not rotated.
 
     Args:
         robot: centred; a platform in the axes of its file.
@@ -52,10 +52,10 @@ class SensitivitySearch:
     def __init__(self, robot: PointMassRobot | PlatformRobot) -> None:
         """Find the orientation of a platform."""
         check_determined(robot)
-        self._robot, self._pairs = robot, None
+        self.robot, self._pairs = robot, None
         if isinstance(robot, PlatformRobot):
             self._pairs = _pairs(robot)
-            self._robot = robot if self._pairs is not None else aligned(robot)[0]
+            self.robot = robot if self._pairs is not None else aligned(robot)[0]
 
     def __call__(self, positions: np.ndarray, quaternions: np.ndarray | None = None) -> Sensitivities:
         """Sensitivities at places.
@@ -67,7 +67,7 @@ class SensitivitySearch:
         Returns:
             (n,) each.
         """
-        robot, pairs = self._robot, self._pairs
+        robot, pairs = self.robot, self._pairs
         if isinstance(robot, PointMassRobot):
             return in_batches(partial(_of_point_mass, robot), positions, size=BATCH)
         if quaternions is None and pairs is not None:

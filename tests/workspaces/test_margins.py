@@ -109,3 +109,15 @@ def test_symmetric_grids_are_answered(name, condition):
     places = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
     found = cspr_jax.workspace(robot_of(name), places, condition=condition)
     assert not np.isnan(found.margin).any()
+
+
+def test_positions_of_the_mass_centre():
+    """A pose named by either point; the mass centre lies aside of the origin of the platform's axes."""
+    robot = cspr_jax.load_robot("cogiro")
+    places, turns = drawn("cogiro", QUICK, np.random.default_rng(5))
+    quaternions = turns.as_quat(scalar_first=True)
+    of_origin = cspr_jax.workspace(robot, places, quaternions)
+    centres = places + turns.apply(np.asarray(robot.centre_of_mass))
+    of_centre = cspr_jax.workspace(robot, centres, quaternions, point="mass-centre")
+    np.testing.assert_allclose(of_centre.margin, of_origin.margin, atol=1e-7)
+    assert np.abs(cspr_jax.workspace(robot, centres, quaternions).margin - of_origin.margin).max() > 1.0

@@ -175,6 +175,23 @@ def test_its_picture(tmp_path, figures):
     assert label.startswith("sensitivity of the position (m/m)")
 
 
+@pytest.mark.parametrize("angle", [0.0, 0.4])
+def test_positions_of_the_origin(angle):
+    """Of a platform whose file's axes are, or are not, those of its reference orientation."""
+    mssm, axes = cspr_jax.load_robot("laval-mssm"), Rotation.from_euler("z", angle)
+    centre, inertia = np.array([0.02, -0.01, 0.03]), axes.as_matrix() @ np.asarray(mssm.inertia) @ axes.as_matrix().T
+    points, arm = axes.apply(np.asarray(mssm.platform_points)), axes.apply(centre)
+    robot = cspr_jax.platform(mssm.base_points, points, mass=1.0, inertia=inertia, centre_of_mass=arm, z_axis="down")
+    places = np.random.default_rng(0).uniform([-0.3, -0.3, 1.0], [0.3, 0.3, 1.6], (6, 3))
+    turns = Rotation.from_rotvec(0.2 * Rotation.random(6, random_state=1).as_rotvec())
+    quaternions = turns.as_quat(scalar_first=True)
+    of_origin = cspr_jax.sensitivity(robot, places, quaternions, point="origin")
+    of_centre = cspr_jax.sensitivity(robot, places + turns.apply(centre), quaternions)
+    np.testing.assert_allclose(of_origin.sigma_p, of_centre.sigma_p, rtol=1e-9)
+    np.testing.assert_allclose(of_origin.sigma_r, of_centre.sigma_r, rtol=1e-9)
+    assert np.abs(cspr_jax.sensitivity(robot, places, quaternions).sigma_p - of_centre.sigma_p).max() > 0.01
+
+
 @pytest.mark.parametrize(
     ("robot", "y", "words"),
     [("boralugoda-rectangle", [0.1], "4 points: must be 3 in this map"), ("transition-planar", [0.1], "axes.y")],
