@@ -142,8 +142,11 @@ def waiting() -> Iterator[None]:
     """
     if not sys.stderr.isatty():
         latest = ["starting"]
-        listener = lambda text: latest.__setitem__(0, text or "computing")  # noqa: E731
-        with _every_minute(lambda: latest[0]), stages.heard(listener, _write):
+
+        def keep(text: str) -> None:
+            latest[0] = text or "computing"
+
+        with _every_minute(lambda: latest[0]), stages.heard(keep, _write):
             yield
         return
     from rich.progress import SpinnerColumn, TextColumn, TimeElapsedColumn

@@ -149,10 +149,12 @@ def test_keys_of_samples_are_not_ignored(kind):
     """What says how samples become a curve is refused where there are none."""
     robot = cspr_jax.load_robot("prototype")
     more = {"duration": 1.0} if kind == "function" else {}
-    if kind == "function":
-        source = lambda t: jnp.array([0.0, 0.0, 1.0])  # noqa: E731
-    else:
-        source = CubicSpline(TIMES, PLACES) if kind == "curve" else cspr_jax.spline(robot, TIMES, PLACES)
+    make = {
+        "function": lambda: lambda t: jnp.array([0.0, 0.0, 1.0]),
+        "motion": lambda: cspr_jax.spline(robot, TIMES, PLACES),
+        "curve": lambda: CubicSpline(TIMES, PLACES),
+    }
+    source = make[kind]()
     for key, value in {"interpolation": "quintic", "ends": "natural", "smooth": 1e-3}.items():
         with pytest.raises(ConfigError, match=f"{key} = .*: must be absent for a motion without samples"):
             cspr_jax.check(robot, source, **more, **{key: value})
