@@ -21,7 +21,7 @@ from jax import Array, lax
 
 from cspr_jax.arithmetic.elementary import solved
 from cspr_jax.errors import InputError
-from cspr_jax.robots.wrench_sets import FLAT, normals_to, spanning, wrench_faces
+from cspr_jax.robots.wrench_sets import FLAT, beside_faces, face_distances, one_sided_faces
 
 # A limit counts as kept within the first of these parts of the largest tension; for points that are compared, within
 # the second.
@@ -114,7 +114,7 @@ def centred(matrix: Array, wrench: Array, tension_min: Array, tension_max: Array
         InputError: fewer cables than components.
     """
     solutions = all_tensions(matrix, wrench)
-    tensions, largest = _most_central(matrix, wrench, tension_min, tension_max, solutions)
+    tensions, largest = _most_central(matrix, tension_min, tension_max, solutions)
     answer = checked(matrix, wrench, tension_min, tension_max, solutions, tensions)
     return answer, jnp.where(solutions.is_regular, largest, -jnp.inf)
 
@@ -131,11 +131,11 @@ def most_central(matrix: Array, wrench: Array, tension_min: Array, tension_max: 
     Returns:
         (n_cables,) N.
     """
-    return _most_central(matrix, wrench, tension_min, tension_max, all_tensions(matrix, wrench))[0]
+    return _most_central(matrix, tension_min, tension_max, all_tensions(matrix, wrench))[0]
 
 
-def _most_central(matrix: Array, wrench: Array, low: Array, high: Array, solutions: AllTensions) -> tuple[Array, Array]:
-    largest = _largest_distance(matrix, wrench, low, high, solutions)
+def _most_central(matrix: Array, low: Array, high: Array, solutions: AllTensions) -> tuple[Array, Array]:
+    largest = _largest_distance(matrix, low, high, solutions)
     inwards = jnp.where(jnp.isfinite(largest), largest, 0.0)
     return solutions.tensions(_shortest(solutions, low + inwards, high - inwards)), largest
 
@@ -372,24 +372,24 @@ def projected(kernel: Array, is_held: Array, vector: Array, products: Array) -> 
     return solution[:freedom], solution[freedom:]
 
 
-def _largest_distance(matrix: Array, wrench: Array, low: Array, high: Array, solutions: AllTensions) -> Array:
+def _largest_distance(matrix: Array, low: Array, high: Array, solutions: AllTensions) -> Array:
     """Largest r, () N: half of a cable's range, or a face's slack over its way inwards for each newton of r."""
     dof, count = matrix.shape
     if count == dof:
         return jnp.min(jnp.minimum(solutions.least - low, high - solutions.least))
-    faces = wrench_faces(*lax.stop_gradient((matrix, low, high)))
-    moves = jnp.sum(jnp.abs(faces.normals @ lax.stop_gradient(matrix)), axis=1)
-    is_face = jnp.isfinite(faces.offsets) & (moves > 0.0)
-    each = jnp.where(is_face, faces.slacks(lax.stop_gradient(wrench)) / jnp.where(is_face, moves, 1.0), jnp.inf)
-    nearest = jnp.argmin(each)
+    others, products = beside_faces(count, dof), one_sided_faces(matrix, solutions.kernel)
+
+    def slack(along, cables):
+        # A cable without a largest tension pulls beyond the face: its slack is infinite.
+        reached = jnp.where(along < 0.0, high[cables], low[cables])
+        return jnp.sum(along * (solutions.least[cables] - reached), axis=-1)
+
+    both, cables = jnp.concatenate([products, -products]), np.concatenate([others, others])
+    each = lax.stop_gradient(face_distances(both, slack(both, cables), jnp.ones(both.shape)))
     # Compute the distance from the nearest face once more, now differentiable: infinite limits must not appear in it.
-    half = each.size // 2
-    normal = normals_to(matrix)[nearest % half] * jnp.where(nearest < half, 1.0, -1.0)
-    normal = normal / lax.stop_gradient(jnp.max(jnp.abs(normal)))
-    along = normal @ matrix
-    is_own = (jnp.arange(count)[None] == jnp.asarray(spanning(count, dof))[nearest % half][:, None]).any(0)
-    along = jnp.where(is_own | (jnp.abs(along) <= FLAT), 0.0, along)
-    reached = jnp.where(along > 0.0, low, jnp.where((along < 0.0) & jnp.isfinite(high), high, 0.0))
-    slack = jnp.dot(normal, wrench) - jnp.dot(along, reached)
-    distance = jnp.where(is_face[nearest], slack / jnp.sum(jnp.abs(along)), jnp.inf)
+    nearest = jnp.argmin(each)
+    is_face = jnp.isfinite(each[nearest])
+    along = jnp.where(is_face, both[nearest], 0.0)
+    size = jnp.where(is_face, jnp.sum(jnp.abs(along)), 1.0)
+    distance = jnp.where(is_face, slack(along, jnp.asarray(cables)[nearest]) / size, jnp.inf)
     return jnp.minimum(distance, 0.5 * jnp.min(high - low))

@@ -152,6 +152,65 @@ def normals_to(matrix: Array) -> Array:
     return products[:, ::-1] * signs[None]
 
 
+@functools.cache
+def beside_faces(count: int, dof: int) -> np.ndarray:
+    """Cables that do not span a face.
+
+    Returns:
+        (n_choices, count - dof + 1) in the order of `wrench_sets.spanning`.
+    """
+    return np.array([np.setdiff1d(np.arange(count), columns) for columns in spanning(count, dof)])
+
+
+def one_sided_faces(matrix: Array, kernel: Array) -> Array:
+    """Products of a normal to each choice of d - 1 cables with the other cables.
+
+    With up to two cables more than needed they are relations among the columns of the kernel, some thirty products in
+    place of determinants.
+
+    Args:
+        matrix: (dof, n_cables) unit columns.
+        kernel: (n, n_cables) orthonormal tensions without a wrench, one for each cable beyond dof.
+
+    Returns:
+        (n_choices, n_others), the cables as `beside_faces` has them; 0 for cables in the face.
+    """
+    dof, count = matrix.shape
+    chosen = beside_faces(count, dof)
+    if count - dof > 2:
+        normals = normals_to(matrix)
+        size = jnp.linalg.norm(normals, axis=1)[:, None]
+        along = jnp.take_along_axis(normals / jnp.where(size > FLAT, size, 1.0) @ matrix, jnp.asarray(chosen), axis=1)
+        return jnp.where((size > FLAT) & (jnp.abs(along) > FLAT), along, 0.0)
+    # One row of the null space more than it has columns: the relation among them.
+    rows = kernel.T[chosen]
+    if chosen.shape[1] == 1:
+        return jnp.ones(chosen.shape)
+    if chosen.shape[1] == 2:
+        along = jnp.stack([rows[:, 1, 0], -rows[:, 0, 0]], axis=1)
+    else:
+        after, last = rows[:, np.array([1, 2, 0])], rows[:, np.array([2, 0, 1])]
+        along = after[..., 0] * last[..., 1] - after[..., 1] * last[..., 0]
+    size = jnp.max(jnp.abs(along), axis=1, keepdims=True)
+    along = jnp.where(size > FLAT, along / jnp.where(size > FLAT, size, 1.0), 0.0)
+    return jnp.where(jnp.abs(along) > FLAT, along, 0.0)
+
+
+def face_distances(along: Array, slacks: Array, weights: Array) -> Array:
+    """Distances of tensions from their limits at which a face is reached.
+
+    Args:
+        along: (n_faces, n_others) products of `one_sided_faces`.
+        slacks: (n_faces,) of the faces, N.
+        weights: (n_faces, n_others) parts of the distance that the cables keep.
+
+    Returns:
+        (n_faces,) N; inf for a face that is none.
+    """
+    sizes = jnp.sum(jnp.abs(along) * weights, axis=1)
+    return jnp.where(sizes > 0.0, slacks / jnp.where(sizes > 0.0, sizes, 1.0), jnp.inf)
+
+
 @jax.jit
 def wrench_faces(matrix: Array, tension_min: Array, tension_max: Array) -> Faces:
     """Faces of the set of wrenches that cables can give.
