@@ -45,7 +45,7 @@ def in_threads(function: Callable, items: Sequence) -> list:
         with double_precision(), jax.default_device(device):
             return function(item)
 
-    if cores() == 1:
+    if cores() == 1 or len(items) == 1:
         return [one(item) for item in items]
     with ThreadPoolExecutor(THREADS) as pool:
         return list(pool.map(one, items))

@@ -7,6 +7,7 @@ lines, or of the height of the spool over the face.
 """
 
 import dataclasses
+import time
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
@@ -87,36 +88,40 @@ def around(
         return None
     segments = np.any(is_met.reshape(len(tasks.places[0]), -1), axis=1)
     least = dict.fromkeys(np.flatnonzero(is_met.any(axis=0)).tolist(), APART * size)
-    best: tuple[Tasks, Unknowns] | None = None
-    for bent in _bent(tasks, unknowns, segments):
-        try:
-            clear = _clear(question, tasks, bent, least)
-        except OutOfTime:
-            if best is None:
-                raise
-            break
-        if clear is not None and (best is None or clear[0].cost(clear[1])[0] < best[0].cost(best[1])[0]):
-            best = clear
-    return best
+    bent = Unknowns(*map(np.concatenate, zip(*_bent(tasks, unknowns, segments), strict=True)))
+    return _clear(question, tasks.taken(np.zeros(len(bent.duration), int)), bent, least)
 
 
 def _clear(
     question: FreeQuestion, tasks: Tasks, bent: Unknowns, least: dict[int, float]
 ) -> tuple[Tasks, Unknowns] | None:
-    # The best motion on the side of a bent one, if it is clear at all instants: planes about one after the other.
+    # The best of the motions on the sides of bent ones, if one is clear at all instants: planes about one after the
+    # other.
     within, begun = _parted(question, tasks, bent, least, np.inf)
     begun = started(within, within.controls(begun), begun.duration)
-    level = BARRIERS[0], SOFTNESS
+    level, until = (BARRIERS[0], SOFTNESS), question.settings.until
+    best, cost = None, np.inf
     for _ in range(SEARCHES):
-        result = optima(within, begun, *level, Ending(question.settings.until))
-        if not (result.is_optimal[0] and within.objective.keeps_limits(result.unknowns.level)[0]):
-            return None
-        further, begun = _parted(question, within, result.unknowns, least, np.inf)
-        if begun.values[..., further.n_limited :].min() > 0.0:
-            return within, result.unknowns
-        within, level = further, GO_ON
-        begun = again(within, begun, level[0])
-    return None
+        result = optima(within, begun, *level, Ending(until), keeps=True)
+        if result.is_stopped and time.monotonic() <= until:
+            raise KeyboardInterrupt
+        is_kept = result.is_optimal & within.objective.keeps_limits(result.unknowns.level)
+        within, found = within.taken(is_kept), result.unknowns.taken(is_kept)
+        if not is_kept.any():
+            break
+        further, begun = _parted(question, within, found, least, np.inf)
+        is_clear = np.all(begun.values[..., further.n_limited :] > 0.0, axis=(1, 2, 3, 4))
+        costs = np.where(is_clear, within.cost(found), np.inf)
+        if costs.min() < cost:
+            rows, cost = np.array([costs.argmin()]), costs.min()
+            best = within.taken(rows), found.taken(rows)
+        if result.is_stopped or is_clear.all():
+            break
+        within, level = further.taken(~is_clear), GO_ON
+        begun = again(within, begun.taken(~is_clear), level[0])
+    if best is None and result.is_stopped:
+        raise OutOfTime
+    return best
 
 
 def _clearances(question: FreeQuestion, slacks: PieceSlacks) -> np.ndarray:
@@ -162,7 +167,7 @@ def _parted(
 
 
 def _linear(tasks: Tasks, places: np.ndarray, gap: _Gap) -> tuple[np.ndarray, np.ndarray]:
-    # Clearances (1, s, m, n), m, and their slopes (1, s, m, n, d), by the coordinates; NaN where they say nothing.
+    # Clearances (l, s, m, n), m, and their slopes (l, s, m, n, d), by the coordinates; NaN where they say nothing.
     def values(where: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         quaternions = quaternions_of(tasks, where)
         flat = where.reshape(-1, where.shape[-1])

@@ -21,7 +21,7 @@ from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
-BATCH = 128
+BATCH = 256
 # Entries of x behind the coordinates.
 SCALARS = 2
 # Powers of one over the duration, by which derivatives in normalised time become those in time.

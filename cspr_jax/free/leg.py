@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from functools import cache, partial
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.build.orientations import pose_quaternions
@@ -22,7 +21,7 @@ from cspr_jax.free.still_poses import OF_PLACES, first_refused
 from cspr_jax.free.time_bounds import time_bounds
 from cspr_jax.motions.answers import Answers, joined
 from cspr_jax.motions.leg import Leg
-from cspr_jax.motions.motion import Motion
+from cspr_jax.motions.motion import Motion, states_at
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import ProvedAnswers
 from cspr_jax.motions.waypoints import Waypoints
@@ -185,11 +184,12 @@ class FreeMotions(Leg):
             )
             forms = partial(_of_segment, lines, i), partial(_of_segment, others, i)
             parts.append(self._no_slower(problem, scene, segment, requested, *forms))
-            if any(parts[-1].families) and FAMILIES[str(parts[-1].families[0])].precedes_searches:
+            is_line = any(parts[-1].families) and FAMILIES[str(parts[-1].families[0])].precedes_searches
+            if is_line or i + 1 == len(self):
                 continue
-            end = parts[-1].motions[0].state(jnp.asarray(1.0))
-            turning = [] if quaternions is None else [np.asarray(end.angular_acceleration)]
-            accelerations[i + 1] = np.concatenate([np.asarray(end.acceleration), *turning])
+            end = states_at(parts[-1].motions[0], np.ones(1))
+            turning = [] if quaternions is None else [end.angular_acceleration]
+            accelerations[i + 1] = np.concatenate([end.acceleration, *turning], axis=1)[0]
         return parts
 
     def _no_slower(

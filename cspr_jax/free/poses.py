@@ -221,13 +221,13 @@ def segments_of(tasks: Tasks) -> Tasks:
 
 
 def quaternions_of(tasks: Tasks, places: np.ndarray) -> np.ndarray | None:
-    """Orientations of a task's platform.
+    """Orientations of the platforms of tasks.
 
     Args:
-        places: (1, s, ..., d) coordinates.
+        places: (l, s, ..., d) coordinates.
 
     Returns:
-        (1, s, ..., 4) unit quaternions, scalar first; None for a point mass.
+        (l, s, ..., 4) unit quaternions, scalar first; None for a point mass.
     """
     along, about = coordinates(tasks.robot.pattern)
     if not len(about):
@@ -236,8 +236,8 @@ def quaternions_of(tasks: Tasks, places: np.ndarray) -> np.ndarray | None:
     turning[..., 0] = 1.0
     turning[..., 1 + about] = places[..., len(along) :]
     turning /= np.linalg.norm(turning, axis=-1, keepdims=True)
-    turned = [products(one.reshape(-1, 4), at[None]) for one, at in zip(turning[0], tasks.references[0], strict=True)]
-    return np.stack(turned).reshape(turning.shape)
+    segments = zip(turning.reshape(-1, *turning.shape[2:]), tasks.references.reshape(-1, 4), strict=True)
+    return np.stack([products(one.reshape(-1, 4), at[None]) for one, at in segments]).reshape(turning.shape)
 
 
 def motions_of(tasks: Tasks, unknowns: Unknowns, z0: float) -> list[Spline]:

@@ -6,16 +6,20 @@ holds for the length of each cable, and for the way of the mass centre in every 
 than e . g + s sum(t_max) / m, where s is the largest e . u of a cable's direction u. Below level spools u points up.
 """
 
+import jax
 import jax.numpy as jnp
 import numpy as np
+from jax import Array
 
 from cspr_jax.curves.spline import Spline
 from cspr_jax.motions.criteria import judged_poses
+from cspr_jax.motions.motion import common_shape
 from cspr_jax.motions.problem import Problem
-from cspr_jax.robots.cables import cable_motion
+from cspr_jax.robots.cables import AnyRobot, cable_motion
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import spool_radius
 from cspr_jax.robots.wrench_sets import tension_range
+from cspr_jax.runtime.persistent_jit import persistent_jit
 
 # Directions in the vertical plane through both places; what bounds are lowered by, more than their rounding.
 ANGLES, SAFE = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 181), 1e-9
@@ -57,15 +61,22 @@ def time_bounds(problem: Problem, motions: list[Spline]) -> np.ndarray:
 
 def _time_bound(problem: Problem, motion: Spline) -> float:
     robot, limits = problem.robot, problem.limits
-    start, end = (motion.state(jnp.asarray(tau)) for tau in (0.0, 1.0))
-    way = np.asarray(end.position) - np.asarray(start.position)
+    positions, lengths = map(np.asarray, _ends(robot, common_shape(motion)))
+    way = positions[1] - positions[0]
     bounds = [_of_mass_centre(problem, way)]
     speed, rise = (
         np.inf if most is None else np.asarray(most) for most in (limits.cable_speed_max, limits.cable_acceleration_max)
     )
-    paid = np.abs(np.asarray(cable_motion(robot, end)[0]) - np.asarray(cable_motion(robot, start)[0]))
+    paid = np.abs(lengths[1] - lengths[0])
     bounds.append(float(np.max(least_time(paid, rise, rise, speed))))
     return max(bounds)
+
+
+@persistent_jit
+def _ends(robot: AnyRobot, motion: Spline) -> tuple[Array, Array]:
+    # Positions (2, 3) and lengths of the cables (2, n_cables) where a motion begins and where it ends.
+    states = jax.vmap(motion.state)(jnp.array([0.0, 1.0]))
+    return states.position, jax.vmap(lambda state: cable_motion(robot, state)[0])(states)
 
 
 def _of_mass_centre(problem: Problem, way: np.ndarray) -> float:

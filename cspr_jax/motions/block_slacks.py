@@ -85,7 +85,7 @@ def _edges(slack: AffineBounds) -> tuple[Pair, Pair]:
     return below, above
 
 
-@persistent_jit(static_argnames=("passes", "contacts_alone"), compiler_options=compile_options.least())
+@persistent_jit(static_argnames=("passes", "contacts_alone"))
 def _kernel(
     robot: AnyRobot,
     limits: Limits,
@@ -132,7 +132,7 @@ def _speeds_kernel(velocity: AffineBounds) -> Part:
     return jax.vmap(lambda each: _joined([_part(-norm(each.each(lambda x: x[None])))]))(velocity)
 
 
-@persistent_jit(compiler_options=compile_options.least())
+@persistent_jit
 def _rates_kernel(robot: AnyRobot, limits: Limits, states: StateBounds) -> tuple[Array, Array]:
     # Bound the smallest slacks: the lower end of a line above a slack is above its smallest value.
     def one(state: StateBounds) -> tuple[Array, Array]:

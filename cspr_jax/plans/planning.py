@@ -20,7 +20,7 @@ from cspr_jax.errors import ConfigError
 from cspr_jax.motions.answers import Answers, joined
 from cspr_jax.motions.demands import SAMPLES, Demands, demands
 from cspr_jax.motions.leg import JoinedLeg
-from cspr_jax.motions.motion import Motion, Placed
+from cspr_jax.motions.motion import Motion, Placed, states_at
 from cspr_jax.motions.outcome import LegOutcome
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.waypoints import Waypoints
@@ -275,7 +275,7 @@ def _points(sequence: PlanLegs, legs: tuple[JoinedLeg, ...], z0: float) -> np.nd
     for i in stops.keys.resulting_poses:
         # The place of the first pose is where the motion begins.
         segment, end = (i - 1, 1.0) if i else (0, 0.0)
-        points[i] = stops.frame.outward(np.asarray(motions[segment].state(jnp.asarray(end)).position))
+        points[i] = stops.frame.outward(states_at(motions[segment], np.array([end])).position[0])
     return points
 
 

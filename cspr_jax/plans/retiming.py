@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.build.scenes import scene_of
@@ -14,7 +13,7 @@ from cspr_jax.curves.spline import Spline, chained
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.motions.answers import replaced
 from cspr_jax.motions.attained import with_attained
-from cspr_jax.motions.motion import Motion
+from cspr_jax.motions.motion import Motion, states_at
 from cspr_jax.motions.proved_answers import ProvedAnswers, proved_answers
 from cspr_jax.paths.answers import PathAnswers, feeds_of
 from cspr_jax.paths.discrete import FASTER
@@ -214,8 +213,9 @@ def _jumps(plan: PlannedMotions, faster: list[_Faster], is_better: np.ndarray) -
     largest, gravity = 0.0, float(plan.problem.robot.gravity)
     for before, after in itertools.pairwise(faster):
         if is_better[before.ride.segments[-1]] and is_better[after.ride.segments[0]]:
-            ends = before.fastest.motion.state(jnp.asarray(1.0)), after.fastest.motion.state(jnp.asarray(0.0))
-            largest = max(largest, float(np.linalg.norm(ends[1].acceleration - ends[0].acceleration)))
+            ends = ((before, 1.0), (after, 0.0))
+            end, start = (states_at(ride.fastest.motion, np.array([tau])).acceleration for ride, tau in ends)
+            largest = max(largest, float(np.linalg.norm(start - end)))
     if not largest > JUMPS * gravity:
         return []
     return [f"retime: accelerations, and so tensions, jump by up to {largest:.3g} m/s^2 where the motion stops"]

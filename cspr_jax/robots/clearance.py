@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 import jax
 import numpy as np
 
-from cspr_jax.arithmetic.batches import in_batches, in_parts, room
+from cspr_jax.arithmetic.batches import in_batches, in_parts, in_threads, room
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.errors import InputError
 from cspr_jax.robots import clearance_kernels as kernels
@@ -22,6 +22,8 @@ from cspr_jax.robots.shapes import Body, Box, Cylinder, Hull, Obstacle, Sphere, 
 
 # Poses of a batch on a CPU; rates are about the same from 16384 to 131072.
 BATCH = 65_536
+# Few poses are computed in a batch of this length: a search asks for some at a time.
+FEW = 4096
 # The part of a cable next to its attachment point for which contacts with the platform do not count is so many
 # diameters long, or this part of the size of the platform's shape.
 LEAVE_DIAMETERS, LEAVE_SIZE = 10.0, 0.01
@@ -228,20 +230,21 @@ def _all(scene: Scene, all_poses: _CheckedPoses, threshold: float, dtype: np.dty
     terms = list(_terms(scene, origin, dtype))
     extent = max(float(np.abs(x).max()) for x in (scene.base_points - origin, scene.platform_points))
     reach = max([extent] + [_reach(shape, origin) for shape in scene.obstacles])
-    bound = ROUNDING * float(np.finfo(dtype).eps)
+    bound, count = ROUNDING * float(np.finfo(dtype).eps), len(all_poses.place)
+    size = FEW if count <= FEW else BATCH
 
     def one(part: slice) -> Clearances:
         poses = all_poses.rows(part).lanes(origin, dtype)
-        answers = in_batches(lambda batch: tuple(term(batch) for _, _, term in terms), poses, size=BATCH)
+        answers = in_batches(lambda batch: tuple(term(batch) for _, _, term in terms), poses, size=size)
         answer = _least([(kind, first, x) for (kind, first, _), x in zip(terms, answers, strict=True)])
         far = [np.abs(x) for x in poses.position]
-        size = np.maximum(np.maximum(np.maximum(far[0], far[1]), far[2]), reach)
+        extents = np.maximum(np.maximum(np.maximum(far[0], far[1]), far[2]), reach)
         # NaN compares as false: such poses stay open.
-        return answer._replace(is_open=~(np.abs(answer.clearance - threshold) > bound * size))
+        return answer._replace(is_open=~(np.abs(answer.clearance - threshold) > bound * extents))
 
     if not terms:
-        return _nothing(len(all_poses.place))
-    parts = in_parts(one, len(all_poses.place), room(BATCH))
+        return _nothing(count)
+    parts = in_threads(one, [slice(count)]) if count <= FEW else in_parts(one, count, room(BATCH))
     return Clearances(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 

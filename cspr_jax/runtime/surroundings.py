@@ -17,6 +17,9 @@ from cspr_jax.errors import ConfigError, ResourceError
 # Threads that every command needs: for signals, and those of NumPy's library, one for each core. Then threads for jax:
 # some pools of XLA have one for each core.
 FEW, OF_JAX, OF_JAX_PER_CORE = 4, 16, 4
+# Threads of NumPy's and SciPy's library for linear algebra, and of all that use OpenMP. With matrices as small as here
+# its threads mostly wait for work, and do so busily: they would take a fifth of the processor time of a plan.
+OF_OPENBLAS, OF_ALL_LIBRARIES = "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"
 # Address space below which jax does not compile a plan on two cores, bytes.
 LEAST_MEMORY = 2_000_000_000
 _SMALL_STACK = 1 << 16  # bytes
@@ -33,6 +36,8 @@ def settle() -> None:
 
     The command line opens no window, and its pictures do not depend on matplotlib's settings.
     """
+    if OF_ALL_LIBRARIES not in os.environ:
+        os.environ.setdefault(OF_OPENBLAS, "1")
     os.environ["MPLBACKEND"] = "Agg"
     os.environ["MATPLOTLIBRC"] = os.devnull  # an empty file: one of the user's may end the import of matplotlib
     logging.getLogger("matplotlib").setLevel(logging.CRITICAL)

@@ -209,6 +209,23 @@ def test_settings_of_a_notebook_and_no_home(monkeypatch):
     assert xla._folder(None, lambda line: None) is None
 
 
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3"), ({"OMP_NUM_THREADS": "4"}, None)],
+)
+def test_threads_of_linear_algebra_do_not_wait_busily(given, expected):
+    """The setting is made before NumPy is loaded, and those of the user win."""
+    code = (
+        "import os, sys\nfrom cspr_jax.cli import main\nassert 'numpy' not in sys.modules\n"
+        "sys.argv = ['cspr', '--version']\ntry: main()\n"
+        "except SystemExit: print(os.environ.get('OPENBLAS_NUM_THREADS'))"
+    )
+    kept = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, env=kept | given, capture_output=True, text=True, timeout=60)
+    assert done.stdout.splitlines()[-1] == str(expected)
+
+
 @pytest.mark.parametrize("place", ["folder", "variable"])
 def test_settings_of_matplotlib_that_cannot_be_read(tmp_path, place):
     """One of the variable is not used; one in the working folder, where matplotlib looks first, is named."""
