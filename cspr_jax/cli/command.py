@@ -81,6 +81,7 @@ def prepare_jax(options: argparse.Namespace, *, quick: bool = False, prefers_cpu
     surroundings.check_threads_of_jax()
     if getattr(options, "scheduler", None) is None:  # its workers have settings of their own
         xla.prepare(options.device, warn, quick=quick, prefers_cpu=prefers_cpu)
+    surroundings.defer_fortran()
     xla.check_device(options.device)
     xla.tell_compiling()
 

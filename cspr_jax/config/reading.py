@@ -44,7 +44,8 @@ Model = TypeVar("Model", bound="Table")
 class Table(BaseModel):
     """A TOML table: every key known, types as written, numbers finite, nothing changed afterwards."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+    # Checks of a table are built when one is read: a command reads few of them.
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False, defer_build=True)
 
 
 def other_case(path: Path) -> str:

@@ -2,6 +2,7 @@
 
 import contextlib
 import errno
+import importlib.util
 import locale
 import logging
 import os
@@ -51,6 +52,21 @@ def settle() -> None:
         # A user without a name, as in a container. Where folders of the home folder are made, this fails in the usual
         # way, and everybody does without them.
         os.environ["HOME"] = os.devnull
+
+
+def defer_fortran() -> None:
+    """Load NumPy's interface to Fortran only where somebody uses it: SciPy asks for all names that NumPy has.
+
+    It takes as long as a fifth of jax.
+    """
+    name = "numpy.f2py"
+    spec = None if name in sys.modules else importlib.util.find_spec(name)
+    if spec is None or spec.loader is None:
+        return
+    loader = spec.loader = importlib.util.LazyLoader(spec.loader)
+    module = sys.modules[name] = importlib.util.module_from_spec(spec)
+    loader.exec_module(module)
+    sys.modules["numpy"].f2py = module  # type: ignore[attr-defined]
 
 
 def check_matplotlibrc() -> None:

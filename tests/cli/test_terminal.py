@@ -226,6 +226,17 @@ def test_threads_of_linear_algebra_do_not_wait_busily(given, expected):
     assert done.stdout.splitlines()[-1] == str(expected)
 
 
+def test_fortran_is_loaded_where_it_is_used():
+    """SciPy asks NumPy for all names that it has; who uses one of them gets it."""
+    code = (
+        "import sys; from cspr_jax.runtime import surroundings; surroundings.defer_fortran(); "
+        "import scipy.interpolate, numpy; print('numpy.f2py.crackfortran' in sys.modules); "
+        "print(callable(numpy.f2py.get_include), 'numpy.f2py.crackfortran' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.stdout.splitlines() == ["False", "True True"]
+
+
 @pytest.mark.parametrize("place", ["folder", "variable"])
 def test_settings_of_matplotlib_that_cannot_be_read(tmp_path, place):
     """One of the variable is not used; one in the working folder, where matplotlib looks first, is named."""
