@@ -33,7 +33,7 @@ from cspr_jax.store.publishing import check_place, publish
 from cspr_jax.store.result import Result, open_result
 
 # Motions of cells where nobody says how many, and at most; rows a second of a plan's motion.
-USUAL, MOST, RATE = 50, 500, 60.0
+USUAL, MOST, RATE, STEP = 50, 500, 60.0, 100
 
 
 @checked
@@ -147,7 +147,9 @@ def _of_motion(motion: Result | Plan, name: str) -> tuple[str, dict[str, Any], l
 def _planned(planned: Plan, title: str) -> dict[str, Any]:
     with double_precision():
         length = float(np.sum(planned.answers.duration))
-        columns = motion_files.rows(planned, rate=min(RATE, MOST_ROWS / length))
+        # Motions of about one length have as many rows, so that they share compiled code.
+        rate = STEP * np.ceil(min(RATE * length, MOST_ROWS) / STEP) / length
+        columns = motion_files.rows(planned, rate=float(rate))
         columns |= planned.outcome_columns | motion_files.failures(planned) | path_columns(planned)
         return motion_content(title, columns, motion_files.segments(planned), planned.robot_file, planned.keys)
 

@@ -3,7 +3,6 @@
 import csv
 import io
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +24,7 @@ from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.robots import cables
 from cspr_jax.robots.limits import NO_LIMITS, Limits
 from cspr_jax.robots.tension_couples import is_rectangle, tension_couples
+from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.identity import canonical_json
 from cspr_jax.schema.quantities import (
     ACROSS,
@@ -59,7 +59,7 @@ OPEN = ("tension", "tension_residual", "tension_each", "tension_couple", "path_a
 SAME_TICK = 1e-6
 
 
-@partial(jax.jit, static_argnames=("rule", "with_couples"))
+@persistent_jit(static_argnames=("rule", "with_couples"))
 def _states(robot, limits: Limits, motion: Motion, tau, *, rule: str, with_couples: bool):
     def one(t):
         state = motion.state(t)
