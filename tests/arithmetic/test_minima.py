@@ -29,6 +29,18 @@ def test_the_smallest_sample_is_followed_whatever_others_promise():
     np.testing.assert_allclose([smallest[0, 1], when[0, 1]], [0.0, 0.123], atol=1e-6)
 
 
+def test_the_smallest_sample_comes_first():
+    """Whatever others promise, which follow by what they promise."""
+    rng = np.random.default_rng(3)
+    values = rng.uniform(size=(5, 40, 2))
+    estimates = values - rng.exponential(size=values.shape)
+    for count in (1, 3):
+        chosen = lowest_samples(values, estimates, count)
+        np.testing.assert_array_equal(chosen[:, 0], values.argmin(1))
+        others = np.take_along_axis(estimates, chosen[:, 1:], axis=1)
+        assert (np.diff(others, axis=1) >= 0.0).all()
+
+
 def test_parabolas_do_not_reach_across_what_does_not_count():
     tau = np.array([0.0, 0.01, 0.5, 1.0])
     values = np.array([1.0, 0.9, np.inf, 0.95])[:, None]

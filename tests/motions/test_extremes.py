@@ -104,8 +104,26 @@ def refined(robot, motion):
     "family", [name if name in QUICK else pytest.param(name, marks=pytest.mark.thorough) for name in PLANS]
 )
 def test_extremes_and_their_times(family):
+    check_extremes(cspr_jax.plan({"schema": 1, "robot": "prototype", "family": family} | PLANS[family]))
+
+
+@pytest.mark.parametrize("side", ["both", "before", "after"])
+def test_extremes_at_joints(side):
+    """Of pieces shorter than distances of samples: at kinks of accelerations, and on either side of their jumps.
+
+    Were joints no samples, values would be missed by 1e-5 of their scales and more.
+    """
+    aside, velocity = (5e-6, None) if side == "both" else (0.0, 0.003)
+    times = np.array([0.0, 0.8, 0.801, 0.8027, 1.7])
+    places = np.array([[0.0, 0.0, 1.4], [0.1, 0.1, 1.3], [0.1 + aside, 0.1, 1.3], [0.1, 0.1, 1.3], [0.05, 0.0, 1.6]])
+    velocities = None if velocity is None else velocity * np.eye(5, 3, -2)
+    if side == "after":
+        times, places, velocities = 1.7 - times[::-1], places[::-1], -velocities[::-1]
+    check_extremes(cspr_jax.check("prototype", times, places, velocities=velocities).plan)
+
+
+def check_extremes(planned):
     """To a millionth of their scales; at the times that are told the motion has these values."""
-    planned = cspr_jax.plan({"schema": 1, "robot": "prototype", "family": family} | PLANS[family])
     robot, demands = planned.problem.robot, planned.demands
     for i, motion in enumerate(planned.motions):
         duration = float(motion.duration())
