@@ -16,7 +16,6 @@ from cspr_jax.api.argument_rules import (
     DIFFERENTIABLE,
     INSTEAD,
     Rule,
-    ask_about_keywords,
     choice,
     instants,
     integer,
@@ -27,6 +26,7 @@ from cspr_jax.api.argument_rules import (
     word,
 )
 from cspr_jax.errors import InputError
+from cspr_jax.errors.suggestions import ask_about_keywords
 from cspr_jax.schema.given_numbers import ANY
 from cspr_jax.schema.limits import LARGEST_GRID, LARGEST_MAX_ARCS, LIMITS, UNCERTAINTIES
 

@@ -6,8 +6,8 @@ import sys
 from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any
 
-from cspr_jax.config.suggestions import did_you_mean, one_of
 from cspr_jax.errors import InputError
+from cspr_jax.errors.suggestions import one_of
 from cspr_jax.schema.given_numbers import Numbers, whole
 
 # A rule refuses what an argument, named in errors, may not be.
@@ -176,14 +176,6 @@ def refuse_tracers(key: str, value: Any, instead: str) -> None:
     if place is not None:
         fault = "a tracer of jax, as grad, jit and vmap pass"
         raise InputError(key + place, None, f"must be numbers: {instead}", fault=fault)
-
-
-def ask_about_keywords(function: str, keywords: Iterable[str], known: Collection[str]) -> None:
-    """Raise a `TypeError` where a keyword that a function does not take is nearly one that it takes."""
-    for key in (key for key in keywords if key not in known):
-        question = did_you_mean(key, known)
-        if question:
-            raise TypeError(f"{function}() takes no {key}: {question.strip()}") from None
 
 
 def word(*words: str) -> Rule:

@@ -10,8 +10,8 @@ from cspr_jax.api.argument_checks import DEPTH, DEPTH_WORDS, LENGTHS, POINTS_WOR
 from cspr_jax.arithmetic.frames import IDENTITY, Frame
 from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE
 from cspr_jax.config.near_rest import almost_at_rest
-from cspr_jax.config.suggestions import one_of
 from cspr_jax.errors import InputError
+from cspr_jax.errors.suggestions import one_of
 from cspr_jax.motions.amplitudes import NAMES, Amplitude, boundary_errors, named
 from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.given_limits import limits_over

@@ -9,8 +9,8 @@ import numpy as np
 from cspr_jax.config.limits import LimitTable
 from cspr_jax.config.mappings import plain
 from cspr_jax.config.obstacles import SurroundingsKeys
-from cspr_jax.config.suggestions import did_you_mean
 from cspr_jax.errors import InputError, demand
+from cspr_jax.errors.suggestions import did_you_mean
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.patterns import PATTERNS

@@ -13,12 +13,14 @@ from cspr_jax.config.reading import other_case
 from cspr_jax.config.robot import RobotFile, read_foreign
 from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.errors import ConfigError
+from cspr_jax.errors.suggestions import with_suggestions
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.store.disk import Disk
 from cspr_jax.store.publishing import publish
 
 
+@with_suggestions
 @dataclasses.dataclass(frozen=True)
 class ImportedRobot:
     """Robot that was read from a file of another program.

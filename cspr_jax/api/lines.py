@@ -7,8 +7,8 @@ from numpy.typing import ArrayLike
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import check_point_mass, starts_and_ends
 from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.config.suggestions import one_of
 from cspr_jax.errors import InputError
+from cspr_jax.errors.suggestions import one_of
 from cspr_jax.lines.least_time import LeastTimes, least_times
 from cspr_jax.lines.motion import LAWS, TimedLine, fixed_law, s_curve
 from cspr_jax.motions.amplitudes import named

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from cspr_jax.api.argument_checks import checked
-from cspr_jax.config.suggestions import one_of
 from cspr_jax.errors import ConfigError, InputError, demand
+from cspr_jax.errors.suggestions import one_of
 from cspr_jax.outputs import example_files, listings
 
 # There is a template for each of these kinds of file.

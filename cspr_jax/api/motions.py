@@ -16,11 +16,11 @@ from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import amplitude_of, kernel_problem, warn_of_rest
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.frames import IDENTITY, Frame
-from cspr_jax.config.suggestions import one_of
 from cspr_jax.curves.files import kept_to, placed_inward, reference_of, samples_of, source_spline
 from cspr_jax.curves.interpolation import linear_maps
 from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import InputError
+from cspr_jax.errors.suggestions import one_of
 from cspr_jax.motions import slacks as motion_slacks
 from cspr_jax.motions.amplitudes import Amplitude, named
 from cspr_jax.motions.motion import Motion, Placed, inward

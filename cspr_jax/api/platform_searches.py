@@ -12,8 +12,8 @@ from cspr_jax.api.arguments import batched, depths, kernel_problem, points_of, q
 from cspr_jax.api.searches import WithMotions
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.arithmetic.frames import Frame
-from cspr_jax.config.suggestions import one_of
 from cspr_jax.errors import InputError
+from cspr_jax.errors.suggestions import one_of
 from cspr_jax.motions.amplitudes import Amplitude
 from cspr_jax.motions.motion import Placed
 from cspr_jax.motions.platform_kind import PlatformMotionKind

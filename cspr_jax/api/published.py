@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Any
 
 from cspr_jax.api.argument_checks import checked
 from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.config.suggestions import one_of
 from cspr_jax.errors import ConfigError, demand, shown
+from cspr_jax.errors.suggestions import one_of
 from cspr_jax.runtime.processes import LARGEST, check_count, usual_count
 
 if TYPE_CHECKING:

@@ -12,6 +12,7 @@ from cspr_jax.api.pictures import finished
 from cspr_jax.api.plans import NAME, Plan, plan
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import ConfigError
+from cspr_jax.errors.suggestions import with_suggestions
 from cspr_jax.outputs import replay as replays
 from cspr_jax.outputs.mujoco_module import need_mujoco
 from cspr_jax.outputs.mujoco_motion import STEP
@@ -19,6 +20,7 @@ from cspr_jax.outputs.plots.replay import replay_figure
 from cspr_jax.outputs.plots.style import style_of
 
 
+@with_suggestions
 @dataclasses.dataclass(frozen=True)
 class Replay(replays.PlayedPlan):
     """A plan, and its motion as MuJoCo plays it; see `cspr_jax.outputs.replay.PlayedPlan` for the fields."""

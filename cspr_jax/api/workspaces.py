@@ -9,8 +9,8 @@ from cspr_jax.api.argument_checks import checked
 from cspr_jax.api.arguments import check_in_plane, check_point_mass, points_of, quaternions
 from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.arithmetic.frames import Frame
-from cspr_jax.config.suggestions import one_of
 from cspr_jax.errors import InputError
+from cspr_jax.errors.suggestions import one_of
 from cspr_jax.motions.given_limits import limits_over
 from cspr_jax.robots.kernel_axes import centred, prepared
 from cspr_jax.robots.limits import Limits

@@ -13,8 +13,8 @@ from typing import Any, BinaryIO, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from cspr_jax.config import wording
-from cspr_jax.config.suggestions import look_alike
 from cspr_jax.errors import ConfigError
+from cspr_jax.errors.suggestions import look_alike
 
 LARGEST_FILE = 1 << 20
 # The time that tomllib takes grows with the square of a key's parts.

@@ -21,9 +21,9 @@ from cspr_jax.config.limits import (
     Row,
 )
 from cspr_jax.config.reading import checked, other_case, read_toml
-from cspr_jax.config.suggestions import did_you_mean
 from cspr_jax.config.wording import fault
 from cspr_jax.errors import ConfigError, InputError, demand, shown
+from cspr_jax.errors.suggestions import did_you_mean
 from cspr_jax.robots.parallel_pairs import ParallelPairs, parallel_pairs
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.schema.limits import LIMITS

@@ -8,8 +8,8 @@ from typing import Any
 from pydantic import BaseModel, PlainValidator
 from pydantic_core import ErrorDetails, PydanticCustomError
 
-from cspr_jax.config.suggestions import look_alike, nearest
 from cspr_jax.errors import demand, shown
+from cspr_jax.errors.suggestions import look_alike, nearest
 
 # Names of the variants of a union; they are part of pydantic's location of an error, not of the user's key.
 VARIANT = "~"

@@ -14,8 +14,8 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.elementary import leaf, polynomial
-from cspr_jax.config.suggestions import one_of
 from cspr_jax.errors import InputError
+from cspr_jax.errors.suggestions import one_of
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
 HIGHEST_DERIVATIVE = 5

@@ -17,6 +17,7 @@ from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.elementary import solved
+from cspr_jax.errors.suggestions import with_suggestions
 from cspr_jax.motions.flight import flown
 from cspr_jax.motions.motion import Motion
 from cspr_jax.robots.force_balance import cable_motion
@@ -43,6 +44,7 @@ class Throw(NamedTuple):
     target: Any
 
 
+@with_suggestions
 @dataclasses.dataclass(frozen=True)
 class LaunchErrors:
     """Independent errors of a launch.

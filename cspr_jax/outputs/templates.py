@@ -17,9 +17,9 @@ from cspr_jax.config.obstacles import SurroundingsKeys
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import Table
 from cspr_jax.config.robot import RobotFile
-from cspr_jax.config.suggestions import one_of
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import InputError, RefusedError, StoreError, printable
+from cspr_jax.errors.suggestions import one_of
 from cspr_jax.outputs.example_files import folder
 from cspr_jax.schema.families import FAMILIES
 from cspr_jax.schema.map_kinds import MAP_KINDS

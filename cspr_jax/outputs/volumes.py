@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.errors import InputError
+from cspr_jax.errors.suggestions import with_suggestions
 from cspr_jax.schema.meanings import CELL_SIDES, OPEN_CONDITIONS
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.result import Result
@@ -19,6 +20,7 @@ OPEN_WORDS = {name: f"inside at the centre, {name} not proved" for name in OPEN_
 LEVEL, POLAR = ("x", "y", "z"), ("radius", "azimuth", "z")
 
 
+@with_suggestions
 @dataclasses.dataclass(frozen=True)
 class WorkspaceVolume:
     """Volume of a workspace, or area, or length, for each value of the other axes of its map.

@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from cspr_jax.config.suggestions import one_of
 from cspr_jax.errors import ConfigError, demand, shown
+from cspr_jax.errors.suggestions import one_of
 from cspr_jax.outputs.table_layout import Cell, grid
 from cspr_jax.plans.planning import plan
 from cspr_jax.published import batotp, boralugoda, chapter_1, chapter_3, peers, ray_hulls, table_3_2, table_3_4

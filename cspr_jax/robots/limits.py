@@ -5,7 +5,10 @@ import dataclasses
 import jax
 from jax import Array
 
+from cspr_jax.errors.suggestions import with_suggestions
 
+
+@with_suggestions
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class Uncertainty:
@@ -22,6 +25,7 @@ class Uncertainty:
     mass_factor: Array | float = 1.0
 
 
+@with_suggestions
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class Limits:

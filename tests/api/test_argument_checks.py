@@ -1,6 +1,7 @@
 """Arguments of all public functions: what no function can use is one line that names the argument, before it runs."""
 
 import copy
+import dataclasses
 import inspect
 import pickle
 from fractions import Fraction
@@ -288,6 +289,39 @@ def test_names_that_nearly_fit_are_asked_about(good, tmp_path):
     with pytest.raises(AttributeError) as caught:
         cspr_jax.minimum_arc  # noqa: B018
     assert caught.value.obj is cspr_jax and caught.value.name == "minimum_arc"  # by which Python asks
+
+
+MAKING = {name: one for name, one in PUBLIC.items() if dataclasses.is_dataclass(one)}
+
+
+@pytest.mark.parametrize(
+    ("keyword", "meant", "kind"),
+    [
+        ("max_tension", "tension_max", "Limits"),
+        ("maximum_cable_speed", "cable_speed_max", "Limits"),
+        ("mass_center", "mass_centre", "Uncertainty"),
+        ("cable_lenght", "cable_length", "LaunchErrors"),
+    ],
+)
+def test_keywords_of_classes_that_nearly_fit_are_asked_about(keyword, meant, kind):
+    with pytest.raises(TypeError, match=rf"^{kind}\(\) takes no {keyword}: did you mean {meant}\?$"):
+        PUBLIC[kind](**{keyword: 1.0})
+
+
+def test_every_keyword_that_nearly_fits_is_asked_about():
+    """Of all public functions, methods and classes, with a letter twice; signatures stay those of the plain ones."""
+    assert {"Limits", "LaunchErrors", "Uncertainty"} <= set(MAKING)
+    for name, one in (TAKING | MAKING).items():
+        for parameter in inspect.signature(one).parameters.values():
+            if parameter.name == "self" or len(parameter.name) < 4:
+                continue
+            with pytest.raises(TypeError, match=rf"^{name}\(\) takes no .*: did you mean \w+\?$"):
+                one(**{parameter.name + parameter.name[-1]: None})
+    for one in MAKING.values():
+        fields = [field.name for field in dataclasses.fields(one) if field.init]
+        assert list(inspect.signature(one).parameters) == fields
+    with pytest.raises(TypeError, match=r"Limits.__init__\(\) got an unexpected keyword argument 'xyz'"):
+        cspr_jax.Limits(xyz=1.0)
 
 
 def test_public_names_are_listed():

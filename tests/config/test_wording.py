@@ -10,9 +10,9 @@ from cspr_jax.config import hints, wording
 from cspr_jax.config.plan import PlanFile, read_plan
 from cspr_jax.config.reading import checked, read_text
 from cspr_jax.config.robot import RobotFile, read_robot, resolve_robot
-from cspr_jax.config.suggestions import nearest
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError, InputError, shown
+from cspr_jax.errors.suggestions import nearest
 from cspr_jax.sweep.definition import read_sweep
 
 SPOOLS = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]

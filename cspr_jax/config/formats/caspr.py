@@ -14,9 +14,9 @@ from cspr_jax.config.formats import model
 from cspr_jax.config.formats.model import Body, Cable
 from cspr_jax.config.formats.xml_text import child, number, read_xml, text_of, vector
 from cspr_jax.config.reading import other_case
-from cspr_jax.config.suggestions import did_you_mean
 from cspr_jax.config.wording import either
 from cspr_jax.errors import ConfigError, shown
+from cspr_jax.errors.suggestions import did_you_mean
 
 
 @dataclasses.dataclass(frozen=True)

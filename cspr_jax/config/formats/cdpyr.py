@@ -15,9 +15,9 @@ import numpy as np
 from cspr_jax.config.formats import model
 from cspr_jax.config.formats.model import Body, Cable
 from cspr_jax.config.reading import look_alike_before, read_text, refuse_long_numbers
-from cspr_jax.config.suggestions import look_alike
 from cspr_jax.config.wording import either
 from cspr_jax.errors import ConfigError, shown
+from cspr_jax.errors.suggestions import look_alike
 
 # By numbers of rotations and translations.
 PATTERNS = {(0, 1): "1T", (0, 2): "2T", (0, 3): "3T", (1, 2): "1R2T", (2, 3): "2R3T", (3, 3): "3R3T"}

@@ -8,8 +8,8 @@ from xml.etree.ElementTree import Element, ParseError
 
 from cspr_jax.config.formats.model import LARGEST_NUMBER
 from cspr_jax.config.reading import decoded, look_alike_before, read_bytes
-from cspr_jax.config.suggestions import look_alike
 from cspr_jax.errors import ConfigError, shown
+from cspr_jax.errors.suggestions import look_alike
 
 LONGEST_FAULT = 200  # characters of a parser's message
 _DECLARED = re.compile(rb"""<\?xml[^>]*?\sencoding\s*=\s*["']([^"']{1,40})""")

@@ -17,9 +17,9 @@ import numpy as np
 from cspr_jax.config.formats.caspr import joint_place
 from cspr_jax.config.formats.xml_text import child, number, read_xml, text_of
 from cspr_jax.config.motions.table import MotionPieces
-from cspr_jax.config.suggestions import did_you_mean
 from cspr_jax.config.wording import either
 from cspr_jax.errors import ConfigError, InputError, shown
+from cspr_jax.errors.suggestions import did_you_mean
 
 ENDING = "_trajectories.xml"
 TURN_ERROR = 1e-11  # of the components of quaternions

@@ -27,9 +27,9 @@ from cspr_jax.config.motions.heads import (
     unit_of,
 )
 from cspr_jax.config.motions.table import POINTS, Z_AXES
-from cspr_jax.config.suggestions import did_you_mean, nearest
 from cspr_jax.config.wording import either
 from cspr_jax.errors import ConfigError, shown
+from cspr_jax.errors.suggestions import did_you_mean, nearest
 from cspr_jax.schema.quantities import TRAJECTORY
 
 # Columns that this program writes beside the motion.

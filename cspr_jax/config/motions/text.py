@@ -22,8 +22,8 @@ from cspr_jax.config.motions.preamble import Preamble, cells_of, has_content, is
 from cspr_jax.config.motions.stamps import Stamps, unit_of_stamps
 from cspr_jax.config.motions.table import MotionTable
 from cspr_jax.config.reading import decoded, opened
-from cspr_jax.config.suggestions import look_alike
 from cspr_jax.errors import ConfigError, shown
+from cspr_jax.errors.suggestions import look_alike
 
 BLOCK = 4 << 20  # bytes that are read at a time
 LARGEST_LINE = 1 << 16

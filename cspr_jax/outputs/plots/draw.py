@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from cspr_jax.config.suggestions import one_of
 from cspr_jax.errors import InputError
+from cspr_jax.errors.suggestions import one_of
 from cspr_jax.outputs.plots.comparison import Compared, comparison_figure
 from cspr_jax.outputs.plots.conditions import excluded, is_workspace, said, shown_first
 from cspr_jax.outputs.plots.envelope import AXES, envelope_figure

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 from matplotlib.figure import Figure
 
-from cspr_jax.config.suggestions import one_of
 from cspr_jax.errors import InputError
+from cspr_jax.errors.suggestions import one_of
 from cspr_jax.outputs.plots.landings import landing_figure
 from cspr_jax.outputs.plots.motion import motion_figure
 from cspr_jax.outputs.plots.motion_source import robot_and_plan

@@ -4,8 +4,8 @@ import dataclasses
 
 import numpy as np
 
-from cspr_jax.config.suggestions import one_of
 from cspr_jax.errors import InputError
+from cspr_jax.errors.suggestions import one_of
 from cspr_jax.outputs.plots.conditions import shown_first
 from cspr_jax.schema.quantities import RATIO
 from cspr_jax.store.result import Result

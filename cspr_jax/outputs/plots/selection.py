@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cspr_jax.config.suggestions import one_of
 from cspr_jax.errors import ConfigError, InputError, shown
+from cspr_jax.errors.suggestions import one_of
 from cspr_jax.outputs.plots.labels import value
 from cspr_jax.store.result import Result
 

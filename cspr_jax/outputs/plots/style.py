@@ -12,8 +12,8 @@ import matplotlib.style
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from cspr_jax.config.suggestions import one_of
 from cspr_jax.errors import ConfigError, InputError, demand, shown
+from cspr_jax.errors.suggestions import one_of
 from cspr_jax.outputs.plots.fitting import fit, share_of_panels, thin_ticks
 from cspr_jax.outputs.plots.layout import INCH, NARROW
 from cspr_jax.outputs.plots.options import USUAL, WIDTHS

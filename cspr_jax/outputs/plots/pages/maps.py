@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import BoundaryNorm, to_hex
 
-from cspr_jax.config.suggestions import one_of
 from cspr_jax.errors import InputError
+from cspr_jax.errors.suggestions import one_of
 from cspr_jax.outputs.plots.colours import Scale, scale_of
 from cspr_jax.outputs.plots.conditions import is_margin, said, shown_first
 from cspr_jax.outputs.plots.fixed_axes import notes

@@ -1,4 +1,4 @@
-"""Errors on the host, and the exit code of each."""
+"""Errors on the host, and the exit code of each; what was probably meant is in `suggestions`."""
 
 import datetime
 import enum

@@ -1,11 +1,16 @@
 """Keys that a user probably meant by one that does not exist: by its words first, then by its letters."""
 
 import difflib
+import functools
+import inspect
 import re
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
+from typing import Any, TypeVar
 
 from cspr_jax.errors import demand
+
+Kind = TypeVar("Kind", bound=type)
 
 # Words that users write, with the words of the keys that they mean.
 _SYNONYMS = {
@@ -112,6 +117,32 @@ def one_of(value: object, names: Iterable[str], allowed: str = "") -> str:
     allowed = allowed or f"one of {', '.join(names)}"
     question = did_you_mean(value, names) if isinstance(value, str) else ""
     return f"{question}{demand(allowed)}" if question else allowed
+
+
+def ask_about_keywords(function: str, keywords: Iterable[str], known: Collection[str]) -> None:
+    """Raise a `TypeError` where a keyword that a function does not take is nearly one that it takes."""
+    for key in (key for key in keywords if key not in known):
+        question = did_you_mean(key, known)
+        if question:
+            raise TypeError(f"{function}() takes no {key}: {question.strip()}") from None
+
+
+def with_suggestions(kind: Kind) -> Kind:
+    """Make a class ask about keywords that are nearly those of its constructor.
+
+    Returns:
+        the class; its signature stays.
+    """
+    plain = kind.__init__  # type: ignore[misc]
+    known = tuple(inspect.signature(kind).parameters)
+
+    @functools.wraps(plain)
+    def with_question(self: Any, *arguments: Any, **keywords: Any) -> None:
+        ask_about_keywords(kind.__name__, keywords, known)
+        plain(self, *arguments, **keywords)
+
+    kind.__init__ = with_question  # type: ignore[misc]
+    return kind
 
 
 def _words(name: str) -> list[str]:
