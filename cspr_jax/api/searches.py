@@ -66,7 +66,7 @@ class WithMotions:
             if not count:
                 return []
             frame = each(placed.frame, count)[0]
-            samples = SAMPLES * np.maximum(self.tried_arcs, 1) + 1
+            samples = SAMPLES * np.maximum(self.tried_arcs, 2) + 1
             return causes(self.problem, frame, self, each(placed.motion, count), samples)
 
 

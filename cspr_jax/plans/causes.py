@@ -86,7 +86,7 @@ def _of_segment(
     rows = [_of_need(need, frame, duration) for need in numbers if need.criterion in numbered and need.slack < MET]
     known = {row.criterion for row in rows}
     others = (flag for flag in flags if flag.text not in known)
-    return (*rows, *(_of_flag(flag, problem, answers, i) for flag in others))
+    return (*rows, *(_of_flag(flag, problem, frame, answers, i, motion) for flag in others))
 
 
 def _of_need(need: Need, frame: Frame, duration: float) -> Cause:
@@ -98,13 +98,20 @@ def _of_need(need: Need, frame: Frame, duration: float) -> Cause:
     return Cause(need.criterion.text, need.cables, t, needed, allowed, need.unit)
 
 
-def _of_flag(flag: Verdict, problem: Problem, answers: Answers, i: int) -> Cause:
+def _of_flag(flag: Verdict, problem: Problem, frame: Frame, answers: Answers, i: int, motion: Motion) -> Cause:
     # Return the cause of a flag that no instant of the motion raises, or that a choice of tensions does.
     if flag == Verdict.UNCERTAINTY:
         stands = np.fmin(answers.tolerated[i], answers.not_tolerated[i])
         return Cause(flag.text, needed=1.0, allowed=float(stands), unit=UNITS[flag])
     refuted = answers.details(i).get("refuted_at", math.nan)
+    if flag == Verdict.WRENCH_INFEASIBLE and not math.isfinite(refuted) and math.isfinite(answers.duration[i]):
+        from cspr_jax.motions.attained import attained  # few motions need the general proof
+        from cspr_jax.motions.proved_answers import cause_of, sampled_proof
+
+        return cause_of(attained(problem, motion, sampled_proof(problem, motion)), 0, frame)
     if flag == Verdict.WRENCH_INFEASIBLE:
         weight = float(problem.robot.mass * problem.robot.gravity) / problem.robot.n_cables
         return Cause(flag.text, (), refuted, float(answers.margin[i]) * weight, 0.0, UNITS[flag])
-    return Cause(flag.text, t=refuted) if flag == Verdict.CABLE_PLATFORM else Cause(flag.text)
+    # Tensions and limits refute a motion before contacts do.
+    is_alone = Verdict(int(answers.verdict[i])) & ~NO_REASON == Verdict.CABLE_PLATFORM
+    return Cause(flag.text, t=refuted) if is_alone else Cause(flag.text)

@@ -1,5 +1,7 @@
 """Extremes of motions of all families and their times, beside dense samples of states that NumPy refines."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from support.motions import MANY, states_along
@@ -74,16 +76,22 @@ def values(robot, motion, tau):
     }
 
 
-def refined(robot, motion):
-    """For each extreme the smallest values around the lowest samples of pieces, their times, and the scale."""
+def refined(at, motion, columns=None):
+    """For each column of values at times the smallest ones around the lowest samples of pieces, their times, the scale.
+
+    Args:
+        at: gives the columns by their names, (n,) each, from normalised times.
+        columns: names of those that are asked for; None: all.
+    """
     knots = np.unique([0.0, *np.asarray(motion.breaks(), float).ravel(), 1.0])
     knots = knots[np.append(True, np.diff(knots) > 1e-9)]
     count = max(20 * MANY // (len(knots) - 1), 9)
     pieces = np.linspace(knots[:-1] + 1e-13 * (knots[:-1] > 0.0), knots[1:] - 1e-13 * (knots[1:] < 1.0), count, axis=1)
-    dense, tau = values(robot, motion, pieces.ravel()), pieces.ravel()
+    dense, tau = at(pieces.ravel()), pieces.ravel()
     low, high = np.repeat(pieces[:, 0], count), np.repeat(pieces[:, -1], count)
     result = {}
-    for name, column in dense.items():
+    for name in columns or dense:
+        column = dense[name]
         table = column.reshape(pieces.shape)
         padded = np.pad(table, ((0, 0), (1, 1)), constant_values=np.inf)
         is_low = ((table <= padded[:, :-2]) & (table <= padded[:, 2:])).ravel()
@@ -93,7 +101,7 @@ def refined(robot, motion):
         for _ in range(ROUNDS):
             points = center[:, None] + width[:, None] * np.linspace(-1.0, 1.0, POINTS)
             points = np.clip(points, low[start][:, None], high[start][:, None])
-            found = values(robot, motion, points.ravel())[name].reshape(points.shape)
+            found = at(points.ravel())[name].reshape(points.shape)
             center = points[np.arange(len(start)), found.argmin(1)]
             width = 2.0 * width / (POINTS - 1)
         result[name] = found.min(1), center, float(np.abs(column).max())
@@ -127,7 +135,7 @@ def check_extremes(planned):
     robot, demands = planned.problem.robot, planned.demands
     for i, motion in enumerate(planned.motions):
         duration = float(motion.duration())
-        expected = refined(robot, motion)
+        expected = refined(partial(values, robot, motion), motion)
         told = demands.when[i] / duration
         beside = values(robot, motion, np.clip(np.concatenate([told - 1e-12, told, told + 1e-12]), 0.0, 1.0))
         for name, (lowest, times, scale) in expected.items():
