@@ -142,6 +142,11 @@ MARGIN = (
     "or smallest depth below the spools over z0, whichever is less; platforms on more cables: distance that all "
     "tensions can keep from their limits, over the weight per cable."
 )
+# Of margins in maps, `motions.time_proof.CLOSE`.
+_BOUNDED = (
+    "As its proof bounds it: the smallest itself may be less by 0.2 %, near zero by 0.02 % of what is usual along the "
+    "motion."
+)
 # Units of margins by their numbers in motion files.
 MARGIN_UNITS = ("1", "N", "m/s^2")
 TRAJECTORY = {
@@ -397,7 +402,7 @@ OF_ELLIPSES = (
         "1",
         "smallest slack of the limits",
         "Smallest slack of the limits beside tensions, and of the depth below the spools: lengths over the robot's "
-        "size, speeds and accelerations over what is allowed; NaN where only formulas are used.",
+        f"size, speeds and accelerations over what is allowed; NaN where only formulas are used. {_BOUNDED}",
     ),
 )
 # Maps of lines and paths have these rows in place of those of arcs and of ellipses.
@@ -414,7 +419,8 @@ OF_PATHS = (
         "N",
         "smallest distance of a tension from its limits",
         "Smallest along the motion, of redundant cables that of the tensions that keep it largest; negative where they "
-        "break a limit; along a slow motion where none is feasible, NaN where no free motion is found.",
+        "break a limit; along a slow motion where none is feasible, NaN where no free motion is found. "
+        f"{_BOUNDED} Plans tell it to rounding.",
         signed=True,
     ),
     Quantity(
@@ -959,7 +965,7 @@ QUANTITIES = {
             "N",
             "smallest distance of a tension from its limits",
             "Smallest along a turn, of redundant cables that of the tensions that keep it largest; negative where they "
-            "break a limit; NaN where only formulas are used.",
+            f"break a limit; NaN where only formulas are used. {_BOUNDED} Plans tell it to rounding.",
             signed=True,
         ),
         Quantity(
