@@ -11,6 +11,15 @@ _ROWS = {
     "units": ("", "With `rows`: their units."),
     "last_step": ("s", "With `--rate`: time between the last two rows, of which the last is the end of the motion."),
 }
+# Of a segment, or of a motion that is checked.
+_EXTREMES = {
+    "cable_length_max": ("m", "Largest length of any cable."),
+    "cable_speed_max": ("m s-1", "Largest speed of any cable."),
+    "cable_acceleration_max": ("m s-2", "Largest acceleration of any cable."),
+    "speed_max": ("m s-1", "Largest speed of the mass centre."),
+    "acceleration_max": ("m s-2", "Largest acceleration of the mass centre."),
+    "z_lowest": ("m", "z of the lowest point, of all of a platform: mass centre, attachment points, shape."),
+}
 WHOLE = {
     "schema": ("1", "Version of these fields."),
     "robot": ("", "Name of the robot."),
@@ -63,8 +72,9 @@ SEGMENT = {
     "cause": (
         "",
         "Causes why the segment is not feasible, the worst first: `criterion` (name of a flag), `cable` (from 0 on; "
-        "null: none), `t` (s from the start of the segment), `needed` and `allowed` (of `unit`), and `cables` where "
-        "two touch; null where the segment is feasible. Paths without a motion: also `s`, m, and `position`, m, of the "
+        "null: none), `t` (s from the start of the segment), `needed` (the worst there is, at `t`) and `allowed` (both "
+        "of `unit`), and `cables` where two touch; null where the segment is feasible. Paths without a motion: also "
+        "`s`, m, and `position`, m, of the "
         "place that no path speed passes, where the criterion needs an acceleration along the path, `needed`, and "
         "`against` (`criterion` and `cable`; null: the speeds from which the way on is possible) allows no more than "
         '`allowed`, or, with `needs` false, the other way round; or `end` ("start" or "end") with its possible '
@@ -75,15 +85,7 @@ SEGMENT = {
         "Whether a smaller number of arcs could not be refuted, or, over pulleys, was refuted without them only.",
     ),
     "feasible_at_infinity": ("1", "Point masses: left-hand side of thesis (2.55)."),
-    "z_lowest": (
-        "m",
-        "z of the lowest point on the way, of all of a platform: mass centre, attachment points, shape.",
-    ),
-    "cable_length_max": ("m", "Largest length of any cable on the way."),
-    "cable_speed_max": ("m s-1", "Largest speed of any cable on the way."),
-    "cable_acceleration_max": ("m s-2", "Largest acceleration of any cable on the way."),
-    "speed_max": ("m s-1", "Largest speed of the mass centre on the way."),
-    "acceleration_max": ("m s-2", "Largest acceleration of the mass centre on the way."),
+    **_EXTREMES,
     "samples": ("1", "Number of instants at which tensions, lengths and speeds were taken."),
     "oscillations": ("1", "Transitions: smallest feasible number of oscillations; null: none."),
     "tried_oscillations": ("1", "Transitions: half of `tried_arcs`; absent in other families."),
@@ -242,12 +244,7 @@ CHECK = {
     "tension_min": ("N", "Smallest tension of any cable, as of a segment of a plan."),
     "tension_max": ("N", "Largest tension of any cable, likewise."),
     "tension_margin": ("N", "Redundant cables: `margin`; else null."),
-    "cable_length_max": ("m", "Largest length of any cable."),
-    "cable_speed_max": ("m s-1", "Largest speed of any cable."),
-    "cable_acceleration_max": ("m s-2", "Largest acceleration of any cable."),
-    "speed_max": ("m s-1", "Largest speed of the mass centre."),
-    "acceleration_max": ("m s-2", "Largest acceleration of the mass centre."),
-    "z_lowest": ("m", "z of the lowest point, of all of the platform: mass centre, attachment points, shape."),
+    **_EXTREMES,
     "demands": (
         "",
         "By limit or condition: `value` of the worst cable, `bound` that is proved for all (null: of tensions that a "
