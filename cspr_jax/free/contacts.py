@@ -106,15 +106,15 @@ def _clear(
         if result.is_stopped and time.monotonic() <= until:
             raise KeyboardInterrupt
         is_kept = result.is_optimal & within.objective.keeps_limits(result.unknowns.level)
-        within, found = within.taken(is_kept), result.unknowns.taken(is_kept)
+        within, unknowns = within.taken(is_kept), result.unknowns.taken(is_kept)
         if not is_kept.any():
             break
-        further, begun = _parted(question, within, found, least, np.inf)
+        further, begun = _parted(question, within, unknowns, least, np.inf)
         is_clear = np.all(begun.values[..., further.n_limited :] > 0.0, axis=(1, 2, 3, 4))
-        costs = np.where(is_clear, within.cost(found), np.inf)
+        costs = np.where(is_clear, within.cost(unknowns), np.inf)
         if costs.min() < cost:
             rows, cost = np.array([costs.argmin()]), costs.min()
-            best = within.taken(rows), found.taken(rows)
+            best = within.taken(rows), unknowns.taken(rows)
         if result.is_stopped or is_clear.all():
             break
         within, level = further.taken(~is_clear), GO_ON
