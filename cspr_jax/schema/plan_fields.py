@@ -11,7 +11,7 @@ _ROWS = {
     "units": ("", "With `rows`: their units."),
     "last_step": ("s", "With `--rate`: time between the last two rows, of which the last is the end of the motion."),
 }
-# Of a segment, or of a motion that is checked.
+# Fields of segments and of checks.
 _EXTREMES = {
     "cable_length_max": ("m", "Largest length of any cable."),
     "cable_speed_max": ("m s-1", "Largest speed of any cable."),
