@@ -1,5 +1,7 @@
 """What stands between a motion and feasible: the limit without which there is one, with its numbers."""
 
+import dataclasses
+
 import h5py
 import jax
 import numpy as np
@@ -8,6 +10,7 @@ from support.commands import cspr, plan, planned
 from swings.test_decide import LIMITS, answered, limited, problem
 
 import cspr_jax
+from cspr_jax.plans.causes import causes
 from cspr_jax.robots.cables import cable_motion
 from cspr_jax.schema.verdicts import Verdict
 
@@ -184,6 +187,21 @@ def test_a_platform_that_one_limit_refuses(limits, key, flag):
     assert bound["margin"] == pytest.approx(free["margin"], rel=1e-6)
     assert cause.needed == pytest.approx(free[key], rel=1e-6) and cause.allowed == limits[key]
     assert 0.0 < cause.t < bound["duration"] and len(cause.cables) == 1
+
+
+def test_a_contact_has_a_time_where_nothing_else_refutes_the_motion():
+    """The time at which tensions or limits refute it is not that of the contact."""
+    plan = cspr_jax.plan(MSSM | {"cable_speed_max": 1.2})
+    (leg,), contact = plan.legs, Verdict.CABLE_PLATFORM
+    for verdict, expected in (
+        (contact, 0.5),
+        (contact | Verdict.NO_ARCS, 0.5),
+        (contact | Verdict.SLACK_CABLE, np.nan),
+    ):
+        answers = dataclasses.replace(leg.answers, verdict=np.array([verdict.value]), refuted_at=np.array([0.5]))
+        found = causes(plan.problem, plan.frame, answers, leg.motions, np.array([101]))[0]
+        (time,) = (cause.t for cause in found if cause.criterion == "cable_platform")
+        assert time == pytest.approx(expected, nan_ok=True)
 
 
 @pytest.mark.thorough
