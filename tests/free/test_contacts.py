@@ -12,6 +12,7 @@ from cspr_jax.free import contacts
 from cspr_jax.free.poses import FreePoses, motions_of
 from cspr_jax.free.question import FreeQuestion, FreeSettings, slacks_of
 from cspr_jax.free.search import Optima, started
+from cspr_jax.free.tasks import Unknowns
 from cspr_jax.motions.amplitudes import named
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.clearance import Meeting, scene
@@ -187,6 +188,50 @@ def test_a_motion_that_does_not_get_clear_is_none(monkeypatch):
             clear = contacts._clear(among, tasks, unknowns, {0: 1e-5})
             assert (clear is not None) == is_clear
             assert len(begun) == (1 if is_clear else contacts.SEARCHES)
+
+
+def test_the_best_clear_motion_of_all_sides_is_taken(monkeypatch):
+    """The cheapest is not clear and goes on alone, one does not converge: the cheaper one of the others is taken."""
+    with double_precision():
+        middle = {"obstacles": [sphere([0.0, 0.0, 2.2], 0.05)]}
+        question, tasks, unknowns = moved("prototype", np.random.default_rng(1), middle)
+        ends = np.array([[0.2, 0.0, 2.2], [-0.2, 0.0, 2.2]])
+        tasks = dataclasses.replace(tasks, places=ends[None, None])
+        line = np.linspace(ends[0], ends[1], tasks.basis.controls)[None, 3:-3]
+        aside = np.array([0.0, 0.0, 0.3, 0.3])[:, None, None, None] * np.array([0.0, 1.0, 0.0])
+        found = Unknowns(*(np.repeat(leaf, 4, axis=0) for leaf in unknowns))
+        found = found._replace(inner=line[None] + aside, duration=np.array([[0.5], [0.6], [0.8], [0.7]]))
+        is_optimal, rows = np.array([True, False, True, True]), [np.arange(4), np.array([0]), np.array([0]), [0]]
+        sizes = []
+
+        def known(within, unknowns, *level, **levels):
+            chosen = np.asarray(rows[len(sizes)])
+            sizes.append(len(within.places))
+            several = unknowns._replace(inner=found.inner[chosen], duration=found.duration[chosen])
+            return Optima(several, is_optimal[chosen], np.ones(len(chosen), int))
+
+        monkeypatch.setattr(contacts, "optima", known)
+        solid = scene(question.problem.robot, obstacles=[sphere([0.0, 0.0, 2.2], 0.05)])
+        among = dataclasses.replace(question, scene=solid)
+        within, best = contacts._clear(among, tasks.taken(np.zeros(4, int)), found, {0: 1e-5})
+        assert sizes == [4, 1, 1, 1][: contacts.SEARCHES]
+        assert best.duration.tolist() == [[0.7]]
+        assert len(within.places) == 1
+
+
+def test_planes_about_several_motions_are_those_of_each():
+    """Turned platforms among bodies: what is computed together is what is computed alone."""
+    rng, (shape, meeting) = np.random.default_rng(8), SOLIDS["platform and box"]
+    with double_precision():
+        question, tasks, unknowns = moved("cogiro", rng, {"obstacles": [shape], "hull": True})
+        other = unknowns._replace(inner=unknowns.inner + 0.05 * rng.normal(size=unknowns.inner.shape))
+        gap = contacts._gap(question, question.scene, meeting)
+        places = [tasks.basis.places(tasks.controls(each))[..., 0, :] for each in (unknowns, other)]
+        together = contacts._linear(tasks.taken(np.zeros(2, int)), np.concatenate(places), gap)
+        for i, place in enumerate(places):
+            for both, alone in zip(together, contacts._linear(tasks, place, gap), strict=True):
+                np.testing.assert_allclose(both[i], alone[0], atol=1e-12)
+        assert np.abs(together[0][0] - together[0][1]).max() > 1e-3
 
 
 def test_motions_are_bent_along_the_segments_in_question():
