@@ -138,7 +138,10 @@ class Uncertain:
                         parts[i - count + 3][k] += 1e-6
                     slopes[i, k] = self.slack(place, (parts[0], parts[1], mass, parts[2])) - middle
                 directions = -np.nan_to_num(slopes, posinf=0.0, neginf=0.0)
-        return least
+        if np.isfinite(least):
+            return least
+        # No slope leads away from robots whose cables pull against each other as hard as one likes.
+        return min(self.slack(place, self.drawn_moves(rng)) for _ in range(200))
 
 
 def check(asked, rng, count, *, largest=0.15, robots=6, samples=2, depth=1):
