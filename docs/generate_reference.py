@@ -234,6 +234,7 @@ def kind_text(kind: MapKind) -> str:
         "needs": _names(kind.needs),
         "needs one of": _names(kind.one_of),
         "takes": _names(kind.takes),
+        "limits that it takes": _names(kind.limits),
         "quantities": ", ".join(f"**`{name}`**" if name in kind.stored else f"`{name}`" for name in kind.quantities),
         "also stored": "; ".join(f"with `{key}`: {_names(names)}" for key, names in kind.stored_with),
         "only available": "; ".join(f"with {_names(keys)}: {_names(names)}" for names, keys in kind.only_with),

@@ -58,7 +58,7 @@ def axis_points(axis: AxisRange | list[float]) -> np.ndarray:
 
 _OF_TARGETS = (
     "{} of the targets, m: {{ start, stop, count }} or a list; of a platform those of its mass centre, in workspaces "
-    "of the origin of its axes, unless workspace.point says otherwise"
+    "of the origin of its axes, unless point or workspace.point says otherwise"
 )
 _OF_STARTS = "{} of the start points, m, in place of trajectory.from"
 
@@ -224,6 +224,11 @@ class _SweepKeys(Table):
     )
     workspace: WorkspaceTable | None = Field(
         None, description='[workspace] of map = "workspace": conditions, orientation, wrenches'
+    )
+    point: Literal["mass-centre", "origin"] | None = Field(
+        None,
+        description='sensitivity: point of a platform whose places x, y, z are: "mass-centre", the default, or '
+        '"origin" of its axes; workspaces have workspace.point',
     )
     limits: LimitTable = Field(default_factory=LimitTable, description="[limits] of all motions of the file")
     run: RunTable = Field(default_factory=RunTable, description="[run] dtype, tile, store")

@@ -57,6 +57,7 @@ class MapKind:
         needs: keys that must be given.
         takes: further keys that may be given, of those that only some kinds have.
         one_of: keys of which exactly one must be given.
+        limits: rows of `schema.limits.LIMITS` that it takes where it takes limits; none: all.
         definitions: of the accessible set that it takes.
         is_over_orientations: whether its grid has axes over all orientations besides those of the sweep file.
         cells: of a tile, at most, where the sweep file does not say.
@@ -81,6 +82,7 @@ class MapKind:
     needs: tuple[str, ...] = ()
     takes: tuple[str, ...] = ()
     one_of: tuple[str, ...] = ()
+    limits: tuple[str, ...] = ()
     definitions: tuple[str, ...] = ("grid", "scan", "equal-volume")
     is_over_orientations: bool = False
     cells: int = LARGEST_TILE
@@ -183,6 +185,7 @@ _ROWS: dict[str, MapKind] = {
             patterns=("2T", "3T"),
             needs=("axes.tau",),
             takes=("axes.cable", "limits"),
+            limits=("floor",),
             one_of=_DEPTHS,
         ),
         MapKind(
@@ -272,6 +275,7 @@ _ROWS: dict[str, MapKind] = {
             families=(),
             patterns=("2T", "3T"),
             takes=("limits",),
+            limits=("tension_min", "tension_max"),
         ),
         MapKind(
             name="least-time",
@@ -361,6 +365,7 @@ _ROWS: dict[str, MapKind] = {
             patterns=("2T", "3T"),
             start="point",
             takes=("axes.from_x", "axes.from_y", "axes.from_z", "launch", "limits"),
+            limits=("floor",),
             cells=1024,
         ),
         MapKind(
@@ -392,6 +397,7 @@ _ROWS: dict[str, MapKind] = {
             pictured=("sigma_p",),
             motionless=columns.OF_LENGTHS,
             families=(),
+            takes=("point",),
         ),
         MapKind(
             name="workspace",
@@ -408,6 +414,7 @@ _ROWS: dict[str, MapKind] = {
             motionless=of_workspaces.QUANTITIES,
             families=(),
             takes=("workspace", "limits", "limits.uncertainty", "axes.tilt_azimuth", "axes.tilt", "axes.torsion"),
+            limits=("tension_min", "tension_max", "floor", "cable_length_max", "cable_speed_max"),
         ),
     )
 }

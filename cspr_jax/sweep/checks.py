@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cspr_jax.config.limits import LimitTable
 from cspr_jax.config.obstacles import SurroundingsKeys
 from cspr_jax.config.reading import Table
 from cspr_jax.config.robot import RobotFile
@@ -22,6 +23,7 @@ _SPECIAL = (
     *("trajectory.inclination", "trajectory.beta_hat", "trajectory.beat"),
     *("trajectory.max_acceleration", "trajectory.rule", "trajectory.path"),
     *("limits", "limits.uncertainty", "orientations", "orientations.values", "launch", "workspace", "ellipse"),
+    "point",
     *SurroundingsKeys.model_fields,
 )
 # A hint names at most so many kinds.
@@ -52,6 +54,7 @@ def check_map(kind: MapKind, keys: SweepFile, path: Path) -> None:
             others = any(name in form.keys for form in MAP_KINDS[keys.map].forms)
             where = f'with family = "{keys.trajectory.family}"' if others else f"in this map{_hint(kinds_with(name))}"
             raise ConfigError(path, f"{name}: must be absent {where}")
+    _check_limits(kind, keys, path)
     if keys.orientations is not None and keys.orientations.definition is not None:
         _check_choice(keys.orientations.definition, "orientations.definition", kind.definitions, path)
     for missing in filter(None, (_missing(keys, name) for name in kind.needs)):
@@ -156,6 +159,16 @@ def _hint(kinds: list[str]) -> str:
 def _check_choice(value: str, name: str, allowed: tuple[str, ...], path: Path) -> None:
     if value not in allowed:
         raise ConfigError(path, f'{name} = "{value}": must be {either(allowed)} in this map')
+
+
+def _check_limits(kind: MapKind, keys: SweepFile, path: Path) -> None:
+    takes = (*kind.limits, *["tension_margin"] * ("tension_min" in kind.limits), "uncertainty")
+    for name in LimitTable.model_fields if kind.limits else ():
+        if name not in takes and getattr(keys.limits, name) is not None:
+            known = ", ".join(kind.limits)
+            raise ConfigError(
+                path, f"limits.{name}: must be absent in this map, which takes {known} alone; plans take all"
+            )
 
 
 def _check_start(kind: MapKind, keys: SweepFile, path: Path) -> None:

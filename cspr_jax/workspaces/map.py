@@ -22,7 +22,6 @@ from cspr_jax.robots.clearance import Scene
 from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.orientation_grids import cone_grid, equal_volume_grid, planar_grid
 from cspr_jax.robots.patterns import PATTERNS
-from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.quantities import TILT_TORSION
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.workspaces.all_robots import AllRobots, mass_searches
@@ -33,10 +32,8 @@ from cspr_jax.workspaces.search import WorkspaceSearch
 from cspr_jax.workspaces.speeds import CableSpeeds, cable_speeds
 
 INTERFERENCE = "interference-free"
-# Limits that apply to poses at rest; all others belong to motions.
 TENSIONS = ("tension_min", "tension_max")
 SPEED = "cable_speed_max"
-HELD = (*TENSIONS, "floor", "cable_length_max", SPEED)
 # Sets of orientations divide pi into this many parts unless the file says otherwise.
 DIVISIONS = 12
 
@@ -80,16 +77,10 @@ class WorkspaceMap(GridMap):
             self._cells = RestCells(self._poses, self._quaternion[0], all_robots)
 
     def _refuse_unused(self) -> None:
-        for limit in LIMITS:
-            if getattr(self._keys.limits, limit.name) is None:
-                continue
-            if limit.name not in HELD:
-                raise ConfigError(
-                    self._file, f"limits.{limit.name}: must be absent in this map, whose cells are at rest"
-                )
-            if limit.name in TENSIONS and FEASIBLE not in self._workspace.conditions:
+        for name in TENSIONS:
+            if getattr(self._keys.limits, name) is not None and FEASIBLE not in self._workspace.conditions:
                 allowed = f'must be absent: "{FEASIBLE}" is not among workspace.conditions'
-                raise ConfigError(self._file, f"limits.{limit.name}: {allowed}")
+                raise ConfigError(self._file, f"limits.{name}: {allowed}")
 
     def _surroundings(self, robot_file: RobotFile) -> Scene | None:
         if INTERFERENCE not in self._workspace.conditions:
@@ -147,7 +138,8 @@ class WorkspaceMap(GridMap):
         if uncertainty is None:
             return None
         if self._samples is not None:
-            raise ConfigError(self._file, "limits.uncertainty: cannot be combined with workspace.orientations")
+            allowed = "cannot be combined with workspace.orientations: one sweep for each workspace.orientation"
+            raise ConfigError(self._file, f"limits.uncertainty: {allowed}")
         is_in_pairs = robot_file.translation_only or robot_file.pairs is not None
         if uncertainty.spool_positions and (is_in_pairs or self._robot.pulleys is not None):
             allowed = "must be 0 on pairs of cables and with pulleys; mass_factor and mass_centre are known there"
@@ -223,7 +215,8 @@ class WorkspaceMap(GridMap):
         if turning and self._samples is not None:
             raise ConfigError(self._file, f"axes.{turning[0]}: cannot be combined with workspace.orientations")
         if self._limits.uncertainty is not None and turning:
-            raise ConfigError(self._file, f"axes.{turning[0]}: cannot be combined with limits.uncertainty")
+            allowed = "cannot be combined with limits.uncertainty: one sweep for each workspace.orientation"
+            raise ConfigError(self._file, f"axes.{turning[0]}: {allowed}")
         if self._workspace.prove and (turning or "radius" in grid.axes):
             name = turning[0] if turning else "radius"
             raise ConfigError(self._file, f"axes.{name}: cannot be combined with workspace.prove")

@@ -8,6 +8,7 @@ from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
 from cspr_jax.maps.grid_map import GridMap
 from cspr_jax.schema.tiles import Grid
+from cspr_jax.workspaces.geometry import mass_centres
 from cspr_jax.workspaces.sensitivities import SensitivitySearch
 
 ROUNDING = 1e-9
@@ -29,7 +30,10 @@ class SensitivityMap(GridMap):
 
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Answers of the cells of a tile; see `GridMap.__call__`."""
-        return self._search(self._targets(cells))._asdict()
+        places = self._targets(cells)
+        if self._keys.point == "origin":
+            places = mass_centres(self._search.robot, places, None)
+        return self._search(places)._asdict()
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse places out of a planar robot's plane; see `GridMap.refuse_hopeless`."""

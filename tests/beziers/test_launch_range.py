@@ -128,6 +128,27 @@ def test_tiles_change_no_bit(result, tmp_path):
         assert np.array_equal(values, other.data[name], equal_nan=True), name
 
 
+@pytest.mark.thorough
+def test_limits_of_the_mass_centre_hold_along_every_segment(tmp_path):
+    """Differences of places at 4,001 instants; without the limits launches exceed each of them."""
+    where = {"x": [-0.6, 0.0, 0.9], "y": [0.1, 0.5]}
+    free = mapped(tmp_path / "free", **where)
+    bound = mapped(tmp_path / "bound", **where, more="[limits]\nspeed_max = 0.9\nacceleration_max = 2.5")
+    exceeded, kept = [], []
+    for found, most in ((free, exceeded), (bound, kept)):
+        places, data = launches_of(found)
+        for i, target in enumerate(places):
+            times = np.linspace(0.0, data["duration"][i], 4001)
+            points = segment_of(data, i, target, 9.80665)[0]
+            place = states_of(points, data["duration"][i], times)[0]
+            speed, acceleration = (np.diff(place, n=n, axis=0) / times[1] ** n for n in (1, 2))
+            most.append([np.linalg.norm(x, axis=1).max() for x in (speed, acceleration)])
+    assert len(kept) > 1 and (np.max(kept, axis=0) <= [0.9, 2.5]).all()
+    assert (np.max(exceeded, axis=0) > [0.9, 2.5]).all()
+    lost = (bound.data["verdict"] != 0) & (free.data["verdict"] == 0)
+    assert (bound.data["verdict"][lost] & (Verdict.TOO_FAST | Verdict.OVER_ACCELERATION).value).all()
+
+
 @pytest.mark.soak
 def test_a_limit_shrinks_the_range(tmp_path):
     """Of the six cables each, half of what a pair pulls."""

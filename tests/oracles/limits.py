@@ -5,6 +5,10 @@ limits, with the tension over the weight F, the cable length rho and the depth e
 
     (F - F_min) eta,  (F_max - F) eta,  (floor - z) / z0,  (rho_max^2 - rho^2) / (2 z0^2),
     rho^2 (1 - (rho' / v_max)^2) / (2 z0^2),  rho^3 (1 -+ rho'' / a_max) / z0^3
+
+and of the mass centre
+
+    1 - (|v| / v_max)^2,  1 - (|a| / a_max)^2
 """
 
 import dataclasses
@@ -19,7 +23,7 @@ CANDIDATES, ROUNDS, POINTS = 3, 7, 21
 
 @dataclasses.dataclass(frozen=True)
 class Case:
-    """A segment with its limits, z down; limits are None or one number a cable, floor one number."""
+    """A segment with its limits, z down; limits are None or one number a cable, of floor and mass centre one number."""
 
     base: np.ndarray
     mass: float
@@ -57,6 +61,8 @@ def slacks(case: Case, arcs: int, tau: np.ndarray) -> np.ndarray:
                 "cable_length_max": lambda limit: (limit**2 - rho**2) / (2.0 * case.z0**2),
                 "cable_speed_max": lambda limit: rho**2 * (1.0 - (rate / limit) ** 2) / (2.0 * case.z0**2),
                 "cable_acceleration_max": lambda limit: rho**3 * (1.0 - np.abs(bend) / limit) / case.z0**3,
+                "speed_max": lambda limit: 1.0 - (v**2).sum(1, keepdims=True) / limit**2,
+                "acceleration_max": lambda limit: 1.0 - (a**2).sum(1, keepdims=True) / limit**2,
             }[name](limit).min(1)
         )
     return np.stack(found)

@@ -296,5 +296,7 @@ def limits(
         "length_max": float(cable_lengths(base_points, position).max()),
         "speed_max": float(np.abs(cable_rates(base_points, position, velocity)).max()),
         "cable_acceleration_max": float(np.abs(second).max()),
+        "mass_centre_speed": float(np.linalg.norm(velocity, axis=1).max()),
+        "mass_centre_acceleration": float(np.linalg.norm(acceleration, axis=1).max()),
         "mu_min": float(force_ratios(base_points, position, acceleration, g).min()),
     }

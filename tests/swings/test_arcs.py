@@ -13,6 +13,7 @@ from cspr_jax.motions.amplitudes import named
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots import point_mass
 from cspr_jax.robots.limits import Limits
+from cspr_jax.schema.limits import LIMITS as ROWS
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.swings import margins
 from cspr_jax.swings.arcs import minimum_arcs
@@ -183,13 +184,16 @@ LIMITS = {  # limit, its attained extreme, its flag, and whether it is a lower l
     "cable_length_max": ("length_max", Verdict.CABLE_TOO_LONG, False),
     "cable_speed_max": ("speed_max", Verdict.CABLE_TOO_FAST, False),
     "cable_acceleration_max": ("cable_acceleration_max", Verdict.CABLE_OVER_ACCELERATION, False),
+    "speed_max": ("mass_centre_speed", Verdict.TOO_FAST, False),
+    "acceleration_max": ("mass_centre_acceleration", Verdict.OVER_ACCELERATION, False),
 }
+OF_CABLES = [row.name for row in ROWS if row.per_cable]
 
 
 def limits_of(key, value):
     """One limit, the others out of reach: given all the same, so that kernels compile once."""
     far = {other: np.full(3, -1e6 if other == "tension_min" else 1e6) for other in LIMITS} | {key: np.full(3, value)}
-    return Limits(**{other: v[0] if other == "floor" else v for other, v in far.items()})
+    return Limits(**{other: v if other in OF_CABLES else v[0] for other, v in far.items()})
 
 
 @pytest.mark.parametrize("key", LIMITS)

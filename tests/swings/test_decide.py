@@ -10,7 +10,10 @@ from oracles import point_mass as printed
 import cspr_jax
 from cspr_jax.motions.amplitudes import from_polynomial, named
 
-LIMITS = ("tension_min", "tension_max", "floor", "cable_length_max", "cable_speed_max", "cable_acceleration_max")
+LIMITS = (
+    *("tension_min", "tension_max", "floor", "cable_length_max", "cable_speed_max", "cable_acceleration_max"),
+    *("speed_max", "acceleration_max"),
+)
 MAX_ARCS = 12
 # Nearer to zero than this a verdict may be either.
 NEAR = 1e-9
@@ -72,6 +75,8 @@ def limited(rng, cases, names):
         "cable_length_max": middle["length_max"] * rng.uniform(1.0, 1.2, 3),
         "cable_speed_max": middle["speed_max"] * rng.uniform(0.9, 1.6, 3),
         "cable_acceleration_max": middle["cable_acceleration_max"] * rng.uniform(0.9, 1.8, 3),
+        "speed_max": middle["mass_centre_speed"] * rng.uniform(0.9, 1.6),
+        "acceleration_max": middle["mass_centre_acceleration"] * rng.uniform(0.9, 1.8),
     }
     chosen = {name: values[name] if name in names else None for name in LIMITS}
     return [oracle.Case(*(getattr(c, f) for f in c.__dataclass_fields__ if f != "limits"), chosen) for c in cases]

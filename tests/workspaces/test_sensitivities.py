@@ -192,6 +192,30 @@ def test_positions_of_the_origin(angle):
     assert np.abs(cspr_jax.sensitivity(robot, places, quaternions).sigma_p - of_centre.sigma_p).max() > 0.01
 
 
+@pytest.mark.parametrize("z_axis", ["down", "up"])
+def test_a_map_of_places_of_the_origin(tmp_path, z_axis):
+    """That of the mass centre beside it, of a robot whose reference orientation is that of its file."""
+    mssm, sign = cspr_jax.load_robot("laval-mssm"), 1.0 if z_axis == "down" else -1.0
+    turn = np.diag([1.0, sign, sign])
+    centre = turn @ [0.02, -0.01, 0.0]
+    robot = {name: (np.asarray(getattr(mssm, name)) @ turn).tolist() for name in ("base_points", "platform_points")}
+    robot |= {"name": "shifted", "mass": 1.0, "inertia": np.asarray(mssm.inertia).tolist()}
+    robot |= {"z_axis": z_axis, "centre_of_mass": centre.tolist()}
+    axes = {"x": np.array([-0.4, 0.7]), "y": np.array([0.1, 0.5]), "z": np.array([0.5, 0.9]) * sign}
+
+    def sigmas(name, shift, **keys):
+        moved = {axis: (points + shift[i]).tolist() for i, (axis, points) in enumerate(axes.items())}
+        keys |= {"schema": 1, "map": "sensitivity", "robot": robot, "axes": moved}
+        result = cspr_jax.open_result(cspr_jax.run(keys, tmp_path / name))
+        return np.stack([result.data["sigma_p"], result.data["sigma_r"]])
+
+    beside = sigmas("centre", centre)
+    np.testing.assert_allclose(sigmas("origin", np.zeros(3), point="origin"), beside, rtol=1e-9)
+    plain = sigmas("plain", np.zeros(3))
+    np.testing.assert_array_equal(sigmas("named", np.zeros(3), point="mass-centre"), plain)
+    assert np.abs(plain - beside).max() > 0.01
+
+
 @pytest.mark.parametrize(
     ("robot", "y", "words"),
     [("boralugoda-rectangle", [0.1], "4 points: must be 3 in this map"), ("transition-planar", [0.1], "axes.y")],
