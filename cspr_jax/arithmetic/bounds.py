@@ -10,6 +10,19 @@ import jax.numpy as jnp
 from jax import Array
 
 
+def hypotenuse(a: Array, b: Array) -> Array:
+    """Length of a vector in a plane; `jnp.hypot` takes several times as long, for the sake of squares that overflow.
+
+    Args:
+        a: (...) one component.
+        b: (...) the other.
+
+    Returns:
+        (...).
+    """
+    return jnp.sqrt(a * a + b * b)
+
+
 class Bounds(NamedTuple):
     """Upper bounds of |f|, |f'| and |f''| over one interval; arrays of one shape.
 
@@ -43,9 +56,9 @@ class Bounds(NamedTuple):
     def combined(self, other: "Bounds") -> "Bounds":
         """Bounds of the length of a vector whose perpendicular components have these bounds."""
         return Bounds(
-            jnp.hypot(self.value, other.value),
-            jnp.hypot(self.slope, other.slope),
-            jnp.hypot(self.curvature, other.curvature),
+            hypotenuse(self.value, other.value),
+            hypotenuse(self.slope, other.slope),
+            hypotenuse(self.curvature, other.curvature),
         )
 
     def turned(self, rate: Array) -> "Bounds":

@@ -16,12 +16,14 @@ class CellCost(NamedTuple):
     Fields:
         seconds: without limits, and with 30 arcs.
         orientation: further seconds for each orientation of a place's set.
-        limits: cost of limits, over their cost for a point mass along arcs (`sweep.tile_sizes`).
+        limits: cost of limits, over the costs that `sweep.tile_sizes` has.
+        uncertainty: cost of an uncertainty, likewise.
     """
 
     seconds: float = 1e-5
     orientation: float = 0.0
     limits: float = 1.0
+    uncertainty: float = 1.0
 
 
 ORDINARY_COST = CellCost()

@@ -16,7 +16,7 @@ TILE_SECONDS = 40.0
 # A run has at least so many tiles, unless these would take less than a few seconds: each pads its last batches, and a
 # tile of a platform's poses takes half a second whatever it holds.
 FEWEST_TILES, SHORTEST_SECONDS = 20, 5.0
-# Seconds that proofs of limits take a cell of a map of arcs, with 30 arcs.
+# Seconds that proofs of limits take a cell with 30 arcs, before what `CellCost` says of a kind of map.
 LIMIT_SECONDS = {
     "tension_min": 5e-4,
     "tension_max": 5e-4,
@@ -24,8 +24,8 @@ LIMIT_SECONDS = {
     "cable_length_max": 3e-4,
     "cable_speed_max": 6e-3,
     "cable_acceleration_max": 2e-3,
-    "uncertainty": 1e-2,
 }
+UNCERTAINTY_SECONDS = 1e-2
 # Likewise for a workspace, by what else is computed for each cell.
 WORKSPACE_SECONDS = {"prove": 2e-4, "obstacle": 5e-5, "platform_hull": 5e-5, "platform_box": 5e-5}
 # Likewise for motions among obstacles, by how many there are: each motion that is feasible without them is judged.
@@ -39,17 +39,15 @@ def cell_seconds(kind: MapKind, keys: SweepFile) -> float:
     Returns:
         seconds.
     """
-    names = (*(row.name for row in LIMITS), "uncertainty")
-    limits = sum(
-        LIMIT_SECONDS.get(name, max(LIMIT_SECONDS.values())) for name in names if is_given(keys, f"limits.{name}")
-    )
+    names = [row.name for row in LIMITS if is_given(keys, f"limits.{row.name}")]
+    limits = kind.cost.limits * sum(LIMIT_SECONDS.get(name, max(LIMIT_SECONDS.values())) for name in names)
+    if is_given(keys, "limits.uncertainty"):
+        limits += kind.cost.uncertainty * UNCERTAINTY_SECONDS
     conditions = sum(cost for name, cost in WORKSPACE_SECONDS.items() if is_given(keys, f"workspace.{name}"))
     if keys.surroundings:
         conditions += JUDGED_SECONDS + OBSTACLE_SECONDS * len(keys.obstacle or ())
     divisions = (keys.orientations or Orientations()).divisions
-    motion = (kind.cost.seconds + kind.cost.limits * limits) * (
-        keys.trajectory.max_arcs / ARCS if kind.families else 1.0
-    )
+    motion = (kind.cost.seconds + limits) * (keys.trajectory.max_arcs / ARCS if kind.families else 1.0)
     return motion + conditions + kind.cost.orientation * 4 * divisions**3
 
 

@@ -45,7 +45,7 @@ def _rounded(count: int) -> int:
     return -(-count // STEP) * STEP
 
 
-def over_blocks(edges: Array, counts: Array, arcs: Array, first, step):
+def over_blocks(edges: Array, counts: Array, arcs: Array, first, step, *, together: int = 1):
     """Fold a function over the blocks of each segment.
 
     Args:
@@ -53,8 +53,9 @@ def over_blocks(edges: Array, counts: Array, arcs: Array, first, step):
         counts: (n_rows,).
         arcs: (n,) number of arcs of each segment.
         first: state to start from.
-        step: (state, start, stop) -> state, with start and stop (n,). A segment with fewer blocks sees its last block
-            again.
+        step: (state, start, stop) -> state, with start and stop (together, n). A segment with fewer blocks sees its
+            last block again.
+        together: how many blocks of each segment a step takes.
 
     Returns:
         the last state.
@@ -63,7 +64,8 @@ def over_blocks(edges: Array, counts: Array, arcs: Array, first, step):
     count, flat, row = counts[index], edges.reshape(-1), edges.shape[1] * index
 
     def body(i, state):
-        place = row + jnp.minimum(i, count - 1)
+        later = together * i + jnp.arange(together, dtype=jnp.int32)[:, None]
+        place = row[None] + jnp.minimum(later, count[None] - 1)
         return step(state, flat[place], flat[place + 1])
 
-    return lax.fori_loop(0, jnp.max(count), body, first)
+    return lax.fori_loop(0, (jnp.max(count) + (together - 1)) // together, body, first)

@@ -1,12 +1,11 @@
 """All criteria of a segment together, in one order: taut cables, below the spools, then the limits that are given."""
 
-import functools
 import itertools
 
 import jax
-import jax.numpy as jnp
 from jax import Array
 
+from cspr_jax.arithmetic.lanes import largest, smallest
 from cspr_jax.motions.amplitudes import Amplitude
 from cspr_jax.motions.limits import limits_set
 from cspr_jax.robots.limits import Limits
@@ -14,7 +13,7 @@ from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.swings.hypocycloid import Segment
 from cspr_jax.swings.limit_slacks import count, limit_curvatures, limit_slacks
-from cspr_jax.swings.slacks import instant, row_bounds, stretch, taut_bounds
+from cspr_jax.swings.slacks import each_taut_bounds, instant, row_bounds, stretch
 
 # Criteria that are no limits: taut cables, and the depth below the spools.
 BASIC = 2
@@ -80,7 +79,7 @@ def slacks(
         n_criteria numbers ().
     """
     values = iter(smooth_slacks(robot, limits, amplitude, segment, arcs, tau))
-    return tuple(functools.reduce(jnp.minimum, itertools.islice(values, n)) for n in counts(robot, limits))
+    return tuple(smallest(list(itertools.islice(values, n))) for n in counts(robot, limits))
 
 
 def curvatures(
@@ -106,10 +105,10 @@ def curvatures(
         n_criteria numbers ().
     """
     over = stretch(segment, amplitude, arcs, start, stop)
-    kappa = taut_bounds(segment, arcs, over)
+    kappa = each_taut_bounds(segment, arcs, over)
     eta = row_bounds(segment, arcs, over, segment.tilt)
     return (
-        jnp.max(kappa.curvature),
+        largest([bounds.curvature for bounds in kappa]),
         eta.curvature,
         *limit_curvatures(robot, limits, segment, arcs, over, kappa),
     )

@@ -12,6 +12,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.arithmetic.lanes import smallest_of_each
 from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.runtime.persistent_jit import persistent_jit
@@ -103,4 +104,4 @@ def _lowest(problem: Problem, arguments) -> tuple[Array, Array]:
     tau = jnp.broadcast_to(((jnp.arange(SAMPLES, dtype=arcs.dtype) + 0.5) / SAMPLES)[:, None], (SAMPLES, len(arcs)))
     values = jax.vmap(jax.vmap(partial(slacks, *problem)), in_axes=(None, None, 0))(segments, arcs, tau)
     near = jax.vmap(partial(tolerance, problem.amplitude))(segments, arcs)
-    return jnp.stack([jnp.min(value, axis=0) for value in values[BASIC:]], axis=1), near
+    return jnp.stack(smallest_of_each(values[BASIC:]), axis=1), near

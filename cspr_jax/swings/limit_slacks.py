@@ -14,8 +14,8 @@ Each is dimensionless and free of a division that could blow up.
 """
 
 import math
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -23,6 +23,7 @@ from jax import Array
 
 from cspr_jax.arithmetic.bounds import Bounds
 from cspr_jax.arithmetic.elementary import sincospi
+from cspr_jax.arithmetic.lanes import Vector, dot, largest
 from cspr_jax.motions.limits import limits_set
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot, plane_normal
@@ -32,7 +33,7 @@ from cspr_jax.swings.slacks import Instant, Stretch, row_bounds
 
 
 class _AtInstant(NamedTuple):
-    # A segment at one instant: numbers, and (n_cables,) of the cables; derivatives in tau.
+    # A segment and one of its cables at one instant, numbers; derivatives in tau. XLA makes one loop of numbers.
     z0: Array
     time: Array
     weight: Array
@@ -42,12 +43,12 @@ class _AtInstant(NamedTuple):
     length: Array
     rate: Array
     rate_slope: Array
-    velocity: Array
-    acceleration: Array
+    velocity: Vector
+    acceleration: Vector
 
 
 class _OverInterval(NamedTuple):
-    # Bounds over an interval; `square` bounds (rho^2)'' without the division that is in `length`.
+    # Bounds over an interval, of one cable; `square` bounds (rho^2)'' without the division that is in `length`.
     n_cables: int
     z0: Array
     time: Array
@@ -62,15 +63,16 @@ class _OverInterval(NamedTuple):
 
 
 class _Closed(NamedTuple):
-    # Closed form of a limit: its slacks, the bound of their second derivatives, and how many slacks each cable has.
-    slack: Callable[[_AtInstant, Array], Array]
+    # Closed form of a limit: its slack, the bound of its second derivative, and how many slacks each cable has (two:
+    # the slack is a pair).
+    slack: Callable[[_AtInstant, Array], Any]
     curvature: Callable[[_OverInterval, Array], Array]
     sides: int = 1
 
 
-def _bends(state: _AtInstant, limit: Array) -> Array:
+def _bends(state: _AtInstant, limit: Array) -> tuple[Array, Array]:
     bend = (state.length**2 * state.rate_slope - state.rate**2) / (limit * state.time**2)
-    return jnp.concatenate([state.length**3 - bend, state.length**3 + bend]) / state.z0**3
+    return (state.length**3 - bend) / state.z0**3, (state.length**3 + bend) / state.z0**3
 
 
 def _lifted(over: _OverInterval, limit: Array) -> Array:
@@ -90,8 +92,8 @@ def _bent(over: _OverInterval, limit: Array) -> Array:
     return (cube + bend.curvature / (limit * over.time**2)) / over.z0**3
 
 
-def _square_share(vector: Array, largest: Array) -> Array:
-    return 1.0 - jnp.dot(vector, vector) / largest**2
+def _square_share(vector: Vector, largest: Array) -> Array:
+    return 1.0 - dot(vector, vector) / largest**2
 
 
 # Every row of `schema.limits.LIMITS` has an entry.
@@ -151,19 +153,30 @@ def limit_slacks(
     """
     if not limits_set(limits):
         return ()
-    position, slope, curvature = _path(segment, arcs, tau, state)
-    rays = position[None] - robot.base_points
-    length = jnp.linalg.norm(rays, axis=1)
-    rate = rays @ slope
-    rate_slope = jnp.dot(slope, slope) + rays @ curvature
+    position, velocity, acceleration = _path(segment, arcs, tau, state)
     z0, time, weight = segment.hub[2], duration(segment, arcs), robot.mass * robot.gravity
-    lift = jnp.stack(state.kappa) * length / (len(state.kappa) * z0)
-    here = _AtInstant(z0, time, weight, state.eta, lift, position[2], length, rate, rate_slope, slope, curvature)
-    slacks = (CLOSED[row.name].slack(here, getattr(limits, row.name)) for row in limits_set(limits))
-    return tuple([slack] if slack.ndim == 0 else [slack[i] for i in range(slack.shape[0])] for slack in slacks)
+    speed_square = dot(velocity, velocity)
+
+    def cable_state(cable: int) -> _AtInstant:
+        ray = [position[i] - robot.base_points[cable, i] for i in range(3)]
+        length = jnp.sqrt(dot(ray, ray))
+        lift = state.kappa[cable] * length / (len(state.kappa) * z0)
+        rate, rate_slope = dot(ray, velocity), speed_square + dot(ray, acceleration)
+        numbers = z0, time, weight, state.eta, lift, position[2], length, rate, rate_slope
+        return _AtInstant(*numbers, velocity, acceleration)
+
+    cables = [cable_state(k) for k in range(robot.n_cables)]
+
+    def row_slacks(row: Limit) -> list[Array]:
+        slack, limit = CLOSED[row.name].slack, getattr(limits, row.name)
+        if not row.per_cable:
+            return [slack(cables[0], limit)]
+        return jax.tree.leaves([slack(cable, limit[k]) for k, cable in enumerate(cables)])
+
+    return tuple(row_slacks(row) for row in limits_set(limits))
 
 
-def _path(segment: Segment, arcs: Array, tau: Array, state: Instant) -> tuple[Array, Array, Array]:
+def _path(segment: Segment, arcs: Array, tau: Array, state: Instant) -> tuple[Vector, Vector, Vector]:
     # Return the position and its first two derivatives in tau.
     ratio, steady, period = oscillation(segment, arcs)
     span = segment.end_radius - segment.start_radius
@@ -172,12 +185,19 @@ def _path(segment: Segment, arcs: Array, tau: Array, state: Instant) -> tuple[Ar
     lateral, axial = sincospi(segment.sense * segment.precession * tau)
     slope_r = r1 * cosine - r * segment.sense * steady / (math.pi * arcs) * sine
     slope_t = r1 * ratio * sine
-    slope = jnp.stack([axial * slope_r + lateral * slope_t, axial * slope_t - lateral * slope_r])
-    return segment.hub + segment.plane @ state.c, segment.plane @ slope, segment.plane @ (period * (state.d - state.c))
+    slope = axial * slope_r + lateral * slope_t, axial * slope_t - lateral * slope_r
+    bend = period * (state.d[0] - state.c[0]), period * (state.d[1] - state.c[1])
+    return _in_space(segment, state.c, segment.hub), _in_space(segment, slope), _in_space(segment, bend)
+
+
+def _in_space(segment: Segment, vector: Sequence[Array] | Array, origin: Sequence[Any] | Array = (0, 0, 0)) -> Vector:
+    # From the plane of the trajectory; without a product of matrices, beside which XLA makes loops of their own.
+    plane = segment.plane
+    return [origin[i] + plane[i, 0] * vector[0] + plane[i, 1] * vector[1] for i in range(3)]
 
 
 def limit_curvatures(
-    robot: PointMassRobot, limits: Limits, segment: Segment, arcs: Array, over: Stretch, kappa: Bounds
+    robot: PointMassRobot, limits: Limits, segment: Segment, arcs: Array, over: Stretch, kappa: Sequence[Bounds]
 ) -> tuple[Array, ...]:
     """Bound of the second derivative of each limit's slack over an interval.
 
@@ -185,7 +205,7 @@ def limit_curvatures(
         robot: a point mass on three cables.
         segment: of the parity of `arcs`.
         arcs: () number of arcs, a float.
-        kappa: bounds of the variable part of the pseudotensions over the interval, leaves (n_cables,).
+        kappa: bounds of the variable part of each cable's pseudotension over the interval, () each.
 
     Returns:
         one () for each limit of `limits_set`, the largest over the cables.
@@ -195,11 +215,21 @@ def limit_curvatures(
     z0, time, weight = segment.hub[2], duration(segment, arcs), robot.mass * robot.gravity
     pace, pull = pace_bounds(segment, arcs, over)
     eta = row_bounds(segment, arcs, over, segment.tilt)
-    length = _length(robot, segment, over, pace, eta)
     depth = row_bounds(segment, arcs, over, segment.plane[2])
-    square = 2.0 * (pace.slope**2 + length.value * pace.curvature)
-    here = _OverInterval(robot.n_cables, z0, time, weight, kappa, eta, depth, length, pace, pull, square)
-    return tuple(jnp.max(CLOSED[row.name].curvature(here, getattr(limits, row.name))) for row in limits_set(limits))
+
+    def cable_bounds(kappa: Bounds, length: Bounds) -> _OverInterval:
+        square = 2.0 * (pace.slope**2 + length.value * pace.curvature)
+        return _OverInterval(robot.n_cables, z0, time, weight, kappa, eta, depth, length, pace, pull, square)
+
+    cables = [cable_bounds(*each) for each in zip(kappa, _lengths(robot, segment, over, pace, eta), strict=True)]
+
+    def row_curvature(row: Limit) -> Array:
+        curvature, limit = CLOSED[row.name].curvature, getattr(limits, row.name)
+        if not row.per_cable:
+            return curvature(cables[0], limit)
+        return largest([curvature(cable, limit[k]) for k, cable in enumerate(cables)])
+
+    return tuple(row_curvature(row) for row in limits_set(limits))
 
 
 def pace_bounds(segment: Segment, arcs: Array, over: Stretch) -> tuple[Bounds, Bounds]:
@@ -225,19 +255,24 @@ def pace_bounds(segment: Segment, arcs: Array, over: Stretch) -> tuple[Bounds, B
     return c, (d_r.combined(d_t).turned(precession) + c).times(period)  # c'' = T^2 lambda (d - c)
 
 
-def _length(robot: PointMassRobot, segment: Segment, over: Stretch, pace: Bounds, eta: Bounds) -> Bounds:
-    # |rho'| <= |p'|, and rho'' = (|p'|^2 - rho'^2 + ray . p'') / rho; leaves (n_cables,).
+def _lengths(robot: PointMassRobot, segment: Segment, over: Stretch, pace: Bounds, eta: Bounds) -> list[Bounds]:
+    # |rho'| <= |p'|, and rho'' = (|p'|^2 - rho'^2 + ray . p'') / rho.
     nearest = least_lengths(robot, segment, over, pace, eta)
-    slope = jnp.broadcast_to(pace.slope, nearest.shape)
-    farthest = _at_middle(robot, segment, over) + over.radius * pace.slope
-    return Bounds(farthest, slope, slope**2 / nearest + pace.curvature)
+    farthest = [x + over.radius * pace.slope for x in _at_middle(robot, segment, over)]
+    bends = [pace.slope**2 / x + pace.curvature for x in nearest]
+    return [Bounds(x, pace.slope, bend) for x, bend in zip(farthest, bends, strict=True)]
 
 
-def _at_middle(robot: PointMassRobot, segment: Segment, over: Stretch) -> Array:
-    return jnp.linalg.norm((segment.hub + segment.plane @ over.place)[None] - robot.base_points, axis=1)
+def _at_middle(robot: PointMassRobot, segment: Segment, over: Stretch) -> list[Array]:
+    return _distances(robot, _in_space(segment, over.place, segment.hub))
 
 
-def least_lengths(robot: PointMassRobot, segment: Segment, over: Stretch, pace: Bounds, eta: Bounds) -> Array:
+def _distances(robot: PointMassRobot, position: Vector | Array) -> list[Array]:
+    rays = ([position[i] - spool[i] for i in range(3)] for spool in robot.base_points)
+    return [jnp.sqrt(dot(ray, ray)) for ray in rays]
+
+
+def least_lengths(robot: PointMassRobot, segment: Segment, over: Stretch, pace: Bounds, eta: Bounds) -> list[Array]:
     """Lower bounds of the lengths of the cables over an interval.
 
     No cable is shorter than the distance from the spool plane. Where the mass goes far within the interval, its
@@ -249,13 +284,13 @@ def least_lengths(robot: PointMassRobot, segment: Segment, over: Stretch, pace: 
         eta: bounds of the depth over z0, less 1, () each.
 
     Returns:
-        (n_cables,) m, not negative.
+        the bounds, (...) each as those of `pace`, in cable order, m; not negative.
     """
-    in_middle = _at_middle(robot, segment, over) - over.radius * pace.slope
-    from_hub = jnp.linalg.norm(segment.hub[None] - robot.base_points, axis=1) - pace.value
-    lowest = jnp.maximum(segment.tilt @ over.place - over.radius * eta.slope, -eta.value)
-    depth = (1.0 + lowest) * segment.hub[2] / jnp.linalg.norm(plane_normal(robot))
-    return jnp.maximum(jnp.maximum(in_middle, from_hub), jnp.maximum(depth, 0.0))
+    tilt = segment.tilt[0] * over.place[0] + segment.tilt[1] * over.place[1]
+    lowest = jnp.maximum(tilt - over.radius * eta.slope, -eta.value)
+    depth = jnp.maximum((1.0 + lowest) * segment.hub[2] / jnp.linalg.norm(plane_normal(robot)), 0.0)
+    each = zip(_at_middle(robot, segment, over), _distances(robot, segment.hub), strict=True)
+    return [largest([x - over.radius * pace.slope, y - pace.value, depth]) for x, y in each]
 
 
 def _rate(length: Bounds, pace: Bounds, pull: Bounds) -> Bounds:

@@ -15,6 +15,7 @@ from jax import Array, lax
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.arithmetic.elementary import vertex
+from cspr_jax.arithmetic.lanes import smallest_of_each, stored
 from cspr_jax.motions.problem import Problem
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.swings.blocks import INTERVALS, blocks, over_blocks
@@ -23,24 +24,36 @@ from cspr_jax.swings.hypocycloid import Segment
 from cspr_jax.swings.proof import SMALL, length
 
 CANDIDATES = 3
+# An estimate says in its last 16 bits where it lies, 1/4096 of the distance of samples; none is larger than this.
+LAST_BITS, LARGEST = 2**16 - 1, 1e300
 # Distance of the points of the first refining parabola, in steps between samples; how much narrower each next one is.
 FIRST_WIDTH, NARROWER, ROUNDS = 1.0 / 4.0, 1.0 / 6.0, 7
 
 
-def _block_estimates(function, problem: Problem, segment: Segment, arcs: Array, start: Array, stop: Array):
-    # For each function: an estimate of its minimum in the block, and where.
-    weight = jnp.arange(INTERVALS + 1, dtype=arcs.dtype) / INTERVALS
-    tau = start * (1.0 - weight) + stop * weight
-    values = jnp.stack(jax.vmap(partial(function, *problem, segment, arcs))(tau))
-    # A parabola through every three neighbours: the lowest sample may be of the valley of another block.
-    moves, vertices = vertex(values[:, :-2], values[:, 1:-1], values[:, 2:])
-    return _lowest(vertices, tau[None, 1:-1] + moves * (tau[1] - tau[0]))
+def _block_estimates(function, problem: Problem, segments: Segment, arcs: Array, start: Array, stop: Array):
+    # For each function: an estimate of its minimum in one block of each segment, and where; (n_functions, n) each.
+    weight = (jnp.arange(INTERVALS + 1, dtype=arcs.dtype) / INTERVALS)[:, None]
+    tau = start[None] * (1.0 - weight) + stop[None] * weight
+    sampled = partial(jax.vmap(jax.vmap(partial(function, *problem)), in_axes=(None, None, 0)), segments, arcs)
+    # A parabola through every three neighbours: the lowest sample may be of the valley of another block. Of parts of
+    # computed arrays XLA would compute each anew, with all that several functions share.
+    each = map(vertex, sampled(tau[:-2]), sampled(tau[1:-1]), sampled(tau[2:]))
+    marked = smallest_of_each([_marked(estimate, weight[1:-1] + move / INTERVALS) for move, estimate in each])
+    estimates, fractions = _unmarked(jnp.stack(marked))
+    return estimates, start[None] * (1.0 - fractions) + stop[None] * fractions
 
 
-def _lowest(estimates: Array, places: Array) -> tuple[Array, Array]:
-    # Find the smallest of the last axis and its place without an argmin, which XLA computes one number at a time.
-    smallest = jnp.min(estimates, axis=-1)
-    return smallest, jnp.max(jnp.where(estimates == smallest[..., None], places, -jnp.inf), axis=-1)
+def _marked(estimates: Array, fractions: Array) -> Array:
+    # Write a number from 0 to 1 into the last bits of another one: the smallest of such numbers says where it lies. XLA
+    # computes an argmin one number at a time, and several minima in one loop only if nothing else is found.
+    numbers = jnp.where(estimates < LARGEST, estimates, LARGEST)  # neither is NaN
+    mark = jnp.round(fractions * LAST_BITS).astype(jnp.int64)
+    return lax.bitcast_convert_type(lax.bitcast_convert_type(numbers, jnp.int64) & ~LAST_BITS | mark, jnp.float64)
+
+
+def _unmarked(marked: Array) -> tuple[Array, Array]:
+    bits = lax.bitcast_convert_type(marked, jnp.int64)
+    return lax.bitcast_convert_type(bits & ~LAST_BITS, jnp.float64), (bits & LAST_BITS).astype(jnp.float64) / LAST_BITS
 
 
 def _insert(best: tuple[Array, Array], estimate: Array, place: Array) -> tuple[Array, Array]:
@@ -56,7 +69,7 @@ def _insert(best: tuple[Array, Array], estimate: Array, place: Array) -> tuple[A
     return jnp.stack(estimates), jnp.stack(places)
 
 
-def refined_minimum(function: Callable[[Array], Array], tau: Array, step: Array) -> Array:
+def refined_minimum(function: Callable[[Array], Array], tau: Array, step: Array, one: Array | None = None) -> Array:
     """Smallest value of a continuous function near an estimated minimum, by ever narrower parabolas.
 
     A parabola is believed only where its middle is the lowest of its three points; else the points move to the lowest.
@@ -66,6 +79,7 @@ def refined_minimum(function: Callable[[Array], Array], tau: Array, step: Array)
         function: of one instant, () to ().
         tau: () the estimate.
         step: () distance of the samples that it came from.
+        one: () the number 1; see `arithmetic.lanes.stored`.
 
     Returns:
         () a value that the function attains.
@@ -75,7 +89,7 @@ def refined_minimum(function: Callable[[Array], Array], tau: Array, step: Array)
         smallest, at, width = state
         middle_point = jnp.clip(at, width, 1.0 - width)  # equidistant points, the ends of the motion among them
         points = jnp.stack([middle_point - width, middle_point, middle_point + width])
-        left, middle, right = jax.vmap(function)(points)
+        left, middle, right = stored(jax.vmap(function)(points), one)
         bracketed = (middle <= left) & (middle <= right)
         lower = jnp.where(left < right, points[0], points[2])
         at = jnp.where(bracketed, middle_point + width * vertex(left, middle, right)[0], lower)
@@ -129,13 +143,12 @@ def _chosen(values: Sequence[Array], number: Array) -> Array:
 
 
 @persistent_jit(static_argnames="functions")
-def _minima(functions: Functions, problem: Problem, edges: Array, counts: Array, arguments) -> Array:
+def _minima(functions: Functions, problem: Problem, edges: Array, counts: Array, one: Array, arguments) -> Array:
     segments, arcs = arguments
     evaluate, groups = functions
 
     def step(state, start, stop):
-        fresh = jax.vmap(partial(_block_estimates, evaluate, problem), out_axes=1)(segments, arcs, start, stop)
-        return _insert(state, *fresh)
+        return _insert(state, *_block_estimates(evaluate, problem, segments, arcs, start[0], stop[0]))
 
     nothing = jnp.full((CANDIDATES, sum(groups), *arcs.shape), jnp.inf, arcs.dtype)
     nowhere = jnp.full_like(nothing, -1.0)
@@ -145,10 +158,10 @@ def _minima(functions: Functions, problem: Problem, edges: Array, counts: Array,
 
     def refine(segment, p, number, where, width):
         # number, where: (n_groups, CANDIDATES). One copy of the function serves all: it compiles much faster.
-        def one(number, tau):
-            return refined_minimum(lambda t: _chosen(evaluate(*problem, segment, p, t), number), tau, width)
+        def minimum(number, tau):
+            return refined_minimum(lambda t: _chosen(evaluate(*problem, segment, p, t), number), tau, width, one)
 
-        return jnp.min(jax.vmap(jax.vmap(one))(number, where), axis=1)
+        return jnp.min(jax.vmap(jax.vmap(minimum))(number, where), axis=1)
 
     return jax.vmap(refine, in_axes=(0, 0, 2, 2, 0))(segments, arcs, number, where, steps)
 
@@ -168,7 +181,8 @@ def smallest_values(functions: Functions, problem: Problem, segments: Segment, a
     arcs = np.asarray(arcs, float)
     order = np.argsort(arcs, kind="stable")
     arguments = jax.tree.map(lambda x: x[order], (segments, arcs))
-    minima = in_batches(partial(_minima, functions, problem, *table), arguments, size=length(problem, len(arcs)))
+    kernel = partial(_minima, functions, problem, *table, 1.0)
+    minima = in_batches(kernel, arguments, size=length(problem, len(arcs)))
     return minima[np.argsort(order, kind="stable")]
 
 

@@ -22,12 +22,13 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches
+from cspr_jax.arithmetic.lanes import smallest_of_each
 from cspr_jax.motions.amplitudes import Amplitude
 from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.swings.blocks import INTERVALS, blocks, over_blocks
-from cspr_jax.swings.criteria import curvatures, slacks
+from cspr_jax.swings.criteria import BASIC, curvatures, slacks
 from cspr_jax.swings.hypocycloid import Segment
 from cspr_jax.swings.slacks import largest_term
 
@@ -36,6 +37,8 @@ BATCH = 1024
 # Length of the batches of few segments with limits, for which a whole batch would take several times as long.
 SMALL = 128
 FINEST_CUT = 12
+# Blocks of a segment in one step of a first look.
+TOGETHER = 2
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,44 +79,49 @@ def tolerance(amplitude: Amplitude, segment: Segment, arcs: Array) -> Array:
     return SMALLEST_MARGIN + 512.0 * jnp.finfo(terms.dtype).eps * terms
 
 
-def block_bounds(problem: Problem, segments: Segment, arcs: Array, start: Array, stop: Array) -> tuple[Array, Array]:
+def block_bounds(
+    problem: Problem, segments: Segment, arcs: Array, start: Array, stop: Array
+) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
     """Smallest sampled slack, and proved lower bound, of each criterion over one block of each segment.
 
     Args:
+        problem: robot, limits and amplitude.
         segments: leaves (n, ...).
         arcs: (n,).
         start: (n,) tau where each block starts.
         stop: (n,) tau where it stops; no knot inside.
 
     Returns:
-        sampled (n_criteria, n) and proved (n_criteria, n).
+        sampled and proved, n_criteria arrays (n,) each.
     """
     weight = (jnp.arange(INTERVALS + 1, dtype=arcs.dtype) / INTERVALS)[:, None]
     tau = start[None] * (1.0 - weight) + stop[None] * weight
     values = jax.vmap(jax.vmap(partial(slacks, *problem)), in_axes=(None, None, 0))(segments, arcs, tau)
-    sampled = jnp.stack([jnp.min(v, axis=0) for v in values])
-    bound = jnp.stack(jax.vmap(partial(curvatures, *problem))(segments, arcs, start, stop))
-    return sampled, sampled - bound * (((stop - start) / INTERVALS) ** 2)[None] / 8.0
+    sampled, share = smallest_of_each(values), ((stop - start) / INTERVALS) ** 2 / 8.0
+    bounds = jax.vmap(partial(curvatures, *problem))(segments, arcs, start, stop)
+    return sampled, tuple(low - bound * share for low, bound in zip(sampled, bounds, strict=True))
 
 
 @persistent_jit
 def _first_look(problem: Problem, edges: Array, counts: Array, arguments) -> tuple[Array, Array, Array]:
     segments, arcs = arguments
+    look = jax.vmap(partial(block_bounds, problem), in_axes=(None, None, 0, 0))
 
     def step(state, start, stop):
-        sampled, proved = block_bounds(problem, segments, arcs, start, stop)
-        return jnp.minimum(state[0], sampled), jnp.minimum(state[1], proved)
+        sampled, proved = look(segments, arcs, start, stop)
+        return tuple(map(jnp.minimum, state, smallest_of_each((*sampled, *proved))))
 
-    nothing = jnp.full((2 + len(limits_set(problem.limits)), *arcs.shape), jnp.inf, arcs.dtype)
-    sampled, proved = over_blocks(edges, counts, arcs, (nothing, nothing), step)
+    n_criteria = BASIC + len(limits_set(problem.limits))
+    nothing = (jnp.full_like(arcs, jnp.inf),) * (2 * n_criteria)
+    minima = over_blocks(edges, counts, arcs, nothing, step, together=TOGETHER)
     near = jax.vmap(partial(tolerance, problem.amplitude))(segments, arcs)
-    return sampled.T, proved.T, near
+    return jnp.stack(minima[:n_criteria], axis=1), jnp.stack(minima[n_criteria:], axis=1), near
 
 
 @persistent_jit
 def _closer_look(problem: Problem, arguments) -> tuple[Array, Array]:
     sampled, proved = block_bounds(problem, *arguments)
-    return sampled.T, proved.T
+    return jnp.stack(sampled, axis=1), jnp.stack(proved, axis=1)
 
 
 def prove(

@@ -17,7 +17,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.arithmetic.bounds import Bounds
+from cspr_jax.arithmetic.bounds import Bounds, hypotenuse
 from cspr_jax.arithmetic.elementary import sincospi
 from cspr_jax.motions.amplitudes import Amplitude, derivatives, local_bounds
 from cspr_jax.swings.hypocycloid import Segment, oscillation, swing
@@ -141,7 +141,7 @@ def stretch(segment: Segment, amplitude: Amplitude, arcs: Array, start: Array, s
 def _components(segment: Segment, vector: Array, over: Stretch) -> tuple[Bounds, Bounds]:
     # Bound vector . e_r and vector . e_t, which turn into each other at the rate of the precession.
     lateral, axial = sincospi(segment.sense * segment.precession * over.middle)
-    length = jnp.hypot(vector[0], vector[1])
+    length = hypotenuse(vector[0], vector[1])
     rate = math.pi * segment.precession
     change = over.radius * rate * length
     radial = jnp.minimum(jnp.abs(vector[0] * axial - vector[1] * lateral) + change, length)
@@ -191,17 +191,31 @@ def row_bounds(
 def _oscillating(cosine: Bounds, sine: Bounds, omega: Array) -> Bounds:
     # Bound f cos(omega tau) + g sin(omega tau) and its derivatives, with their factors joined at the worst phase.
     return Bounds(
-        jnp.hypot(cosine.value, sine.value),
-        jnp.hypot(cosine.slope + omega * sine.value, sine.slope + omega * cosine.value),
-        jnp.hypot(
+        hypotenuse(cosine.value, sine.value),
+        hypotenuse(cosine.slope + omega * sine.value, sine.slope + omega * cosine.value),
+        hypotenuse(
             cosine.curvature + 2.0 * omega * sine.slope + omega**2 * cosine.value,
             sine.curvature + 2.0 * omega * cosine.slope + omega**2 * sine.value,
         ),
     )
 
 
-def taut_bounds(segment: Segment, arcs: Array, over: Stretch) -> Bounds:
+def each_taut_bounds(segment: Segment, arcs: Array, over: Stretch) -> list[Bounds]:
     """Bounds of the variable part of each kappa_k over an interval (of kappa_k - 1; the derivatives are kappa_k's).
+
+    Args:
+        segment: of the parity of `arcs`.
+        arcs: () number of arcs, a float.
+
+    Returns:
+        bounds, () each, in cable order.
+    """
+    cables = range(segment.pull.shape[0])
+    return [row_bounds(segment, arcs, over, segment.tilt, segment.pull[k], segment.twist[k]) for k in cables]
+
+
+def taut_bounds(segment: Segment, arcs: Array, over: Stretch) -> Bounds:
+    """The bounds of `each_taut_bounds` in arrays.
 
     Args:
         segment: of the parity of `arcs`.
@@ -210,6 +224,4 @@ def taut_bounds(segment: Segment, arcs: Array, over: Stretch) -> Bounds:
     Returns:
         bounds with leaves (n_cables,), in cable order.
     """
-    return jax.vmap(lambda pull, twist: row_bounds(segment, arcs, over, segment.tilt, pull, twist))(
-        segment.pull, segment.twist
-    )
+    return jax.tree.map(lambda *bounds: jnp.stack(bounds), *each_taut_bounds(segment, arcs, over))

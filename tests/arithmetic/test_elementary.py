@@ -7,6 +7,7 @@ import pytest
 
 from cspr_jax.arithmetic.bounds import Bounds
 from cspr_jax.arithmetic.elementary import polynomial, sincospi
+from cspr_jax.arithmetic.lanes import smallest_of_each
 
 # As users' kernels are compiled, and as `compile_options.least` has them: there sums and products are rounded apart.
 SINCOSPI, APART = (jax.jit(sincospi, compiler_options={"xla_backend_optimization_level": i}) for i in (1, 0))
@@ -125,3 +126,11 @@ def test_bounds_are_attained():
     np.testing.assert_allclose(f.combined(f.times(2.0)), [5.0**0.5 * v for v in f], rtol=1e-13)
     circle = Bounds(1.0, a, a**2)  # a vector that turns at rate a, seen from axes that turn against it
     np.testing.assert_allclose(circle.turned(rate), [1.0, a + rate, (a + rate) ** 2], rtol=1e-13)
+
+
+def test_smallest_of_each_array():
+    """As NumPy finds them, each by itself; NaN stays NaN."""
+    arrays = np.random.default_rng(3).normal(size=(3, 17, 5))
+    arrays[1, 4, 2], arrays[2, :, 0] = np.nan, np.inf
+    found = jax.jit(smallest_of_each)(list(arrays))
+    np.testing.assert_array_equal(found, arrays.min(1))
