@@ -200,12 +200,12 @@ def face_distances(along: Array, slacks: Array, weights: Array) -> Array:
     """Distances of tensions from their limits at which a face is reached.
 
     Args:
-        along: (n_faces, n_others) products of `one_sided_faces`.
-        slacks: (n_faces,) of the faces, N.
-        weights: (n_faces, n_others) parts of the distance that the cables keep.
+        along: (n, m) products of `one_sided_faces`.
+        slacks: (n,) of the faces, N.
+        weights: (n, m) parts of the distance that the cables keep.
 
     Returns:
-        (n_faces,) N; inf for a face that is none.
+        (n,) N; inf for a face that is none.
     """
     sizes = jnp.sum(jnp.abs(along) * weights, axis=1)
     return jnp.where(sizes > 0.0, slacks / jnp.where(sizes > 0.0, sizes, 1.0), jnp.inf)

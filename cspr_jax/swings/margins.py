@@ -21,7 +21,7 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.swings.blocks import INTERVALS, blocks, over_blocks
 from cspr_jax.swings.criteria import BASIC, counts, smooth_slacks
 from cspr_jax.swings.hypocycloid import Segment
-from cspr_jax.swings.proof import SMALL, length
+from cspr_jax.swings.proof import OF_PLANS, SMALL, length
 
 CANDIDATES = 3
 # An estimate says in its last 16 bits where it lies, 1/4096 of the distance of samples; none is larger than this.
@@ -182,7 +182,7 @@ def smallest_values(functions: Functions, problem: Problem, segments: Segment, a
     order = np.argsort(arcs, kind="stable")
     arguments = jax.tree.map(lambda x: x[order], (segments, arcs))
     kernel = partial(_minima, functions, problem, *table, 1.0)
-    minima = in_batches(kernel, arguments, size=length(problem, len(arcs)))
+    minima = in_batches(kernel, arguments, size=length(problem, len(arcs), OF_PLANS))
     return minima[np.argsort(order, kind="stable")]
 
 

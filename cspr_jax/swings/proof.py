@@ -34,8 +34,9 @@ from cspr_jax.swings.slacks import largest_term
 
 SMALLEST_MARGIN = 1e-9
 BATCH = 1024
-# Length of the batches of few segments with limits, for which a whole batch would take several times as long.
-SMALL = 128
+# Length of the batches of few segments: with limits, for which a whole batch would take several times as long, and of
+# plans, which have up to so many.
+SMALL, OF_PLANS = 128, 16
 FINEST_CUT = 12
 # Blocks of a segment in one step of a first look.
 TOGETHER = 2
@@ -159,13 +160,16 @@ def prove(
     return Proof(feasible, infeasible, met | (feasible[:, None] & counted), broken, sampled, bound)
 
 
-def length(problem: Problem, count: int) -> int:
+def length(problem: Problem, count: int, few: int = 0) -> int:
     """Length of the batches for some segments, or blocks of them.
 
+    Args:
+        few: number up to which batches are small.
+
     Returns:
-        that of small batches where limits, whose slacks take long, leave much of a batch to fill.
+        that of small batches, too, where limits, whose slacks take long, leave much of a batch to fill.
     """
-    return SMALL if 2 * count <= BATCH and limits_set(problem.limits) else BATCH
+    return SMALL if count <= few or (2 * count <= BATCH and limits_set(problem.limits)) else BATCH
 
 
 def is_met_at_samples(problem: Problem, segments: Segment, arcs: np.ndarray) -> np.ndarray:
@@ -197,7 +201,7 @@ def first_look(problem: Problem, segments: Segment, arcs: np.ndarray) -> tuple[n
     order = np.argsort(arcs, kind="stable")
     back = np.argsort(order, kind="stable")
     arguments = jax.tree.map(lambda x: x[order], (segments, arcs))
-    look = in_batches(partial(_first_look, problem, *table), arguments, size=length(problem, len(arcs)))
+    look = in_batches(partial(_first_look, problem, *table), arguments, size=length(problem, len(arcs), OF_PLANS))
     return jax.tree.map(lambda x: x[back], look)
 
 
