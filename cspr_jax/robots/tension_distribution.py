@@ -114,30 +114,11 @@ def centred(matrix: Array, wrench: Array, tension_min: Array, tension_max: Array
         InputError: fewer cables than components.
     """
     solutions = all_tensions(matrix, wrench)
-    tensions, largest = _most_central(matrix, tension_min, tension_max, solutions)
+    largest = _largest_distance(matrix, tension_min, tension_max, solutions)
+    inwards = jnp.where(jnp.isfinite(largest), largest, 0.0)
+    tensions = solutions.tensions(_shortest(solutions, tension_min + inwards, tension_max - inwards))
     answer = checked(matrix, wrench, tension_min, tension_max, solutions, tensions)
     return answer, jnp.where(solutions.is_regular, largest, -jnp.inf)
-
-
-def most_central(matrix: Array, wrench: Array, tension_min: Array, tension_max: Array) -> Array:
-    """The tensions that are farthest from their limits, or beyond them by the least; of all these the least.
-
-    Args:
-        matrix: (dof, n_cables) unit columns.
-        wrench: (dof,) N.
-        tension_min: (n_cables,) N.
-        tension_max: (n_cables,) N, inf for none.
-
-    Returns:
-        (n_cables,) N.
-    """
-    return _most_central(matrix, tension_min, tension_max, all_tensions(matrix, wrench))[0]
-
-
-def _most_central(matrix: Array, low: Array, high: Array, solutions: AllTensions) -> tuple[Array, Array]:
-    largest = _largest_distance(matrix, low, high, solutions)
-    inwards = jnp.where(jnp.isfinite(largest), largest, 0.0)
-    return solutions.tensions(_shortest(solutions, low + inwards, high - inwards)), largest
 
 
 def checked(
