@@ -6,7 +6,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax.arithmetic.frames import Frame
@@ -32,7 +31,6 @@ from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.point_mass import spool_radius
 from cspr_jax.robots.tension_rule_table import TENSION_RULES
 from cspr_jax.robots.wrench_sets import tension_range
-from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.families import FAMILIES
 
 # Value that a search for z0 takes for a "best" epsilon, until that is chosen.
@@ -333,17 +331,13 @@ def _counts(leg: JoinedLeg, keys: PlanFile) -> np.ndarray:
     return np.maximum(SAMPLES * leg.answers.tried_arcs, keys.samples) + 1
 
 
-@persistent_jit
-def _ends(before: Motion, after: Motion):
-    return before.state(jnp.asarray(1.0))[:3], after.state(jnp.asarray(0.0))[:3]
-
-
 def _refuse_jumps(problem: Problem, sequence: PlanLegs, legs: tuple[JoinedLeg, ...]) -> None:
     # Positions, velocities and accelerations must meet where another family goes on.
     size, gravity = float(spool_radius(problem.robot)), float(problem.robot.gravity)
     scales = {"position": size, "velocity": np.sqrt(size * gravity), "acceleration": gravity}
     for leg, (before, after) in zip(sequence.legs[1:], itertools.pairwise(legs), strict=True):
-        last, first = _ends(before.motions[-1], after.motions[0])
+        ends = (before.motions[-1], 1.0), (after.motions[0], 0.0)
+        last, first = (states_at(motion, np.array([tau]))[:3] for motion, tau in ends)
         if not np.isfinite([np.asarray(values) for values in (*last, *first)]).all():
             continue  # there is no motion, as its verdict says
         for (name, scale), a, b in zip(scales.items(), last, first, strict=True):

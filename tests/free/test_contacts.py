@@ -166,13 +166,18 @@ def test_a_motion_gives_way_to_what_it_only_grazes():
     assert clear(planned, keys) > 0.0
 
 
+def across():
+    """A question about the prototype, a task from one side of a sphere to the other, unknowns, and its ends (2, 3)."""
+    middle = {"obstacles": [sphere([0.0, 0.0, 2.2], 0.05)]}
+    question, tasks, unknowns = moved("prototype", np.random.default_rng(1), middle)
+    ends = np.array([[0.2, 0.0, 2.2], [-0.2, 0.0, 2.2]])
+    return question, dataclasses.replace(tasks, places=ends[None, None]), unknowns, ends
+
+
 def test_a_motion_that_does_not_get_clear_is_none(monkeypatch):
     """Planes about one motion after the other, and no end: here a search always comes back to the line."""
     with double_precision():
-        middle = {"obstacles": [sphere([0.0, 0.0, 2.2], 0.05)]}
-        question, tasks, unknowns = moved("prototype", np.random.default_rng(1), middle)
-        ends = np.array([[0.2, 0.0, 2.2], [-0.2, 0.0, 2.2]])
-        tasks = dataclasses.replace(tasks, places=ends[None, None])
+        question, tasks, unknowns, ends = across()
         begun = []
 
         def straight(within, unknowns, *level, **levels):
@@ -193,10 +198,7 @@ def test_a_motion_that_does_not_get_clear_is_none(monkeypatch):
 def test_the_best_clear_motion_of_all_sides_is_taken(monkeypatch):
     """The cheapest is not clear and goes on alone, one does not converge: the cheaper one of the others is taken."""
     with double_precision():
-        middle = {"obstacles": [sphere([0.0, 0.0, 2.2], 0.05)]}
-        question, tasks, unknowns = moved("prototype", np.random.default_rng(1), middle)
-        ends = np.array([[0.2, 0.0, 2.2], [-0.2, 0.0, 2.2]])
-        tasks = dataclasses.replace(tasks, places=ends[None, None])
+        question, tasks, unknowns, ends = across()
         line = np.linspace(ends[0], ends[1], tasks.basis.controls)[None, 3:-3]
         aside = np.array([0.0, 0.0, 0.3, 0.3])[:, None, None, None] * np.array([0.0, 1.0, 0.0])
         found = Unknowns(*(np.repeat(leaf, 4, axis=0) for leaf in unknowns))

@@ -274,6 +274,17 @@ def test_float32_gives_the_same_verdicts():
     assert quick.is_open.sum() == 1 and (quick.clearance == exact.clearance).any()
 
 
+def test_few_poses_and_many_are_computed_alike(monkeypatch):
+    """Short batches on one thread, or several long ones on two."""
+    place, turns = random_poses(50, 9)
+    known = scene(platform(), None, diameter=0.01)
+    few = clearance.clearances(known, place, turns)
+    monkeypatch.setattr(clearance, "FEW", 0)
+    monkeypatch.setattr(clearance, "BATCH", 16)
+    for one, other in zip(few, clearance.clearances(known, place, turns), strict=True):
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-15)
+
+
 @pytest.mark.thorough
 def test_a_room_that_is_turned_and_moved():
     robot, (place, turns) = platform(), random_poses(300, 8)
