@@ -50,7 +50,7 @@ wheel: $(STAMP)
 gallery: $(TESTS)
 	$(BIN)/python docs/gallery/run.py
 
-# The documents as a site; what leads nowhere fails.
+# The documents as a site, in build/site; what leads nowhere fails.
 site: $(TESTS)
 	$(BIN)/python -m sphinx -q -W -n --keep-going -d build/doctrees docs build/site
 
@@ -72,17 +72,14 @@ bench: $(TESTS)
 	$(BIN)/python benchmarks/effective_amplitude.py
 	$(BIN)/python benchmarks/store_cost.py
 
-# On an idle machine: a line of benchmarks/history.jsonl, and the page that shows all.
+# On an idle machine: a line of benchmarks/history.jsonl, from which the site has a page of rates.
 bench-record: $(TESTS)
 	$(BIN)/python benchmarks/record.py
-	$(BIN)/python docs/generate_rates.py
 
+# Pages that are generated and committed; docs/conf.py writes the others into docs/built when the site is built.
 docs: $(STAMP)
 	$(BIN)/python docs/generate_reference.py
-	$(BIN)/python docs/generate_maps.py
 	$(BIN)/python docs/generate_command_line.py
-	$(BIN)/python docs/generate_api.py
-	$(BIN)/python docs/make_images.py --page
 
 # Sweeps and plans first, some two minutes; their results stay in results/images.
 images: $(STAMP)
@@ -102,4 +99,4 @@ $(TESTS): $(STAMP)
 	@touch $(TESTS)
 
 clean:
-	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis results/demo build dist
+	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis results/demo build dist docs/built

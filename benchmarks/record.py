@@ -1,6 +1,6 @@
 """Append the rates of `cspr bench` to benchmarks/history.jsonl, with the processor, the versions and the commit.
 
-On an idle machine: `make bench-record`, which draws docs/rates.md from it, too.
+On an idle machine: `make bench-record`, from which the site has a page of rates.
 """
 
 import datetime

@@ -1,32 +1,33 @@
 """The site of the documents, built by `make site`."""
 
+import sys
+from pathlib import Path
+
 import cspr_jax
+
+sys.path.insert(0, str(Path(__file__).parent))
 
 project = "cspr_jax"
 author = "the authors of cspr_jax"
 release = version = cspr_jax.__version__
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
-exclude_patterns = ["examples", "_build"]
+extensions = ["myst_nb"]
+exclude_patterns = ["examples"]
 html_theme = "furo"
 html_title = "cspr_jax"
 # Notebooks are shown as they ran; `make gallery` runs them.
 nb_execution_mode = "off"
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 4
-# Names of types and errors in docstrings are words: what is linked is pages, sections and functions.
-nitpick_ignore_regex = [("py:(exc|class|obj)", ".*")]
 suppress_warnings = ["mystnb.unknown_mime_type"]
-# Shapes, units and errors are in the docstrings; types in the signatures.
-napoleon_google_docstring = True
-napoleon_custom_sections = [("Fields", "params_style")]
-autodoc_typehints = "none"
-autodoc_member_order = "bysource"
 
 
 def setup(app):
-    """Formulas as MathML, which browsers draw themselves: the pages need no network."""
+    """Write the pages that are built; show formulas as MathML, which browsers draw themselves without a network."""
+    import build_pages
     from docutils.nodes import SkipNode
     from docutils.utils.math.latex2mathml import tex2mathml
+
+    build_pages.write()
 
     def formula(*, block):
         def visit(writer, node):

@@ -1,18 +1,17 @@
-"""Write docs/rates.md and its picture from benchmarks/history.jsonl: python docs/generate_rates.py."""
+"""The page of rates over time and its picture, from benchmarks/history.jsonl."""
 
 import json
 from pathlib import Path
 
 from matplotlib.figure import Figure
 
-HERE = Path(__file__).parent
-HISTORY = HERE.parent / "benchmarks" / "history.jsonl"
+HISTORY = Path(__file__).parents[1] / "benchmarks" / "history.jsonl"
 HEAD = """# Rates over time
 
-Do not edit: written by `make bench-record`, which measures on the machine where it is called and appends a line to
-`benchmarks/history.jsonl`. Rates are million checks a second. Ratios are to NumPy in the same run, and carry over to
+`make bench-record` measures on the machine where it is called, and appends a line to `benchmarks/history.jsonl`, from
+which this page is built. Rates are million checks a second. Ratios are to NumPy in the same run, and carry over to
 other machines better than rates; on a shared host single figures vary by 15 % and more.
-[Performance](performance.md#a-check) says what a check is, and what limits it.
+[Performance](../performance.md#a-check) says what a check is, and what limits it.
 
 ![Checks a second over those of NumPy in the same run, by commit.](rates.png)
 
@@ -31,8 +30,9 @@ def row(record: dict) -> str:
     return f"| {' | '.join(cells)} |\n"
 
 
-def picture(records: list[dict]) -> Figure:
+def picture() -> Figure:
     """Ratios to NumPy by commit."""
+    records = _records()
     figure = Figure(figsize=(6.8, 3.6), layout="constrained")
     panel = figure.add_subplot()
     for kind, words in (("six_cable", "six cables"), ("three_cable", "three cables")):
@@ -47,12 +47,10 @@ def picture(records: list[dict]) -> Figure:
     return figure
 
 
-def main() -> None:
-    """Write the page and its picture."""
-    records = [json.loads(line) for line in HISTORY.read_text("utf-8").splitlines()]
-    (HERE / "rates.md").write_text(HEAD + "".join(map(row, records)), "utf-8")
-    picture(records).savefig(HERE / "rates.png", dpi=110)
+def page_text() -> str:
+    """The page."""
+    return HEAD + "".join(map(row, _records()))
 
 
-if __name__ == "__main__":
-    main()
+def _records() -> list[dict]:
+    return [json.loads(line) for line in HISTORY.read_text("utf-8").splitlines()]
