@@ -21,6 +21,7 @@ def page_texts() -> dict[str, str]:
         "accuracy.md": generate_accuracy.page_text(),
         "images.md": make_images.page_text(),
         "rates.md": generate_rates.page_text(),
+        "maps/index.md": generate_maps.index_text(),
         **{f"maps/{kind}.md": generate_maps.page_text(kind) for kind in generate_maps.PAGES},
     }
 

@@ -18,6 +18,7 @@ html_title = "cspr_jax"
 nb_execution_mode = "off"
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 4
+highlight_language = "none"  # of blocks that name no language, such as formulas
 suppress_warnings = ["mystnb.unknown_mime_type"]
 
 
@@ -32,7 +33,7 @@ def setup(app):
     def formula(*, block):
         def visit(writer, node):
             markup = tex2mathml(node.astext(), as_block=block)
-            writer.body.append(f'<div class="math">{markup}</div>\n' if block else markup)
+            writer.body.append(f'<div style="overflow: auto hidden">{markup}</div>\n' if block else markup)
             raise SkipNode
 
         return visit, None

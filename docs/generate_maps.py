@@ -140,3 +140,13 @@ def page_text(name: str) -> str:
             f"## Its quantities\n\n{quantities_text(own)}",
         ]
     )
+
+
+def index_text() -> str:
+    """The page that leads to all kinds of map."""
+    rows = "".join(f"| [{kind}]({kind}.md) | {page.text.partition('?')[0]}? |\n" for kind, page in PAGES.items())
+    pages = "\n".join(PAGES)
+    return (
+        "# Kinds of map\n\nA sweep file names one of them, `map = ...`; `cspr run` computes it over a grid.\n\n"
+        f"| map | question |\n|---|---|\n{rows}\n```{{toctree}}\n:hidden:\n\n{pages}\n```\n"
+    )
