@@ -17,8 +17,10 @@ import jaxlib.version
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
-from support import readers
+from support import readers, shapes
 from xdist.scheduler import LoadScopeScheduling
+
+shapes.install()
 
 from cspr_jax.arithmetic import batches, elementary
 from cspr_jax.robots import point_mass

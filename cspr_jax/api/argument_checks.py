@@ -38,16 +38,7 @@ MOST = 10**9  # for numbers that functions bound more narrowly by themselves
 
 
 def checked(function: Function, name: str = "", module: str = "") -> Function:
-    """A function that checks its arguments first.
-
-    Args:
-        function: each of its parameters has a rule.
-        name: new name of the function, with the module; "": its present name.
-        module: module that holds the function under this name.
-
-    Returns:
-        the function; its signature and docstring stay.
-    """
+    """A function that checks its arguments first."""
     signature, own_name = inspect.signature(function), name or function.__qualname__
     instead = INSTEAD.get(own_name, "jax differentiates single motions with slacks, sampled_margin and tensions")
     rules = {

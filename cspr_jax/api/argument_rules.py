@@ -40,18 +40,7 @@ NESTED = 4  # what is in a list or a dictionary is searched so deep for what jax
 def real(
     allowed: str, *shapes: tuple[int | None, ...], traced: bool = False, none: bool = False, **bounds: Any
 ) -> Rule:
-    """Rule of real numbers of one of some shapes, or of any.
-
-    Args:
-        allowed: in words.
-        shapes: any where there are none; `ANY` stands for any size.
-        traced: whether what jax traces passes.
-        none: whether None does.
-        bounds: those of `Numbers`.
-
-    Returns:
-        the rule.
-    """
+    """Rule of real numbers of one of some shapes, or of any."""
     kind = Numbers(allowed, shapes or None, **bounds)
 
     def check(key: str, value: Any) -> None:
@@ -62,21 +51,13 @@ def real(
 
 
 def instants(allowed: str, *shapes: tuple[int | None, ...]) -> Rule:
-    """Rule of times, whose powers must not overflow.
-
-    Returns:
-        the rule.
-    """
+    """Rule of times, whose powers must not overflow."""
     words = f"instants {allowed}, at most {LARGEST_TIME:.0e} s"
     return real(words, *shapes, least=-LARGEST_TIME, largest=LARGEST_TIME)
 
 
 def integer(least: int, largest: int, *, none: bool = False) -> Rule:
-    """Rule of whole numbers.
-
-    Returns:
-        the rule.
-    """
+    """Rule of whole numbers."""
 
     def check(key: str, value: Any) -> None:
         if not (none and value is None):
@@ -86,16 +67,7 @@ def integer(least: int, largest: int, *, none: bool = False) -> Rule:
 
 
 def kind_of(allowed: str, *kinds: type, none: bool = False, has: tuple[str, ...] = ()) -> Rule:
-    """Rule of some types, or of a further one that need not be imported for this.
-
-    Args:
-        allowed: in words.
-        none: whether None passes.
-        has: attributes of the further type.
-
-    Returns:
-        the rule.
-    """
+    """Rule of some types, or of a further one that need not be imported for this."""
 
     def check(key: str, value: Any) -> None:
         is_kind = isinstance(value, kinds) or (bool(has) and all(hasattr(value, name) for name in has))
@@ -108,11 +80,7 @@ def kind_of(allowed: str, *kinds: type, none: bool = False, has: tuple[str, ...]
 
 
 def choice(rule: Rule, *others: Any) -> Rule:
-    """Rule that lets some strings, or None, pass besides.
-
-    Returns:
-        the rule.
-    """
+    """Rule that lets some strings, or None, pass besides."""
 
     def check(key: str, value: Any) -> None:
         if (value is None or isinstance(value, str)) and value in others:
@@ -128,15 +96,7 @@ def choice(rule: Rule, *others: Any) -> Rule:
 
 
 def many(rule: Rule, allowed: str) -> Rule:
-    """Rule of collections.
-
-    Args:
-        rule: of each element.
-        allowed: in words.
-
-    Returns:
-        the rule.
-    """
+    """Rule of collections."""
 
     def check(key: str, value: Any) -> None:
         if isinstance(value, str | bytes | Mapping) or not isinstance(value, Collection):
@@ -164,14 +124,7 @@ def _traced_place(value: Any, depth: int = NESTED) -> str | None:
 
 
 def refuse_tracers(key: str, value: Any, instead: str) -> None:
-    """Refuse what jax traces, anywhere in an argument of a function that computes with NumPy.
-
-    Args:
-        instead: what jax may trace, in words.
-
-    Raises:
-        InputError: it holds a tracer; named by its key where it is in a dictionary.
-    """
+    """Refuse what jax traces, anywhere in an argument of a function that computes with NumPy."""
     place = _traced_place(value)
     if place is not None:
         fault = "a tracer of jax, as grad, jit and vmap pass"
@@ -179,11 +132,7 @@ def refuse_tracers(key: str, value: Any, instead: str) -> None:
 
 
 def word(*words: str) -> Rule:
-    """Rule of one of some words, or None.
-
-    Returns:
-        the rule.
-    """
+    """Rule of one of some words, or None."""
     allowed = " or ".join(f'"{each}"' for each in words) + ", or None"
 
     def check(key: str, value: Any) -> None:

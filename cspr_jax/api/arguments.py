@@ -1,7 +1,9 @@
 """Arguments of the functions from Python as kernels take them, and motions of many answers."""
 
+from __future__ import annotations
+
 import warnings
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax
 import numpy as np
@@ -24,49 +26,27 @@ from cspr_jax.robots.point_mass import PLANAR, PointMassRobot
 from cspr_jax.robots.robot import check_determined, check_moved
 from cspr_jax.schema.given_numbers import ANY, Numbers
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 POINTS = Numbers(POINTS_WORDS, ((ANY, 3),), **LENGTHS)
 DEPTHS = Numbers(DEPTH_WORDS, ((), (ANY,)), **DEPTH)
 
 
 def check_point_mass(robot: Any) -> None:
-    """Refuse robots that are not point masses.
-
-    Raises:
-        InputError: the wrong kind of robot.
-    """
+    """Refuse robots that are not point masses."""
     if not isinstance(robot, PointMassRobot):
         raise InputError("robot", getattr(robot, "name", robot), "a point mass")
 
 
-def check_in_plane(key: str, points: np.ndarray, *, is_planar: bool) -> None:
-    """Refuse points beside the plane of a planar robot.
-
-    Args:
-        key: named in errors.
-        points: (n, 3) in the robot's axes, m.
-        is_planar: whether the robot is one.
-
-    Raises:
-        InputError: some y is not 0.
-    """
+def check_in_plane(key: str, points: Float[np.ndarray, "n 3"], *, is_planar: bool) -> None:
+    """Refuse points beside the plane of a planar robot."""
     if is_planar and points[:, 1].any():
         raise InputError(key, "y not 0", "y = 0: the plane of a planar robot")
 
 
-def starts_and_ends(robot: Any, start, targets) -> tuple[np.ndarray, np.ndarray]:
-    """Ends of many motions of a point mass.
-
-    Args:
-        start: (3,) of all motions, or (n, 3), in the robot's axes, m.
-        targets: (n, 3) likewise.
-
-    Returns:
-        (n, 3) starts and (n, 3) ends, m.
-
-    Raises:
-        InputError: the wrong kind of robot, shapes that do not fit, values that are not finite, or points beside the
-            plane of a planar robot.
-    """
+def starts_and_ends(robot: Any, start, targets) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
+    """Ends of many motions of a point mass."""
     check_point_mass(robot)
     ends, starts = points_of("targets", targets), points_of("start", np.atleast_2d(np.asarray(start, float)))
     if len(starts) not in (1, len(ends)):
@@ -76,17 +56,7 @@ def starts_and_ends(robot: Any, start, targets) -> tuple[np.ndarray, np.ndarray]
 
 
 def amplitude_of(amplitude: str | Amplitude, *, free_end: bool | None = None) -> Amplitude:
-    """Amplitude function, from its name or as it is.
-
-    Args:
-        free_end: whether it must meet (1.27) and (1.28), or (2.49); None: neither. What jax is tracing is not checked.
-
-    Returns:
-        the function.
-
-    Raises:
-        InputError: an unknown name, or conditions that it breaks.
-    """
+    """Amplitude function, from its name or as it is."""
     try:
         function = named(amplitude) if isinstance(amplitude, str) else amplitude
     except InputError as error:
@@ -103,14 +73,7 @@ def amplitude_of(amplitude: str | Amplitude, *, free_end: bool | None = None) ->
 
 
 def warn_of_rest(robot: Any, key: str, place: Any, z0: Any, cure: str) -> None:
-    """Warn of a place that differs from P0 only in its last digits.
-
-    Args:
-        key: name of the argument.
-        place: (3,) in the robot's axes, m.
-        z0: () m.
-        cure: argument that would set the place to rest.
-    """
+    """Warn of a place that differs from P0 only in its last digits."""
     if np.shape(place) == (3,) and np.shape(z0) == ():
         line = almost_at_rest(key, np.asarray(place, float).tolist(), float(z0), robot, cure)
         if line:
@@ -126,23 +89,7 @@ def kernel_problem(
     families: tuple[str, ...] = (),
     any_cables: bool = False,
 ) -> tuple[Problem, Frame]:
-    """Robot, limits and amplitude function, as the kernels take them.
-
-    Args:
-        robot: in its own axes.
-        amplitude: name of an amplitude function, or the function.
-        limits: override those of the robot; None: those of the robot.
-        free_end: as in `amplitude_of`.
-        families: as in `limits_over`.
-        any_cables: whether there may be more cables than degrees of freedom.
-
-    Returns:
-        the problem, and the frame of the robot.
-
-    Raises:
-        InputError: more cables than degrees of freedom where they must not be, or what `amplitude_of` and `limits_over`
-            refuse.
-    """
+    """Robot, limits and amplitude function, as the kernels take them."""
     function = amplitude_of(amplitude, free_end=free_end)
     (check_moved if any_cables else check_determined)(robot)
     prepared_robot, frame = prepared(robot)
@@ -153,73 +100,29 @@ def kernel_problem(
 
 
 def batched(kind, segments, problem: Problem, answers: Answers, frame: Frame, *more) -> Any:
-    """Motions of answers, as one motion whose leaves all have a leading dimension, so that `jax.vmap` takes it.
-
-    Args:
-        kind: class of the motions.
-        segments: leaves (n, ...).
-        *more: further fields of the class.
-
-    Returns:
-        the motions, in the robot's axes.
-    """
+    """Motions of answers, as one motion whose leaves all have a leading dimension, so that `jax.vmap` takes it."""
     count = len(answers.tried_arcs)
     shared = jax.tree.map(lambda x: np.broadcast_to(x, (count, *np.shape(x))), (problem.amplitude, frame))
     return Placed(kind(segments, shared[0], answers.tried_arcs.astype(float), *more), shared[1])
 
 
-def depths(z0, count: int) -> np.ndarray:
-    """Depths of P0.
-
-    Args:
-        z0: () or (count,) m.
-        count: number of motions.
-
-    Returns:
-        (count,) m.
-
-    Raises:
-        InputError: the wrong shape, or not positive.
-    """
+def depths(z0, count: int) -> Float[np.ndarray, "count"]:
+    """Depths of P0."""
     if np.shape(z0) not in ((), (count,)):
         raise InputError("z0", f"shape {np.shape(z0)}", f"a number > 0, or ({count},) of them")
     return np.broadcast_to(DEPTHS.array("z0", z0), (count,)).copy()
 
 
 def release_ranges(x, y, z) -> list:
-    """Ranges of places of release.
-
-    Args:
-        x: least and largest x, m; None: unbounded here.
-        y: likewise.
-        z: likewise.
-
-    Returns:
-        the three.
-
-    Raises:
-        InputError: a least one above the largest.
-    """
+    """Ranges of places of release."""
     for name, values in {"release_x": x, "release_y": y, "release_z": z}.items():
         if values is not None and not values[0] <= values[1]:
             raise InputError(name, list(values), "[least, largest], the first not above the second, at most 1e6 m")
     return [x, y, z]
 
 
-def quaternions(key: str, orientations, count: int) -> np.ndarray:
-    """Orientations.
-
-    Args:
-        key: named in errors.
-        orientations: (count, 4) unit quaternions, scalar first; None: the reference orientation.
-        count: number of poses.
-
-    Returns:
-        (count, 4).
-
-    Raises:
-        InputError: the wrong shape, or not of unit length.
-    """
+def quaternions(key: str, orientations, count: int) -> Float[np.ndarray, "count 4"]:
+    """Orientations."""
     if orientations is None:
         return np.tile(IDENTITY, (count, 1))
     values = np.asarray(orientations, float)
@@ -228,17 +131,6 @@ def quaternions(key: str, orientations, count: int) -> np.ndarray:
     return values / np.linalg.norm(values, axis=1, keepdims=True)
 
 
-def points_of(key: str, points) -> np.ndarray:
-    """Points.
-
-    Args:
-        key: named in errors.
-        points: (n, 3) m, n >= 1.
-
-    Returns:
-        (n, 3) m.
-
-    Raises:
-        InputError: the wrong shape, not finite, or beyond 1e6 m.
-    """
+def points_of(key: str, points) -> Float[np.ndarray, "n 3"]:
+    """Points."""
     return POINTS.array(key, points)

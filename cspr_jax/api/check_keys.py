@@ -22,14 +22,7 @@ NAME = Path("motion")
 
 
 def robot_table(robot: AnyRobot) -> dict[str, Any]:
-    """Keys of a robot file for a robot made in Python.
-
-    Args:
-        robot: in its own axes.
-
-    Returns:
-        plain values.
-    """
+    """Keys of a robot file for a robot made in Python."""
     table: dict[str, Any] = {"name": robot.name or "robot", "pattern": robot.pattern, "z_axis": robot.z_axis}
     table |= {name: getattr(robot, name) for name in ("base_points", "mass", "gravity", "cable_diameter")}
     if isinstance(robot, PlatformRobot):
@@ -51,14 +44,7 @@ def robot_table(robot: AnyRobot) -> dict[str, Any]:
 def check_keys(
     robot: AnyRobot | str | Path, limits: Limits | Mapping[str, Any] | None, **settings: Any
 ) -> dict[str, Any]:
-    """Keys of the plan of a motion that is checked.
-
-    Args:
-        settings: further keys; None: absent.
-
-    Returns:
-        plain values.
-    """
+    """Keys of the plan of a motion that is checked."""
     keys: dict[str, Any] = {"schema": 1, "family": "spline", "motion": str(NAME)}
     keys["robot"] = str(robot) if isinstance(robot, str | Path) else robot_table(robot)
     return keys | {name: value for name, value in settings.items() if value is not None} | _limit_keys(limits)

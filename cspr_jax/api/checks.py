@@ -281,19 +281,7 @@ def _check_source(times: Any, samples: Mapping[str, Any], duration: float | None
 def check_file(
     motion: Path, keys: Mapping[str, Any], *, outputs: Sequence[str] = (), limits: Path | None = None
 ) -> Check:
-    """Check the motion of a file.
-
-    Args:
-        keys: of a plan: its robot, and what else it has but the motion.
-        outputs: options of what is to be made of the motion, for which it must be held.
-        limits: file that they come from; None: none.
-
-    Returns:
-        the check, feasible or not.
-
-    Raises:
-        ConfigError: a mistake in a file.
-    """
+    """Check the motion of a file."""
     with double_precision():
         data = {"schema": 1, "family": "spline", **keys, "motion": str(motion)}
         plan = plan_keys(data, motion)

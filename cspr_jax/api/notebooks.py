@@ -51,14 +51,7 @@ def _image(result: "Result") -> str:
 
 
 def plan_summary(plan: Any) -> list[str]:
-    """Robot, durations and verdicts of a plan, as lines.
-
-    Args:
-        plan: `api.plans.Plan`.
-
-    Returns:
-        one line for the plan, and one for each segment.
-    """
+    """Robot, durations and verdicts of a plan, as lines."""
     segments = plan.to_dict()["segments"]
     word = "feasible, proved" if plan.feasible else "not proved feasible"
     families, total = ", ".join(plan.keys.families), float(np.sum(plan.answers.duration))

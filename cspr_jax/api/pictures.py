@@ -99,14 +99,7 @@ def plot(  # noqa: PLR0913
 def sources_beside(
     plan: str | Path | None, robot: "AnyRobot | str | Path | None", z_axis: str | None
 ) -> dict[str, Any]:
-    """Robot, plan or axes beside motions in CSV.
-
-    Returns:
-        arguments of `outputs.plots.motion_source.completed`.
-
-    Raises:
-        ConfigError: two of them.
-    """
+    """Robot, plan or axes beside motions in CSV."""
     sources = {"--plan": plan, "--robot": robot, "--z-axis": z_axis}
     options = [option for option, value in sources.items() if value is not None]
     if len(options) > 1:
@@ -128,31 +121,12 @@ def _opened(source: Path | Result, name: str, beside: dict[str, Any]) -> Result:
 
 
 def names_of(axes: str | Sequence[str]) -> list[str]:
-    """Names of axes that may be given as one.
-
-    Args:
-        axes: one, or several.
-
-    Returns:
-        all of them.
-    """
+    """Names of axes that may be given as one."""
     return [axes] if isinstance(axes, str) else list(axes)
 
 
 def finished(draw: Callable[[], Figure], name: str, style: Style, output: str | Path | None) -> Figure:
-    """A picture in the common style, written if `output` is given.
-
-    Args:
-        name: name of the result, for errors.
-        output: picture to write; its ending selects the format. None: nothing is written.
-
-    Returns:
-        the figure of matplotlib.
-
-    Raises:
-        StoreError: the picture cannot be written.
-        ConfigError: nothing to draw, a size out of bounds, or an unknown picture format.
-    """
+    """A picture in the common style, written if `output` is given."""
     picture = None
     stage("drawing")
     try:

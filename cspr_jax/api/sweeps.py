@@ -163,17 +163,7 @@ def _executor(job: Job, prepare: Callable[[], None]) -> Iterator[Executor]:
 
 
 def checked_sweep(source: str | Path | Mapping[str, Any]) -> Sweep:
-    """A sweep, checked without computing anything.
-
-    Args:
-        source: path of a sweep file, or what it holds.
-
-    Returns:
-        the sweep.
-
-    Raises:
-        ConfigError: a mistake in it.
-    """
+    """A sweep, checked without computing anything."""
     if not isinstance(source, Mapping):
         return read_sweep(Path(source))
     data = plain(source)
@@ -229,11 +219,7 @@ def run(
 
 
 def check_tiles(tiles: tuple[int, int] | None, count: int) -> None:
-    """Refuse a range of tiles that a sweep does not have; its end may lie beyond the last one.
-
-    Raises:
-        ConfigError: it is empty, or begins beyond the last tile.
-    """
+    """Refuse a range of tiles that a sweep does not have; its end may lie beyond the last one."""
     if tiles is not None and not 0 <= tiles[0] < min(tiles[1], count):
         raise ConfigError("--tiles", f"{tiles[0]}:{tiles[1]}: must be FIRST:END within the {count} tiles, such as 0:8")
 
@@ -260,11 +246,7 @@ def merge(paths: Sequence[str | Path], directory: str | Path, *, accept_environm
 def merged(
     paths: Sequence[str | Path], directory: Path, options: engine.Options, hooks: engine.Hooks | None = None
 ) -> Path:
-    """As `merge`, with the options and hooks of a run.
-
-    Returns:
-        the path of the result.
-    """
+    """As `merge`, with the options and hooks of a run."""
     from cspr_jax.sweep.merging import Merged, read_part
 
     places = [Path(path) for path in paths]

@@ -8,13 +8,18 @@ Each operation widens the band by what rounding may be of it. Operations are com
 them are traced, and written down for XLA, as calls of a few.
 """
 
+from __future__ import annotations
+
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float
 
 # A few roundings of an operation, in parts of the largest number in it.
 ROUNDING = 8.0 * float(np.finfo(float).eps)
@@ -35,29 +40,17 @@ class AffineBounds(NamedTuple):
     radius: Any
     square: Any = None
 
-    def reach(self) -> Array:
-        """How far the function may be from `middle`.
-
-        Returns:
-            (...).
-        """
+    def reach(self) -> Float[Array, "..."]:
+        """How far the function may be from `middle`."""
         reach = jnp.abs(self.slope) + self.radius
         return reach if self.square is None else reach + jnp.abs(self.square)
 
-    def low(self) -> Array:
-        """Lower bound.
-
-        Returns:
-            (...).
-        """
+    def low(self) -> Float[Array, "..."]:
+        """Lower bound."""
         return self.middle - self.reach() if self.square is None else -(-self).high()
 
-    def high(self) -> Array:
-        """Upper bound.
-
-        Returns:
-            (...).
-        """
+    def high(self) -> Float[Array, "..."]:
+        """Upper bound."""
         if self.square is None:
             return self.middle + self.reach()
         # The top of a parabola may lie within the block.
@@ -65,31 +58,16 @@ class AffineBounds(NamedTuple):
         top = jnp.where(is_within, -0.25 * rise**2 / jnp.where(is_within, self.square, 1.0), rise + self.square)
         return self.middle + top + self.radius
 
-    def size(self) -> Array:
-        """Bound of the absolute value.
-
-        Returns:
-            (...).
-        """
+    def size(self) -> Float[Array, "..."]:
+        """Bound of the absolute value."""
         return jnp.abs(self.middle) + self.reach()
 
     def each(self, change) -> "AffineBounds":
-        """The same bounds in another order, such as transposed or with another dimension.
-
-        Args:
-            change: takes an array and keeps its numbers.
-
-        Returns:
-            the bounds.
-        """
+        """The same bounds in another order, such as transposed or with another dimension."""
         return jax.tree.map(change, self)
 
     def total(self, axis: int = -1) -> "AffineBounds":
-        """Bounds of the sum along an axis.
-
-        Returns:
-            the bounds.
-        """
+        """Bounds of the sum along an axis."""
         return _total(self, axis)
 
     def __add__(self, other: Any) -> "AffineBounds":
@@ -122,14 +100,7 @@ class AffineBounds(NamedTuple):
 
 
 def rounded(bounds: AffineBounds, size: Any = 0.0) -> AffineBounds:
-    """Bounds with a band that is wider by the rounding of numbers as large as they are, or more.
-
-    Args:
-        size: (...) of further numbers.
-
-    Returns:
-        the bounds.
-    """
+    """Bounds with a band that is wider by the rounding of numbers as large as they are, or more."""
     return bounds._replace(radius=bounds.radius + ROUNDING * (bounds.size() + size))
 
 
@@ -192,46 +163,27 @@ def _product(f: AffineBounds, g: AffineBounds) -> AffineBounds:
     return product._replace(radius=product.radius + ROUNDING * (product.radius + size))
 
 
-def squares(f: AffineBounds) -> Array:
-    """Shares of s^2.
-
-    Returns:
-        (...) zeros of a line.
-    """
+def squares(f: AffineBounds) -> Float[Array, "..."]:
+    """Shares of s^2."""
     return jnp.zeros_like(f.middle) if f.square is None else f.square
 
 
 def flat(f: AffineBounds) -> AffineBounds:
-    """Bounds around a line.
-
-    Returns:
-        the bounds, from those around a parabola, too.
-    """
+    """Bounds around a line."""
     if f.square is None:
         return f
     half = 0.5 * f.square
     return rounded(AffineBounds(f.middle + half, f.slope, f.radius + jnp.abs(half)))
 
 
-def constant(values: Array) -> AffineBounds:
-    """Bounds of constants.
-
-    Args:
-        values: (...).
-
-    Returns:
-        the bounds.
-    """
+def constant(values: Float[Array, "..."]) -> AffineBounds:
+    """Bounds of constants."""
     return AffineBounds(values, jnp.zeros_like(values), jnp.zeros_like(values))
 
 
 @jax.jit
 def squared(f: AffineBounds) -> AffineBounds:
-    """Bounds of f^2.
-
-    Returns:
-        the bounds.
-    """
+    """Bounds of f^2."""
     if f.square is not None:
         return f * f
     half, line = 0.5 * f.slope**2, jnp.abs(f.middle) + jnp.abs(f.slope)
@@ -239,29 +191,14 @@ def squared(f: AffineBounds) -> AffineBounds:
     return rounded(AffineBounds(f.middle**2 + half, 2.0 * f.middle * f.slope, radius), line**2)
 
 
-def selected(choices: Array, f: AffineBounds, g: AffineBounds) -> AffineBounds:
-    """Bounds of f where a condition holds, else of g.
-
-    Args:
-        choices: (...) whether it holds; of the shape of both, or one that extends to it.
-
-    Returns:
-        the bounds.
-    """
+def selected(choices: Bool[Array, "..."], f: AffineBounds, g: AffineBounds) -> AffineBounds:
+    """Bounds of f where a condition holds, else of g."""
     return jax.tree.map(lambda a, b: jnp.where(choices, a, b), f, g)
 
 
 @jax.jit
-def dot(f: AffineBounds, g: AffineBounds | Array) -> AffineBounds:
-    """Bounds of the products of vectors.
-
-    Args:
-        f: (..., n).
-        g: (..., n).
-
-    Returns:
-        (...).
-    """
+def dot(f: AffineBounds, g: AffineBounds | Float[Array, "... n"]) -> AffineBounds:
+    """Bounds of the products of vectors."""
     if not isinstance(g, AffineBounds):
         return (f * g).total()
     product, size = _products(f, g)
@@ -271,27 +208,13 @@ def dot(f: AffineBounds, g: AffineBounds | Array) -> AffineBounds:
 
 @jax.jit
 def norm_squared(f: AffineBounds) -> AffineBounds:
-    """Bounds of the squared lengths of vectors.
-
-    Args:
-        f: (..., n).
-
-    Returns:
-        (...).
-    """
+    """Bounds of the squared lengths of vectors."""
     return squared(f).total()
 
 
 @jax.jit
 def norm(f: AffineBounds) -> AffineBounds:
-    """Bounds of the lengths of vectors, also of those that vanish.
-
-    Args:
-        f: (..., n).
-
-    Returns:
-        (...).
-    """
+    """Bounds of the lengths of vectors, also of those that vanish."""
     f = flat(f)
     # A length is convex: it lies below the chord between the ends of the line, and above its part along any direction.
     start, end = (jnp.sqrt(jnp.sum((f.middle + side) ** 2, axis=-1)) for side in (-f.slope, f.slope))
@@ -304,15 +227,7 @@ def norm(f: AffineBounds) -> AffineBounds:
 
 @jax.jit
 def cross(f: AffineBounds, g: AffineBounds) -> AffineBounds:
-    """Bounds of the vector products.
-
-    Args:
-        f: (..., 3).
-        g: (..., 3).
-
-    Returns:
-        (..., 3).
-    """
+    """Bounds of the vector products."""
 
     def ahead(bounds: AffineBounds) -> AffineBounds:
         return bounds.each(lambda x: jnp.concatenate([x[..., 1:], x[..., :1]], axis=-1))
@@ -321,37 +236,18 @@ def cross(f: AffineBounds, g: AffineBounds) -> AffineBounds:
 
 
 @jax.jit
-def turned(matrix: AffineBounds | Array, f: AffineBounds | Array) -> AffineBounds:
-    """Bounds of matrices times vectors; one of both may be constant.
-
-    Args:
-        matrix: (..., m, n).
-        f: (..., n).
-
-    Returns:
-        (..., m).
-    """
+def turned(matrix: AffineBounds | Float[Array, "... m n"], f: AffineBounds | Float[Array, "... n"]) -> AffineBounds:
+    """Bounds of matrices times vectors; one of both may be constant."""
     across: Any = f.each(lambda x: x[..., None, :]) if isinstance(f, AffineBounds) else f[..., None, :]
     # Constants go to the right.
     return dot(matrix, across) if isinstance(matrix, AffineBounds) else dot(across, matrix)
 
 
 def stacked(bounds: "list[AffineBounds]", axis: int = -1) -> AffineBounds:
-    """Bounds of several functions in one array.
-
-    Args:
-        bounds: of one shape.
-
-    Returns:
-        the bounds, with one more axis.
-    """
+    """Bounds of several functions in one array."""
     return jax.tree.map(lambda *leaves: jnp.stack(leaves, axis), *bounds)
 
 
 def joined(bounds: "list[AffineBounds]", axis: int = -1) -> AffineBounds:
-    """Bounds one after the other along an axis.
-
-    Returns:
-        the bounds.
-    """
+    """Bounds one after the other along an axis."""
     return jax.tree.map(lambda *leaves: jnp.concatenate(leaves, axis), *bounds)

@@ -29,13 +29,6 @@ def in_threads(function: Callable, items: Sequence) -> list:
     """Results of a function, in order, by two threads: work that XLA does on one core runs beside that of the other.
 
     In a process that computes on one core, one thread does it all.
-
-    Args:
-        function: called from several threads.
-        items: arguments of the function, one for each call.
-
-    Returns:
-        one result an item.
     """
     # jax does not say its type.
     device = jax.config.jax_default_device  # type: ignore[attr-defined]
@@ -55,14 +48,6 @@ def in_parts(function: Callable[[slice], Found], count: int, size: int) -> list[
     """Results of many cases, range by range.
 
     Two threads work: what one does outside of XLA, and what XLA does on one core, runs beside the work of the other.
-
-    Args:
-        function: gives the result of a range of cases; it is called from several threads.
-        count: number of cases, at least one.
-        size: length of the largest range.
-
-    Returns:
-        one result a range, in order.
     """
     # All parts have one length, and each thread gets as many.
     rounds = -(-count // (THREADS * size))
@@ -71,31 +56,12 @@ def in_parts(function: Callable[[slice], Found], count: int, size: int) -> list[
 
 
 def room(size: int) -> int:
-    """Length of a batch on the device in use.
-
-    Args:
-        size: length on a CPU.
-
-    Returns:
-        the length.
-    """
+    """Length of a batch on the device in use."""
     return min(size * LARGER.get(jax.default_backend(), 1), LARGEST)
 
 
 def row_by_row(function: Callable, rows):
-    """Apply a function of many lanes to each row of a table, inside of a compiled function.
-
-    On a CPU one row follows the other, so that the lanes stay in its caches. Elsewhere rows are taken in two halves: a
-    GPU waits for the start of every kernel, and XLA stores the results of a loop, while it would compute a formula
-    outside of loops again for each of its consumers.
-
-    Args:
-        function: takes one row, a pytree without the leading dimension.
-        rows: pytree of arrays (m, ...).
-
-    Returns:
-        pytree of the results, leaves (m, ...).
-    """
+    """Apply a function of many lanes to each row of a table, inside of a compiled function."""
     if jax.default_backend() == "cpu":
         return lax.map(function, rows)
     count = len(jax.tree.leaves(rows)[0])
@@ -103,17 +69,7 @@ def row_by_row(function: Callable, rows):
 
 
 def in_batches(function: Callable, arguments, *, size: int, axis: int = 0):
-    """Apply a compiled function to arrays of any length, in batches of one length.
-
-    Args:
-        function: takes one pytree whose leaves have leading dimension `size`, returns a pytree likewise.
-        arguments: pytree of arrays (n, ...), n >= 0.
-        size: length of a batch on a CPU; see `room`.
-        axis: axis along which the results of a batch are joined.
-
-    Returns:
-        pytree of NumPy arrays, of length n along the axis; None if n is 0.
-    """
+    """Apply a compiled function to arrays of any length, in batches of one length."""
     size = room(size)
     arguments = jax.tree.map(np.asarray, arguments)  # to slice an array of jax takes a hundred times as long
     count = len(jax.tree.leaves(arguments)[0])
@@ -132,14 +88,7 @@ def in_batches(function: Callable, arguments, *, size: int, axis: int = 0):
 
 
 def padded(arguments, size: int):
-    """Arrays padded to the length of a batch.
-
-    Args:
-        arguments: pytree of NumPy arrays (n, ...), 0 < n <= size.
-
-    Returns:
-        the pytree (size, ...), its last elements repeated.
-    """
+    """Arrays padded to the length of a batch."""
 
     def one(array):
         if len(array) == size:

@@ -1,10 +1,15 @@
 """Smallest values of functions over intervals, with a proof: blocks are halved until values and bounds agree."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 ROUNDS = 64
 # A bound and an attained value agree if they differ by no more than this part of the scale of the values.
@@ -45,11 +50,7 @@ class MinimumBlocks(NamedTuple):
         return MinimumBlocks(*(x[index] for x in self))
 
     def halved(self) -> "MinimumBlocks":
-        """Both halves of each block.
-
-        Returns:
-            twice as many.
-        """
+        """Both halves of each block."""
         half = 0.5 * self.width
         left, right = (self.case, self.piece, self.start, half), (self.case, self.piece, self.start + half, half)
         return MinimumBlocks(*(np.concatenate(pair) for pair in zip(left, right, strict=True)))
@@ -59,23 +60,12 @@ def smallest(
     blocks: MinimumBlocks,
     count: int,
     values: Callable[[MinimumBlocks], tuple[np.ndarray, np.ndarray]],
-    scales: np.ndarray,
+    scales: Float[np.ndarray, "n_groups"],
     *,
     size: int,
     enough: float = math.inf,
 ) -> Proved:
-    """Smallest values over all blocks of each case.
-
-    Args:
-        count: number of cases n.
-        values: takes blocks, and gives a lower bound and an attained value of each, (n_blocks, n_groups).
-        scales: (n_groups,) scales of the values.
-        size: number of blocks that are given to `values` at a time.
-        enough: bounds above this many scales need not be sharp.
-
-    Returns:
-        the values; inf for a case without blocks.
-    """
+    """Smallest values over all blocks of each case."""
     best = np.full((count, len(scales)), np.inf)
     done, seen = best.copy(), 0
     for halvings in range(ROUNDS + 1):

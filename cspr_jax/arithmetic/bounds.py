@@ -4,22 +4,19 @@ A proof that holds between samples needs a bound of a second derivative. Instead
 its factors are bounded once, and the bounds combined by Leibniz' rule.
 """
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax.numpy as jnp
 from jax import Array
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
-def hypotenuse(a: Array, b: Array) -> Array:
-    """Length of a vector in a plane; `jnp.hypot` takes several times as long, for the sake of squares that overflow.
 
-    Args:
-        a: (...) one component.
-        b: (...) the other.
-
-    Returns:
-        (...).
-    """
+def hypotenuse(a: Float[Array, "..."], b: Float[Array, "..."]) -> Float[Array, "..."]:
+    """Length of a vector in a plane; `jnp.hypot` takes several times as long, for the sake of squares that overflow."""
     return jnp.sqrt(a * a + b * b)
 
 

@@ -9,11 +9,17 @@ and a polynomial lies between its smallest and largest Bernstein coefficient (L.
 Approximation Practice, theorem 8.2; G. Farin, Curves and Surfaces for CAGD).
 """
 
+from __future__ import annotations
+
 import functools
 import math
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 DEGREE = 18
 # Bound of Lebesgue's constant of the nodes, by which an error of the values can grow between them.
@@ -23,22 +29,14 @@ RADII = (2.5, 6.0)
 
 
 @functools.cache
-def nodes() -> np.ndarray:
-    """Chebyshev's nodes, both ends among them.
-
-    Returns:
-        (n + 1,) in [-1, 1], increasing.
-    """
+def nodes() -> Float[np.ndarray, "n+1"]:
+    """Chebyshev's nodes, both ends among them."""
     return -np.cos(np.pi * np.arange(DEGREE + 1) / DEGREE)
 
 
 @functools.cache
-def bernstein() -> np.ndarray:
-    """Matrix from values at the nodes to Bernstein coefficients.
-
-    Returns:
-        (n + 1, n + 1), computed in integers and rounded once.
-    """
+def bernstein() -> Float[np.ndarray, "n+1 n+1"]:
+    """Matrix from values at the nodes to Bernstein coefficients."""
     places = [(1 + Fraction(float(x))) / 2 for x in nodes()]
     scale = max(place.denominator for place in places)  # a power of two, as all of them
     whole, columns = [int(place * scale) for place in places], []
@@ -53,25 +51,11 @@ def bernstein() -> np.ndarray:
     return np.array(columns).T
 
 
-def remainders(radii: np.ndarray) -> np.ndarray:
-    """Factors from bounds on ellipses to bounds of the remainder.
-
-    Args:
-        radii: (m,) rho, above 1.
-
-    Returns:
-        (m,).
-    """
+def remainders(radii: Float[np.ndarray, "m"]) -> Float[np.ndarray, "m"]:
+    """Factors from bounds on ellipses to bounds of the remainder."""
     return 4.0 * radii**-DEGREE / (radii - 1.0)
 
 
-def semi_axes(radii: np.ndarray) -> np.ndarray:
-    """Semi-axes of the ellipses.
-
-    Args:
-        radii: (m,) rho, at least 1.
-
-    Returns:
-        (m, 2) along the axis and across.
-    """
+def semi_axes(radii: Float[np.ndarray, "m"]) -> Float[np.ndarray, "m 2"]:
+    """Semi-axes of the ellipses."""
     return np.stack([0.5 * (radii + 1.0 / radii), 0.5 * (radii - 1.0 / radii)], axis=1)

@@ -1,8 +1,10 @@
 """Least value of a smooth objective under smallest margins: the best of many places are improved, and proved."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -10,6 +12,9 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # A function of arguments and unknowns (n,) that gives the objective () and the margins (n_margins,).
 Parts = Callable[[Any, Array], tuple[Array, Array]]
@@ -51,19 +56,13 @@ def _slopes(parts: Parts, arguments: Any, x: Array) -> tuple[Array, Array]:
 
 
 def least(
-    parts: Parts, arguments: Any, low: np.ndarray, high: np.ndarray, judged: Callable[[np.ndarray], Judged]
-) -> np.ndarray:
-    """Unknowns with the least objective among feasible ones: a local minimum, or the best of several.
-
-    Args:
-        parts: a function at the top of a module, so that it is compiled once.
-        low: (n,) smallest unknowns.
-        high: (n,) largest unknowns.
-        judged: proves or refutes a place.
-
-    Returns:
-        (n,) a feasible place if any improved place is feasible; else the place with the largest margin.
-    """
+    parts: Parts,
+    arguments: Any,
+    low: Float[np.ndarray, "n"],
+    high: Float[np.ndarray, "n"],
+    judged: Callable[[np.ndarray], Judged],
+) -> Float[np.ndarray, "n"]:
+    """Unknowns with the least objective among feasible ones: a local minimum, or the best of several."""
     from scipy.stats import qmc  # it takes a second to import
 
     share = qmc.Halton(len(low), seed=0).random(LOOKED_AT)

@@ -10,12 +10,7 @@ _GROUPS, _MOUNTED = Path("/proc/self/cgroup"), Path("/sys/fs/cgroup")
 
 
 def cores() -> int:
-    """Number of cores that this process computes on.
-
-    Returns:
-        the number, at least 1: the value of the environment variable `SHARE`, else all cores that the process may use,
-        within the quota of its container or job.
-    """
+    """Number of cores that this process computes on."""
     share = os.environ.get(SHARE, "")
     if share.isascii() and share.isdigit() and int(share) > 0:
         return int(share)
@@ -25,14 +20,7 @@ def cores() -> int:
 
 
 def quota(groups: Path = _GROUPS, mounted: Path = _MOUNTED) -> float:
-    """Quota of time, in cores, that Linux's control groups (versions 1 and 2) grant this process.
-
-    Args:
-        mounted: folder of the control groups.
-
-    Returns:
-        the least quota of all levels; infinite where there is none.
-    """
+    """Quota of time, in cores, that Linux's control groups (versions 1 and 2) grant this process."""
     try:
         lines = groups.read_text("utf-8", "replace").splitlines()
     except OSError:

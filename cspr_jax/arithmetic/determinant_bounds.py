@@ -1,21 +1,21 @@
 """Bounds of determinants over a block, by elimination in affine bounds with the largest pivots of the middle."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.arithmetic.affine_bounds import AffineBounds
 from cspr_jax.arithmetic.function_bounds import reciprocal
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 
 def determinant(matrix: AffineBounds) -> AffineBounds:
-    """Bounds of the determinant of a small matrix.
-
-    Args:
-        matrix: (n, n), n >= 1.
-
-    Returns:
-        (); the radius is NaN where a pivot but the last may vanish.
-    """
+    """Bounds of the determinant of a small matrix."""
     rest, product = matrix, matrix.each(lambda x: jnp.ones((), x.dtype))
     product = product._replace(slope=jnp.zeros_like(product.slope), radius=jnp.zeros_like(product.radius))
     while len(rest.middle) > 1:
@@ -40,23 +40,14 @@ def _swapped(count: int, place: Array) -> Array:
     return jnp.where(index == place, 0, jnp.where(index == 0, place, index))
 
 
-def size_range(number: AffineBounds) -> tuple[Array, Array]:
-    """Bounds of the absolute value.
-
-    Returns:
-        lower bound, 0 where the sign may change or nothing is known, and upper bound, inf where nothing is known, (...)
-        each.
-    """
+def size_range(number: AffineBounds) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
+    """Bounds of the absolute value."""
     low, high = number.low(), number.high()
     least = jnp.where(low > 0.0, low, jnp.where(high < 0.0, -high, 0.0))
     most = number.size()
     return least, jnp.where(jnp.isnan(most), jnp.inf, most)
 
 
-def changes_sign(number: AffineBounds) -> Array:
-    """Tell whether a number is proved to have opposite signs at both ends of the block.
-
-    Returns:
-        (...), False where nothing is known.
-    """
+def changes_sign(number: AffineBounds) -> Float[Array, "..."]:
+    """Tell whether a number is proved to have opposite signs at both ends of the block."""
     return jnp.abs(number.middle) < jnp.abs(number.slope) - number.radius

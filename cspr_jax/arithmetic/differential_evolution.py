@@ -7,9 +7,11 @@ gradients would get stuck. All questions use the same places and moves, so that 
 on other questions.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -17,6 +19,9 @@ import numpy as np
 from jax import Array, lax
 
 from cspr_jax.arithmetic.batches import in_batches, in_parts
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # A function of arguments, a question and unknowns (d,) in [0, 1] that gives the objective () >= 0 and the smallest
 # margin ().
@@ -48,14 +53,7 @@ class Moves(NamedTuple):
 
 
 def moves_of(unknowns: int, population: int) -> Moves:
-    """Moves, the same ones for all questions.
-
-    Args:
-        population: number of members n, at least 2.
-
-    Returns:
-        the moves.
-    """
+    """Moves, the same ones for all questions."""
     random = np.random.default_rng(0)
     shape = (GENERATIONS * population, population)
     # A permutation and the same permutation rolled pair no member with itself.
@@ -115,18 +113,8 @@ def _rank(value: Array, margin: Array, threshold: Array) -> Array:
 
 def evolved(
     parts: Parts, arguments: Any, questions: Any, *, unknowns: int, margins: tuple[float, ...], population: int
-) -> np.ndarray:
-    """Best places of many questions.
-
-    Args:
-        parts: a function at the top of a module, so that it is compiled once.
-        questions: pytree of NumPy arrays (n, ...).
-        margins: below 1, at each of which the objective is to be least; inf: the margin is to be largest.
-        population: number of members; twice as many take four times as long.
-
-    Returns:
-        (n, n_margins, d) in [0, 1]; where no place has the margin, the place with the largest margin.
-    """
+) -> Float[np.ndarray, "n n_margins d"]:
+    """Best places of many questions."""
     from scipy.stats import qmc  # it takes a second to import
 
     places = qmc.Halton(unknowns, seed=0).random(GROUP * population)

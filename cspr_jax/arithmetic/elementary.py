@@ -1,15 +1,20 @@
 """Elementary functions that XLA compiles well, for one number or an array of any shape."""
 
+from __future__ import annotations
+
 import contextlib
 import math
 import os
 from collections.abc import Iterator
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Numbers of terms that keep the truncation error below half a unit in the last place on |x| <= pi / 2.
 _SINE_TERMS = {"float64": 11, "float32": 7}
@@ -18,47 +23,26 @@ _COSINE_TERMS = {"float64": 12, "float32": 7}
 PROMOTION = ("standard", "allow")
 
 
-def polynomial(coefficients, x: Array) -> Array:
-    """Value of c[0] + c[1] x + c[2] x^2 + ... by Horner's rule.
-
-    Args:
-        coefficients: (n,) sequence, lowest power first; numbers, or arrays of the shape of `x`.
-        x: (...) argument.
-
-    Returns:
-        (...) value, in the dtype of `x`.
-    """
+def polynomial(coefficients, x: Float[Array, "..."]) -> Float[Array, "..."]:
+    """Value of c[0] + c[1] x + c[2] x^2 + ... by Horner's rule."""
     value = jnp.zeros_like(x)
     for coefficient in reversed(coefficients):
         value = value * x + coefficient
     return value
 
 
-def unit_vectors(vectors: np.ndarray) -> np.ndarray:
-    """Vectors scaled to length 1; a zero vector stays zero.
-
-    Args:
-        vectors: (..., k).
-
-    Returns:
-        (..., k).
-    """
+def unit_vectors(vectors: Float[np.ndarray, "... k"]) -> Float[np.ndarray, "... k"]:
+    """Vectors scaled to length 1; a zero vector stays zero."""
     sizes = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors / np.where(sizes > 0.0, sizes, 1.0)
 
 
 @jax.jit
-def sincospi(x: Array) -> tuple[Array, Array]:
+def sincospi(x: Float[Array, "..."]) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
     """sin(pi x) and cos(pi x), by range reduction and a polynomial.
 
     The sine and cosine of XLA's CPU backend run one element at a time; this runs in vector
     registers. Counting the angle in half turns makes the reduction exact.
-
-    Args:
-        x: (...) angle in half turns (1 is pi radians); |x| below 2^50.
-
-    Returns:
-        sin(pi x): (...) and cos(pi x): (...), each within 3.5e-16 (float64) or 2e-7 (float32) of the truth.
     """
     half_turns = jnp.round(x)
     angle = x - half_turns
@@ -70,28 +54,13 @@ def sincospi(x: Array) -> tuple[Array, Array]:
     return sign * (math.pi * angle) * sine, sign * cosine
 
 
-def lesser(a: Array, b: Array) -> Array:
-    """The smaller of two numbers in one machine instruction; XLA's minimum takes four, for the sake of NaN.
-
-    Args:
-        a: (...).
-        b: (...).
-
-    Returns:
-        (...) where one is NaN, b.
-    """
+def lesser(a: Float[Array, "..."], b: Float[Array, "..."]) -> Float[Array, "..."]:
+    """The smaller of two numbers in one machine instruction; XLA's minimum takes four, for the sake of NaN."""
     return jnp.where(a < b, a, b)
 
 
-def length(vector: Array) -> Array:
-    """Length of a vector, with a gradient of zero where it is zero.
-
-    Args:
-        vector: (n,).
-
-    Returns:
-        ().
-    """
+def length(vector: Float[Array, "n"]) -> Float[Array, ""]:
+    """Length of a vector, with a gradient of zero where it is zero."""
     square = jnp.sum(vector * vector)
     # The length is NaN where the square is.
     return jnp.where(square > 0.0, jnp.sqrt(jnp.where(square > 0.0, square, 1.0)), square)
@@ -117,9 +86,6 @@ def double_precision() -> Iterator[None]:
     """Set jax as this package needs it, whatever the caller has set, and restore the caller's settings afterwards.
 
     Above all 64 bits, since verdicts are in float64. NaN is a valid answer in places, so that it is no error.
-
-    Raises:
-        RuntimeError: this process was forked from a process that had used jax, whose threads do not survive a fork.
     """
     _refuse_fork()
     with contextlib.ExitStack() as stack:
@@ -137,30 +103,14 @@ def double_precision() -> Iterator[None]:
 
 
 def leaf(value) -> Array:
-    """A float64 NumPy array, as a leaf of a pytree that compiled functions take.
-
-    It is NumPy's, since jax would round it to float32 where 64 bits are off.
-
-    Args:
-        value: number or nested sequence; values that jax is tracing stay as they are.
-
-    Returns:
-        the array.
-    """
+    """A float64 NumPy array, as a leaf of a pytree that compiled functions take."""
     return value if isinstance(value, jax.core.Tracer) else cast(Array, np.asarray(value, float))
 
 
-def vertex(left: Array, middle: Array, right: Array) -> tuple[Array, Array]:
-    """Vertex of the parabola through three equidistant values: its place, and the value there.
-
-    Args:
-        left: () value one step before.
-        middle: () value.
-        right: () value one step after.
-
-    Returns:
-        steps from the middle value, () in [-1, 1]; the value, (). Without a minimum inside, those of an end.
-    """
+def vertex(
+    left: Float[Array, ""], middle: Float[Array, ""], right: Float[Array, ""]
+) -> tuple[Float[Array, ""], Float[Array, ""]]:
+    """Vertex of the parabola through three equidistant values: its place, and the value there."""
     bend = left - 2.0 * middle + right
     move = 0.5 * (left - right) / jnp.where(bend > 0.0, bend, 1.0)
     move = jnp.clip(jnp.where(bend > 0.0, move, jnp.sign(left - right)), -1.0, 1.0)
@@ -168,18 +118,11 @@ def vertex(left: Array, middle: Array, right: Array) -> tuple[Array, Array]:
 
 
 @jax.jit
-def solved(matrix: Array, right: Array) -> tuple[Array, Array]:
+def solved(matrix: Float[Array, "n n"], right: Float[Array, "n m"]) -> tuple[Float[Array, "n m"], Float[Array, ""]]:
     """Solution of a small linear system, and the determinant, by elimination with pivots.
 
     It replaces `jnp.linalg`, for which XLA calls LAPACK: in jaxlib 0.10 batches of such calls can wait for ever for
     threads that they occupy themselves.
-
-    Args:
-        matrix: (n, n).
-        right: (n, m) right-hand sides.
-
-    Returns:
-        (n, m), not finite where the matrix is singular; () determinant.
     """
     count = matrix.shape[0]
     if not count:

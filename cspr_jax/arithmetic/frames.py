@@ -4,10 +4,16 @@ Coordinates cross here, once, in the float64 numbers of the file: the centroid i
 computed, so that no digit is lost on a robot whose spools lie far from the origin of its axes.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Unit quaternion of no rotation, scalar first.
 IDENTITY = (1.0, 0.0, 0.0, 0.0)
@@ -39,112 +45,48 @@ class Frame:
     origin: np.ndarray
     rest: np.ndarray
 
-    def inward(self, points) -> np.ndarray:
-        """Points of the file in the kernels' coordinates.
-
-        Args:
-            points: (..., 3) m.
-
-        Returns:
-            (..., 3) from the centroid of the spools, z down, m.
-        """
+    def inward(self, points) -> Float[np.ndarray, "... 3"]:
+        """Points of the file in the kernels' coordinates."""
         array = _numbers(points)
         origin, rest, signs = (_beside(x, array) for x in (self.origin, self.rest, self.signs))
         return ((array - origin) - rest) * signs
 
-    def outward(self, points) -> np.ndarray:
-        """Points of the kernels in the file's coordinates.
-
-        Args:
-            points: (..., 3) from the centroid of the spools, z down, m.
-
-        Returns:
-            (..., 3) m.
-        """
+    def outward(self, points) -> Float[np.ndarray, "... 3"]:
+        """Points of the kernels in the file's coordinates."""
         array = _numbers(points)
         origin, rest, signs = (_beside(x, array) for x in (self.origin, self.rest, self.signs))
         return origin + (array * signs + rest)
 
-    def depth(self, height) -> np.ndarray:
-        """Depth below the centroid of the spools of a z coordinate of the file.
-
-        Args:
-            height: (...) z in the file's axes, m.
-
-        Returns:
-            (...) z in the kernels' coordinates, m.
-        """
+    def depth(self, height) -> Float[np.ndarray, "..."]:
+        """Depth below the centroid of the spools of a z coordinate of the file."""
         return ((_numbers(height) - self.origin[2]) - self.rest[2]) * self.signs[2]
 
-    def height(self, depth) -> np.ndarray:
-        """Height in the file of a depth below the centroid of the spools.
-
-        Args:
-            depth: (...) m.
-
-        Returns:
-            (...) z in the file's axes, m.
-        """
+    def height(self, depth) -> Float[np.ndarray, "..."]:
+        """Height in the file of a depth below the centroid of the spools."""
         return self.origin[2] + (_numbers(depth) * self.signs[2] + self.rest[2])
 
-    def turned(self, vectors) -> np.ndarray:
-        """Vectors in the other axes, either way.
-
-        Args:
-            vectors: (..., 3).
-
-        Returns:
-            (..., 3).
-        """
+    def turned(self, vectors) -> Float[np.ndarray, "... 3"]:
+        """Vectors in the other axes, either way."""
         array = _numbers(vectors)
         return array * _beside(self.signs, array)
 
     def turned_tensor(self, tensor):
-        """A tensor in the other axes, either way.
-
-        Args:
-            tensor: (3, 3), NumPy or jax.
-
-        Returns:
-            (3, 3).
-        """
+        """A tensor in the other axes, either way."""
         return self.signs[:, None] * tensor * self.signs[None]
 
-    def turned_angles(self, angles) -> np.ndarray:
-        """Angles of tilt and torsion in the other axes, either way.
-
-        Args:
-            angles: (..., 3) phi, theta, sigma.
-
-        Returns:
-            (..., 3).
-        """
+    def turned_angles(self, angles) -> Float[np.ndarray, "... 3"]:
+        """Angles of tilt and torsion in the other axes, either way."""
         return np.asarray(angles, float) * np.array([self.signs[1], 1.0, self.signs[2]])
 
-    def turned_quaternions(self, quaternions) -> np.ndarray:
-        """Orientations in the other axes, either way.
-
-        Args:
-            quaternions: (..., 4), scalar first.
-
-        Returns:
-            (..., 4).
-        """
+    def turned_quaternions(self, quaternions) -> Float[np.ndarray, "... 4"]:
+        """Orientations in the other axes, either way."""
         # The scalar part keeps its sign, like the component along x.
         array = _numbers(quaternions)
         return array * _beside(self.signs[np.array([0, 0, 1, 2])], array)
 
 
 def frame_of(base_points, z_axis: str) -> Frame:
-    """The frame of a robot.
-
-    Args:
-        base_points: (n_cables, 3) in the file's axes, m.
-        z_axis: "down" or "up".
-
-    Returns:
-        the frame.
-    """
+    """The frame of a robot."""
     points, signs = _numbers(base_points), np.array(_SIGNS[z_axis])
     if not isinstance(points, np.ndarray):
         origin = points.mean(0)

@@ -1,6 +1,9 @@
 """Functions of bounded functions: reciprocals, roots, sines and angles of sines, as `arithmetic.affine_bounds`."""
 
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -9,16 +12,15 @@ from jax import Array
 from cspr_jax.arithmetic import elementary
 from cspr_jax.arithmetic.affine_bounds import AffineBounds, flat, rounded
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 LARGEST_SINE = 0.9
 
 
 @jax.jit
 def reciprocal(f: AffineBounds) -> AffineBounds:
-    """Bounds of 1 / f, of a positive function.
-
-    Returns:
-        the bounds; NaN where f may not be positive.
-    """
+    """Bounds of 1 / f, of a positive function."""
     value = 1.0 / f.middle
     if f.square is not None:
         return _bent_parabola(f, (value, -(value**2), 2.0 * value**3), 6.0 / _positive(f) ** 4)
@@ -27,11 +29,7 @@ def reciprocal(f: AffineBounds) -> AffineBounds:
 
 @jax.jit
 def root(f: AffineBounds) -> AffineBounds:
-    """Bounds of the square root of a positive function.
-
-    Returns:
-        the bounds; NaN where f may not be positive.
-    """
+    """Bounds of the square root of a positive function."""
     f = flat(f)
     value = jnp.sqrt(f.middle)
     return bent(f, value, 0.5 / value, -0.25 * _positive(f) ** -1.5)
@@ -39,11 +37,7 @@ def root(f: AffineBounds) -> AffineBounds:
 
 @jax.jit
 def reciprocal_root(f: AffineBounds) -> AffineBounds:
-    """Bounds of 1 over the square root of a positive function.
-
-    Returns:
-        the bounds; NaN where f may not be positive.
-    """
+    """Bounds of 1 over the square root of a positive function."""
     value = 1.0 / jnp.sqrt(f.middle)
     if f.square is not None:
         return _bent_parabola(f, (value, -0.5 * value**3, 0.75 * value**5), 1.875 * _positive(f) ** -3.5)
@@ -52,11 +46,7 @@ def reciprocal_root(f: AffineBounds) -> AffineBounds:
 
 @jax.jit
 def arc_sine(f: AffineBounds) -> AffineBounds:
-    """Bounds of the angle of a sine, between -pi/2 and pi/2.
-
-    Returns:
-        the bounds; NaN where f may be larger than 0.9, or smaller than -0.9: near 1 no digits are left of 1 - x^2.
-    """
+    """Bounds of the angle of a sine, between -pi/2 and pi/2."""
     f = flat(f)
     size = jnp.where(f.size() < LARGEST_SINE, f.size(), jnp.nan)
     # The second derivative, x (1 - x^2)^-1.5, changes its sign with x, and is largest where |x| is.
@@ -70,17 +60,10 @@ def _positive(f: AffineBounds) -> Array:
     return jnp.where(low > 0.0, low, jnp.nan)
 
 
-def bent(f: AffineBounds, value: Array, slope: Array, bend: Array) -> AffineBounds:
-    """Bounds of F(f) for a function F whose second derivative keeps its sign.
-
-    Args:
-        value: (...) of F at the middle of f.
-        slope: (...) of its derivative there.
-        bend: (...) the largest second derivative within the band, with its sign.
-
-    Returns:
-        the bounds.
-    """
+def bent(
+    f: AffineBounds, value: Float[Array, "..."], slope: Float[Array, "..."], bend: Float[Array, "..."]
+) -> AffineBounds:
+    """Bounds of F(f) for a function F whose second derivative keeps its sign."""
     # By Taylor about the middle, the remainder is between 0 and bend reach^2 / 2.
     half = 0.25 * bend * f.reach() ** 2
     return rounded(AffineBounds(value + half, slope * f.slope, jnp.abs(slope) * f.radius + jnp.abs(half)), value)
@@ -97,14 +80,7 @@ def _bent_parabola(f: AffineBounds, values: tuple[Array, Array, Array], third: A
 
 @jax.jit
 def sincospi(f: AffineBounds) -> tuple[AffineBounds, AffineBounds]:
-    """Bounds of sin(pi f) and cos(pi f).
-
-    Args:
-        f: angle in half turns.
-
-    Returns:
-        the bounds of both.
-    """
+    """Bounds of sin(pi f) and cos(pi f)."""
     f = flat(f)
     sine, cosine = elementary.sincospi(f.middle)
     # At d from the middle, sin(m + d) = sin m cos d + cos m sin d, with cos d from 1 - d^2 / 2 to 1, and sin d within

@@ -5,10 +5,15 @@ chain rule, in interval arithmetic. The aim is a bound of the second derivative:
 further below the chord of its ends than w^2 / 8 times the largest second derivative.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 Interval = tuple[np.ndarray, np.ndarray]
 
@@ -54,30 +59,15 @@ class Jet:
         return Jet(*((change(*(x[0] for x in part)), change(*(x[1] for x in part))) for part in parts))
 
     def expanded(self, axis: int) -> "Jet":
-        """The same bounds with one more dimension.
-
-        Args:
-            axis: place of the new dimension, which has length 1.
-
-        Returns:
-            the bounds.
-        """
+        """The same bounds with one more dimension."""
         return self._each(lambda x: np.expand_dims(x, axis))
 
     def joined(self, other: "Jet") -> "Jet":
-        """Bounds of two functions side by side in the last dimension.
-
-        Returns:
-            the bounds.
-        """
+        """Bounds of two functions side by side in the last dimension."""
         return self._each(lambda x, y: np.concatenate(np.broadcast_arrays(x, y), axis=-1), other)
 
     def summed(self) -> "Jet":
-        """Bounds of the sum over the last dimension.
-
-        Returns:
-            the bounds.
-        """
+        """Bounds of the sum over the last dimension."""
         return self._each(lambda x: x.sum(-1))
 
     def __add__(self, other: Any) -> "Jet":
@@ -132,15 +122,8 @@ class Jet:
         return self * (other**-1.0 if isinstance(other, Jet) else 1.0 / other)
 
 
-def lowest(ends: np.ndarray, jet: Jet) -> np.ndarray:
-    """Lower bounds of a function over blocks.
-
-    Args:
-        ends: (2, ...) values at both ends of each block, whose width is 1.
-
-    Returns:
-        (...); -inf where nothing is known.
-    """
+def lowest(ends: Float[np.ndarray, "2 ..."], jet: Jet) -> Float[np.ndarray, "..."]:
+    """Lower bounds of a function over blocks."""
     least = ends.min(0)
     with np.errstate(invalid="ignore"):
         low = least - np.maximum(jet.bend[1], 0.0) / 8.0

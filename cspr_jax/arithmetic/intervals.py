@@ -1,17 +1,17 @@
 """Unions of intervals of numbers."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
-def united(intervals: np.ndarray) -> np.ndarray:
-    """Intervals of which none overlaps or touches another one.
 
-    Args:
-        intervals: (n, 2) in any order.
-
-    Returns:
-        (m, 2) with the same points, increasing.
-    """
+def united(intervals: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "m 2"]:
+    """Intervals of which none overlaps or touches another one."""
     merged: list[list[float]] = []
     for start, end in sorted(intervals.tolist()):
         if merged and start <= merged[-1][1]:

@@ -1,11 +1,16 @@
 """Smallest values: golden sections of one function, and of many that may have kinks around their smallest samples."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Int
 
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
@@ -37,29 +42,13 @@ class Bracket(NamedTuple):
 
 
 def inner_points(low, high) -> tuple[Any, Any]:
-    """Two points that divide an interval by the golden section.
-
-    Args:
-        low: (...) lower ends, NumPy or jax.
-        high: (...) upper ends.
-
-    Returns:
-        (...) the left point; (...) the right point.
-    """
+    """Two points that divide an interval by the golden section."""
     step = GOLDEN * (high - low)
     return high - step, low + step
 
 
 def golden_step(function: Callable, bracket: Bracket, *, left_if_equal: bool = True) -> tuple[Bracket, Any]:
-    """A bracket that is 0.618 times as wide, with one more value of the function.
-
-    Args:
-        function: (...) to (...), of jax.
-        left_if_equal: whether to keep the left side where both points have the same value.
-
-    Returns:
-        the bracket, and the new value, (...).
-    """
+    """A bracket that is 0.618 times as wide, with one more value of the function."""
     low, high, left, right, at_left, at_right = bracket
     down = at_left <= at_right if left_if_equal else at_left < at_right
     low, high = jnp.where(down, low, left), jnp.where(down, right, high)
@@ -71,16 +60,10 @@ def golden_step(function: Callable, bracket: Bracket, *, left_if_equal: bool = T
     return Bracket(low, high, left, right, at_left, at_right), value
 
 
-def vertex_values(times: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Smallest values near samples, estimated by parabolas through three of them each.
-
-    Args:
-        times: (..., n) increasing.
-        values: (..., n, n_functions) samples.
-
-    Returns:
-        (..., n, n_functions) vertices of the parabolas, at samples that are no minima their values.
-    """
+def vertex_values(
+    times: Float[np.ndarray, "... n"], values: Float[np.ndarray, "... n n_functions"]
+) -> Float[np.ndarray, "... n n_functions"]:
+    """Smallest values near samples, estimated by parabolas through three of them each."""
     vertices = np.array(values, float)
     gaps = np.diff(times)[..., None]
     before, after = gaps[..., :-1, :], gaps[..., 1:, :]
@@ -96,16 +79,10 @@ def vertex_values(times: np.ndarray, values: np.ndarray) -> np.ndarray:
     return vertices
 
 
-def lowest_samples(values: np.ndarray, estimates: np.ndarray, count: int) -> np.ndarray:
-    """Samples around which the smallest values are looked for: the smallest one, then minima by their estimates.
-
-    Args:
-        values: (..., n, n_functions) samples.
-        estimates: (..., n, n_functions) of the smallest values near them; inf where there is none.
-
-    Returns:
-        (..., count, n_functions) indices.
-    """
+def lowest_samples(
+    values: Float[np.ndarray, "... n n_functions"], estimates: Float[np.ndarray, "... n n_functions"], count: int
+) -> Int[np.ndarray, "... count n_functions"]:
+    """Samples around which the smallest values are looked for: the smallest one, then minima by their estimates."""
     earlier, later = np.array(values, float), np.array(values, float)
     earlier[..., 1:, :], earlier[..., :1, :] = values[..., :-1, :], np.inf
     later[..., :-1, :], later[..., -1:, :] = values[..., 1:, :], np.inf
@@ -114,33 +91,17 @@ def lowest_samples(values: np.ndarray, estimates: np.ndarray, count: int) -> np.
     return np.argsort(ranks, axis=-2, kind="stable")[..., :count, :]
 
 
-def narrowed(function: Callable[[np.ndarray], np.ndarray], tau: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Smallest value of each function along each of several motions.
-
-    Args:
-        function: takes instants (n_motions, m), and gives values (n_motions, m, n_functions).
-        tau: (n,) or (n_motions, n) increasing instants from 0 to 1, at least three.
-        values: (n_motions, n, n_functions) values at these instants.
-
-    Returns:
-        (n_motions, n_functions) attained values.
-    """
+def narrowed(
+    function: Callable[[np.ndarray], np.ndarray], tau: np.ndarray, values: Float[np.ndarray, "n_motions n n_functions"]
+) -> Float[np.ndarray, "n_motions n_functions"]:
+    """Smallest value of each function along each of several motions."""
     return narrowed_places(function, tau, values)[0]
 
 
 def narrowed_places(
-    function: Callable[[np.ndarray], np.ndarray], tau: np.ndarray, values: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Smallest value of each function along each of several motions, and the instant at which it is attained.
-
-    Args:
-        function: as for `narrowed`.
-        tau: as for `narrowed`.
-        values: (n_motions, n, n_functions) as for `narrowed`.
-
-    Returns:
-        (n_motions, n_functions) values, and (n_motions, n_functions) instants.
-    """
+    function: Callable[[np.ndarray], np.ndarray], tau: np.ndarray, values: Float[np.ndarray, "n_motions n n_functions"]
+) -> tuple[Float[np.ndarray, "n_motions n_functions"], Float[np.ndarray, "n_motions n_functions"]]:
+    """Smallest value of each function along each of several motions, and the instant at which it is attained."""
     tau = np.broadcast_to(tau, values.shape[:2])
     starts = lowest_samples(values, vertex_values(tau, values), PLACES)
     return followed(function, tau, starts, ROUNDS)
@@ -148,22 +109,12 @@ def narrowed_places(
 
 def followed(
     function: Callable[[np.ndarray], np.ndarray],
-    tau: np.ndarray,
-    starts: np.ndarray,
+    tau: Float[np.ndarray, "n_motions n"],
+    starts: Int[np.ndarray, "n_motions n_starts n_functions"],
     rounds: int,
     n_followed: int = PLACES,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Smallest value of each function near some of its samples, and the time at which it is attained.
-
-    Args:
-        function: as for `narrowed`.
-        tau: (n_motions, n) times of the samples.
-        starts: (n_motions, n_starts, n_functions) indices of samples.
-        n_followed: of the starts that are followed after the first round.
-
-    Returns:
-        (n_motions, n_functions) values, and (n_motions, n_functions) times.
-    """
+) -> tuple[Float[np.ndarray, "n_motions n_functions"], Float[np.ndarray, "n_motions n_functions"]]:
+    """Smallest value of each function near some of its samples, and the time at which it is attained."""
     motion, column = np.arange(len(tau))[:, None, None], np.arange(starts.shape[2])
     centers, width = tau[motion, starts], _distances(tau)[motion, starts]
     for _ in range(rounds):

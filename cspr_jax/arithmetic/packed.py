@@ -17,51 +17,23 @@ _HALF = 32  # bits
 
 
 def paired(values: Sequence[Array]) -> tuple[Array, ...]:
-    """Pack two real numbers into one complex number.
-
-    Args:
-        values: an even number of float64 arrays of one shape.
-
-    Returns:
-        half as many.
-    """
+    """Pack two real numbers into one complex number."""
     return tuple(lax.complex(a, b) for a, b in zip(values[::2], values[1::2], strict=True))
 
 
 def parts(pairs: Sequence[Array]) -> list[Array]:
-    """Take apart the numbers that `paired` has packed.
-
-    Args:
-        pairs: complex arrays.
-
-    Returns:
-        twice as many.
-    """
+    """Take apart the numbers that `paired` has packed."""
     return [part(x) for x in pairs for part in (jnp.real, jnp.imag)]
 
 
 def packed(values: Sequence[Array]) -> tuple[Array, ...]:
-    """Pack four real numbers, rounded to float32, into one complex number.
-
-    Args:
-        values: float64 arrays of one shape.
-
-    Returns:
-        a fourth as many, rounded up.
-    """
+    """Pack four real numbers, rounded to float32, into one complex number."""
     filled = [*values, *([jnp.zeros_like(values[0])] * (-len(values) % WIDTH))]
     return paired([_joined(a, b) for a, b in zip(filled[::2], filled[1::2], strict=True)])
 
 
 def unpacked(fours: Sequence[Array]) -> list[Array]:
-    """Take apart the numbers that `packed` has packed.
-
-    Args:
-        fours: complex arrays.
-
-    Returns:
-        four times as many, float64.
-    """
+    """Take apart the numbers that `packed` has packed."""
     return [x for both in parts(fours) for x in _halves(both)]
 
 

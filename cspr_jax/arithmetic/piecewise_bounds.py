@@ -5,12 +5,17 @@ straight line. A block that holds many pieces gets one line, and the widest band
 parabola, which a block within one piece may get, less is left.
 """
 
+from __future__ import annotations
+
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cspr_jax.arithmetic.affine_bounds import ROUNDING, AffineBounds
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 
 class PieceParts(NamedTuple):
@@ -32,19 +37,12 @@ class PieceParts(NamedTuple):
 
 
 def overlaps(
-    knots: np.ndarray, start: np.ndarray, end: np.ndarray, tables: tuple[np.ndarray, np.ndarray] | None = None
+    knots: Float[np.ndarray, "m+1"],
+    start: Float[np.ndarray, "k"],
+    end: Float[np.ndarray, "k"],
+    tables: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> PieceParts:
-    """PieceParts of pieces that blocks hold.
-
-    Args:
-        knots: (m + 1,) increasing; of n tables, one after the other, (m + n,).
-        start: (k,) of the blocks, increasing or not.
-        end: (k,) beyond `start`.
-        tables: numbers of the tables, from 0 on, of the knots and of the blocks, (m + n,) and (k,); None: there is one.
-
-    Returns:
-        the parts.
-    """
+    """PieceParts of pieces that blocks hold."""
     of_knots, of_blocks = (np.zeros(len(knots), int), np.zeros(len(start), int)) if tables is None else tables
     # NumPy orders complex numbers by their real parts first.
     places = of_knots + 1j * knots
@@ -64,22 +62,9 @@ def overlaps(
 
 
 def piecewise_bounds(
-    table: np.ndarray, parts: PieceParts, orders: int = 3, *, parabolas: bool = False
+    table: Float[np.ndarray, "m degree+1 n"], parts: PieceParts, orders: int = 3, *, parabolas: bool = False
 ) -> list[AffineBounds]:
-    """Bounds of a piecewise polynomial and of its derivatives.
-
-    Args:
-        table: (m, degree + 1, n) Bernstein coefficients of the pieces.
-        parts: of k blocks.
-        orders: how many functions: the polynomial, and its derivatives below this order.
-        parabolas: whether bands are around parabolas.
-
-    Returns:
-        one for each order, leaves (k, n).
-
-    Raises:
-        ValueError: blocks with parabolas reach over several pieces.
-    """
+    """Bounds of a piecewise polynomial and of its derivatives."""
     if parabolas and (np.diff(parts.block) != 1).any():
         raise ValueError("parabolas are of blocks within one piece")
     coefficients, bands = table[parts.piece], []
@@ -93,15 +78,8 @@ def piecewise_bounds(
     return bands
 
 
-def bernstein_of_powers(coefficients: np.ndarray) -> np.ndarray:
-    """Bernstein coefficients of polynomials over [0, 1].
-
-    Args:
-        coefficients: (..., degree + 1, n) of the powers of the variable, the constant one first.
-
-    Returns:
-        (..., degree + 1, n).
-    """
+def bernstein_of_powers(coefficients: Float[np.ndarray, "... degree+1 n"]) -> Float[np.ndarray, "... degree+1 n"]:
+    """Bernstein coefficients of polynomials over [0, 1]."""
     degree = coefficients.shape[-2] - 1
     matrix = np.array([[math.comb(i, j) / math.comb(degree, j) for j in range(degree + 1)] for i in range(degree + 1)])
     return matrix @ coefficients

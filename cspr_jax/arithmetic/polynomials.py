@@ -1,21 +1,19 @@
 """Tables of polynomials: coefficients of the powers of x in the last dimension, the constant one first."""
 
+from __future__ import annotations
+
 import math
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
-def product(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Product of polynomials.
 
-    Args:
-        first: (..., n) coefficients.
-        second: (..., m) likewise.
-
-    Returns:
-        (..., n + m - 1).
-    """
+def product(first: Float[np.ndarray, "... n"], second: Float[np.ndarray, "... m"]) -> np.ndarray:
+    """Product of polynomials."""
     n, m = first.shape[-1], second.shape[-1]
     shape = np.broadcast_shapes(first.shape[:-1], second.shape[:-1])
     coefficients = np.zeros((*shape, n + m - 1))
@@ -24,30 +22,15 @@ def product(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     return coefficients
 
 
-def total(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Sum of polynomials of any degrees.
-
-    Args:
-        first: (..., n) coefficients.
-        second: (..., m) likewise.
-
-    Returns:
-        (..., max(n, m)).
-    """
+def total(first: Float[np.ndarray, "... n"], second: Float[np.ndarray, "... m"]) -> Float[np.ndarray, "n m"]:
+    """Sum of polynomials of any degrees."""
     size = max(first.shape[-1], second.shape[-1])
     a, b = (np.concatenate([x, np.zeros((*x.shape[:-1], size - x.shape[-1]))], axis=-1) for x in (first, second))
     return a + b
 
 
-def derivatives(table: np.ndarray, order: int) -> list[np.ndarray]:
-    """Polynomials and their derivatives.
-
-    Args:
-        table: (..., n) coefficients.
-
-    Returns:
-        order + 1 tables: (..., n), (..., n - 1), ...; for constants (..., 1).
-    """
+def derivatives(table: Float[np.ndarray, "... n"], order: int) -> list[np.ndarray]:
+    """Polynomials and their derivatives."""
     tables = [table]
     for _ in range(order):
         last = tables[-1]
@@ -56,17 +39,10 @@ def derivatives(table: np.ndarray, order: int) -> list[np.ndarray]:
     return tables
 
 
-def over(table: np.ndarray, start: np.ndarray, width: np.ndarray) -> np.ndarray:
-    """Polynomials of another variable: 0 at the start of a block, 1 at its end.
-
-    Args:
-        table: (..., n) coefficients.
-        start: (...) starts of the blocks.
-        width: (...) widths of the blocks.
-
-    Returns:
-        (..., n).
-    """
+def over(
+    table: Float[np.ndarray, "... n"], start: Float[np.ndarray, "..."], width: Float[np.ndarray, "..."]
+) -> Float[np.ndarray, "... n"]:
+    """Polynomials of another variable: 0 at the start of a block, 1 at its end."""
     degree = table.shape[-1] - 1
     moved = np.zeros(np.broadcast_shapes(table.shape, (*np.shape(start), 1)))
     for i in range(degree + 1):
@@ -75,15 +51,8 @@ def over(table: np.ndarray, start: np.ndarray, width: np.ndarray) -> np.ndarray:
     return moved * width[..., None] ** np.arange(degree + 1)
 
 
-def bounds(table: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds of polynomials over [0, 1], by their Bernstein coefficients.
-
-    Args:
-        table: (..., n) coefficients.
-
-    Returns:
-        the lower and the upper bounds, (...) each.
-    """
+def bounds(table: Float[np.ndarray, "... n"]) -> tuple[Float[np.ndarray, "..."], Float[np.ndarray, "..."]]:
+    """Bounds of polynomials over [0, 1], by their Bernstein coefficients."""
     coefficients = table @ _weights(table.shape[-1] - 1).T
     return coefficients.min(-1), coefficients.max(-1)
 

@@ -25,14 +25,6 @@ def rotation_bounds(quaternion: AffineBounds, first: AffineBounds, second: Affin
 
     With n = |q|^2, the angular velocity is 2 vec(q' q*) / n; since vec(q' q'*) = 0, the derivative of its numerator is
     2 vec(q'' q*).
-
-    Args:
-        quaternion: (4,) scalar first, of any length but zero.
-        first: (4,) its derivative, 1/s.
-        second: (4,) the second one, 1/s^2.
-
-    Returns:
-        the bounds; radii are NaN where the quaternion may vanish.
     """
     unit, inverse = unit_rotation_bounds(quaternion, first, second), reciprocal(norm_squared(quaternion))
     angular_velocity = unit.angular_velocity * inverse
@@ -42,16 +34,7 @@ def rotation_bounds(quaternion: AffineBounds, first: AffineBounds, second: Affin
 
 
 def unit_rotation_bounds(quaternion: AffineBounds, first: AffineBounds, second: AffineBounds) -> RotationBounds:
-    """Bounds of the rotation of a unit quaternion.
-
-    Args:
-        quaternion: (4,) scalar first.
-        first: (4,) its derivative, 1/s.
-        second: (4,) the second one, 1/s^2.
-
-    Returns:
-        the bounds.
-    """
+    """Bounds of the rotation of a unit quaternion."""
     w, x, y, z = (quaternion.each(lambda leaf, i=i: leaf[i]) for i in range(4))
     ww, xx, yy, zz = (squared(part) for part in (w, x, y, z))
     rows = [

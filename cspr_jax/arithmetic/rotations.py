@@ -1,24 +1,23 @@
 """Orientations as unit quaternions, scalar first."""
 
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # A given quaternion is normalised if its length differs from 1 by no more than this.
 UNIT_TOLERANCE = 1e-6
 
 
-def from_tilt_torsion(angles: np.ndarray) -> np.ndarray:
-    """Orientations of tilt-and-torsion angles, Z_phi X_theta Z_(sigma - phi), thesis section 3.10.2.
-
-    Args:
-        angles: (..., 3) azimuth phi of the axis of the tilt from x, tilt theta, torsion sigma, rad.
-
-    Returns:
-        (..., 4) unit quaternions.
-    """
+def from_tilt_torsion(angles: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "... 4"]:
+    """Orientations of tilt-and-torsion angles, Z_phi X_theta Z_(sigma - phi), thesis section 3.10.2."""
     half_tilt, half_torsion = 0.5 * angles[..., 1], 0.5 * angles[..., 2]
     across = angles[..., 0] - half_torsion
     return np.stack(
@@ -32,41 +31,20 @@ def from_tilt_torsion(angles: np.ndarray) -> np.ndarray:
     )
 
 
-def cylindrical_frames(places: np.ndarray) -> np.ndarray:
-    """Azimuths (3.98) of the cylindrical frames of places, to be added to tilt-and-torsion angles in these frames.
-
-    Args:
-        places: (..., 3) from a point on the vertical axis.
-
-    Returns:
-        (..., 3) the azimuth, 0, 0, rad.
-    """
+def cylindrical_frames(places: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "... 3"]:
+    """Azimuths (3.98) of the cylindrical frames of places, to be added to tilt-and-torsion angles in these frames."""
     azimuth = np.arctan2(places[..., 1], places[..., 0])
     return np.stack([azimuth, np.zeros_like(azimuth), np.zeros_like(azimuth)], axis=-1)
 
 
-def about_vertical(angle: float) -> np.ndarray:
-    """The matrix of a rotation about the z axis.
-
-    Args:
-        angle: rad.
-
-    Returns:
-        (3, 3).
-    """
+def about_vertical(angle: float) -> Float[np.ndarray, "3 3"]:
+    """The matrix of a rotation about the z axis."""
     c, s = math.cos(angle), math.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def matrix(quaternion: Array) -> Array:
-    """The rotation matrix of a unit quaternion, (3.29) with (3.31).
-
-    Args:
-        quaternion: (4,).
-
-    Returns:
-        (3, 3) from platform to fixed axes.
-    """
+def matrix(quaternion: Float[Array, "4"]) -> Float[Array, "3 3"]:
+    """The rotation matrix of a unit quaternion, (3.29) with (3.31)."""
     w, x, y, z = quaternion
     return jnp.stack(
         [
@@ -77,55 +55,25 @@ def matrix(quaternion: Array) -> Array:
     )
 
 
-def product(left: Array, right: Array) -> Array:
-    """The product of two quaternions, (3.18): the right one is the first rotation.
-
-    Args:
-        left: (4,).
-        right: (4,).
-
-    Returns:
-        (4,).
-    """
+def product(left: Float[Array, "4"], right: Float[Array, "4"]) -> Float[Array, "4"]:
+    """The product of two quaternions, (3.18): the right one is the first rotation."""
     scalar = left[0] * right[0] - jnp.dot(left[1:], right[1:])
     vector = left[0] * right[1:] + right[0] * left[1:] + jnp.cross(left[1:], right[1:])
     return jnp.concatenate([scalar[None], vector])
 
 
-def products(left: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Products of quaternions, one by one; see `product`.
-
-    Args:
-        left: (n, 4), or (1, 4) one for all.
-        right: (n, 4), or (1, 4) one for all.
-
-    Returns:
-        (n, 4).
-    """
+def products(left: np.ndarray, right: np.ndarray) -> Float[np.ndarray, "n 4"]:
+    """Products of quaternions, one by one; see `product`."""
     scalar = left[:, :1] * right[:, :1] - (left[:, 1:] * right[:, 1:]).sum(1, keepdims=True)
     vector = left[:, :1] * right[:, 1:] + right[:, :1] * left[:, 1:] + np.cross(left[:, 1:], right[:, 1:])
     return np.concatenate([scalar, vector], axis=1)
 
 
-def conjugate(quaternion: Array) -> Array:
-    """The opposite rotation.
-
-    Args:
-        quaternion: (..., 4) unit.
-
-    Returns:
-        (..., 4).
-    """
+def conjugate(quaternion: Float[Array, "... 4"]) -> Float[Array, "... 4"]:
+    """The opposite rotation."""
     return quaternion * jnp.array([1.0, -1.0, -1.0, -1.0], quaternion.dtype)
 
 
-def upper(quaternion: Array) -> Array:
-    """Whichever of q and -q has an angle in [-pi, pi]: its scalar part is not negative, thesis section 3.7.
-
-    Args:
-        quaternion: (..., 4).
-
-    Returns:
-        (..., 4) the same orientation.
-    """
+def upper(quaternion: Float[Array, "... 4"]) -> Float[Array, "... 4"]:
+    """Whichever of q and -q has an angle in [-pi, pi]: its scalar part is not negative, thesis section 3.7."""
     return jnp.where(quaternion[..., :1] < 0.0, -quaternion, quaternion)

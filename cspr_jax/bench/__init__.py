@@ -14,17 +14,7 @@ SCHEMA = 1
 
 
 def bench(kernels: Path | None = None) -> dict[str, Any]:
-    """Measure the rates.
-
-    Args:
-        kernels: folder of the hand-written kernels; None: without them.
-
-    Returns:
-        the object that `cspr bench --json` prints: checks per second, best of five.
-
-    Raises:
-        ConfigError: there is no compiler, it refuses a kernel, or a kernel computes something else.
-    """
+    """Measure the rates."""
     by_hand = None if kernels is None else hand_written.compiled(kernels)
     six, three = six_cables.work(room(six_cables.TRAJECTORIES)), three_cables.work()
     batches = six_cables.batches(six)
@@ -66,14 +56,7 @@ def _ratios(rates: dict[str, dict[str, float]], to: dict[str, float]) -> dict[st
 
 
 def lines(report: dict[str, Any]) -> list[str]:
-    """Lines that `cspr bench` prints for people.
-
-    Args:
-        report: by `bench`.
-
-    Returns:
-        the lines.
-    """
+    """Lines that `cspr bench` prints for people."""
     text = [f"checks per second, best of {report['repeats']}, {report['cores']} cores, {report['device']}"]
     for name, key in (("six_cable", "checks_per_second"), ("three_cable", "three_cable")):
         text.append(name.replace("_", "-"))

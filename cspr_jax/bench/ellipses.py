@@ -1,6 +1,8 @@
 """Ellipses of a point mass: verdicts and intervals of frequencies a second, beside NumPy's version of the formulas."""
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -11,6 +13,9 @@ from cspr_jax.ellipses import harmonics
 from cspr_jax.ellipses.harmonics import Ellipse
 from cspr_jax.ellipses.hull import SpoolHull, hull_of
 from cspr_jax.robots.kernel_axes import centred
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 COUNT = 1 << 20
 
@@ -30,23 +35,15 @@ class EllipseWork(NamedTuple):
 
 
 def work(count: int) -> EllipseWork:
-    """Draw ellipses.
-
-    Returns:
-        the ellipses.
-    """
+    """Draw ellipses."""
     rng, robot = np.random.default_rng(0), load_robot("prototype")
     centre = rng.normal(size=(count, 3)) * [0.08, 0.08, 0.2] + [0.0, 0.0, 2.0]
     axes = rng.normal(size=(2, count, 3)) * [0.3, 0.3, 0.1]
     return EllipseWork(hull_of(centred(robot)[0]), Ellipse(centre, *axes), 2.2 * np.exp(rng.uniform(-0.1, 0.1, count)))
 
 
-def numpy_margins(case: EllipseWork) -> np.ndarray:
-    """Margins by NumPy; see `harmonics.least_margin`.
-
-    Returns:
-        (n,).
-    """
+def numpy_margins(case: EllipseWork) -> Float[np.ndarray, "n"]:
+    """Margins by NumPy; see `harmonics.least_margin`."""
     constant, tilting, pulling, depth, swing = _numpy_terms(case)
     e = 1.0 - case.frequency**2 * depth / np.asarray(case.hull.gravity)
     harmonic = tilting + e[:, None] * pulling
@@ -54,12 +51,8 @@ def numpy_margins(case: EllipseWork) -> np.ndarray:
     return np.where(depth > 0.0, np.minimum(slack, 1.0 - swing / depth), -np.inf)
 
 
-def numpy_intervals(case: EllipseWork) -> np.ndarray:
-    """Ends of the feasible frequencies by NumPy; see `harmonics.frequency_interval`.
-
-    Returns:
-        (2, n) rad/s, NaN where no frequency is feasible.
-    """
+def numpy_intervals(case: EllipseWork) -> Float[np.ndarray, "2 n"]:
+    """Ends of the feasible frequencies by NumPy; see `harmonics.frequency_interval`."""
     constant, tilting, pulling, depth, swing = _numpy_terms(case)
     square, mixed, rest = (pulling**2).sum(0), (tilting * pulling).sum(0), constant**2 - (tilting**2).sum(0)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -80,11 +73,7 @@ def _numpy_terms(case: EllipseWork) -> tuple[np.ndarray, ...]:
 
 
 def rates() -> dict[str, dict[str, float]]:
-    """Ellipses a second, from arrays to arrays.
-
-    Returns:
-        "verdicts" and "frequencies": "float64" and "numpy" each.
-    """
+    """Ellipses a second, from arrays to arrays."""
     case = work(COUNT)
 
     def of_many(function, *items):
@@ -104,14 +93,7 @@ def rates() -> dict[str, dict[str, float]]:
 
 
 def lines(measured: dict[str, dict[str, float]]) -> list[str]:
-    """Lines for people.
-
-    Args:
-        measured: of `rates`.
-
-    Returns:
-        the lines.
-    """
+    """Lines for people."""
     rows = [
         f"  {name:12s} float64 {row['float64'] / 1e6:6.1f} M/s, NumPy {row['numpy'] / 1e6:6.1f} M/s"
         for name, row in measured.items()

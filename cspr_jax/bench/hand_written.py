@@ -48,33 +48,12 @@ class Kernels(NamedTuple):
 
 
 def compiled(folder: Path) -> Kernels:
-    """The kernels of a folder.
-
-    Args:
-        folder: where three_cables.cpp and six_cables.cpp are.
-
-    Returns:
-        the functions.
-
-    Raises:
-        ConfigError: there is no compiler, it refuses a kernel, or a kernel lacks the function it is named after.
-    """
+    """The kernels of a folder."""
     return Kernels(_compiled(folder / "six_cables.cpp"), _compiled(folder / "three_cables.cpp"))
 
 
 def rates(kernels: Kernels, six: six_cables.SixCableWork, three: three_cables.ThreeCableWork) -> dict[str, float]:
-    """Checks a second of both kernels, on all cores; their results are compared with the package's.
-
-    Args:
-        kernels: compiled.
-        three: the work of the three-cable kernel.
-
-    Returns:
-        "six_cable" and "three_cable".
-
-    Raises:
-        ConfigError: a kernel computes something else.
-    """
+    """Checks a second of both kernels, on all cores; their results are compared with the package's."""
     both = _six_cables(kernels.six_cables, six), _three_cables(kernels.three_cables, three)
     return dict(zip(("six_cable", "three_cable"), both, strict=True))
 

@@ -46,22 +46,14 @@ EIGHT = Region("cogiro", (0.0, 0.0, 4.0), 1.5, 0.05, (100.0, 5000.0))
 
 
 def problem(region: Region) -> Problem:
-    """Robot and limits of a region.
-
-    Returns:
-        them, in the axes of the kernels.
-    """
+    """Robot and limits of a region."""
     robot = centred(load_robot(region.robot))[0]
     low, high = (leaf(np.full(robot.n_cables, value)) for value in region.tensions)
     return Problem(robot, Limits(tension_min=low, tension_max=high), named("quintic"))
 
 
 def poses(region: Region, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray | None]:
-    """Random poses in a region.
-
-    Returns:
-        positions (PLACES, 3), m, and quaternions (PLACES, 4), scalar first; None for a point mass.
-    """
+    """Random poses in a region."""
     places = np.array(region.middle) + region.reach * rng.uniform(-1.0, 1.0, (PLACES, 3))
     turns = np.concatenate([np.ones((PLACES, 1)), region.tilt * rng.uniform(-1.0, 1.0, (PLACES, 3))], axis=1)
     return places, turns if region.tilt else None
@@ -79,14 +71,7 @@ def _decided(proofs: list[MotionProof]) -> None:
 
 
 def record_rate() -> float:
-    """Records of three cables that are interpolated and proved a second, each of `ROWS` rows.
-
-    Returns:
-        the rate.
-
-    Raises:
-        SelfCheckError: a motion is left undecided.
-    """
+    """Records of three cables that are interpolated and proved a second, each of `ROWS` rows."""
     judged, spline = problem(THREE), _motion(THREE, np.random.default_rng(0))
     times = np.linspace(0.0, DURATION, ROWS)
     places = np.asarray(jax.jit(jax.vmap(spline.state))(times / DURATION).position)
@@ -94,14 +79,7 @@ def record_rate() -> float:
 
 
 def together_rate() -> float:
-    """Motions of eight cables that are judged a second, `TOGETHER` at once.
-
-    Returns:
-        the rate.
-
-    Raises:
-        SelfCheckError: a motion is left undecided.
-    """
+    """Motions of eight cables that are judged a second, `TOGETHER` at once."""
     judged, rng = problem(EIGHT), np.random.default_rng(0)
     several = SeveralSplines([_motion(EIGHT, rng) for _ in range(TOGETHER)])
     prove = partial(proofs_of, judged, several.bounds, several.durations, jumps=several.jumps)
@@ -109,21 +87,10 @@ def together_rate() -> float:
 
 
 def rates() -> dict[str, Any]:
-    """Rates of all of this work.
-
-    Returns:
-        motions a second by kind of work.
-    """
+    """Rates of all of this work."""
     return {f"3 cables, {ROWS} rows": record_rate(), f"8 cables, {TOGETHER} together": together_rate()}
 
 
 def lines(measured: dict[str, Any]) -> list[str]:
-    """Lines for people.
-
-    Args:
-        measured: of `rates`.
-
-    Returns:
-        the lines.
-    """
+    """Lines for people."""
     return ["proofs of motions a second", *(f"  {name:26s} {rate:8.3g}" for name, rate in measured.items())]

@@ -25,17 +25,7 @@ def _section(region: motions.Region, rng: np.random.Generator) -> Section:
 
 
 def rate(region: motions.Region) -> float:
-    """Paths a second, `TOGETHER` at once.
-
-    Args:
-        region: in which the paths lie.
-
-    Returns:
-        the rate.
-
-    Raises:
-        SelfCheckError: a path cannot be run along.
-    """
+    """Paths a second, `TOGETHER` at once."""
     problem, rng = motions.problem(region), np.random.default_rng(0)
     sections = [_section(region, rng) for _ in range(TOGETHER)]
     settings = [SectionSettings(CELLS, 0.0)] * TOGETHER
@@ -48,21 +38,10 @@ def rate(region: motions.Region) -> float:
 
 
 def rates() -> dict[str, float]:
-    """Rates of all of this work.
-
-    Returns:
-        paths a second by number of cables.
-    """
+    """Rates of all of this work."""
     return {name: rate(region) for name, region in REGIONS.items()}
 
 
 def lines(measured: dict[str, float]) -> list[str]:
-    """Lines for people.
-
-    Args:
-        measured: of `rates`.
-
-    Returns:
-        the lines.
-    """
+    """Lines for people."""
     return ["least times along paths a second", *(f"  {name:26s} {rate:8.3g}" for name, rate in measured.items())]

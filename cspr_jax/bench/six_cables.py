@@ -4,9 +4,11 @@ The MSSM goes to one place with random orientations, numbers of arcs and beta-ha
 printed formulas, (3.1) to (3.11), (3.44) and (3.80), on whole arrays, and solves with `np.linalg.solve`.
 """
 
+from __future__ import annotations
+
 import math
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -24,6 +26,9 @@ from cspr_jax.platforms.sieve import smallest_tensions
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.robots.reference_pose import aligned
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 TRAJECTORIES, SAMPLES, LANES = 65_536, 128, 2048
 NUMPY_TRAJECTORIES = 128
@@ -51,14 +56,7 @@ class SixCableWork(NamedTuple):
 
 
 def work(count: int) -> SixCableWork:
-    """Random transitions.
-
-    Args:
-        count: how many.
-
-    Returns:
-        the work.
-    """
+    """Random transitions."""
     rng = np.random.default_rng(0)
     axis = rng.normal(size=(3, count))
     axis /= np.linalg.norm(axis, axis=0)
@@ -82,11 +80,7 @@ class Batch(NamedTuple):
 
 
 def batches(work: SixCableWork) -> list[Batch]:
-    """The work by numbers of arcs.
-
-    Returns:
-        batches of one shape.
-    """
+    """The work by numbers of arcs."""
     half = work.angle[:, None] / 2.0
     quaternions = np.concatenate([np.cos(half), np.sin(half) * work.axis], axis=1)
     portions, lanes = [], room(LANES)
@@ -112,14 +106,7 @@ def _segments(robot: PlatformRobot, odd, items) -> PlatformSegment:
 
 
 def rate(robot: PlatformRobot, portions: list[Batch], *, single_precision: bool) -> tuple[float, float]:
-    """Checks a second.
-
-    Args:
-        single_precision: whether in float32.
-
-    Returns:
-        the rate, and the share of the trajectories whose tensions are positive at all samples.
-    """
+    """Checks a second."""
 
     def call(batch):
         return jax.block_until_ready(tensions(robot, batch, single_precision=single_precision))
@@ -130,15 +117,8 @@ def rate(robot: PlatformRobot, portions: list[Batch], *, single_precision: bool)
     return total * SAMPLES / best(partial(in_threads, call, portions)), taut / total
 
 
-def tensions(robot: PlatformRobot, batch: Batch, *, single_precision: bool) -> Array:
-    """Smallest normalised tension of each trajectory.
-
-    Args:
-        single_precision: whether in float32.
-
-    Returns:
-        (lanes,) of `platforms.sieve.smallest_tensions`.
-    """
+def tensions(robot: PlatformRobot, batch: Batch, *, single_precision: bool) -> Float[Array, "lanes"]:
+    """Smallest normalised tension of each trajectory."""
     tau, arcs = np.linspace(0.0, 1.0, SAMPLES), float(batch.arcs)
     return smallest_tensions(
         robot, QUINTIC, arcs, tau, batch.segments, kind=FROM_REST, single_precision=single_precision
@@ -146,11 +126,7 @@ def tensions(robot: PlatformRobot, batch: Batch, *, single_precision: bool) -> A
 
 
 def operations_a_check(robot: PlatformRobot, batch: Batch) -> float | None:
-    """Arithmetic operations of one check.
-
-    Returns:
-        as XLA counts them; None where it does not.
-    """
+    """Arithmetic operations of one check."""
     lowered = smallest_tensions.lower(
         robot, QUINTIC, float(batch.arcs), np.zeros(1), batch.segments, kind=FROM_REST, single_precision=True
     )
@@ -158,14 +134,7 @@ def operations_a_check(robot: PlatformRobot, batch: Batch) -> float | None:
 
 
 def numpy_rate(work: SixCableWork) -> float:
-    """Checks a second of the NumPy version.
-
-    Args:
-        work: a part of it is done.
-
-    Returns:
-        the rate.
-    """
+    """Checks a second of the NumPy version."""
     first_cases = SixCableWork(work.robot, *(x[:NUMPY_TRAJECTORIES] for x in work[1:]))
     return len(first_cases.arcs) * SAMPLES / best(partial(_numpy_checks, first_cases))
 

@@ -43,11 +43,7 @@ class ThreeCableWork(NamedTuple):
 
 
 def work() -> ThreeCableWork:
-    """Segments from one point to random ones.
-
-    Returns:
-        the work.
-    """
+    """Segments from one point to random ones."""
     half = math.sqrt(3.0) / 2.0
     base = RADIUS * np.array([[half, -0.5, 0.0], [-half, -0.5, 0.0], [0.0, 1.0, 0.0]])
     problem = Problem(point_mass_robot(base, mass=0.198), Limits(), amplitudes.named("quintic"))
@@ -58,14 +54,7 @@ def work() -> ThreeCableWork:
 
 
 def rate(work: ThreeCableWork, dtype: str) -> float:
-    """Checks a second of the sieve.
-
-    Args:
-        dtype: "float32" or "float64".
-
-    Returns:
-        the rate.
-    """
+    """Checks a second of the sieve."""
     pair = jax.tree.map(lambda x: np.asarray(x, dtype), work.segments)
     batches = [jax.device_put(jax.tree.map(lambda x, i=i: x[i::BATCHES], pair)) for i in range(BATCHES)]
 
@@ -76,23 +65,12 @@ def rate(work: ThreeCableWork, dtype: str) -> float:
 
 
 def checks(count: int) -> int:
-    """Number of checks of segments.
-
-    Returns:
-        their number.
-    """
+    """Number of checks of segments."""
     return count * MAX_ARCS * sieve.SAMPLES
 
 
 def numpy_rate(work: ThreeCableWork) -> float:
-    """Checks a second of the NumPy version.
-
-    Args:
-        work: a part of it is done.
-
-    Returns:
-        the rate.
-    """
+    """Checks a second of the NumPy version."""
     ends = work.ends[:NUMPY_SEGMENTS]
     return checks(len(ends)) / best(partial(_numpy_checks, np.asarray(work.problem.robot.base_points), ends))
 

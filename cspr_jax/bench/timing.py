@@ -15,14 +15,7 @@ SIDE, COPIED = 3072, 2**28
 
 
 def best(work: Callable[[], object], repeats: int | None = None) -> float:
-    """The shortest of several times, after one that compiles.
-
-    Args:
-        repeats: how often; None: `REPEATS`.
-
-    Returns:
-        s.
-    """
+    """The shortest of several times, after one that compiles."""
     work()
     times = []
     for _ in range(repeats or REPEATS):
@@ -33,20 +26,12 @@ def best(work: Callable[[], object], repeats: int | None = None) -> float:
 
 
 def cores() -> int:
-    """Number of processors that this process may use.
-
-    Returns:
-        their number.
-    """
+    """Number of processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def peak() -> dict[str, float]:
-    """Peak rates of the processor: NumPy's products of large matrices, and copies of large arrays.
-
-    Returns:
-        "float32" and "float64" operations a second, "bytes" read and written a second.
-    """
+    """Peak rates of the processor: NumPy's products of large matrices, and copies of large arrays."""
     rates = {}
     for dtype in ("float32", "float64"):
         # Rows are divided among threads: the command line has NumPy's library work in the calling thread alone.
@@ -64,13 +49,6 @@ def _square(pool: ThreadPoolExecutor, matrix: np.ndarray, product: np.ndarray) -
 
 
 def operations(lowered: Any, cases: int) -> float | None:
-    """Arithmetic operations of a compiled function, as XLA counts them; a loop's are counted once.
-
-    Args:
-        cases: number of cases that it computes.
-
-    Returns:
-        the operations of each case; None where XLA does not say.
-    """
+    """Arithmetic operations of a compiled function, as XLA counts them; a loop's are counted once."""
     costs = lowered.compile().cost_analysis() or {}
     return costs["flops"] / cases if "flops" in costs else None

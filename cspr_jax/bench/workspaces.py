@@ -75,16 +75,7 @@ def _twelve_cables() -> PlatformRobot:
 def margin_rate(
     robot: PointMassRobot | PlatformRobot, condition: str, dtype: str, *, by_null_space: bool, batches: int
 ) -> tuple[float, float]:
-    """Margins of one condition a second, from poses as lanes to their two bounds.
-
-    Args:
-        condition: of `workspaces.questions.CONDITIONS`.
-        dtype: "float32" or "float64".
-        by_null_space: by the null space of the wrench matrix; else by its normals.
-
-    Returns:
-        the rate; s that the first batch takes, mostly of compiling.
-    """
+    """Margins of one condition a second, from poses as lanes to their two bounds."""
     centred_robot = centred(robot)[0]
     start = time.perf_counter()
     search = WorkspaceSearch(centred_robot, requirement(centred_robot, condition, robot.limits))
@@ -102,14 +93,7 @@ def margin_rate(
 
 
 def clearance_rate(dtype: str) -> float:
-    """Poses a second of which the nearest two of eight cables are found, among 28 pairs.
-
-    Args:
-        dtype: "float32" or "float64".
-
-    Returns:
-        the rate.
-    """
+    """Poses a second of which the nearest two of eight cables are found, among 28 pairs."""
     signs = (-1.0, 1.0)
     corners = np.array([[x, y, z] for x in signs for y in signs for z in signs])
     robot = platform_robot(corners * [5.0, 4.0, 3.0], corners * [0.4, 0.3, 0.2], mass=1.0, inertia=np.eye(3))
@@ -128,11 +112,7 @@ def clearance_rate(dtype: str) -> float:
 
 
 def tension_rate(robot: PointMassRobot | PlatformRobot) -> float:
-    """Least tensions within limits a second, from arrays of wrench matrices to arrays of tensions.
-
-    Returns:
-        the rate.
-    """
+    """Least tensions within limits a second, from arrays of wrench matrices to arrays of tensions."""
     count = TENSIONS
     centred_robot = centred(robot)[0]
     search = WorkspaceSearch(centred_robot, requirement(centred_robot, FEASIBLE, robot.limits))
@@ -147,11 +127,7 @@ def tension_rate(robot: PointMassRobot | PlatformRobot) -> float:
 
 
 def rates() -> dict[str, Any]:
-    """Rates of all of this work.
-
-    Returns:
-        poses a second by kind of work and by type of numbers; "first_s", time of compiling and of the first batch.
-    """
+    """Rates of all of this work."""
     eight, four, twelve = load_robot("cogiro"), _four_cables(), _twelve_cables()
     rows: dict[str, Any] = {}
     for name, robot, condition, by_null_space, batches in (
@@ -188,14 +164,7 @@ def _others(robot: PointMassRobot | PlatformRobot) -> dict[str, float]:
 
 
 def lines(measured: dict[str, Any]) -> list[str]:
-    """Lines for people.
-
-    Args:
-        measured: of `rates`.
-
-    Returns:
-        the lines.
-    """
+    """Lines for people."""
     text = ["workspaces, poses a second"]
     for name, row in measured.items():
         words = [f"{key} {value / 1e6:8.3g} M/s" for key, value in row.items() if key != "first_s"]

@@ -6,12 +6,17 @@ given or follows from an acceleration at the start, middle = start + r accelerat
 most, is zero.
 """
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cspr_jax.arithmetic.polynomials import product, total
 from cspr_jax.beziers.motion import powers
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 
 class Ends(NamedTuple):
@@ -29,34 +34,21 @@ class Ends(NamedTuple):
     middle: np.ndarray
     middle_change: np.ndarray
 
-    def middles(self, durations: np.ndarray) -> np.ndarray:
-        """Second control points of given durations.
-
-        Args:
-            durations: (n, ...) s.
-
-        Returns:
-            (n, ..., 3) m.
-        """
+    def middles(self, durations: Float[np.ndarray, "n ..."]) -> Float[np.ndarray, "n ... 3"]:
+        """Second control points of given durations."""
         r = (np.asarray(durations) / np.pi) ** 2
         more = (slice(None), *[None] * (r.ndim - 1))
         return self.middle[more] + self.middle_change[more] * r[..., None]
 
 
 def critical_durations(
-    rows: np.ndarray, arms: np.ndarray, normal: np.ndarray, gravity: float, ends: Ends
+    rows: Float[np.ndarray, "n_cables 3"],
+    arms: Float[np.ndarray, "n_cables 3"],
+    normal: Float[np.ndarray, "3"],
+    gravity: float,
+    ends: Ends,
 ) -> list[np.ndarray]:
-    """Durations between which no cable tightens or falls slack, and no depth below the spools changes its sign.
-
-    Args:
-        rows: (n_cables, 3) of the adjugate.
-        arms: (n_cables, 3) likewise.
-        normal: (3,) of the spool plane, the third component 1.
-        gravity: m/s^2.
-
-    Returns:
-        (n_roots,) s of each segment, increasing.
-    """
+    """Durations between which no cable tightens or falls slack, and no depth below the spools changes its sign."""
     # In units in which r, and with it the coefficients, are about 1.
     size = np.abs(ends.end - ends.start).sum(1) + np.abs(ends.start).sum(1)
     unit = size / gravity

@@ -1,7 +1,10 @@
 """Durations of Bezier segments that keep every cable taut, as intervals; and the least of them under limits."""
 
+from __future__ import annotations
+
 import math
 from functools import partial
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -18,6 +21,9 @@ from cspr_jax.motions.proved_verdicts import Verdicts
 from cspr_jax.robots.force_balance import adjugate
 from cspr_jax.robots.point_mass import PointMassRobot, plane_normal, spool_radius
 from cspr_jax.schema.verdicts import Verdict
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Halvings of the stretch between a duration that is feasible and one that is not: as many as float64 has digits.
 HALVINGS = 60
@@ -38,33 +44,17 @@ def _proved_margins(robot: PointMassRobot, motions: Bezier):
     return jax.vmap(one)(motions)
 
 
-def proved_margins(robot: PointMassRobot, ends: Ends, durations: np.ndarray, z0: np.ndarray) -> np.ndarray:
-    """Smallest slacks less their rounding errors: a segment is proved feasible where they are positive.
-
-    Args:
-        robot: a point mass on as many cables as it has degrees of freedom; centred.
-        durations: (n,) s.
-        z0: (n,) m.
-
-    Returns:
-        (n,).
-    """
+def proved_margins(
+    robot: PointMassRobot, ends: Ends, durations: Float[np.ndarray, "n"], z0: Float[np.ndarray, "n"]
+) -> Float[np.ndarray, "n"]:
+    """Smallest slacks less their rounding errors: a segment is proved feasible where they are positive."""
     motions = Bezier(ends.start, ends.middles(durations), ends.end, durations, z0)
     margins = in_batches(partial(_proved_margins, robot), motions, size=BATCH)
     return np.where(np.isfinite(margins), margins, -np.inf)
 
 
-def feasible_durations(robot: PointMassRobot, ends: Ends, z0: np.ndarray) -> list[np.ndarray | None]:
-    """Durations that keep every cable taut below the spools; on redundant cables, wherever they are.
-
-    Args:
-        robot: a point mass; centred.
-        z0: (n,) m.
-
-    Returns:
-        for each segment (n_intervals, 2) s, both ends of each interval proved feasible; the last end is inf where any
-        longer duration is feasible. None on redundant cables where the curve depends on the duration.
-    """
+def feasible_durations(robot: PointMassRobot, ends: Ends, z0: Float[np.ndarray, "n"]) -> list[np.ndarray | None]:
+    """Durations that keep every cable taut below the spools; on redundant cables, wherever they are."""
     if robot.n_cables > robot.dof:
         from cspr_jax.beziers.redundant_durations import taut_durations  # with proofs of any motion
 
@@ -105,20 +95,13 @@ def _intervals(is_in_segment: np.ndarray, is_good: np.ndarray, changes: np.ndarr
     return np.array([*starts, *inside, *ends]).reshape(-1, 2)
 
 
-def least_duration(problem: Problem, ends: Ends, intervals: np.ndarray | None, z0: float) -> float:
+def least_duration(
+    problem: Problem, ends: Ends, intervals: Float[np.ndarray, "n_intervals 2"] | None, z0: float
+) -> float:
     """Least feasible duration of one segment.
 
     Without limits it is the first one that keeps every cable taut. With limits, the first of many durations that meets
     them is narrowed down; a shorter one between two of them is not excluded.
-
-    Args:
-        ends: of the segment, leading dimension 1.
-        intervals: (n_intervals, 2) durations that keep every cable taut, s; None: not known.
-        z0: m.
-
-    Returns:
-        s; if none is feasible, the tried duration that keeps every cable taut and breaks the fewest limits; if none
-        keeps them taut, the one with the largest margin. Redundant cables: `redundant_durations.least_proved_duration`.
     """
     if intervals is not None and len(intervals) and not limits_set(problem.limits):
         return float(intervals[0, 0])
@@ -156,15 +139,8 @@ def _nearest(judgements: Verdicts) -> int:
     return int(np.lexsort((-margin, counts, ~(judgements.margin > 0.0)))[0])
 
 
-def slowest(problem: Problem, points: np.ndarray) -> float:
-    """Duration that is long enough for the limits of speeds and accelerations.
-
-    Args:
-        points: (n + 1, 3) of the path, m; NaN where not known yet.
-
-    Returns:
-        s; 0 without such limits.
-    """
+def slowest(problem: Problem, points: Float[np.ndarray, "n+1 3"]) -> float:
+    """Duration that is long enough for the limits of speeds and accelerations."""
     way = float(np.nansum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
     way = way or float(spool_radius(problem.robot))
     limits = problem.limits

@@ -1,24 +1,26 @@
 """The Bezier segment through the place and the velocity of a release."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.arithmetic.elementary import sincospi
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
-def through(start: Array, position: Array, velocity: Array, share: Array, duration: Array) -> tuple[Array, Array]:
-    """Control points of the segment that passes a place with a velocity, (29).
 
-    Args:
-        start: (3,) first control point, m.
-        position: (3,) place of the release, m.
-        velocity: (3,) at the release, m/s.
-        share: () time of the release over the duration of the segment, in ]0, 1[.
-        duration: () s.
-
-    Returns:
-        the second and the third control point, (3,) each, m.
-    """
+def through(
+    start: Float[Array, "3"],
+    position: Float[Array, "3"],
+    velocity: Float[Array, "3"],
+    share: Float[Array, ""],
+    duration: Float[Array, ""],
+) -> tuple[Float[Array, "3"], Float[Array, "3"]]:
+    """Control points of the segment that passes a place with a velocity, (29)."""
     sine, c = sincospi(jnp.asarray(share, float))
     step = duration * velocity / (jnp.pi * sine)
     middle = (start * (1.0 + c) - 2.0 * position) / (c - 1.0) - step

@@ -4,8 +4,10 @@ Unknowns are the place of the release, the time of the flight, the duration of t
 released on it. All else follows: the velocity of the release (26), the control point and the end of the segment (29).
 """
 
+from __future__ import annotations
+
 import dataclasses
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -26,6 +28,9 @@ from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.point_mass import spool_radius
 from cspr_jax.schema.verdicts import FLAGS
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 UNKNOWNS, POPULATION = 6, 64
 # Margins that the launch of least speed must keep in the search: of taut cables they are exact; limits are sampled
@@ -105,21 +110,13 @@ def _shots(known: tuple[Problem, ReleaseBounds], cases: tuple[LaunchRequirement,
 
 
 def launch_range(
-    problem: Problem, starts: np.ndarray, targets: np.ndarray, bounds: ReleaseBounds, population: int = POPULATION
+    problem: Problem,
+    starts: Float[np.ndarray, "n 3"],
+    targets: Float[np.ndarray, "n 3"],
+    bounds: ReleaseBounds,
+    population: int = POPULATION,
 ) -> LaunchRange:
-    """Launches of least speed, and the largest margins, to landing places.
-
-    Args:
-        problem: robot, a point mass, centred, z down, and limits.
-        starts: (n, 3) where the segments start at rest, m.
-        targets: (n, 3) where the object is to land, m.
-        bounds: within which a release is looked for.
-        population: of the search; one twice as large takes four times as long.
-
-    Returns:
-        the launches, each the best of a search: it is proved feasible, but not that there is no slower one, or none
-        where the search finds none.
-    """
+    """Launches of least speed, and the largest margins, to landing places."""
     question = LaunchRequirement(starts, targets, depths_of(problem.robot, starts))
     margins = (np.inf, *(SAMPLED if limits_set(problem.limits) else EXACT))
     places = evolved(_energy, (problem, bounds), question, unknowns=UNKNOWNS, margins=margins, population=population)

@@ -107,17 +107,7 @@ def _landing(arguments, x: Array) -> tuple[Array, Array]:
 
 
 def launched(problem: Problem, launch: Launch, durations: list[float | None], choose: str | None) -> LaunchSequence:
-    """The launch, with everything that is left open chosen.
-
-    Args:
-        problem: robot, a point mass, and limits.
-        durations: of the n segments, s; None: to be chosen, for the least total.
-        choose: the time of flight for the least kinetic energy at the release, "energy", or for the earliest landing,
-            "time"; None where it is given.
-
-    Returns:
-        the launch; where nothing feasible is found, the one with the largest margin found.
-    """
+    """The launch, with everything that is left open chosen."""
     launch = Launch(*(value if value is None else jnp.asarray(value) for value in launch))
     if choose == "energy":
         launch = launch._replace(time=jnp.asarray(_searched(problem, launch, durations, _speed).time))

@@ -5,9 +5,11 @@ times the lengths, pseudotensions, the depth. Over a block of c each of them, an
 Bernstein coefficients; interval jets carry these to the slacks.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax
 import numpy as np
@@ -20,23 +22,18 @@ from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.force_balance import adjugate
 
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float
+
 Items = dict[str, Any]
 # Blocks that are looked at together.
 TOGETHER = 1 << 14
 
 
-def limit_slacks(problem: Problem, motions: Bezier, kappa: np.ndarray, is_below: np.ndarray) -> Proved:
-    """Smallest slacks of the limits that are given, in their order.
-
-    Args:
-        problem: robot, a point mass on as many cables as it has degrees of freedom, and limits.
-        motions: NumPy leaves with a leading dimension n.
-        kappa: (n, n_cables, 4) pseudotensions by powers of c, m^3/s^2 (planar: m^2/s^2).
-        is_below: (n,) whether the segment is proved to stay below the spools: elsewhere slacks of tensions are -inf.
-
-    Returns:
-        slacks without a unit, (n, n_limits); of speeds, and of the mass centre, 1 - (rate / limit)^2.
-    """
+def limit_slacks(
+    problem: Problem, motions: Bezier, kappa: Float[np.ndarray, "n n_cables 4"], is_below: Bool[np.ndarray, "n"]
+) -> Proved:
+    """Smallest slacks of the limits that are given, in their order."""
     rows, tables = limits_set(problem.limits), _tables(problem, motions, kappa, is_below)
     slacks = [_SLACKS[row.name](problem, getattr(problem.limits, row.name)) for row in rows]
     count = len(is_below)

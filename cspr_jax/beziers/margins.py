@@ -6,7 +6,9 @@ spools (19), whose smallest value on [-1, 1] is at an end or where its slope is 
 quadratic. All this holds for a point mass on two cables in a plane likewise.
 """
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -16,6 +18,9 @@ from jax import Array, lax
 from cspr_jax.beziers.motion import Bezier, powers
 from cspr_jax.robots.force_balance import adjugate, pseudotensions
 from cspr_jax.robots.point_mass import PointMassRobot, plane_normal, rest_point, spool_radius
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Rounding errors are below so many units of the sum of the sizes of all terms.
 ROUNDING = 64.0
@@ -38,15 +43,8 @@ class Margins(NamedTuple):
 
 
 @jax.jit
-def cubics(robot: PointMassRobot, motion: Bezier) -> Array:
-    """Pseudotensions over their value at rest in P0, by powers of c = cos(pi tau), (19) and (20).
-
-    Args:
-        robot: a point mass on three cables, or on two in a plane; centred.
-
-    Returns:
-        (n_cables, 4) the constant first.
-    """
+def cubics(robot: PointMassRobot, motion: Bezier) -> Float[Array, "n_cables 4"]:
+    """Pseudotensions over their value at rest in P0, by powers of c = cos(pi tau), (19) and (20)."""
     rows, arms = adjugate(robot)
     square, slope, rest = powers(motion.start, motion.middle, motion.end)
     u = (np.pi / motion.time) ** 2
@@ -65,29 +63,15 @@ def cubics(robot: PointMassRobot, motion: Bezier) -> Array:
 
 
 @jax.jit
-def depth_quadratic(robot: PointMassRobot, motion: Bezier) -> Array:
-    """Depth below the spools over z0, by powers of c = cos(pi tau).
-
-    Args:
-        robot: a point mass on three cables, or on two in a plane; centred.
-
-    Returns:
-        (3,) the constant first.
-    """
+def depth_quadratic(robot: PointMassRobot, motion: Bezier) -> Float[Array, "3"]:
+    """Depth below the spools over z0, by powers of c = cos(pi tau)."""
     square, slope, rest = powers(motion.start, motion.middle, motion.end)
     return jnp.stack([rest, slope, square]) @ plane_normal(robot) / motion.z0
 
 
 @jax.jit
 def smallest_margins(robot: PointMassRobot, motion: Bezier) -> Margins:
-    """Smallest pseudotensions and depth of a segment, (22) to (25); the last with "min" in place of "max".
-
-    Args:
-        robot: a point mass on three cables, or on two in a plane; centred.
-
-    Returns:
-        the margins.
-    """
+    """Smallest pseudotensions and depth of a segment, (22) to (25); the last with "min" in place of "max"."""
     rows, arms = adjugate(robot)
     square, slope, rest = (jnp.sum(jnp.abs(x)) for x in powers(motion.start, motion.middle, motion.end))
     place = square + slope + rest
@@ -102,30 +86,16 @@ def smallest_margins(robot: PointMassRobot, motion: Bezier) -> Margins:
     )
 
 
-def depths_of(robot: PointMassRobot, starts: np.ndarray) -> np.ndarray:
-    """Depths by which slacks are normalised where there is no P0: those of the starts.
-
-    Args:
-        robot: a point mass on any number of cables; centred.
-        starts: (n, 3) m.
-
-    Returns:
-        (n,) below the spools, m; for a start that is not below them the size of the robot.
-    """
+def depths_of(robot: PointMassRobot, starts: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n"]:
+    """Depths by which slacks are normalised where there is no P0: those of the starts."""
     depth = starts @ np.asarray(plane_normal(robot))
     return np.where(depth > 0.0, depth, float(spool_radius(robot)))
 
 
-def smallest_cubic(powers_of_c: Array) -> Array:
+def smallest_cubic(powers_of_c: Float[Array, "4 ..."]) -> Float[Array, "..."]:
     """Smallest value of cubics on [-1, 1].
 
     The zeros of the slope are found without cancellation; where one is not in the interval, an end stands in for it.
-
-    Args:
-        powers_of_c: (4, ...) coefficients, the constant first.
-
-    Returns:
-        (...).
     """
     f0, f1, f2, f3 = powers_of_c
     discriminant = f2**2 - 3.0 * f3 * f1
@@ -136,15 +106,8 @@ def smallest_cubic(powers_of_c: Array) -> Array:
     return jnp.minimum(ends, jnp.minimum(*values))
 
 
-def smallest_quadratic(powers_of_c: Array) -> Array:
-    """Smallest value of quadratics on [-1, 1].
-
-    Args:
-        powers_of_c: (3, ...) coefficients, the constant first.
-
-    Returns:
-        (...).
-    """
+def smallest_quadratic(powers_of_c: Float[Array, "3 ..."]) -> Float[Array, "..."]:
+    """Smallest value of quadratics on [-1, 1]."""
     f0, f1, f2 = powers_of_c
     at = _inside(-0.5 * f1 / f2)
     ends = f0 + f2 - jnp.abs(f1)

@@ -5,8 +5,10 @@ w^2 (2 A - B c - 4 A c^2), (18). At the start it is w^2 (middle - start), at the
 segments meet, both are the same (15).
 """
 
+from __future__ import annotations
+
 import dataclasses
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax
 import jax.numpy as jnp
@@ -21,6 +23,9 @@ from cspr_jax.motions.amplitude_bounds import normalised
 from cspr_jax.robots.state import State
 from cspr_jax.robots.state_bounds import StateBounds
 from cspr_jax.runtime.persistent_jit import persistent_jit
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Int
 
 # Blocks of which bounds are computed at a time.
 BATCH = 64
@@ -67,18 +72,10 @@ class Bezier:
         return many_bounds(jax.tree.map(lambda x: np.asarray(x)[None], self), np.zeros(len(start), int), start, end)
 
 
-def many_bounds(curves: Bezier, motion: np.ndarray, start: np.ndarray, end: np.ndarray) -> StateBounds:
-    """Bounds of the states of several segments over blocks of time.
-
-    Args:
-        curves: NumPy leaves with a leading dimension n.
-        motion: (k,) number of the segment of each block.
-        start: (k,) s.
-        end: (k,) s.
-
-    Returns:
-        the bounds, leaves (k, ...).
-    """
+def many_bounds(
+    curves: Bezier, motion: Int[np.ndarray, "k"], start: Float[np.ndarray, "k"], end: Float[np.ndarray, "k"]
+) -> StateBounds:
+    """Bounds of the states of several segments over blocks of time."""
     each = jax.tree.map(lambda x: x[motion], curves)
     return in_batches(_bounds, (each, normalised(each.time, start, end)), size=BATCH)
 
@@ -100,28 +97,10 @@ def _bounds(blocks: tuple[Bezier, AffineBounds]) -> StateBounds:
 
 
 def powers(start: Any, middle: Any, end: Any) -> tuple[Any, Any, Any]:
-    """Coefficients of the powers of c = cos(pi tau) in the position, (17).
-
-    Args:
-        start: (..., 3) first control point, m.
-        middle: (..., 3) second one.
-        end: (..., 3) third one.
-
-    Returns:
-        coefficients of c^2, c and 1, (..., 3) each, m.
-    """
+    """Coefficients of the powers of c = cos(pi tau) in the position, (17)."""
     return 0.25 * (start - 2.0 * middle + end), 0.5 * (start - end), 0.25 * (start + 2.0 * middle + end)
 
 
 def end_acceleration(middle: Any, end: Any, duration: Any) -> Any:
-    """Acceleration at the end of a segment, with which the next one starts: (8), (15).
-
-    Args:
-        middle: (..., 3) second control point, m.
-        end: (..., 3) third one, m.
-        duration: (..., 1) s.
-
-    Returns:
-        (..., 3) m/s^2.
-    """
+    """Acceleration at the end of a segment, with which the next one starts: (8), (15)."""
     return (np.pi / duration) ** 2 * (middle - end)

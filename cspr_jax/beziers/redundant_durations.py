@@ -7,7 +7,10 @@ are. Where the second control point follows from the acceleration at the start, 
 only the durations that are tried are decided.
 """
 
+from __future__ import annotations
+
 from functools import partial
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -22,6 +25,9 @@ from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.limits import NO_LIMITS
 from cspr_jax.robots.point_mass import PointMassRobot, spool_radius
 from cspr_jax.schema.verdicts import Verdict
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 BATCH, SAMPLES = 512, 65
 # Durations tried at first, in geometric progression from the shortest to the longest, over the time of a fall as far
@@ -68,18 +74,8 @@ class _Segment:
         return good
 
 
-def taut_durations(robot: PointMassRobot, ends: Ends, z0: float) -> np.ndarray | None:
-    """Durations that keep every cable taut.
-
-    Args:
-        robot: a point mass on more cables than degrees of freedom; centred.
-        ends: of the segment, leading dimension 1.
-        z0: m.
-
-    Returns:
-        (1, 2) s: both ends of the interval, proved; the first is 0 where the shortest duration tried is feasible, the
-        last inf where any longer one is; (0, 2) where none was found; None where the curve depends on the duration.
-    """
+def taut_durations(robot: PointMassRobot, ends: Ends, z0: float) -> Float[np.ndarray, "1 2"] | None:
+    """Durations that keep every cable taut."""
     if ends.middle_change.any():
         return None
     segment = _Segment(Problem(robot, NO_LIMITS, named("quintic")), ends, z0)
@@ -96,19 +92,7 @@ def taut_durations(robot: PointMassRobot, ends: Ends, z0: float) -> np.ndarray |
 
 
 def least_proved_duration(problem: Problem, ends: Ends, z0: float, slowest: float) -> float:
-    """Least feasible duration of a segment.
-
-    Args:
-        problem: robot, a point mass on more cables than degrees of freedom, and limits.
-        ends: of the segment, leading dimension 1.
-        z0: m.
-        slowest: duration that is long enough for the limits of the cables' speeds and accelerations, s.
-
-    Returns:
-        s, proved feasible; one shorter by more than `CLOSE` of it is not, and where the control points do not depend on
-        the duration none is. If none is found, the duration with the largest slack of those tried; 0 where the shortest
-        one tried is feasible, so that nothing bounds the accelerations.
-    """
+    """Least feasible duration of a segment."""
     segment = _Segment(problem, ends, z0)
     times, values = _looked_at(segment, problem.robot, ends, slowest)
     first = _first_proved(segment, times, values)

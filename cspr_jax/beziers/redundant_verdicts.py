@@ -4,8 +4,11 @@ The motion determines no pseudotensions there. Tensions that balance it are encl
 (`motions.time_proof`); the margin is the largest distance that all tensions can keep from their limits, in newtons.
 """
 
+from __future__ import annotations
+
 import itertools
 from functools import partial
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -23,21 +26,16 @@ from cspr_jax.robots.tension_distribution import centred
 from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # Segments that are proved together, and the largest share of the weight a cable that counts for searches: on cables
 # that pull against each other without largest tensions it has no bound.
 TOGETHER, LARGEST = 64, 1e6
 
 
 def proofs(problem: Problem, motions: Bezier, *, at_rest: bool = False) -> list[MotionProof]:
-    """Proofs of segments.
-
-    Args:
-        motions: NumPy leaves with a leading dimension n.
-        at_rest: whether each place on the way is judged at rest, as where a segment takes for ever.
-
-    Returns:
-        n proofs.
-    """
+    """Proofs of segments."""
 
     def bounds(first: int, motion: np.ndarray, start: np.ndarray, end: np.ndarray) -> StateBounds:
         states = many_bounds(motions, motion + first, start, end)
@@ -49,16 +47,8 @@ def proofs(problem: Problem, motions: Bezier, *, at_rest: bool = False) -> list[
     return list(itertools.chain.from_iterable(parts))
 
 
-def verdicts_and_proofs(problem: Problem, motions: Bezier) -> tuple[Verdicts, np.ndarray]:
-    """Verdicts of segments, with their proofs.
-
-    Args:
-        problem: robot, a point mass on more cables than degrees of freedom, and limits.
-        motions: leaves with a leading dimension n.
-
-    Returns:
-        the verdicts, margins in N; (n,) `MotionProof` of each, None of one that is not finite.
-    """
+def verdicts_and_proofs(problem: Problem, motions: Bezier) -> tuple[Verdicts, Float[np.ndarray, "n"]]:
+    """Verdicts of segments, with their proofs."""
     motions = jax.tree.map(np.asarray, motions)
     count = len(motions.time)
     leaves = np.concatenate([leaf.reshape(count, -1) for leaf in jax.tree.leaves(motions)], axis=1)
@@ -73,15 +63,8 @@ def verdicts_and_proofs(problem: Problem, motions: Bezier) -> tuple[Verdicts, np
     return Verdicts(verdict, margin, bound, room), each
 
 
-def instant_slacks(problem: Problem, motion: Bezier, tau: Array) -> Array:
-    """Slacks at one instant, for searches.
-
-    Args:
-        tau: () normalised time.
-
-    Returns:
-        (n_slacks,) the margin of the tensions over the weight a cable, then limits, without a unit.
-    """
+def instant_slacks(problem: Problem, motion: Bezier, tau: Float[Array, ""]) -> Float[Array, "n_slacks"]:
+    """Slacks at one instant, for searches."""
     robot, state = problem.robot, motion.state(tau)
     matrix, wrench = robot.wrench_matrix(state), robot.inertial_wrench(state)
     margin = centred(matrix, wrench, *tension_range(robot, problem.limits))[1]

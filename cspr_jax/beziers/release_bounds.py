@@ -30,19 +30,7 @@ class ReleaseBounds(NamedTuple):
 def bounds_of(
     problem: Problem, frame: Frame, releases: Sequence[Range] = (None, None, None), longest: float | None = None
 ) -> ReleaseBounds:
-    """Bounds of the unknowns.
-
-    Args:
-        problem: gives the size of the robot.
-        releases: least and largest x, y and z of the release, as `box_of` takes them.
-        longest: largest duration of the segment, s; None: that of all searches.
-
-    Returns:
-        the bounds.
-
-    Raises:
-        InputError: a planar robot whose y is not 0, or a largest duration below the smallest one.
-    """
+    """Bounds of the unknowns."""
     box = box_of(problem.robot, frame, releases)
     short, long = duration_bounds(problem, np.zeros((2, 3)))
     if longest is not None and not np.log(longest) > short:

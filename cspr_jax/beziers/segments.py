@@ -1,7 +1,9 @@
 """Bezier segments, one after the other: durations that are given or the least, accelerations that go on, verdicts."""
 
+from __future__ import annotations
+
 import dataclasses
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import numpy as np
@@ -14,6 +16,9 @@ from cspr_jax.beziers.verdicts import verdicts
 from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.cause import Cause
 from cspr_jax.motions.problem import Problem
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -84,24 +89,12 @@ class Joined(NamedTuple):
 
 def joined_segments(
     problem: Problem,
-    points: np.ndarray,
+    points: Float[np.ndarray, "n+1 3"],
     durations: list[float | None],
-    first_control_point: np.ndarray,
+    first_control_point: Float[np.ndarray, "3"],
     z0: float,
 ) -> Joined:
-    """Segments through points, at rest in each, with accelerations that go on from one to the next (15).
-
-    Args:
-        problem: robot, a point mass, and limits.
-        points: (n + 1, 3) from the centroid of the spools, z down, m.
-        durations: of the n segments, s; None: the least feasible one, with the segments before as they are.
-        first_control_point: (3,) second control point of the first segment, m.
-        z0: depth at which slacks are normalised, m.
-
-    Returns:
-        the segments; where no duration is feasible, "least" is the one with the largest margin of those tried. Where
-        there is no least one, since redundant cables give any acceleration, it is NaN, and the segment is the last one.
-    """
+    """Segments through points, at rest in each, with accelerations that go on from one to the next (15)."""
     motions, intervals, depth = [], [], np.array([z0])
     # The first segment is given its control point, each of the next ones the acceleration at its start.
     ends = Ends(points[:1], points[1:2], first_control_point[None], np.zeros((1, 3)))
@@ -121,14 +114,7 @@ def joined_segments(
 
 
 def answers_of(problem: Problem, segments: Joined) -> BezierAnswers:
-    """Answers of segments.
-
-    Args:
-        segments: of `joined_segments`.
-
-    Returns:
-        the answers; control points from the centroid of the spools, z down.
-    """
+    """Answers of segments."""
     motions = segments.motions
     count, proofs = len(motions.time), None
     if problem.robot.n_cables > problem.robot.dof:

@@ -4,7 +4,9 @@ At the ends of segments the accelerations are affine in u = (pi / T)^2: each seg
 before it, (15).
 """
 
-from typing import Any, NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -20,6 +22,9 @@ from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.slacks import slacks
 from cspr_jax.robots.point_mass import spool_radius
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Shortest and longest duration looked at, over that of a fall by the robot's size.
 SHORTEST, LONGEST = 0.1, 40.0
@@ -44,15 +49,8 @@ class Anchored(NamedTuple):
 
 
 @jax.jit
-def segments_of(sequence: Anchored, durations: Array) -> Bezier:
-    """Segments of given durations.
-
-    Args:
-        durations: (n,) s.
-
-    Returns:
-        leaves with a leading dimension n.
-    """
+def segments_of(sequence: Anchored, durations: Float[Array, "n"]) -> Bezier:
+    """Segments of given durations."""
     starts, ends = sequence.points[:-1], sequence.points[1:]
     r = (durations / np.pi) ** 2
     added = (starts - ends) / r[:, None]
@@ -67,14 +65,6 @@ def margins_of(problem: Problem, segments: Bezier, samples: int = SAMPLES) -> Ar
     """Margins of segments for a search: exact ones of taut cables and of the depth, sampled ones of limits.
 
     On redundant cables those of tensions are sampled, too.
-
-    Args:
-        problem: robot, a point mass, and limits.
-        segments: leaves with a leading dimension n.
-        samples: instants of a segment at which limits are sampled.
-
-    Returns:
-        (n * n_slacks,) without a unit.
     """
     tau = jnp.linspace(0.0, 1.0, samples)
     if problem.robot.n_cables > problem.robot.dof:
@@ -95,29 +85,14 @@ def margins_of(problem: Problem, segments: Bezier, samples: int = SAMPLES) -> Ar
 
 
 def judged(problem: Problem, segments: Bezier) -> Judged:
-    """Judgement of a sequence, proved.
-
-    Args:
-        segments: leaves with a leading dimension n.
-
-    Returns:
-        whether all are feasible, and the smallest margin.
-    """
+    """Judgement of a sequence, proved."""
     judgements = verdicts(problem, jax.tree.map(np.asarray, segments))
     worst = smallest_slacks(problem, judgements).min()
     return Judged(bool((judgements.verdict == 0).all()), float(worst))
 
 
-def duration_bounds(problem: Problem, points: np.ndarray) -> tuple[float, float]:
-    """Logarithms of the shortest and of the longest duration that searches look at.
-
-    Args:
-        problem: gives the size of the robot, and limits of its speed.
-        points: (n + 1, 3) of the sequence, m; NaN where not known yet.
-
-    Returns:
-        of s.
-    """
+def duration_bounds(problem: Problem, points: Float[np.ndarray, "n+1 3"]) -> tuple[float, float]:
+    """Logarithms of the shortest and of the longest duration that searches look at."""
     unit = np.sqrt(float(spool_radius(problem.robot)) / float(problem.robot.gravity))
     longest = max(LONGEST * unit, slowest(problem, points))
     return float(np.log(SHORTEST * unit)), float(np.log(longest))
@@ -129,16 +104,8 @@ def _parts(arguments, x: Array) -> tuple[Array, Array]:
     return jnp.sum(times), margins_of(problem, segments_of(sequence, times))
 
 
-def least_total(problem: Problem, sequence: Anchored, durations: list[float | None]) -> np.ndarray:
-    """Durations whose sum is least.
-
-    Args:
-        problem: robot, a point mass, and limits.
-        durations: of the n segments, s; None: to be chosen.
-
-    Returns:
-        (n,) s; where nothing feasible is found, those with the largest margin found.
-    """
+def least_total(problem: Problem, sequence: Anchored, durations: list[float | None]) -> Float[np.ndarray, "n"]:
+    """Durations whose sum is least."""
     known = np.array([1.0 if time is None else time for time in durations])
     free = np.array([i for i, time in enumerate(durations) if time is None])
 

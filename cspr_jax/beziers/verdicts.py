@@ -1,6 +1,9 @@
 """Verdicts of Bezier segments: exact for taut cables, proved for limits."""
 
+from __future__ import annotations
+
 from functools import partial
+from typing import TYPE_CHECKING
 
 import jax
 import numpy as np
@@ -15,6 +18,9 @@ from cspr_jax.motions.proved_verdicts import SPEEDS, Verdicts, plain_slack
 from cspr_jax.robots.force_balance import pseudotensions
 from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.schema.verdicts import FLAGS, Verdict
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Segments judged together: of a plan, and of arrays.
 BATCH, MANY = 256, 8192
@@ -37,14 +43,7 @@ def _pseudotensions(robot, motions: Bezier):
 
 
 def verdicts(problem: Problem, motions: Bezier) -> Verdicts:
-    """Verdicts of Bezier segments: exact for taut cables, proved for limits and on redundant cables.
-
-    Args:
-        motions: leaves with a leading dimension n.
-
-    Returns:
-        the verdicts; margins without a unit, on redundant cables in N.
-    """
+    """Verdicts of Bezier segments: exact for taut cables, proved for limits and on redundant cables."""
     if problem.robot.n_cables > problem.robot.dof:
         from cspr_jax.beziers.redundant_verdicts import verdicts_and_proofs  # with proofs of any motion
 
@@ -77,12 +76,8 @@ def verdicts(problem: Problem, motions: Bezier) -> Verdicts:
     return Verdicts(verdict, slack.min(1), bound.min(1), room)
 
 
-def smallest_slacks(problem: Problem, judgements: Verdicts) -> np.ndarray:
-    """Smallest slack of each segment, of tensions and limits, without a unit.
-
-    Returns:
-        (n,); -inf where there is none.
-    """
+def smallest_slacks(problem: Problem, judgements: Verdicts) -> Float[np.ndarray, "n"]:
+    """Smallest slack of each segment, of tensions and limits, without a unit."""
     robot, margin = problem.robot, judgements.margin
     if robot.n_cables > robot.dof:
         margin = margin * robot.n_cables / float(robot.mass * robot.gravity)

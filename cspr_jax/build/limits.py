@@ -8,18 +8,7 @@ from cspr_jax.robots.limits import Limits
 
 
 def build_limits(robot_file: RobotFile, keys: LimitKeys, file: object) -> Limits:
-    """Limits of the file, with those of the robot where it gives none.
-
-    Args:
-        keys: of the plan or sweep.
-        file: named in errors.
-
-    Returns:
-        the limits.
-
-    Raises:
-        ConfigError: a smallest tension that is not below the largest, or a list of another length.
-    """
+    """Limits of the file, with those of the robot where it gives none."""
     pairs = robot_file.pairs
     try:
         limits = limits_of(robot_file, vars(keys), vars(robot_file), "", len(robot_file.as_written.base_points))

@@ -1,5 +1,9 @@
 """Orientations of a file in the axes of the kernels."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from cspr_jax.arithmetic.frames import IDENTITY, Frame
@@ -7,35 +11,19 @@ from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE, cylindrical_frames, fr
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.motions.waypoints import Waypoints
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
-def orientations(frame: Frame, points: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """Orientations of tilt and torsion in the cylindrical frame of their places, (3.98), in the kernels' axes.
 
-    Args:
-        frame: of the file, to whose axes the angles refer.
-        points: (n, 3) from the centroid of the spools, z down, m.
-        angles: (n, 3) phi, theta, sigma, rad.
-
-    Returns:
-        (n, 4) unit quaternions.
-    """
+def orientations(
+    frame: Frame, points: Float[np.ndarray, "n 3"], angles: Float[np.ndarray, "n 3"]
+) -> Float[np.ndarray, "n 4"]:
+    """Orientations of tilt and torsion in the cylindrical frame of their places, (3.98), in the kernels' axes."""
     return frame.turned_quaternions(from_tilt_torsion(angles + cylindrical_frames(frame.turned(points))))
 
 
-def given_quaternion(quaternion: list[float] | None, key: str, file: object) -> np.ndarray:
-    """An orientation given as a quaternion, which may miss length 1 by rounding.
-
-    Args:
-        quaternion: scalar first; None: the reference orientation.
-        key: named in errors.
-        file: named in errors.
-
-    Returns:
-        (4,) of unit length.
-
-    Raises:
-        ConfigError: not of unit length.
-    """
+def given_quaternion(quaternion: list[float] | None, key: str, file: object) -> Float[np.ndarray, "4"]:
+    """An orientation given as a quaternion, which may miss length 1 by rounding."""
     unit_quaternion = np.asarray(IDENTITY if quaternion is None else quaternion)
     size = float(np.linalg.norm(unit_quaternion))
     if abs(size - 1.0) > UNIT_TOLERANCE:
@@ -43,18 +31,8 @@ def given_quaternion(quaternion: list[float] | None, key: str, file: object) -> 
     return unit_quaternion / size
 
 
-def pose_quaternions(stops: Waypoints, points: np.ndarray) -> np.ndarray:
-    """Orientations of way-points, by their quaternions or by tilt and torsion, in the kernels' axes.
-
-    Args:
-        points: (n_poses, 3) their places, from the centroid of the spools, z down, m.
-
-    Returns:
-        (n_poses, 4) unit quaternions from the reference orientation, scalar first.
-
-    Raises:
-        ConfigError: a quaternion that is not of unit length.
-    """
+def pose_quaternions(stops: Waypoints, points: Float[np.ndarray, "n_poses 3"]) -> Float[np.ndarray, "n_poses 4"]:
+    """Orientations of way-points, by their quaternions or by tilt and torsion, in the kernels' axes."""
     frame, poses = stops.frame, stops.poses
     units = [
         given_quaternion(pose.quaternion, f"{stops.name(i)}.quaternion", stops.path) for i, pose in enumerate(poses)

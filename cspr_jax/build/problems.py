@@ -19,21 +19,7 @@ from cspr_jax.schema.families import FAMILIES
 def build_amplitude(
     keys: TrajectoryKeys, file: object, *, epsilon: float | None = None, at: str = "", for_bounds: bool = False
 ) -> Amplitude:
-    """The amplitude function, its boundary conditions checked.
-
-    Args:
-        keys: of the plan or sweep.
-        file: named in errors.
-        epsilon: value in place of "best".
-        at: prefix of the key in errors.
-        for_bounds: whether "ideal" is allowed, which is no motion.
-
-    Returns:
-        the function.
-
-    Raises:
-        ConfigError: it breaks (2.49), of a transition (1.27) or (1.28); epsilon = "best" where a value must be given.
-    """
+    """The amplitude function, its boundary conditions checked."""
     key = keys.amplitude
     if isinstance(key, PolynomialAmplitude):
         amplitude, text = amplitudes.from_polynomial(key.polynomial), shown(list(key.polynomial))
@@ -64,22 +50,7 @@ def build_problem(
     any_cables: bool = False,
     pulleys: bool = False,
 ) -> Problem:
-    """Robot, limits and amplitude function of a plan or sweep, as the kernels take them.
-
-    Args:
-        file: named in errors.
-        epsilon: value in place of the "best" of an amplitude function.
-        at: prefix of keys of the trajectory in errors.
-        for_bounds: whether the amplitude function may be "ideal", which is no motion.
-        any_cables: whether there may be more cables than degrees of freedom.
-        pulleys: whether there may be pulleys, whatever the families.
-
-    Returns:
-        the problem: its robot is centred; a platform in its reference axes.
-
-    Raises:
-        ConfigError: the robot, the amplitude function or the limits cannot be used.
-    """
+    """Robot, limits and amplitude function of a plan or sweep, as the kernels take them."""
     amplitude = build_amplitude(keys, file, epsilon=epsilon, at=at, for_bounds=for_bounds)
     limit_values = build_limits(robot_file, limits, file)
     pulleys = pulleys or all(FAMILIES[name].knows_pulleys for name in keys.families)
@@ -94,13 +65,5 @@ def build_problem(
 
 
 def motion_kind(keys: TrajectoryKeys, *, from_rest: bool = False) -> PlatformMotionKind:
-    """Kind of the motions of a platform.
-
-    Args:
-        keys: of the plan or sweep.
-        from_rest: whether all start at rest in P0.
-
-    Returns:
-        the kind.
-    """
+    """Kind of the motions of a platform."""
     return PlatformMotionKind(variable=keys.family == "hypocycloid", plain=keys.beat == "beta_1", from_rest=from_rest)

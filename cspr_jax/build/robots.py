@@ -49,27 +49,12 @@ PlatformName = Literal[
 
 
 def gravity_of(robot_file: RobotFile, keys: TrajectoryKeys) -> float:
-    """Gravity: the plan's or sweep's, else the robot's, else 9.81 m/s^2.
-
-    Returns:
-        m/s^2.
-    """
+    """Gravity: the plan's or sweep's, else the robot's, else 9.81 m/s^2."""
     return keys.gravity or robot_file.gravity or STANDARD_GRAVITY
 
 
 def build_robot(robot_file: RobotFile, keys: TrajectoryKeys, file: object) -> PointMassRobot | PlatformRobot:
-    """The robot of a file, in its own axes and with its own limits.
-
-    Args:
-        keys: of the plan or sweep.
-        file: named in errors.
-
-    Returns:
-        the robot.
-
-    Raises:
-        ConfigError: its geometry, inertia or limits cannot be used.
-    """
+    """The robot of a file, in its own axes and with its own limits."""
     settings: dict[str, Any] = {name: getattr(robot_file, name) for name in ("mass", "name", "z_axis")}
     settings |= {"gravity": gravity_of(robot_file, keys), "limits": build_limits(robot_file, LimitKeys(), file)}
     settings |= {"pattern": robot_file.own_pattern}
@@ -112,21 +97,7 @@ def load_robot(reference: str | Path) -> PointMassRobot | PlatformRobot:
 def kernel_robot(
     robot_file: RobotFile, keys: TrajectoryKeys, file: object, *, any_cables: bool = False, pulleys: bool = False
 ) -> Any:
-    """The robot of a file, as the kernels take it; a platform's axes are still those of the file.
-
-    Args:
-        keys: of the plan or sweep.
-        file: named in errors.
-        any_cables: whether there may be more cables than degrees of freedom.
-        pulleys: whether there may be pulleys.
-
-    Returns:
-        the robot, centred.
-
-    Raises:
-        ConfigError: its geometry or inertia cannot be used, it has more cables than degrees of freedom, or no
-            trajectory moves such a robot.
-    """
+    """The robot of a file, as the kernels take it; a platform's axes are still those of the file."""
     robot: Any = build_robot(robot_file, keys, file)
     place, key = robot_file.placed("base_points", file)
     try:
@@ -147,15 +118,7 @@ def kernel_robot(
 
 
 def fault_at_rest(robot_file: RobotFile) -> str | None:
-    """Reason why a robot cannot hang still in its reference orientation, if it cannot.
-
-    Args:
-        robot_file: the robot. A platform is tried as deep below the centroid of its spools as these are away from it,
-            one on more cables at many depths; see `robots.static_equilibrium`.
-
-    Returns:
-        the reason; None if it hangs with every cable taut.
-    """
+    """Reason why a robot cannot hang still in its reference orientation, if it cannot."""
     robot_file = robot_file.equivalent() if robot_file.translation_only else robot_file
     try:
         is_redundant = len(robot_file.base_points) > robot_file.dof
@@ -174,9 +137,5 @@ def fault_at_rest(robot_file: RobotFile) -> str | None:
 
 
 def is_redundant_platform(robot: PointMassRobot | PlatformRobot) -> bool:
-    """Tell whether a robot is judged by margins of tensions, for which largest tensions may be infinite.
-
-    Returns:
-        whether it is a platform on more cables than degrees of freedom.
-    """
+    """Tell whether a robot is judged by margins of tensions, for which largest tensions may be infinite."""
     return isinstance(robot, PlatformRobot) and robot.n_cables > robot.dof

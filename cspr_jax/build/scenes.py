@@ -22,20 +22,7 @@ def scene_of(
     *,
     trajectory: TrajectoryKeys,
 ) -> Scene:
-    """Scene of the robot of a problem, whose platform has its reference axes; see `build_scene`.
-
-    Args:
-        frame: axes of the robot file.
-        keys: of the plan or sweep.
-        file: named in errors.
-        trajectory: of the plan or sweep.
-
-    Returns:
-        the scene in the kernels' coordinates.
-
-    Raises:
-        ConfigError: as `build_scene`.
-    """
+    """Scene of the robot of a problem, whose platform has its reference axes; see `build_scene`."""
     written = centred(build_robot(robot_file, trajectory, file))[0]
     rotation = aligned(written)[1] if isinstance(written, PlatformRobot) else None
     return build_scene(robot, robot_file, frame, keys, file, rotation=rotation)

@@ -1,6 +1,9 @@
 """Bodies that the cables and the platform of a robot can meet, built from checked files."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,26 +16,18 @@ from cspr_jax.robots.clearance import Scene, scene
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.shapes import Body, Obstacle, inward, rotated, turned
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 
 def surroundings(
     robot: AnyRobot,
     frame: Frame,
     obstacles: Sequence[Obstacle] = (),
     body: Body | None = None,
-    rotation: np.ndarray | None = None,
+    rotation: Float[np.ndarray, "3 3"] | None = None,
 ) -> Scene:
-    """A robot among the bodies that its cables can meet.
-
-    Args:
-        robot: centred, z down.
-        frame: axes of the robot file.
-        obstacles: bodies fixed in space, in the axes of the file.
-        body: shape of the platform, in platform axes as in the file, from the mass centre, or from the joint.
-        rotation: (3, 3) from the platform axes of the centred robot to those of `robot`; None: they are the same.
-
-    Returns:
-        the scene in the kernels' coordinates.
-    """
+    """A robot among the bodies that its cables can meet."""
     diameter = 0.0 if robot.cable_diameter is None else np.asarray(robot.cable_diameter)
     kernel_body = None if body is None else turned(body, frame)
     if kernel_body is not None and rotation is not None:
@@ -50,22 +45,7 @@ def build_scene(
     at: str = "",
     rotation: np.ndarray | None = None,
 ) -> Scene:
-    """Scene of a plan or sweep.
-
-    Args:
-        robot: centred, z down.
-        frame: axes of the robot file.
-        file: named in errors.
-        at: prefix of the keys in errors.
-        rotation: as for `surroundings`; of a problem's robot that of `robots.reference_pose.aligned`.
-
-    Returns:
-        the scene in the kernels' coordinates.
-
-    Raises:
-        ConfigError: a shape of a robot that has none, the hull of points that lie in a plane, or surroundings of a
-            point mass that stands for a platform.
-    """
+    """Scene of a plan or sweep."""
     row = PATTERNS[robot.pattern]
     for name in keys.surroundings if robot_file.pairs is not None else ():
         why = "a point mass on three cables moves in place of the platform, and touches other bodies"

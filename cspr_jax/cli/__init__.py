@@ -43,14 +43,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line.
-
-    Args:
-        arguments: words after `cspr`; None: those of the process.
-
-    Returns:
-        the exit code.
-    """
+    """Run the command line."""
     environment = dict(os.environ)
     if arguments is None:
         gc.set_threshold(*FEWER_COLLECTIONS)

@@ -29,53 +29,27 @@ class Command(NamedTuple):
 
 
 def add_json(parser: argparse.ArgumentParser, what: str = "object") -> None:
-    """Add the option for programs that read the answer.
-
-    Args:
-        what: JSON value that the command prints.
-    """
+    """Add the option for programs that read the answer."""
     parser.add_argument("--json", action="store_true", help=f"print one JSON {what} and nothing else")
 
 
 def add_device(parser: argparse.ArgumentParser, usual: str = "cpu") -> None:
-    """Add the option of the device.
-
-    Args:
-        usual: where the command computes without it, for `--help`.
-    """
+    """Add the option of the device."""
     parser.add_argument("--device", choices=("cpu", "gpu"), help=f"where to compute (default: {usual})")
 
 
 def add_all_errors(parser: argparse.ArgumentParser) -> None:
-    """Add the option to print all mistakes of a file.
-
-    Args:
-        parser: of a command that reads a file of keys.
-    """
+    """Add the option to print all mistakes of a file."""
     parser.add_argument("--all-errors", action="store_true", help="print all mistakes in a file, one per line")
 
 
 def add_output(parser: argparse.ArgumentParser, text: str, **settings: Any) -> None:
-    """Add the option of the file or folder to write.
-
-    Args:
-        text: for `--help`.
-        settings: of argparse, such as metavar.
-    """
+    """Add the option of the file or folder to write."""
     parser.add_argument("-o", "--output", type=Path, help=text, **settings)
 
 
 def prepare_jax(options: argparse.Namespace, *, quick: bool = False, prefers_cpu: bool = True) -> None:
-    """Set up jax by the options; from here on a line says when it compiles.
-
-    Args:
-        quick: whether little is computed; see `xla.prepare`.
-        prefers_cpu: whether a GPU would take longer.
-
-    Raises:
-        ConfigError: there is no such device, or settings of jax cannot be used.
-        ResourceError: the threads of jax could not be started.
-    """
+    """Set up jax by the options; from here on a line says when it compiles."""
     from cspr_jax.runtime import surroundings, xla
 
     surroundings.check_threads_of_jax()
@@ -88,15 +62,7 @@ def prepare_jax(options: argparse.Namespace, *, quick: bool = False, prefers_cpu
 
 @contextlib.contextmanager
 def printing() -> Iterator[None]:
-    """Name standard output in the error if it takes nothing more.
-
-    Yields:
-        nothing; the block writes to it.
-
-    Raises:
-        StoreError: it is full.
-        BrokenPipeError: its reader has gone.
-    """
+    """Name standard output in the error if it takes nothing more."""
     try:
         yield
     except BrokenPipeError:
@@ -106,24 +72,13 @@ def printing() -> Iterator[None]:
 
 
 def write(text: str) -> None:
-    """Write to standard output.
-
-    Args:
-        text: of ours, with its line breaks.
-
-    Raises:
-        StoreError: it is full.
-    """
+    """Write to standard output."""
     with printing():
         sys.stdout.write(text)
 
 
 def print_json(value: Any) -> None:
-    """Print one JSON value on one line.
-
-    Args:
-        value: of numbers, words, lists and dictionaries.
-    """
+    """Print one JSON value on one line."""
     write(json.dumps(value, allow_nan=False) + "\n")
 
 
@@ -134,11 +89,7 @@ def print_table(renderable: Any) -> None:
 
 
 def print_line(text: object) -> None:
-    """Print a line for people.
-
-    Args:
-        text: the line; a name in it may be anybody's.
-    """
+    """Print a line for people."""
     write(f"{printable(text)}\n")
 
 

@@ -37,11 +37,7 @@ def _add_plan(parser: argparse.ArgumentParser) -> None:
 
 
 def add_retime(parser: argparse.ArgumentParser, does: str) -> None:
-    """Add the options of motions that are run along again.
-
-    Args:
-        does: help of the option that asks for it.
-    """
+    """Add the options of motions that are run along again."""
     parser.add_argument("--retime", action="store_true", help=does)
     parser.add_argument(
         "--ramp-time",
@@ -58,14 +54,7 @@ def add_retime(parser: argparse.ArgumentParser, does: str) -> None:
 
 
 def retime_settings(options: argparse.Namespace) -> dict[str, Any]:
-    """Settings of a motion that is run along again.
-
-    Returns:
-        arguments of `api.retiming.retime`.
-
-    Raises:
-        ConfigError: a setting that is not allowed.
-    """
+    """Settings of a motion that is run along again."""
     from cspr_jax.schema.limits import LARGEST_GRID
 
     settings = {name: getattr(options, name) for name in ("ramp_time", "grid")}
@@ -80,12 +69,7 @@ def retime_settings(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def add_files(parser: argparse.ArgumentParser, usual_rows: str, anyway: str) -> None:
-    """Add the options of files of a motion: rows, a model for MuJoCo, a film.
-
-    Args:
-        usual_rows: number of rows without --rate, in words.
-        anyway: help of the option that writes what is not feasible.
-    """
+    """Add the options of files of a motion: rows, a model for MuJoCo, a film."""
     add_output(parser, "write the motion to FILE.csv, FILE.h5 or FILE.json", metavar="FILE")
     parser.add_argument("--anyway", action="store_true", help=anyway)
     parser.add_argument(
@@ -108,12 +92,7 @@ def add_files(parser: argparse.ArgumentParser, usual_rows: str, anyway: str) -> 
 
 
 def check_files(options: argparse.Namespace) -> None:
-    """Refuse impossible options of files, before what takes long.
-
-    Raises:
-        ConfigError: an ending, a number or a combination that is not allowed.
-        StoreError: a folder that does not exist.
-    """
+    """Refuse impossible options of files, before what takes long."""
     if options.output is not None and options.output.suffix not in ENDINGS:
         raise ConfigError("-o", f"{options.output}: must end in .csv or .h5 or .json")
     if options.rate is not None and options.output is None and not options.json:
@@ -178,14 +157,7 @@ def _plan(options: argparse.Namespace) -> int:
 
 
 def retimed(plan: Any, settings: dict[str, Any]) -> Any:
-    """A plan, or a check, of motions that are run along again; its warnings are shown.
-
-    Args:
-        plan: `api.plans.Plan` or `api.checks.Check`.
-
-    Returns:
-        the same of the retimed motions.
-    """
+    """A plan, or a check, of motions that are run along again; its warnings are shown."""
     from cspr_jax.api.retiming import retime
 
     before = getattr(plan, "plan", plan).warnings
@@ -198,14 +170,7 @@ def retimed(plan: Any, settings: dict[str, Any]) -> Any:
 
 
 def rows_beside(plan: Any, options: argparse.Namespace) -> dict[str, Any]:
-    """The rows that --rate asks for without -o; of a motion that is not feasible only with --anyway.
-
-    Args:
-        plan: `api.plans.Plan`.
-
-    Returns:
-        "rows" and their "units", unless -o has them, and "last_step", s, between the last two; nothing without --rate.
-    """
+    """The rows that --rate asks for without -o; of a motion that is not feasible only with --anyway."""
     if options.rate is None:
         return {}
     step = last_step(plan, options.rate)
@@ -219,11 +184,7 @@ def rows_beside(plan: Any, options: argparse.Namespace) -> dict[str, Any]:
 
 
 def write_files(plan: Any, options: argparse.Namespace) -> None:
-    """Write the files that options name; a motion that is not feasible only with --anyway.
-
-    Args:
-        plan: `api.plans.Plan`.
-    """
+    """Write the files that options name; a motion that is not feasible only with --anyway."""
     of_mjcf = {} if options.step is None else {"step": options.step}
     for path, save in (
         (options.output, lambda path: plan.save(path, options.rate, anyway=True)),
@@ -242,15 +203,7 @@ def write_files(plan: Any, options: argparse.Namespace) -> None:
 
 
 def last_step(plan: Any, rate: float | None) -> float:
-    """Time between the last two rows: the end of a motion is a row, on the grid of the others or not.
-
-    Args:
-        plan: `api.plans.Plan`.
-        rate: of --rate, or None.
-
-    Returns:
-        s; NaN without a rate or a motion.
-    """
+    """Time between the last two rows: the end of a motion is a row, on the grid of the others or not."""
     length = float(plan.answers.duration.sum())
     if rate is None or not math.isfinite(length):
         return math.nan
@@ -259,11 +212,7 @@ def last_step(plan: Any, rate: float | None) -> float:
 
 
 def print_last_step(plan: Any, options: argparse.Namespace) -> None:
-    """Say so where the last row of a written file is off the grid of the others.
-
-    Args:
-        plan: `api.plans.Plan`.
-    """
+    """Say so where the last row of a written file is off the grid of the others."""
     step, is_written = last_step(plan, options.rate), plan.feasible or options.anyway
     if options.output is not None and is_written and step * (options.rate or 0.0) < 1.0 - SAME_TICK:
         end = float(plan.answers.duration.sum())

@@ -11,18 +11,10 @@ FAULTS: dict[str, str] = {}
 
 
 def catalogue_names() -> list[str]:
-    """Names of the robots that come with the package.
-
-    Returns:
-        the names, sorted.
-    """
+    """Names of the robots that come with the package."""
     return sorted(path.stem for path in CATALOGUE.glob("*.toml"))
 
 
 def catalogue_keys() -> list[dict[str, Any]]:
-    """Keys of the robots that come with the package, as their files have them.
-
-    Returns:
-        the keys of each robot, by name, unchecked: tests check them.
-    """
+    """Keys of the robots that come with the package, as their files have them."""
     return [tomllib.loads((CATALOGUE / f"{name}.toml").read_text("utf-8")) for name in catalogue_names()]

@@ -1,7 +1,9 @@
 """Keys of harmonic ellipses, in a plan, in one of its poses, or in a sweep; without jax."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
@@ -11,6 +13,9 @@ from cspr_jax.config.reading import Table
 from cspr_jax.config.trajectory import Angle
 from cspr_jax.config.wording import fault
 from cspr_jax.schema.given_numbers import SMALLEST
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 
 class Hertz(Table):
@@ -83,15 +88,8 @@ class EllipseShape(Table):
             raise fault("normal", self.normal, f"a direction, of length {SMALLEST:g} at least")
         return self
 
-    def axes(self, *, is_planar: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Half-axes, in the axes of the file.
-
-        Args:
-            is_planar: whether a circle without a normal turns about y.
-
-        Returns:
-            (3,) each, m; of a shape without a size those of a circle of radius 1.
-        """
+    def axes(self, *, is_planar: bool) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+        """Half-axes, in the axes of the file."""
         if self.half_axes is None:
             radius = 1.0 if self.radius is None else self.radius
             return circle_axes(radius, self.normal, is_planar=is_planar)
@@ -124,16 +122,10 @@ class SweepEllipse(EllipseShape):
     )
 
 
-def circle_axes(radius: float, normal: Any, *, is_planar: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Half-axes of a circle: the first as near to x, or y, as the normal allows.
-
-    Args:
-        radius: m.
-        normal: (3,) about which it turns by the rule of the right hand; None: z, of a planar robot y.
-
-    Returns:
-        (3,) each, m.
-    """
+def circle_axes(
+    radius: float, normal: Any, *, is_planar: bool
+) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+    """Half-axes of a circle: the first as near to x, or y, as the normal allows."""
     default = np.eye(3)[1 if is_planar else 2]
     axis = default if normal is None else np.asarray(normal, float)
     axis = axis / np.linalg.norm(axis)
@@ -143,16 +135,10 @@ def circle_axes(radius: float, normal: Any, *, is_planar: bool) -> tuple[np.ndar
     return a, np.cross(axis, a)
 
 
-def cell_axes(table: SweepEllipse, place: Mapping[str, Any], *, is_planar: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Half-axes of the ellipses of cells of a map, in the axes of the file.
-
-    Args:
-        place: (...) coordinates of the cells by axis: circle_radius or scale, tilt and tilt_azimuth, or none of them.
-        is_planar: as for `EllipseShape.axes`.
-
-    Returns:
-        (..., 3) each, m.
-    """
+def cell_axes(
+    table: SweepEllipse, place: Mapping[str, Any], *, is_planar: bool
+) -> tuple[Float[np.ndarray, "... 3"], Float[np.ndarray, "... 3"]]:
+    """Half-axes of the ellipses of cells of a map, in the axes of the file."""
     size = np.asarray(place.get("circle_radius", place.get("scale", 1.0)), float)[..., None]
     tilt, azimuth = (np.asarray(place.get(name, 0.0), float)[..., None] for name in ("tilt", "tilt_azimuth"))
     level = np.concatenate([np.cos(azimuth), np.sin(azimuth), np.zeros_like(azimuth)], axis=-1)

@@ -9,15 +9,7 @@ PLATFORM = "3R3T"
 
 
 def as_moved(robot_file: RobotFile, patterns: Iterable[Collection[str]]) -> RobotFile:
-    """The robot as trajectory families, or a kind of map, move it.
-
-    Args:
-        patterns: for each family or kind of map, the patterns of motion of the robots that it moves.
-
-    Returns:
-        a platform's equivalent, if it says that it only translates, or if some of them move no platforms and it has
-        one; else the robot itself.
-    """
+    """The robot as trajectory families, or a kind of map, move it."""
     if not robot_file.is_platform:
         return robot_file
     if not robot_file.translation_only and all(PLATFORM in allowed for allowed in patterns):
@@ -29,11 +21,7 @@ def as_moved(robot_file: RobotFile, patterns: Iterable[Collection[str]]) -> Robo
 
 
 def no_equivalent(robot_file: RobotFile) -> str:
-    """Reason why a platform is not moved as a point mass, to be appended to a line that refuses it.
-
-    Returns:
-        the reason; empty for other robots.
-    """
+    """Reason why a platform is not moved as a point mass, to be appended to a line that refuses it."""
     try:
         if robot_file.is_platform:
             robot_file.parallel_pairs()

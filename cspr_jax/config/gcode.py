@@ -62,17 +62,7 @@ class GcodeProgram(NamedTuple):
 
 
 def read_program(path: Path, start: list[float] | None = None) -> GcodeProgram:
-    """Moves of a file of G-code. Lengths are in mm until it says otherwise, coordinates absolute.
-
-    Args:
-        start: [x, y, z] where it begins, m; None: where all three are known.
-
-    Returns:
-        the moves, and what is to be said of them.
-
-    Raises:
-        ConfigError: a word that is not read, or that is missing, and its line.
-    """
+    """Moves of a file of G-code. Lengths are in mm until it says otherwise, coordinates absolute."""
     text = read_text(path)
     reader = _GcodeReader(path, start, _decimals(text))
     for number, line in enumerate(text.split("\n"), start=1):

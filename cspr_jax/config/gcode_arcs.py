@@ -28,34 +28,13 @@ class ArcError(ValueError):
 
 
 def missed(half: float) -> float:
-    """Largest difference of two radii of coordinates that are each rounded by up to a half of a unit.
-
-    Args:
-        half: of a unit, m.
-
-    Returns:
-        the difference, m.
-    """
+    """Largest difference of two radii of coordinates that are each rounded by up to a half of a unit."""
     # That at the start is off by sqrt(2) halves, that at the end by three coordinates a side.
     return 4.0 * math.sqrt(2.0) * half
 
 
 def arc_of_radius(start: list[float], end: list[float], radius: float, sign: float, half: float) -> PlaneArc:
-    """Arc of a radius.
-
-    Args:
-        start: [a, b], m.
-        end: likewise.
-        radius: m; below 0 the longer arc.
-        sign: of its angle.
-        half: of a unit of the last decimal that is written, m.
-
-    Returns:
-        the arc.
-
-    Raises:
-        ArcError: an arc that there is not.
-    """
+    """Arc of a radius."""
     across, up = end[0] - start[0], end[1] - start[1]
     chord, length = math.hypot(across, up), abs(radius)
     if chord <= SAME_PLACE:
@@ -68,21 +47,7 @@ def arc_of_radius(start: list[float], end: list[float], radius: float, sign: flo
 
 
 def arc_about(start: list[float], end: list[float], centre: list[float], sign: float, half: float) -> PlaneArc:
-    """Arc about a centre; one that ends where it starts is a full circle.
-
-    Args:
-        start: [a, b], m.
-        end: likewise.
-        centre: likewise.
-        sign: of its angle.
-        half: of a unit of the last decimal that is written, m.
-
-    Returns:
-        the arc.
-
-    Raises:
-        ArcError: radii at start and end that differ too much.
-    """
+    """Arc about a centre; one that ends where it starts is a full circle."""
     radius, other = math.dist(start, centre), math.dist(end, centre)
     allowed = max(missed(half), RADIUS_TOLERANCE * radius)
     if radius <= SAME_PLACE or not abs(other - radius) <= allowed:

@@ -81,14 +81,7 @@ class WordError(ValueError):
 
 
 def line_of(text: str) -> GcodeLine:
-    """Words of a line.
-
-    Returns:
-        the words.
-
-    Raises:
-        WordError: what is not read, and what to write instead.
-    """
+    """Words of a line."""
     plain = _CHECKSUM.sub("", _COMMENT.sub(" ", text).strip()).strip()
     line = GcodeLine([], [], {}, [])
     if not plain or plain == "%":

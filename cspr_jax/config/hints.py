@@ -22,11 +22,7 @@ ROUNDING = 1e-3
 
 
 def robot_hints(robot_file: RobotFile) -> list[str]:
-    """Likely mistakes in the units of a robot, and items that were left out of a file of another program.
-
-    Returns:
-        one line each.
-    """
+    """Likely mistakes in the units of a robot, and items that were left out of a file of another program."""
     lines, spools = list(robot_file.notes), np.asarray(robot_file.base_points)
     span = float(np.linalg.norm(spools[:, None] - spools, axis=2).max())
     if span > LARGEST_SPAN and robot_file.mass < LARGEST_MASS:
@@ -83,11 +79,7 @@ def _distance_to_hull(points: np.ndarray) -> float:
 
 
 def plan_hints(keys: PlanFile, robot_file: RobotFile) -> list[str]:
-    """Likely mistakes in a plan that is not feasible.
-
-    Returns:
-        one line each.
-    """
+    """Likely mistakes in a plan that is not feasible."""
     targets = {i: pose.position for i, pose in enumerate(keys.pose) if pose.position is not None and not pose.rest}
     places = np.asarray(list(targets.values()), float).reshape(-1, 3)
     level = in_plane(np.asarray(robot_file.base_points), places, planar=robot_file.is_planar)
@@ -102,11 +94,7 @@ def plan_hints(keys: PlanFile, robot_file: RobotFile) -> list[str]:
 
 
 def sweep_hints(keys: SweepFile, robot_file: RobotFile) -> list[str]:
-    """Likely mistakes in a sweep.
-
-    Returns:
-        one line each.
-    """
+    """Likely mistakes in a sweep."""
     lines, start, workspace = list[str](), keys.trajectory.start, keys.workspace
     if start is not None and start.position is not None and not start.rest and keys.axes.z0 is not None:
         depth_hints = (
@@ -126,14 +114,7 @@ def sweep_hints(keys: SweepFile, robot_file: RobotFile) -> list[str]:
 
 
 def forgotten_axis(robot_file: RobotFile, targets: Iterable[Sequence[float]]) -> str:
-    """Tell whether the z axis seems to point the other way.
-
-    Args:
-        targets: [x, y, z] in the file's axes, m.
-
-    Returns:
-        a line about the axis, if every target is above every spool; else nothing.
-    """
+    """Tell whether the z axis seems to point the other way."""
     frame = frame_of(robot_file.base_points, robot_file.z_axis)
     depths, spools = (frame.depth([point[2] for point in points]) for points in (targets, robot_file.base_points))
     is_above = bool(len(depths)) and depths.max() < spools.min()
@@ -141,13 +122,6 @@ def forgotten_axis(robot_file: RobotFile, targets: Iterable[Sequence[float]]) ->
 
 
 def axis_question(z_axis: str) -> str:
-    """Question to the user where all targets are above the spools.
-
-    Args:
-        z_axis: "down" or "up", as the robot file has it.
-
-    Returns:
-        the question.
-    """
+    """Question to the user where all targets are above the spools."""
     other = "up" if z_axis == "down" else "down"
     return f'z points {z_axis} in this robot; does it lack z_axis = "{other}"?'

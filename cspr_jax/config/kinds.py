@@ -23,15 +23,7 @@ _PLACES = {
 
 
 def refuse_other_kinds(data: dict[str, Any], expected: str, file: object) -> None:
-    """Refuse a file of another kind, rather than every key of it.
-
-    Args:
-        expected: "sweep", "plan" or "robot".
-        file: named in errors.
-
-    Raises:
-        ConfigError: it has keys of another kind and none of its own.
-    """
+    """Refuse a file of another kind, rather than every key of it."""
     if any(key in data for key in _MARKS[expected]):
         return
     for kind, marks in _MARKS.items():

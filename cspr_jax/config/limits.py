@@ -40,14 +40,7 @@ NotNegative = Annotated[float, Field(ge=0, le=LARGEST), NotTiny]
 
 
 def has_direction(vector: Sequence[float]) -> bool:
-    """Tell whether a vector is long enough to have a direction.
-
-    Args:
-        vector: [x, y, z].
-
-    Returns:
-        the answer.
-    """
+    """Tell whether a vector is long enough to have a direction."""
     return math.hypot(*vector) >= SMALLEST
 
 

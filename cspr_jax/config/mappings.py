@@ -14,18 +14,7 @@ DEEPEST = 32
 
 
 def plain(value: Any, depth: int = DEEPEST) -> Any:
-    """A value as parsed TOML has it.
-
-    Args:
-        value: mappings, sequences, arrays, numbers, paths, and whatever else TOML knows.
-        depth: to which it may be nested.
-
-    Returns:
-        dictionaries, lists and Python's own numbers in their place; anything else as it is, for the schema to refuse.
-
-    Raises:
-        InputError: it is nested more deeply, or holds itself.
-    """
+    """A value as parsed TOML has it."""
     if not depth:
         raise InputError("given", None, f"must be nested at most {DEEPEST} deep", fault="nested too deep, or in itself")
     if isinstance(value, Mapping):
@@ -38,12 +27,5 @@ def plain(value: Any, depth: int = DEEPEST) -> Any:
 
 
 def text_of(data: dict[str, Any]) -> str:
-    """Return the JSON that is kept in place of a file's text.
-
-    Args:
-        data: as `plain` gives it.
-
-    Returns:
-        JSON.
-    """
+    """Return the JSON that is kept in place of a file's text."""
     return json.dumps(data, default=str)

@@ -14,17 +14,7 @@ NEAR_P0 = 1e-3
 
 
 def almost_at_rest(key: str, place: Sequence[float], z0: float, robot: Any, cure: str = "rest = true") -> str:
-    """Tell whether a place is P0 except for its last digits.
-
-    Args:
-        place: (3,) in the robot's axes, m; not said to be at rest.
-        z0: depth of P0 below the centroid of the spools, m.
-        robot: its `base_points` and `z_axis`.
-        cure: key that would say that it is at rest.
-
-    Returns:
-        a line about the place, if it is so near to P0; else nothing.
-    """
+    """Tell whether a place is P0 except for its last digits."""
     spools = np.asarray(robot.base_points)
     rest = frame_of(spools, robot.z_axis).outward(np.array([0.0, 0.0, z0]))
     apart = float(np.linalg.norm(np.asarray(place) - rest))

@@ -83,11 +83,7 @@ class ObstacleTable(Table):
             raise fault("quaternion", self.quaternion, "a unit quaternion, scalar first")
 
     def shape(self) -> shapes.Obstacle:
-        """The shape.
-
-        Returns:
-            the shape, in the axes of the robot file.
-        """
+        """The shape."""
         name = self.name or self.kind
         if self.kind == "sphere" and self.radius is not None:
             return shapes.sphere(self.centre, self.radius, name=name)
@@ -135,18 +131,7 @@ class PlatformShapeKeys(Table):
         centre_of_mass: Sequence[Coordinate] = (0.0, 0.0, 0.0),
         platform_points: Sequence[Sequence[Coordinate]] = (),
     ) -> shapes.Body | None:
-        """The shape.
-
-        Args:
-            centre_of_mass: (3,) of the robot file, platform axes, m.
-            platform_points: (n_cables, 3) of the robot file, platform axes, m.
-
-        Returns:
-            the shape in platform axes, from the mass centre; None: not given.
-
-        Raises:
-            InputError: the shape is the hull of `platform_points`, which lie in a plane.
-        """
+        """The shape."""
         if self.platform_box is not None:
             low, high = ([x - c for x, c in zip(corner, centre_of_mass, strict=True)] for corner in self.platform_box)
             return shapes.box_between(low, high, name="platform")

@@ -136,14 +136,7 @@ class PathTable(Table):
         return (self.interpolation or "polyline") if self.kind == "csv" else self.kind
 
     def beside(self, plan: "PathTable | None") -> "PathTable":
-        """Table of a pose, with what the plan says of all paths.
-
-        Args:
-            plan: table of the plan; None: there is none.
-
-        Returns:
-            the table.
-        """
+        """Table of a pose, with what the plan says of all paths."""
         common: dict[str, Any] = {} if plan is None else {name: getattr(plan, name) for name in ("grid", "ramp_time")}
         return self.model_copy(update={name: value for name, value in common.items() if getattr(self, name) is None})
 
@@ -175,16 +168,7 @@ class TargetPath(Table):
         return self
 
     def between(self, start: Sequence[float], end: Sequence[float], z_axis: str) -> PathTable | None:
-        """Path from the start to a target, as plans have it.
-
-        Args:
-            start: [x, y, z] in the axes of the robot file, m.
-            end: of the target, likewise.
-            z_axis: direction of their z, "up" or "down".
-
-        Returns:
-            the table of a pose at the target; None: a straight line without a length.
-        """
+        """Path from the start to a target, as plans have it."""
         keys: dict[str, Any] = {
             "grid": MAP_GRID if self.grid is None else self.grid,
             "ramp_time": RAMP_TIME if self.ramp_time is None else self.ramp_time,

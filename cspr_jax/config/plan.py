@@ -116,36 +116,17 @@ class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys, FreeMotionKeys):
     _sources: dict[str, Any] = PrivateAttr(default_factory=dict)
 
     def with_source(self, name: str, source: Any) -> "PlanFile":
-        """The plan, with a motion in place of a file.
-
-        Args:
-            name: as `motion` has it.
-            source: samples, as files of motions give them, or a spline.
-
-        Returns:
-            the plan.
-        """
+        """The plan, with a motion in place of a file."""
         plan = self.model_copy()
         plan._sources = self._sources | {name: source}
         return plan
 
     def source(self, name: str) -> Any:
-        """A motion that stands in place of a file.
-
-        Returns:
-            the motion; None: the file is to be read.
-        """
+        """A motion that stands in place of a file."""
         return self._sources.get(name)
 
     def family_of(self, segment: int) -> str:
-        """Family of a segment.
-
-        Args:
-            segment: from 0 on.
-
-        Returns:
-            its name.
-        """
+        """Family of a segment."""
         return self.pose[segment + 1].family or self.family
 
     @property
@@ -333,32 +314,12 @@ class PlanFile(TrajectoryKeys, LimitTable, SurroundingsKeys, FreeMotionKeys):
 
 
 def read_plan(text: str, path: Path) -> PlanFile:
-    """A plan file.
-
-    Args:
-        path: named in errors.
-
-    Returns:
-        its content, limits of [limits] beside the other keys.
-
-    Raises:
-        ConfigError: a mistake in it.
-    """
+    """A plan file."""
     return plan_keys(parse_toml(text, path), path)
 
 
 def kept_plan(text: str, path: Path) -> PlanFile:
-    """Plan that a motion file holds: the text of the plan file, or JSON where there was none.
-
-    Args:
-        path: of the motion file, named in errors.
-
-    Returns:
-        its content, limits of [limits] beside the other keys.
-
-    Raises:
-        ConfigError: a mistake in it.
-    """
+    """Plan that a motion file holds: the text of the plan file, or JSON where there was none."""
     if len(text) > LARGEST_FILE:
         raise ConfigError(path, f"plan of {len(text)} letters: must be at most {LARGEST_FILE}")
     if not text.startswith("{"):
@@ -371,16 +332,6 @@ def kept_plan(text: str, path: Path) -> PlanFile:
 
 
 def plan_keys(data: dict[str, Any], file: object) -> PlanFile:
-    """Parsed content of a plan file.
-
-    Args:
-        file: named in errors.
-
-    Returns:
-        its content, limits of [limits] beside the other keys.
-
-    Raises:
-        ConfigError: a mistake in it.
-    """
+    """Parsed content of a plan file."""
     refuse_other_kinds(data, "plan", file)
     return checked(PlanFile, data, file)

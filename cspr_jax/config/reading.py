@@ -49,11 +49,7 @@ class Table(BaseModel):
 
 
 def other_case(path: Path) -> str:
-    """Clause for a message about a missing file that names one whose name differs in capitals alone.
-
-    Returns:
-        the clause, which begins with a colon; "" if there is no such file or folder.
-    """
+    """Clause for a message about a missing file that names one whose name differs in capitals alone."""
     while path.parent != path and not path.parent.is_dir():
         path = path.parent
     try:
@@ -65,14 +61,7 @@ def other_case(path: Path) -> str:
 
 
 def read_bytes(path: Path) -> bytes:
-    """Content of a file.
-
-    Returns:
-        its bytes.
-
-    Raises:
-        ConfigError: the file cannot be read, or is larger than 1 MB.
-    """
+    """Content of a file."""
     with opened(path) as file:
         size = path.stat().st_size
         if size > LARGEST_FILE:
@@ -82,14 +71,7 @@ def read_bytes(path: Path) -> bytes:
 
 @contextlib.contextmanager
 def opened(path: Path) -> Iterator[BinaryIO]:
-    """Open a file, and only a file, and turn failures to read it into lines.
-
-    Yields:
-        the file, open for reading.
-
-    Raises:
-        ConfigError: it cannot be read.
-    """
+    """Open a file, and only a file, and turn failures to read it into lines."""
     try:
         if path.exists() and not path.is_file():
             raise ConfigError(path, "is not a file")
@@ -104,30 +86,12 @@ def opened(path: Path) -> Iterator[BinaryIO]:
 
 
 def read_text(path: Path) -> str:
-    """Text of a file.
-
-    Returns:
-        its text, with plain line breaks, and without the byte order mark that some editors put before it.
-
-    Raises:
-        ConfigError: the file cannot be read, is larger than 1 MB, or is not UTF-8.
-    """
+    """Text of a file."""
     return decoded(read_bytes(path), path)
 
 
 def decoded(data: bytes, path: Path, *, line: int = 1) -> str:
-    """Text of the content of a file.
-
-    Args:
-        path: of the file, named in errors.
-        line: number of the first line.
-
-    Returns:
-        the text, as `read_text` gives it.
-
-    Raises:
-        ConfigError: it is not UTF-8.
-    """
+    """Text of the content of a file."""
     marked = (name for mark, name in _MARKS if data.startswith(mark))
     encoding = next(marked, _ZEROS.get(tuple(byte == 0 for byte in data[:4])))
     if encoding is not None:
@@ -142,30 +106,13 @@ def decoded(data: bytes, path: Path, *, line: int = 1) -> str:
 
 
 def look_alike_before(text: str, end: int) -> str:
-    """Clause for the message of a parser that stopped at a character that only looks like one of its own.
-
-    Args:
-        end: index of the character at which the parser stopped.
-
-    Returns:
-        the clause of `suggestions.look_alike`, about the last such character of the line up to there, outside strings.
-    """
+    """Clause for the message of a parser that stopped at a character that only looks like one of its own."""
     start = text.rfind("\n", 0, end) + 1
     return look_alike(_STRING.sub("", text[start : end + 1])[::-1])
 
 
 def parse_toml(text: str, path: Path) -> dict[str, Any]:
-    """Contents of a TOML text.
-
-    Args:
-        path: named in errors.
-
-    Returns:
-        its tables.
-
-    Raises:
-        ConfigError: it is not TOML.
-    """
+    """Contents of a TOML text."""
     if _LONG_KEY.search(text):
         raise ConfigError(path, f"is not TOML that is read here: a key of {LONGEST_KEY} parts or more")
     try:
@@ -178,14 +125,7 @@ def parse_toml(text: str, path: Path) -> dict[str, Any]:
 
 
 def refuse_long_numbers(text: str, path: Path) -> None:
-    """Refuse whole numbers of more digits than Python reads.
-
-    Args:
-        path: named in errors.
-
-    Raises:
-        ConfigError: there is one.
-    """
+    """Refuse whole numbers of more digits than Python reads."""
     longest = sys.get_int_max_str_digits()
     number = re.search(rf"[0-9](?:_?[0-9]){{{longest},}}", text) if longest else None
     if number is not None:
@@ -203,30 +143,12 @@ def _stop(text: str, message: str) -> int:
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """Contents of a TOML file.
-
-    Returns:
-        its tables.
-
-    Raises:
-        ConfigError: the file cannot be read, is larger than 1 MB, or is not TOML.
-    """
+    """Contents of a TOML file."""
     return parse_toml(read_text(path), path)
 
 
 def checked(model: type[Model], data: Any, file: object, *, at: str = "") -> Model:
-    """Data as a model.
-
-    Args:
-        file: named in errors.
-        at: key under which the data stands, for errors.
-
-    Returns:
-        the model.
-
-    Raises:
-        ConfigError: the first mistake, and how many more there are; it holds the others.
-    """
+    """Data as a model."""
     try:
         return model.model_validate(data)
     except RecursionError as error:

@@ -163,14 +163,7 @@ class RobotFile(LimitKeys):
         return self
 
     def parallel_pairs(self) -> ParallelPairs:
-        """Pairs of a platform's cables, `robots.parallel_pairs`.
-
-        Returns:
-            the pairs.
-
-        Raises:
-            InputError: why there are none.
-        """
+        """Pairs of a platform's cables, `robots.parallel_pairs`."""
         if self.platform_points is None:
             raise InputError("platform_points", None, "given", fault="it has no platform_points")
         if self.own_pattern != "3R3T":
@@ -196,14 +189,7 @@ class RobotFile(LimitKeys):
         return self.as_written.model_dump(mode="json", exclude_none=True)
 
     def equivalent(self) -> "RobotFile":
-        """The point mass on three cables that this platform on six in parallel pairs is.
-
-        Returns:
-            a robot with the spools of `robots.parallel_pairs`, the same name, mass, axes and file.
-
-        Raises:
-            InputError: why it is none.
-        """
+        """The point mass on three cables that this platform on six in parallel pairs is."""
         exits = self.parallel_pairs().exit_points.tolist()
         others = ("inertia", "centre_of_mass", "pattern", "translation_only")
         absent = dict.fromkeys(("platform_points", *others))
@@ -227,25 +213,11 @@ class RobotFile(LimitKeys):
         return self
 
     def placed(self, key: str, file: object) -> tuple[object, str]:
-        """Place of a key of the robot, for errors.
-
-        Args:
-            file: that names the robot, or holds it as a table.
-
-        Returns:
-            the file that has the key, and the key as it stands there.
-        """
+        """Place of a key of the robot, for errors."""
         return (file, f"robot.{key}") if self._file is None else (self._file, key)
 
     def typed(self, error: InputError) -> str:
-        """The line of an error about this robot, with the numbers of the file instead of those of the kernels' axes.
-
-        Args:
-            error: whose key is one of the file's.
-
-        Returns:
-            the line, without the file's name.
-        """
+        """The line of an error about this robot, with the numbers of the file instead of those of the kernels' axes."""
         value = getattr(self, error.key, None)
         if error.fault or value is None:
             return f"robot.{error}"
@@ -260,18 +232,7 @@ def _check_level(points: list[Point]) -> None:
 
 
 def resolve_robot(reference: Any, file: object, directory: Path) -> RobotFile:
-    """The robot that a plan or sweep names.
-
-    Args:
-        reference: a catalogue name, a path (relative to the file that holds it), or an inline table.
-        file: named in errors.
-
-    Returns:
-        the robot.
-
-    Raises:
-        ConfigError: no such robot, or a mistake in it.
-    """
+    """The robot that a plan or sweep names."""
     if isinstance(reference, dict):
         return checked(RobotFile, reference, file, at="robot")
     if not isinstance(reference, str):
@@ -304,18 +265,7 @@ def _missing(reference: str, file: object, path: Path) -> ConfigError:
 
 
 def read_foreign(path: Path, cable_set: str | None = None) -> tuple[RobotFile, Imported]:
-    """A robot file of another program, `config.formats`.
-
-    Args:
-        path: the file, with an ending that a format has.
-        cable_set: which set of cables, where the file has several; None: its default.
-
-    Returns:
-        the robot, with the content that it was read from.
-
-    Raises:
-        ConfigError: a mistake in it, or content that no robot file can express.
-    """
+    """A robot file of another program, `config.formats`."""
     imported = read(path, cable_set)
     robot_file = checked(RobotFile, imported.keys, path)
     robot_file._file, robot_file._notes = path, imported.warnings
@@ -323,14 +273,7 @@ def read_foreign(path: Path, cable_set: str | None = None) -> tuple[RobotFile, I
 
 
 def read_robot(path: Path) -> RobotFile:
-    """A robot file.
-
-    Returns:
-        the robot.
-
-    Raises:
-        ConfigError: a mistake in it.
-    """
+    """A robot file."""
     data = read_toml(path)
     refuse_other_kinds(data, "robot", path)
     robot_file = checked(RobotFile, data, path)

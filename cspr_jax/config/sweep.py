@@ -1,6 +1,8 @@
 """Sweep files: a map over a grid."""
 
-from typing import Annotated, Any, Literal
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
@@ -17,6 +19,9 @@ from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.schema.quantities import QUANTITIES
 from cspr_jax.schema.tiles import LARGEST_TILE
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 LARGEST_COUNT = 10_000_000
 
@@ -42,15 +47,8 @@ Axis = Annotated[
 ]
 
 
-def axis_points(axis: AxisRange | list[float]) -> np.ndarray:
-    """Points of an axis.
-
-    Args:
-        axis: as the file has it.
-
-    Returns:
-        (n,) float64.
-    """
+def axis_points(axis: AxisRange | list[float]) -> Float[np.ndarray, "n"]:
+    """Points of an axis."""
     if isinstance(axis, AxisRange):
         return np.linspace(axis.start, axis.stop, axis.count)
     return np.array(axis, float)

@@ -37,38 +37,19 @@ _BOUNDS = {
 
 
 def fault(key: str, value: object, allowed: str) -> PydanticCustomError:
-    """Error that a validator of a table raises about one of its keys, or about several together.
-
-    Args:
-        key: of the table; "" for the table itself.
-        value: text that is shown as it is, or any other value.
-
-    Returns:
-        the error.
-    """
+    """Error that a validator of a table raises about one of its keys, or about several together."""
     text = value if isinstance(value, str) else shown(value)
     return PydanticCustomError(FAULT, "{allowed}", {"key": key, "given": text, "allowed": allowed})
 
 
 def either(names: Iterable[str]) -> str:
-    """Names as alternatives.
-
-    Args:
-        names: at least one.
-
-    Returns:
-        such as '"a", "b" or "c"'.
-    """
+    """Names as alternatives."""
     *others, last = (f'"{name}"' for name in names)
     return f"{', '.join(others)} or {last}" if others else last
 
 
 def name_of(rows: Callable[[], Collection[str]]) -> PlainValidator:
-    """Validator of a key whose values are names of rows of a table, which may grow.
-
-    Returns:
-        the validator; its error is that of a Literal of the names.
-    """
+    """Validator of a key whose values are names of rows of a table, which may grow."""
 
     def check(value: Any) -> str:
         table = rows()
@@ -81,27 +62,14 @@ def name_of(rows: Callable[[], Collection[str]]) -> PlainValidator:
 
 
 def rank(error: ErrorDetails) -> int:
-    """Place of an error among those of a file: an error that explains others goes first.
-
-    Returns:
-        a number, smaller for earlier places: another version of the format, then a misspelt key, which explains a
-        missing one.
-    """
+    """Place of an error among those of a file: an error that explains others goes first."""
     if error["loc"] == ("schema",) and error["type"] != "missing":
         return 0
     return 1 if error["type"] == "extra_forbidden" else 2
 
 
 def line(model: type[BaseModel], error: ErrorDetails, at: str) -> str:
-    """One error as a line.
-
-    Args:
-        model: schema of the file.
-        at: key under which the data stands.
-
-    Returns:
-        key, value and what is allowed.
-    """
+    """One error as a line."""
     # The last part of an unknown or missing key is the user's own, whatever it looks like.
     last_part = error["loc"][-1:] if error["type"] in ("extra_forbidden", "missing") else ()
     parts = [part for part in error["loc"][: len(error["loc"]) - len(last_part)] if not str(part).startswith(VARIANT)]

@@ -1,5 +1,9 @@
 """Affine bounds of a spline's states over blocks of time."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import jax
 import numpy as np
 
@@ -10,38 +14,24 @@ from cspr_jax.robots.state_bounds import StateBounds
 from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 BATCH = 256
 
 
 def spline_bounds(
     knots: np.ndarray,
-    position: np.ndarray,
-    quaternion: np.ndarray | None,
-    start: np.ndarray,
-    end: np.ndarray,
+    position: Float[np.ndarray, "m degree+1 3"],
+    quaternion: Float[np.ndarray, "m degree+1 4"] | None,
+    start: Float[np.ndarray, "k"],
+    end: Float[np.ndarray, "k"],
     *,
     of_knots: np.ndarray | None = None,
-    of_blocks: np.ndarray | None = None,
+    of_blocks: Float[np.ndarray, "k"] | None = None,
     parabolas: bool = False,
 ) -> StateBounds:
-    """Bounds of the states over blocks of time, of one motion or of several, whose tables follow each other.
-
-    Args:
-        knots: (m + 1,) s, or (m + n,) those of n motions.
-        position: (m, degree + 1, 3) Bernstein coefficients, m.
-        quaternion: (m, degree + 1, 4) likewise; None for a point mass.
-        start: (k,) s, increasing or not.
-        end: (k,) s, later than `start`.
-        of_knots: (m + n,) numbers of the motions, from 0 on; None: there is one.
-        of_blocks: (k,) likewise.
-        parabolas: whether bands are around parabolas.
-
-    Returns:
-        the bounds, leaves (k, ...).
-
-    Raises:
-        ValueError: blocks with parabolas reach over several pieces.
-    """
+    """Bounds of the states over blocks of time, of one motion or of several, whose tables follow each other."""
     motions = (of_knots, of_blocks) if of_knots is not None and of_blocks is not None else None
     parts = overlaps(knots, start, end, motions)
     translation = piecewise_bounds(position, parts, parabolas=parabolas)

@@ -1,7 +1,9 @@
 """Motions of files and tables, as splines in the axes of the kernels."""
 
+from __future__ import annotations
+
 import dataclasses
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.interpolate import BarycentricInterpolator
@@ -22,6 +24,9 @@ from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.reference_pose import aligned
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # Samples of a motion, not way-points, are at least so many; the part of the largest speed that counts as moving.
 MANY, MOVING = 30, 0.2
 STILL = 1e-6  # m/s; slower samples are at rest but for rounding
@@ -31,21 +36,7 @@ BACK = np.array([1.0, -1.0, -1.0, -1.0])
 
 
 def samples_of(times, positions, quaternions=None, velocities=None, accelerations=None) -> MotionTable:
-    """Samples of a motion from arrays.
-
-    Args:
-        times: (n,) s.
-        positions: (n, 3) m.
-        quaternions: (n, 4) or None.
-        velocities: (n, 3) m/s, or None.
-        accelerations: (n, 3) m/s^2, or None.
-
-    Returns:
-        the samples.
-
-    Raises:
-        InputError: numbers of rows that differ, or quaternions far from unit ones.
-    """
+    """Samples of a motion from arrays."""
     times, positions = np.asarray(times, float), np.asarray(positions, float)
     others = {"quaternions": quaternions, "velocities": velocities, "accelerations": accelerations}
     arrays: dict[str, Any] = {name: np.asarray(rows, float) for name, rows in others.items() if rows is not None}
@@ -67,21 +58,7 @@ def samples_of(times, positions, quaternions=None, velocities=None, acceleration
 def source_spline(
     source: Any, *, z_axis: str, is_platform: bool, interpolation: str | None = None, ends: str | None = None
 ) -> Spline:
-    """A motion as a spline, in the axes of a robot file.
-
-    Args:
-        source: samples, polynomial pieces, a curve of SciPy in these axes, or a spline in them.
-        z_axis: direction of their z, "up" or "down".
-        is_platform: whether the robot has orientations; where the motion has none, it keeps its own axes.
-        interpolation: of samples; None: as they say, else "hermite" with velocities, "cubic" without.
-        ends: of samples; None: as they say, else "rest".
-
-    Returns:
-        the spline.
-
-    Raises:
-        InputError: samples that make no motion of this robot.
-    """
+    """A motion as a spline, in the axes of a robot file."""
     if isinstance(source, Spline):
         return source
     if not isinstance(source, MotionTable | MotionPieces):
@@ -96,20 +73,7 @@ def source_spline(
 
 
 def kept_to(pattern: str, spline: Spline, *, is_planar: bool) -> Spline:
-    """A motion that a robot of a pattern can follow, without the rounding of what it cannot.
-
-    Args:
-        pattern: one of `robots.patterns.PATTERNS`.
-        spline: in the axes of the robot file; NumPy leaves.
-        is_planar: whether the motion was read without y.
-
-    Returns:
-        the motion.
-
-    Raises:
-        InputError: a motion that leaves the plane or the guide of the robot, that moves the joint about which the robot
-            turns, or one without y of a robot in space.
-    """
+    """A motion that a robot of a pattern can follow, without the rounding of what it cannot."""
     row, position = PATTERNS[pattern], np.array(spline.position)
     turning = None if spline.quaternion is None else np.array(spline.quaternion)
     if is_planar and not row.is_planar:
@@ -136,15 +100,7 @@ def kept_to(pattern: str, spline: Spline, *, is_planar: bool) -> Spline:
 
 
 def moving_ends(source: Any, ends: str | None) -> list[str]:
-    """Hints of samples that move at an end where the curve is taken to be at rest.
-
-    Args:
-        source: samples, or anything else.
-        ends: that the user asked for; None: none.
-
-    Returns:
-        one line for each end.
-    """
+    """Hints of samples that move at an end where the curve is taken to be at rest."""
     if not isinstance(source, MotionTable) or source.velocities is not None or (ends or source.ends) is not None:
         return []
     lines, times, positions = [], source.times, source.positions
@@ -163,18 +119,10 @@ def moving_ends(source: Any, ends: str | None) -> list[str]:
     return lines
 
 
-def placed_inward(spline: Spline, frame: Frame, reference: np.ndarray, centre: np.ndarray | None = None) -> Spline:
-    """A spline in the axes of a robot file, in those of the kernels.
-
-    Args:
-        spline: orientations are those of the platform's axes in the file; NumPy leaves.
-        reference: (4,) of `reference_of`.
-        centre: (3,) mass centre in the axes of the platform in the file, m, if the positions are those of their origin;
-            None: the positions are those of the mass centre.
-
-    Returns:
-        the spline, from the centroid of the spools, z down, orientations from the reference one.
-    """
+def placed_inward(
+    spline: Spline, frame: Frame, reference: Float[np.ndarray, "4"], centre: Float[np.ndarray, "3"] | None = None
+) -> Spline:
+    """A spline in the axes of a robot file, in those of the kernels."""
     turning = spline.quaternion
     if turning is not None:
         rows = frame.turned_quaternions(np.asarray(turning)).reshape(-1, 4)
@@ -186,29 +134,14 @@ def placed_inward(spline: Spline, frame: Frame, reference: np.ndarray, centre: n
     return dataclasses.replace(moved, offset=leaf(_rotation(reference).apply(frame.turned(centre))))
 
 
-def centre_from(robot_file: RobotFile, point: str | None) -> np.ndarray | None:
-    """Mass centre of a platform from the point whose positions a motion has.
-
-    Args:
-        point: "mass-centre", "origin" of the platform's axes, or None.
-
-    Returns:
-        (3,) in the axes of the platform in the file, m; None: the motion has the positions that kernels take, those of
-        the mass centre, or of the joint about which the robot turns.
-    """
+def centre_from(robot_file: RobotFile, point: str | None) -> Float[np.ndarray, "3"] | None:
+    """Mass centre of a platform from the point whose positions a motion has."""
     centre, is_jointed = robot_file.centre_of_mass, PATTERNS[robot_file.own_pattern].is_jointed
     return None if centre is None or is_jointed or point != "origin" else np.asarray(centre)
 
 
-def reference_of(robot: AnyRobot) -> np.ndarray:
-    """Rotation from the axes of a platform in its file to those of the kernels.
-
-    Args:
-        robot: in its own axes.
-
-    Returns:
-        (4,) unit quaternion; of a point mass no rotation.
-    """
+def reference_of(robot: AnyRobot) -> Float[np.ndarray, "4"]:
+    """Rotation from the axes of a platform in its file to those of the kernels."""
     if not isinstance(robot, PlatformRobot):
         return np.array(IDENTITY)
     return np.roll(Rotation.from_matrix(aligned(centred(robot)[0])[1]).as_quat(), 1)

@@ -5,8 +5,11 @@ quintic from accelerations too. Quaternions are made continuous in sign, interpo
 afterwards; where positions are Hermite pieces, quaternions are a spline of the same degree.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import BSpline, CubicSpline, PPoly, make_interp_spline
@@ -15,6 +18,9 @@ from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.piecewise_bounds import bernstein_of_powers
 from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import InputError
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 INTERPOLATIONS = ("cubic", "quintic", "hermite")
 ENDS = ("rest", "natural", "periodic")
@@ -25,38 +31,18 @@ LEAST_STEP = 1e-12  # s
 
 
 def interpolated(
-    times: np.ndarray,
-    positions: np.ndarray,
-    quaternions: np.ndarray | None = None,
+    times: Float[np.ndarray, "n"],
+    positions: Float[np.ndarray, "n 3"],
+    quaternions: Float[np.ndarray, "n 4"] | None = None,
     *,
-    velocities: np.ndarray | None = None,
-    accelerations: np.ndarray | None = None,
+    velocities: Float[np.ndarray, "n 3"] | None = None,
+    accelerations: Float[np.ndarray, "n 3"] | None = None,
     interpolation: str = "cubic",
     ends: str = "rest",
-    end_velocities: np.ndarray | None = None,
-    end_accelerations: np.ndarray | None = None,
+    end_velocities: Float[np.ndarray, "2 3"] | None = None,
+    end_accelerations: Float[np.ndarray, "2 3"] | None = None,
 ) -> Spline:
-    """Motion through samples.
-
-    Args:
-        times: (n,) increasing, s; the motion begins at 0.
-        positions: (n, 3) m.
-        quaternions: (n, 4) scalar first, of any length but zero; None for a point mass.
-        velocities: (n, 3) m/s; with "hermite" alone.
-        accelerations: (n, 3) m/s^2; with "hermite" alone.
-        interpolation: one of `INTERPOLATIONS`.
-        ends: of splines, one of `ENDS`: "rest" (velocity 0 of cubics, acceleration too of quintics), "natural" (the
-            derivatives that the degree leaves over are 0) or "periodic".
-        end_velocities: (2, 3) at the first and the last sample, m/s, NaN where `ends` decides; of splines alone.
-        end_accelerations: (2, 3) likewise, m/s^2; of quintics alone, and only where there are velocities.
-
-    Returns:
-        the motion.
-
-    Raises:
-        InputError: times that do not increase, samples that are not finite, a quaternion of length 0, ends that do not
-            meet, velocities where they are of no use, or none where they are needed.
-    """
+    """Motion through samples."""
     times = np.asarray(times, float)
     _check(times, positions, quaternions, interpolation, ends)
     if interpolation == "hermite" and velocities is None:
@@ -78,18 +64,8 @@ def interpolated(
     return dataclasses.replace(curve, interpolation=interpolation, ends="" if interpolation == "hermite" else ends)
 
 
-def linear_maps(times: np.ndarray, kind: str, ends: str, n_arrays: int) -> list[np.ndarray]:
-    """Linear maps from the samples of a motion to the Bernstein coefficients of its pieces.
-
-    Args:
-        times: (n,) increasing, s.
-        kind: one of `INTERPOLATIONS`.
-        ends: as of `interpolated`.
-        n_arrays: positions, and of Hermite pieces velocities and accelerations too.
-
-    Returns:
-        (n - 1, degree + 1, n) for each array of samples.
-    """
+def linear_maps(times: Float[np.ndarray, "n"], kind: str, ends: str, n_arrays: int) -> list[np.ndarray]:
+    """Linear maps from the samples of a motion to the Bernstein coefficients of its pieces."""
     since, unit = np.asarray(times, float) - times[0], np.eye(len(times))
     if kind != "hermite":
         return [_spline(since, unit, 3 if kind == "cubic" else 5, ends)]
@@ -97,30 +73,15 @@ def linear_maps(times: np.ndarray, kind: str, ends: str, n_arrays: int) -> list[
     return [hermite(since, [unit if i == j else np.zeros_like(unit) for i in arrays]) for j in arrays]
 
 
-def continuous(quaternions: np.ndarray) -> np.ndarray:
-    """Unit quaternions, each of the sign that is nearer to the one before.
-
-    Args:
-        quaternions: (n, 4) of any length but zero.
-
-    Returns:
-        (n, 4).
-    """
+def continuous(quaternions: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n 4"]:
+    """Unit quaternions, each of the sign that is nearer to the one before."""
     units = quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
     flips = np.where(np.sum(units[1:] * units[:-1], axis=1) < 0.0, -1.0, 1.0)
     return units * np.cumprod(np.append(1.0, flips))[:, None]
 
 
-def check_order(times: np.ndarray, *, repeated: bool) -> None:
-    """Refuse times that do not increase; the error names the first that does not, and the time before it.
-
-    Args:
-        times: (n,) s.
-        repeated: whether some may be equal to those before them.
-
-    Raises:
-        InputError: they do not increase.
-    """
+def check_order(times: Float[np.ndarray, "n"], *, repeated: bool) -> None:
+    """Refuse times that do not increase; the error names the first that does not, and the time before it."""
     steps = np.diff(times)
     early = np.flatnonzero(steps < 0.0 if repeated else steps <= 0.0)
     if len(early):
@@ -129,15 +90,8 @@ def check_order(times: np.ndarray, *, repeated: bool) -> None:
         raise InputError(f"times[{i}]", float(times[i]), allowed)
 
 
-def check_steps(times: np.ndarray) -> None:
-    """Refuse instants that are too close for numbers.
-
-    Args:
-        times: (n,) s, in their order; some may be equal.
-
-    Raises:
-        InputError: two that differ by less than `LEAST_STEP`, and are not equal.
-    """
+def check_steps(times: Float[np.ndarray, "n"]) -> None:
+    """Refuse instants that are too close for numbers."""
     steps = np.diff(times)
     close = np.flatnonzero((steps > 0.0) & (steps < LEAST_STEP))
     if len(close):
@@ -225,16 +179,8 @@ def _quintic(times: np.ndarray, spline: BSpline) -> np.ndarray:
     return hermite(times, [spline(times, order) for order in range(3)])
 
 
-def hermite(times: np.ndarray, derivatives: list) -> np.ndarray:
-    """Pieces with the values and derivatives of samples.
-
-    Args:
-        times: (n,) s; of two equal ones, the second begins the next piece.
-        derivatives: the values, and as many derivatives as wanted, (n, width) each.
-
-    Returns:
-        (m, 2 len(derivatives), width) Bernstein coefficients of the m pieces between different times.
-    """
+def hermite(times: Float[np.ndarray, "n"], derivatives: list) -> np.ndarray:
+    """Pieces with the values and derivatives of samples."""
     width = np.diff(times)[:, None]
     degree = 2 * len(derivatives) - 1
     falls = [math.factorial(degree - i) / math.factorial(degree) for i in range(len(derivatives))]

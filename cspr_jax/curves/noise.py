@@ -1,13 +1,19 @@
 """Noise in recorded samples, recognised by their differences."""
 
+from __future__ import annotations
+
 import dataclasses
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from cspr_jax.config.motions.table import MotionTable
 from cspr_jax.curves.interpolation import continuous
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Rows of the stretches in which noise is estimated, and the most of them.
 STRETCH, STRETCHES = 96, 16
@@ -44,15 +50,7 @@ class Noise:
 
 
 def noise_notes(table: MotionTable, *, size: float = 1.0) -> list[str]:
-    """Noise that makes the accelerations of a table useless.
-
-    Args:
-        table: samples, of which an interpolation would be the motion.
-        size: by which angular accelerations count, such as the radius of the platform, m.
-
-    Returns:
-        a line each for positions and orientations that are noisy.
-    """
+    """Noise that makes the accelerations of a table useless."""
     parts = [("accelerations jump", "m/s^2", "m", table.positions, 1.0)]
     if table.quaternions is not None:
         parts.append(("angular accelerations jump", "rad/s^2", "rad", 2.0 * continuous(table.quaternions), size))
@@ -68,19 +66,11 @@ def noise_notes(table: MotionTable, *, size: float = 1.0) -> list[str]:
     return lines
 
 
-def noise_of(times: np.ndarray, values: np.ndarray, *, arm: float = 1.0) -> Noise | None:
+def noise_of(times: Float[np.ndarray, "n"], values: Float[np.ndarray, "n width"], *, arm: float = 1.0) -> Noise | None:
     """Noise of samples, if it spoils their second derivatives.
 
     Differences of a high order vanish along smooth motions, but not in noise; so of several orders, the one with the
     least median says most.
-
-    Args:
-        times: (n,) s; not increasing ones are left out.
-        values: (n, width) samples.
-        arm: factor from their second derivatives to accelerations, m.
-
-    Returns:
-        the noise; None: none that matters, or less than `LEAST_ROWS` samples.
     """
     rows = np.append(True, np.diff(times) > 0.0)
     times, values = times[rows], values[rows]
@@ -151,16 +141,8 @@ def _is_rounded(values: np.ndarray, step: float) -> bool:
     return len(changes) > 0 and bool(np.mean(changes == 1.0) >= ONE_STEP)
 
 
-def deviation_of(times: np.ndarray, values: np.ndarray) -> float:
-    """Standard deviation of the noise of the first samples; what rounding leaves is noise too.
-
-    Args:
-        times: (n,) s, increasing.
-        values: (n, width) samples.
-
-    Returns:
-        the deviation, in their unit.
-    """
+def deviation_of(times: Float[np.ndarray, "n"], values: Float[np.ndarray, "n width"]) -> float:
+    """Standard deviation of the noise of the first samples; what rounding leaves is noise too."""
     spread, step = _deviation(times[:STRETCH], values[:STRETCH]), _rounding(values)
     return step / math.sqrt(12.0) if _is_of_rounding(step, spread, values) else spread
 

@@ -32,19 +32,7 @@ _WIDTHS = {2: (0, 2), 3: (0, 1, 2), 7: (0, 1, 2, 3, 4, 5, 6)}
 def spline_of(
     source: MotionTable | MotionPieces, *, interpolation: str | None = None, ends: str | None = None
 ) -> Spline:
-    """A motion that was read, as a spline in its axes.
-
-    Args:
-        interpolation: of a table, one of `curves.interpolation.INTERPOLATIONS`; None: that of the file, else "hermite"
-            if it has velocities, else "cubic".
-        ends: of splines through a table, one of `curves.interpolation.ENDS`; None: those of the file, else "rest".
-
-    Returns:
-        the motion; it begins at 0.
-
-    Raises:
-        InputError: samples or pieces that are no motion; see `curves.interpolation.interpolated`.
-    """
+    """A motion that was read, as a spline in its axes."""
     check_steps(source.knots if isinstance(source, MotionPieces) else source.times)
     if isinstance(source, MotionPieces):
         return _of_pieces(source, interpolation, ends)
@@ -69,18 +57,7 @@ def spline_of(
 
 
 def pieces_of(curve: Any) -> MotionPieces:
-    """A curve of SciPy, exactly.
-
-    Args:
-        curve: a BSpline, or a PPoly or BPoly, such as a CubicSpline or what make_interp_spline gives; its values are
-            (n, 3) positions, (n, 2) x and z of a planar robot, or (n, 7) positions and quaternions, scalar first.
-
-    Returns:
-        its pieces, in the axes of the robot file.
-
-    Raises:
-        InputError: another object, or other values.
-    """
+    """A curve of SciPy, exactly."""
     if isinstance(curve, BSpline):
         knots = np.unique(curve.t[curve.k : len(curve.t) - curve.k])
         orders = range(curve.k + 1)
@@ -112,21 +89,7 @@ def window_splines(
     interpolation: str | None = None,
     ends: str | None = None,
 ) -> Iterator[tuple[float, Spline]]:
-    """A table that is read window by window, as a spline for each window.
-
-    Args:
-        windows: as `config.motions.text.windows` gives them.
-        z_axis: of the robot file, "up" or "down"; None: the motion stays in its own axes.
-        interpolation: as for `spline_of`.
-        ends: as for `spline_of`; not "periodic" where there are several windows.
-
-    Yields:
-        start of the window, s from the start of the table, and its motion, which begins at 0 and with the state with
-        which the one before ends.
-
-    Raises:
-        InputError: as `spline_of`, or where an end would be felt beyond the rows that windows share.
-    """
+    """A table that is read window by window, as a spline for each window."""
     begin, before = None, None
     for window in windows:
         table = window.table if z_axis is None else window.table.in_axes(z_axis)

@@ -1,6 +1,9 @@
 """Several splines in one table, so that bounds of blocks of all of them are computed together."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -8,19 +11,15 @@ from cspr_jax.curves.blocks import spline_bounds
 from cspr_jax.curves.spline import Spline, moved
 from cspr_jax.robots.state_bounds import StateBounds
 
+if TYPE_CHECKING:
+    from jaxtyping import Float, Int
+
 
 class SeveralSplines:
     """Splines of one degree, all of positions alone or all of orientations too, of any numbers of pieces."""
 
     def __init__(self, splines: Sequence[Spline]):
-        """Join the tables.
-
-        Args:
-            splines: at least one.
-
-        Raises:
-            ValueError: degrees differ, only some have orientations, or offsets of mass centres differ.
-        """
+        """Join the tables."""
         self._offset = splines[0].offset
         if any(not np.array_equal(np.asarray(spline.offset), np.asarray(self._offset)) for spline in splines):
             raise ValueError("one offset of the mass centre")
@@ -34,21 +33,15 @@ class SeveralSplines:
         self.durations = np.array([float(spline.knots[-1]) for spline in splines])
         self.jumps = [spline.jumps() for spline in splines]
 
-    def bounds(self, motion: np.ndarray, start: np.ndarray, end: np.ndarray, *, parabolas: bool = False) -> StateBounds:
-        """Bounds of the states over blocks; see `motions.motion.BoundedMotion.bounds`.
-
-        Args:
-            motion: (k,) numbers of the splines, from 0 on.
-            start: (k,) s.
-            end: (k,) s.
-            parabolas: whether bands are around parabolas.
-
-        Returns:
-            the bounds, leaves (k, ...).
-
-        Raises:
-            ValueError: blocks with parabolas reach over several pieces.
-        """
+    def bounds(
+        self,
+        motion: Int[np.ndarray, "k"],
+        start: Float[np.ndarray, "k"],
+        end: Float[np.ndarray, "k"],
+        *,
+        parabolas: bool = False,
+    ) -> StateBounds:
+        """Bounds of the states over blocks; see `motions.motion.BoundedMotion.bounds`."""
         bounds = spline_bounds(
             self._knots,
             self._position,

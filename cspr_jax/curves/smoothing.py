@@ -43,20 +43,6 @@ def smoothed(
     Of all splines that miss the samples by no more in the root mean square, it has the least second derivative in the
     mean square (Reinsch, Numerische Mathematik 10, 1967) among those with the same ends: at rest, velocity and
     acceleration, where the record is at rest or `ends` says so, and free where the record moves.
-
-    Args:
-        deviation: of each coordinate, m.
-        angle: standard deviation of orientations about each axis, rad; None: `deviation` over 1 m.
-        interpolation: of the samples, "cubic" or "quintic"; None: that of the table, else "cubic".
-        ends: one of `curves.interpolation.ENDS`; None: those of the table, else as the samples are there.
-
-    Returns:
-        the smoothed samples, without rates; the curve through them is the smoothing spline, and notes say what was
-        taken off.
-
-    Raises:
-        InputError: a deviation that is not positive, or more than a curve without a second derivative misses the
-            samples by; or too few samples.
     """
     angle = deviation if angle is None else angle
     for key, value in (("smooth", deviation), ("smooth (angle)", angle)):

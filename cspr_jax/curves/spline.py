@@ -1,8 +1,10 @@
 """Piecewise polynomial motion: what a table of samples or way-points and an interpolation are, in Bernstein form."""
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax
 import jax.numpy as jnp
@@ -16,6 +18,9 @@ from cspr_jax.curves.blocks import spline_bounds
 from cspr_jax.robots.state import State
 from cspr_jax.robots.state_bounds import StateBounds
 from cspr_jax.runtime.persistent_jit import persistent_jit
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Second derivatives that differ by less than this part of the largest one do not jump.
 SAME = 1e-9
@@ -61,11 +66,7 @@ class Spline:
         return piece_state(jnp.asarray(self.position)[piece], quaternion, share, width, self.offset)
 
     def padded(self) -> "Spline":
-        """The same motion of a usual number of pieces: the first one is repeated at its start, without a duration.
-
-        Returns:
-            the motion; NumPy leaves.
-        """
+        """The same motion of a usual number of pieces: the first one is repeated at its start, without a duration."""
         count = len(self.knots) - 1
         more = next((usual - count for usual in USUAL if usual >= count), 0)
         if more == 0:
@@ -79,29 +80,15 @@ class Spline:
         return dataclasses.replace(self, **longer)
 
     def stretched(self, factor: float) -> "Spline":
-        """The motion run more slowly, or faster.
-
-        Args:
-            factor: by which its duration grows.
-
-        Returns:
-            the motion; NumPy leaves.
-        """
+        """The motion run more slowly, or faster."""
         return dataclasses.replace(self, knots=leaf(np.asarray(self.knots) * factor))
 
     def breaks(self) -> Array:
         """Breaks; see `Motion.breaks`."""
         return self.knots[1:-1] / self.knots[-1]
 
-    def jumps(self, share: float = SAME) -> np.ndarray:
-        """Instants at which the acceleration jumps.
-
-        Args:
-            share: of the largest one by which it changes there at least.
-
-        Returns:
-            (n,) s, increasing.
-        """
+    def jumps(self, share: float = SAME) -> Float[np.ndarray, "n"]:
+        """Instants at which the acceleration jumps."""
         width = np.diff(np.asarray(self.knots))[:, None]
         is_jump = np.zeros(len(width) - 1, bool)
         for table in (self.position, self.quaternion):
@@ -125,15 +112,8 @@ jax.tree_util.register_dataclass(
 
 
 @persistent_jit
-def moved(bounds: StateBounds, offset: Array) -> StateBounds:
-    """Bounds of another point of a platform, over k blocks.
-
-    Args:
-        offset: (3,) platform axes, m.
-
-    Returns:
-        the bounds.
-    """
+def moved(bounds: StateBounds, offset: Float[Array, "3"]) -> StateBounds:
+    """Bounds of another point of a platform, over k blocks."""
 
     def one(state: StateBounds) -> StateBounds:
         arm = turned(state.rotation, offset)
@@ -147,16 +127,7 @@ def moved(bounds: StateBounds, offset: Array) -> StateBounds:
 
 
 def part(spline: Spline, first: int, last: int) -> Spline:
-    """Consecutive pieces of a spline, as a motion of its own.
-
-    Args:
-        spline: NumPy leaves.
-        first: number of the first piece.
-        last: number behind the last piece.
-
-    Returns:
-        the motion.
-    """
+    """Consecutive pieces of a spline, as a motion of its own."""
     knots = spline.knots[first : last + 1]
     turning = None if spline.quaternion is None else spline.quaternion[first:last]
     return dataclasses.replace(
@@ -165,14 +136,7 @@ def part(spline: Spline, first: int, last: int) -> Spline:
 
 
 def chained(splines: Sequence[Spline]) -> Spline:
-    """Splines one behind another, as one motion.
-
-    Args:
-        splines: at least one, of one degree; NumPy leaves.
-
-    Returns:
-        the motion.
-    """
+    """Splines one behind another, as one motion."""
     ends = np.concatenate([[0.0], np.cumsum([spline.knots[-1] for spline in splines])])
     knots = [spline.knots[:-1] + start for spline, start in zip(splines, ends[:-1], strict=True)]
     tables: dict[str, Any] = {
@@ -184,20 +148,13 @@ def chained(splines: Sequence[Spline]) -> Spline:
 
 
 def piece_state(
-    position: Array, quaternion: Array | None, share: Array, width: Array, offset: Array | None = None
+    position: Float[Array, "degree+1 3"],
+    quaternion: Float[Array, "degree+1 4"] | None,
+    share: Float[Array, ""],
+    width: Float[Array, ""],
+    offset: Array | None = None,
 ) -> State:
-    """State on one piece of a spline.
-
-    Args:
-        position: (degree + 1, 3) Bernstein coefficients, m.
-        quaternion: (degree + 1, 4) likewise; None for a point mass.
-        share: () of the piece that has passed, from 0 to 1.
-        width: () duration of the piece, s.
-        offset: as of `Spline`.
-
-    Returns:
-        the state.
-    """
+    """State on one piece of a spline."""
     place, velocity, acceleration = piece_values(position, share, width)
     if quaternion is None:
         return State(place, velocity, acceleration)
@@ -210,17 +167,10 @@ def piece_state(
     return State(place, velocity, acceleration, rotation, spin, spin_rate, unit)
 
 
-def piece_values(coefficients: Array, share: Array, width: Array) -> tuple[Array, Array, Array]:
-    """Value and first two derivatives on one piece.
-
-    Args:
-        coefficients: (degree + 1, n) Bernstein coefficients.
-        share: () of the piece that has passed, from 0 to 1.
-        width: () of the piece, s.
-
-    Returns:
-        (n,) each, by s and by s^2.
-    """
+def piece_values(
+    coefficients: Float[Array, "degree+1 n"], share: Float[Array, ""], width: Float[Array, ""]
+) -> tuple[Float[Array, "n"], Float[Array, "n"], Float[Array, "n"]]:
+    """Value and first two derivatives on one piece."""
     degree = coefficients.shape[0] - 1
     first = jnp.diff(coefficients, axis=0) * (degree / width)
     second = jnp.diff(first, axis=0) * (max(degree - 1, 0) / width)
@@ -234,17 +184,10 @@ def _bernstein(coefficients: Array, share: Array) -> Array:
     return coefficients.sum(0)
 
 
-def turning_of(quaternion: Array, first: Array, second: Array) -> tuple[Array, Array, Array, Array]:
-    """Rotation of a quaternion that is normalised afterwards; as in `arithmetic.rotation_bounds`.
-
-    Args:
-        quaternion: (4,) scalar first, of any length but zero.
-        first: (4,) its derivative, 1/s.
-        second: (4,) the second one, 1/s^2.
-
-    Returns:
-        rotation (3, 3), angular velocity (3,) rad/s, angular acceleration (3,) rad/s^2, unit quaternion (4,).
-    """
+def turning_of(
+    quaternion: Float[Array, "4"], first: Float[Array, "4"], second: Float[Array, "4"]
+) -> tuple[Float[Array, "3 3"], Float[Array, "3"], Float[Array, "3"], Float[Array, "4"]]:
+    """Rotation of a quaternion that is normalised afterwards; as in `arithmetic.rotation_bounds`."""
     square = jnp.dot(quaternion, quaternion)
     unit = quaternion / jnp.sqrt(square)
     rotation = rotations.matrix(unit)

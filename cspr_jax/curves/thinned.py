@@ -13,15 +13,7 @@ JUMP = 1e-6  # share of the largest acceleration by which one jumps, but for rou
 
 
 def thinned(spline: Spline, first: int) -> Spline:
-    """Hermite pieces through every second sample of a motion, its ends, and where the accelerations of legs jump.
-
-    Args:
-        spline: of Hermite pieces; NumPy leaves.
-        first: number of the first sample between the ends that counts, 1 or 2.
-
-    Returns:
-        the motion, over the same time; NumPy leaves.
-    """
+    """Hermite pieces through every second sample of a motion, its ends, and where the accelerations of legs jump."""
     knots = np.asarray(spline.knots)
     tables = {name: np.asarray(getattr(spline, name)) for name in ("position", "quaternion")}
     sides = {name: _sides(table, np.diff(knots)[:, None]) for name, table in tables.items() if table.ndim}

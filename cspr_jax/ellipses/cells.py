@@ -1,7 +1,10 @@
 """Answers of turns on many ellipses: frequencies and margins by formulas, limits by the proof for any motion."""
 
+from __future__ import annotations
+
 import dataclasses
 import itertools
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +18,9 @@ from cspr_jax.motions.proved_answers import answers_of
 from cspr_jax.robots.point_mass import PointMassRobot, plane_normal, spool_radius
 from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.verdicts import FLAGS, Verdict
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Roundings of a margin, in parts of the largest number in it, with room.
 ROUNDINGS = 256.0 * float(np.finfo(float).eps)
@@ -49,17 +55,8 @@ class EllipseCells(Columns):
     limit_margin: np.ndarray
 
 
-def ellipse_cells(problem: Problem, ellipses: Ellipse, frequencies: np.ndarray | str) -> EllipseCells:
-    """Answers of turns on ellipses.
-
-    Args:
-        ellipses: leaves (n, 3).
-        frequencies: (n,) rad/s, or "natural", or, where formulas hold, "best".
-
-    Returns:
-        the answers: by formulas where they hold and no limit is set, else by the proof for any motion, but for what
-        formulas have refuted.
-    """
+def ellipse_cells(problem: Problem, ellipses: Ellipse, frequencies: Float[np.ndarray, "n"] | str) -> EllipseCells:
+    """Answers of turns on ellipses."""
     robot, count = problem.robot, len(ellipses.centre)
     depth = np.asarray(ellipses.centre) @ np.asarray(plane_normal(robot))
     with np.errstate(invalid="ignore", divide="ignore"):

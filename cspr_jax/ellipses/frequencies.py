@@ -4,8 +4,11 @@ What cables alone allow is a formula (`harmonics`). Limits, spools in several pl
 samples of one turn; a verdict is the proof of the motion that results.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -26,6 +29,9 @@ from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.state_bounds import StateBounds
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # Angles of a turn where there are many frequencies, and for one alone; frequencies of a first look, halvings that
 # follow, and the share by which an end is kept off.
 ANGLES, FINE, LOOKS, HALVINGS, INSIDE = 128, 4096, 65, 40, 1e-5
@@ -37,20 +43,7 @@ SLOWER = "a number: the slower this ellipse, the larger the margin"
 def chosen_frequency(
     problem: Problem, ellipse: Ellipse, rule: str, scene: Scene | None = None, rotation: Rotation | None = None
 ) -> float:
-    """Frequency by a rule.
-
-    Args:
-        ellipse: leaves (3,).
-        rule: "natural", "best", "fastest" or "slowest".
-        scene: bodies that can meet.
-        rotation: of a platform on this ellipse.
-
-    Returns:
-        rad/s; the natural one where no frequency is feasible, so that its verdict says why.
-
-    Raises:
-        InputError: a centre that is not below the spools, or nothing that bounds the frequency.
-    """
+    """Frequency by a rule."""
     natural, hull = natural_frequency(problem, ellipse, rule), formula_hull(problem.robot)
     if rule == "natural":
         return natural
@@ -73,38 +66,14 @@ def chosen_frequency(
 
 
 def searched_frequency(slack: Callable, low: float, high: float, natural: float, rule: str) -> float:
-    """Frequency by a rule, from slacks of frequencies.
-
-    Args:
-        slack: slacks (n,) at frequencies (n,) rad/s.
-        low: the smallest frequency, rad/s.
-        high: the largest one.
-        natural: the frequency where none is feasible.
-        rule: "best", "fastest" or "slowest".
-
-    Returns:
-        rad/s.
-
-    Raises:
-        InputError: nothing that bounds the frequency.
-    """
+    """Frequency by a rule, from slacks of frequencies."""
     if rule == "best":
         return _largest(slack, low, high, natural)
     return _outermost(slack, low, high, natural, rule)
 
 
 def natural_frequency(problem: Problem, ellipse: Ellipse, rule: str = "natural") -> float:
-    """Natural frequency of a pendulum from the plane of the spools to the centre of an ellipse.
-
-    Args:
-        rule: named in errors.
-
-    Returns:
-        rad/s.
-
-    Raises:
-        InputError: a centre that is not below the spools.
-    """
+    """Natural frequency of a pendulum from the plane of the spools to the centre of an ellipse."""
     depth = float(np.asarray(ellipse.centre) @ np.asarray(plane_normal(problem.robot)))
     if not depth > 0.0:
         raise InputError("frequency", rule, "a number: the centre is not below the spools")
@@ -118,21 +87,11 @@ def _row(ellipse: Ellipse) -> Ellipse:
 def sampled_slacks(
     problem: Problem,
     ellipse: Ellipse,
-    frequencies: np.ndarray,
+    frequencies: Float[np.ndarray, "n"],
     scene: Scene | None,
     rotation: Rotation | None = None,
-) -> np.ndarray:
-    """Smallest slacks at samples of one turn.
-
-    Args:
-        ellipse: leaves (3,), or (n, 1, 3) of an ellipse for each frequency.
-        frequencies: (n,) rad/s.
-        scene: bodies that can meet.
-        rotation: of a platform, which oscillates as on the last of its ellipses.
-
-    Returns:
-        (n,) in the units of their criteria.
-    """
+) -> Float[np.ndarray, "n"]:
+    """Smallest slacks at samples of one turn."""
     count = ANGLES if len(frequencies) > 1 else FINE
     angle = np.linspace(0.0, 2.0 * math.pi, count, endpoint=False)[:, None]
     cosine, sine = np.cos(angle), np.sin(angle)

@@ -16,8 +16,10 @@ Source: Gosselin, Ren, Foucault, Dynamic trajectory planning of a two-DOF cable-
 Mottola, Gosselin, Carricato, J. Mechanisms and Robotics 10 (2018) 031004. The form above is derived in docs/theory.md.
 """
 
+from __future__ import annotations
+
 from functools import partial, reduce
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -26,6 +28,9 @@ from jax import Array
 
 from cspr_jax.arithmetic.batches import in_batches, in_parts
 from cspr_jax.ellipses.hull import SpoolHull
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Ellipses in a batch, and in the part of one of two threads.
 BATCH, LARGEST = 16384, 1 << 20
@@ -92,16 +97,8 @@ def _slacks(terms: _Terms, e: Array) -> list[Array]:
     ]
 
 
-def harmonic_margins(hull: SpoolHull, ellipse: Ellipse, frequency: Array) -> Array:
-    """Smallest values along an ellipse, all positive exactly if it is feasible.
-
-    Args:
-        ellipse: leaves (3,).
-        frequency: () rad/s.
-
-    Returns:
-        (n_edges + 1,) of kappa for each edge, 1 at rest below the centroid; of the depth, over that of the centre.
-    """
+def harmonic_margins(hull: SpoolHull, ellipse: Ellipse, frequency: Float[Array, ""]) -> Float[Array, "n_edges+1"]:
+    """Smallest values along an ellipse, all positive exactly if it is feasible."""
     return jnp.stack(_margins(hull, ellipse, frequency))
 
 
@@ -114,16 +111,8 @@ def _margins(hull: SpoolHull, ellipse: Ellipse, frequency: Array) -> list[Array]
     return [*(jnp.where(is_below, slack, -jnp.inf) for slack in slacks), depth]
 
 
-def least_margin(hull: SpoolHull, ellipse: Ellipse, frequency: Array) -> Array:
-    """Smallest of the margins along an ellipse.
-
-    Args:
-        ellipse: leaves (3,).
-        frequency: () rad/s.
-
-    Returns:
-        () positive exactly if it is feasible.
-    """
+def least_margin(hull: SpoolHull, ellipse: Ellipse, frequency: Float[Array, ""]) -> Float[Array, ""]:
+    """Smallest of the margins along an ellipse."""
     return reduce(jnp.minimum, _margins(hull, ellipse, frequency))
 
 
@@ -151,16 +140,8 @@ def _exists(terms: _Terms) -> Array:
     return reduce(jnp.logical_and, [edge.constant > 0.0 for edge in terms.edges], terms.depth > terms.swing)
 
 
-def frequency_interval(hull: SpoolHull, ellipse: Ellipse) -> tuple[Array, Array]:
-    """Frequencies at which an ellipse is feasible: between two ends, which are not.
-
-    Args:
-        ellipse: leaves (3,).
-
-    Returns:
-        () rad/s each, the upper one inf where nothing bounds it, the lower one 0 where the ellipse lies in the static
-        workspace; NaN where no frequency is feasible.
-    """
+def frequency_interval(hull: SpoolHull, ellipse: Ellipse) -> tuple[Float[Array, ""], Float[Array, ""]]:
+    """Frequencies at which an ellipse is feasible: between two ends, which are not."""
     terms = _terms(hull, ellipse)
     low, high = _roots(terms)
     exists = _exists(terms)
@@ -169,15 +150,8 @@ def frequency_interval(hull: SpoolHull, ellipse: Ellipse) -> tuple[Array, Array]
     return first, last
 
 
-def best_frequency(hull: SpoolHull, ellipse: Ellipse) -> Array:
-    """Frequency with the largest margin.
-
-    Args:
-        ellipse: leaves (3,).
-
-    Returns:
-        () rad/s; 0 where slower is always better; NaN where no frequency is feasible.
-    """
+def best_frequency(hull: SpoolHull, ellipse: Ellipse) -> Float[Array, ""]:
+    """Frequency with the largest margin."""
     terms = _terms(hull, ellipse)
     low, high = _roots(terms)
 
@@ -210,14 +184,7 @@ def _each(function, hull: SpoolHull, items):
 
 
 def of_many(function, hull: SpoolHull, *items):
-    """One of the functions above for many ellipses.
-
-    Args:
-        items: what it takes behind the hull, leaves (n, ...).
-
-    Returns:
-        its results, NumPy leaves (n, ...).
-    """
+    """One of the functions above for many ellipses."""
 
     def part(rows: slice):
         return in_batches(partial(_each, function, hull), jax.tree.map(lambda leaf: leaf[rows], items), size=BATCH)

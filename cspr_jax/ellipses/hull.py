@@ -1,6 +1,8 @@
 """Hull of the spools seen from above, by affine functions that are 1 at the centroid and 0 on one edge each."""
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from jax import Array
@@ -10,6 +12,9 @@ from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.errors import InputError
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.point_mass import SPATIAL, PointMassRobot, plane_normal, spool_radius
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Spools count as in one plane within this part of the size of the robot.
 IN_PLANE = 1e-9
@@ -30,17 +35,7 @@ class SpoolHull(NamedTuple):
 
 
 def hull_of(robot: AnyRobot) -> SpoolHull:
-    """Hull of the spools of a robot.
-
-    Args:
-        robot: centred.
-
-    Returns:
-        the hull; on as many cables as degrees of freedom its edges are in the order of the cables opposite to them.
-
-    Raises:
-        InputError: a platform, pulleys, or spools that are not in one plane.
-    """
+    """Hull of the spools of a robot."""
     if not isinstance(robot, PointMassRobot):
         raise InputError("robot", robot.name, "a point mass, for a formula of the frequencies")
     normal, points = np.asarray(plane_normal(robot)), np.asarray(robot.base_points)
@@ -54,30 +49,15 @@ def hull_of(robot: AnyRobot) -> SpoolHull:
 
 
 def formula_hull(robot: AnyRobot) -> SpoolHull | None:
-    """Hull of the spools of a robot for which formulas hold.
-
-    Args:
-        robot: centred.
-
-    Returns:
-        the hull; None for a robot that `hull_of` refuses.
-    """
+    """Hull of the spools of a robot for which formulas hold."""
     try:
         return hull_of(robot)
     except InputError:
         return None
 
 
-def edge_ends(points: np.ndarray, dof: int) -> np.ndarray:
-    """Spools at the ends of the edges of the hull.
-
-    Args:
-        points: (n_cables, 3) m.
-        dof: 3, or 2 of a robot in a vertical plane, where an edge is a point.
-
-    Returns:
-        (n_edges, dof - 1) numbers from 0 on.
-    """
+def edge_ends(points: Float[np.ndarray, "n_cables 3"], dof: int) -> Float[np.ndarray, "n_edges dof-1"]:
+    """Spools at the ends of the edges of the hull."""
     count = len(points)
     if count == dof:
         return np.array([[i for i in range(count) if i != cable] for cable in range(count)])

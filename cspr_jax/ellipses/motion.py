@@ -8,10 +8,12 @@ The law starts and ends without slope and curvature, so that position, velocity 
 of the ellipses. Rest is an ellipse whose axes are zero; a law that is constant, turns on one ellipse.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import math
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax
 import jax.numpy as jnp
@@ -28,6 +30,9 @@ from cspr_jax.motions.amplitudes import Amplitude, derivatives, from_pieces, nam
 from cspr_jax.robots.state import State
 from cspr_jax.robots.state_bounds import StateBounds
 from cspr_jax.runtime.persistent_jit import persistent_jit
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Blocks of which bounds are computed at a time.
 BATCH = 64
@@ -141,32 +146,14 @@ def _bounds(motion: EllipseMotion, blocks: tuple[TimeBounds, AffineBounds]) -> S
     return jax.vmap(one)(blocks)
 
 
-def turning(ellipse: Ellipse, frequency: Array, phase: Array, turns: Any) -> EllipseMotion:
-    """Turns on one ellipse.
-
-    Args:
-        ellipse: leaves (3,).
-        frequency: () rad/s.
-        phase: () angle at the start, rad.
-        turns: () number of turns.
-
-    Returns:
-        the motion.
-    """
+def turning(ellipse: Ellipse, frequency: Float[Array, ""], phase: Float[Array, ""], turns: Any) -> EllipseMotion:
+    """Turns on one ellipse."""
     law, time = with_turns(named("quintic"), 0.0), 2.0 * math.pi * jnp.asarray(turns, float) / frequency
     return EllipseMotion(ellipse, ellipse, jnp.stack([frequency, frequency]), phase, law, integral(law), time)
 
 
 def with_turns(amplitude: Amplitude, share: float) -> Amplitude:
-    """Law of a way that takes a share of the time, and of turns for the rest.
-
-    Args:
-        amplitude: law of the way, from 0 to 1.
-        share: from 0, no way, to 1, no turns.
-
-    Returns:
-        the law.
-    """
+    """Law of a way that takes a share of the time, and of turns for the rest."""
     if share == 0.0:
         return from_pieces("1", (), (0.0,), ((1.0,),))
     powers = share ** -np.arange(amplitude.coefficients.shape[1])
@@ -178,11 +165,7 @@ def with_turns(amplitude: Amplitude, share: float) -> Amplitude:
 
 
 def integral(law: Amplitude) -> Amplitude:
-    """Integral of a law from the start on.
-
-    Returns:
-        the integral, another piecewise polynomial.
-    """
+    """Integral of a law from the start on."""
     origins, knots = np.asarray(law.origins), np.asarray(law.knots)
     pieces, value = [], 0.0
     for row, origin, first, last in zip(law.coefficients, origins, [0.0, *knots], [*knots, 1.0], strict=True):

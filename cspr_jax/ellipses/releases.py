@@ -11,10 +11,12 @@ at the angle 0. At the natural frequency w it is feasible exactly if C lies belo
 with rises towards the plane of the spools and D the depth of C (`harmonics`): however far aside p lies.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -30,6 +32,9 @@ from cspr_jax.motions.parabola import Parabola
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import proof_of, sampled_proof
 from cspr_jax.robots.clearance import Scene
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Times of flight of a first look, over the time of a fall from the plane of the spools to the centre, and their number.
 SHORTEST, LONGEST, LOOKS = 0.01, 100.0, 257
@@ -70,15 +75,8 @@ class ReleaseRequirement(NamedTuple):
     centre: np.ndarray
     turns: float
 
-    def states(self, times: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Place and velocity of the release.
-
-        Args:
-            times: (n,) of the flight, s.
-
-        Returns:
-            (n, 3) m, (n, 3) m/s.
-        """
+    def states(self, times: Any) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
+        """Place and velocity of the release."""
         parabola, gravity = self.parabola, self.problem.robot.gravity
 
         def one(time: Any) -> tuple[Any, Any]:
@@ -89,58 +87,26 @@ class ReleaseRequirement(NamedTuple):
         place, velocity = jax.vmap(one)(np.asarray(times, float))
         return np.asarray(place), np.asarray(velocity)
 
-    def ellipses(self, times: Any, frequencies: np.ndarray) -> Ellipse:
-        """Ellipses that pass the place of the release with its velocity.
-
-        Args:
-            times: (n,) of the flight, s.
-            frequencies: (n,) rad/s.
-
-        Returns:
-            leaves (n, 3).
-        """
+    def ellipses(self, times: Any, frequencies: Float[np.ndarray, "n"]) -> Ellipse:
+        """Ellipses that pass the place of the release with its velocity."""
         place, velocity = self.states(times)
         return Ellipse(np.broadcast_to(self.centre, place.shape), place - self.centre, velocity / frequencies[:, None])
 
-    def slacks(self, times: Any, frequencies: np.ndarray) -> np.ndarray:
-        """Slacks of the ellipses, positive where they are feasible: of samples, and of formulas where these hold.
-
-        Args:
-            times: (n,) of the flight, s.
-            frequencies: (n,) rad/s.
-
-        Returns:
-            (n,).
-        """
+    def slacks(self, times: Any, frequencies: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
+        """Slacks of the ellipses, positive where they are feasible: of samples, and of formulas where these hold."""
         ellipses = self.ellipses(times, frequencies)
         each = Ellipse(*(leaf[:, None] for leaf in ellipses))
         return np.fmin(self.margins(ellipses, frequencies), sampled_slacks(self.problem, each, frequencies, self.scene))
 
-    def margins(self, ellipses: Ellipse, frequencies: np.ndarray) -> np.ndarray:
-        """Margins of ellipses by formulas.
-
-        Args:
-            ellipses: leaves (n, 3).
-            frequencies: (n,) rad/s.
-
-        Returns:
-            (n,); NaN for robots for which there is none.
-        """
+    def margins(self, ellipses: Ellipse, frequencies: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
+        """Margins of ellipses by formulas."""
         hull = formula_hull(self.problem.robot)
         if hull is None:
             return np.full(len(frequencies), np.nan)
         return harmonics.of_many(harmonics.least_margin, hull, ellipses, frequencies)
 
     def release(self, time: float, frequency: float) -> Release:
-        """Release after a whole number of turns.
-
-        Args:
-            time: of the flight, s.
-            frequency: rad/s.
-
-        Returns:
-            the release.
-        """
+        """Release after a whole number of turns."""
         ellipse = Ellipse(*(leaf[0] for leaf in self.ellipses([time], np.array([frequency]))))
         return Release(ellipse, frequency, -2.0 * math.pi * self.turns, flight_time=time)
 
@@ -148,21 +114,7 @@ class ReleaseRequirement(NamedTuple):
 def chosen_release(
     requirement: ReleaseRequirement, before: Turning, rule: str | float, choose: str | None, arcs: range
 ) -> Release:
-    """Release with all that a launch leaves open chosen.
-
-    Args:
-        before: from which the way to the ellipse leads.
-        rule: frequency, rad/s, or "natural", "best", "fastest" or "slowest"; times are chosen at the natural one.
-        choose: the time of flight for the least kinetic energy at the release, "energy", or for the earliest landing,
-            "time"; None where it is given.
-        arcs: numbers of arcs of the way.
-
-    Returns:
-        the release; where none is feasible, that of the largest slack.
-
-    Raises:
-        InputError: a centre that is not below the spools, or nothing that bounds the frequency.
-    """
+    """Release with all that a launch leaves open chosen."""
     nothing = np.zeros(3)
     natural = natural_frequency(requirement.problem, Ellipse(requirement.centre, nothing, nothing))
     frequency, time = rule if isinstance(rule, float) else natural, requirement.parabola.time

@@ -6,8 +6,10 @@ with the law s of the way and the angle theta of the ellipse; p and q go from th
 last one, as its half-axes do.
 """
 
+from __future__ import annotations
+
 import math
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -18,6 +20,9 @@ from cspr_jax.arithmetic.affine_bounds import AffineBounds, cross, dot, turned
 from cspr_jax.arithmetic.elementary import leaf, length
 from cspr_jax.arithmetic.function_bounds import sincospi
 from cspr_jax.arithmetic.rotation_bounds import RotationBounds
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 
 class Rotation(NamedTuple):
@@ -38,16 +43,8 @@ class Rotation(NamedTuple):
     last: Any
 
 
-def turn_between(start: np.ndarray, end: np.ndarray) -> Array:
-    """Shortest rotation from one orientation to another.
-
-    Args:
-        start: (4,) unit quaternion, scalar first.
-        end: (4,) likewise.
-
-    Returns:
-        (3,) about its direction, fixed axes, by at most half a turn, rad.
-    """
+def turn_between(start: Float[np.ndarray, "4"], end: Float[np.ndarray, "4"]) -> Float[Array, "3"]:
+    """Shortest rotation from one orientation to another."""
     quaternion = rotations.products(end[None], start[None] * np.array([1.0, -1.0, -1.0, -1.0]))[0]
     quaternion = quaternion * (1.0 if quaternion[0] >= 0.0 else -1.0)
     sine = float(np.linalg.norm(quaternion[1:]))
@@ -65,16 +62,10 @@ def _direction(vector: Array) -> tuple[Array, Array]:
     return jnp.where(size > 0.0, vector / jnp.where(size > 0.0, size, 1.0), jnp.eye(3)[0]), size
 
 
-def rotation_state(rotation: Rotation, s: tuple, psi: tuple) -> tuple[Array, Array, Array, Array]:
-    """Rotation at one instant.
-
-    Args:
-        s: law of the way and its first two derivatives in time, () each.
-        psi: angle of the oscillation and its first two derivatives in time, () each.
-
-    Returns:
-        (3, 3) rotation, (3,) angular velocity, rad/s, (3,) angular acceleration, rad/s^2, (4,) unit quaternion.
-    """
+def rotation_state(
+    rotation: Rotation, s: tuple, psi: tuple
+) -> tuple[Float[Array, "3 3"], Float[Array, "3"], Float[Array, "3"], Float[Array, "4"]]:
+    """Rotation at one instant."""
     way, angle = _direction(rotation.turn)
     swing = _quaternion(rotation.axis, psi[0])
     quaternion = rotations.product(swing, rotations.product(_quaternion(way, s[0] * angle), rotation.start))
@@ -86,15 +77,7 @@ def rotation_state(rotation: Rotation, s: tuple, psi: tuple) -> tuple[Array, Arr
 
 
 def rotation_bounds(rotation: Rotation, s: tuple, psi: tuple) -> RotationBounds:
-    """Bounds of the rotation over a block; see `rotation_state`.
-
-    Args:
-        s: bounds (1,) each.
-        psi: bounds (1,) each.
-
-    Returns:
-        the bounds.
-    """
+    """Bounds of the rotation over a block; see `rotation_state`."""
     way, angle = _direction(rotation.turn)
     outer = _about(rotation.axis, psi[0])
     inner = dot(_rows(_about(way, s[0] * angle)), rotations.matrix(rotation.start).T[None])

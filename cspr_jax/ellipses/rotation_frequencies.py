@@ -12,7 +12,9 @@ pose, three of them are translations at sqrt(sum tau_k / m) and three are rotati
 those three count as rotations in which the kinetic energy of rotation has the largest share.
 """
 
-from typing import Any, NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -23,6 +25,9 @@ from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.cables import tensions
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.state import State
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 
 class RotationFrequencies(NamedTuple):
@@ -37,17 +42,10 @@ class RotationFrequencies(NamedTuple):
     modes: np.ndarray
 
 
-def rotation_frequencies(problem: Problem, position: np.ndarray, rotation: np.ndarray) -> RotationFrequencies:
-    """Natural frequencies of rotation of a platform in a pose.
-
-    Args:
-        problem: of a platform; on redundant cables the tensions are centred between their limits.
-        position: (3,) of the mass centre, from the centroid of the spools, z down, m.
-        rotation: (3, 3) from platform to fixed axes.
-
-    Returns:
-        the frequencies.
-    """
+def rotation_frequencies(
+    problem: Problem, position: Float[np.ndarray, "3"], rotation: Float[np.ndarray, "3 3"]
+) -> RotationFrequencies:
+    """Natural frequencies of rotation of a platform in a pose."""
     stiffness, inertia = (np.asarray(x) for x in _matrices(problem, jnp.asarray(position), jnp.asarray(rotation)))
     if not np.isfinite(stiffness).all():
         return RotationFrequencies(np.full(3, np.nan), np.full((3, 6), np.nan))

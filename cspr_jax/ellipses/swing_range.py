@@ -10,8 +10,10 @@ an interval of the depth of p; a floor gives one of its height likewise. So for 
 is the point of a box, cut by planes parallel to that of the spools, that is nearest to q. Times of flight are searched.
 """
 
+from __future__ import annotations
+
 import dataclasses
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -24,6 +26,9 @@ from cspr_jax.motions.limits import limits_set
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.schema.verdicts import FLAGS, Verdict
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Shortest time of flight, over the longest one, number of times, and how often a grid of `AROUND` times narrows about
 # the best one.
@@ -53,11 +58,7 @@ class SwingRange(Releases):
 
 
 def other_limit(limits: Limits) -> str | None:
-    """Name of a limit other than a floor, which no formula here knows.
-
-    Returns:
-        the first one; None: there is none.
-    """
+    """Name of a limit other than a floor, which no formula here knows."""
     names = [row.name for row in limits_set(limits) if row.name != "floor"]
     return next(iter([*names, *(["uncertainty"] if limits.uncertainty is not None else [])]), None)
 
@@ -88,23 +89,13 @@ class _Looks(NamedTuple):
 
 
 def swing_range(
-    robot: PointMassRobot, centres: np.ndarray, targets: np.ndarray, box: ReleaseBox, floor: float | None = None
+    robot: PointMassRobot,
+    centres: Float[np.ndarray, "n 3"],
+    targets: Float[np.ndarray, "n 3"],
+    box: ReleaseBox,
+    floor: float | None = None,
 ) -> SwingRange:
-    """Slowest releases from ellipses at their natural frequencies.
-
-    Args:
-        robot: centred.
-        centres: (n, 3) of the ellipses, m.
-        targets: (n, 3) where the object is to land, m.
-        box: places of release.
-        floor: its depth, m, which no ellipse goes through; None: no floor.
-
-    Returns:
-        the releases: each feasible, by a formula, and the slowest one of its time of flight; the times are searched.
-
-    Raises:
-        InputError: pulleys, or spools that are not in one plane.
-    """
+    """Slowest releases from ellipses at their natural frequencies."""
     hull = hull_of(robot)
     space = _Space(np.asarray(hull.normal), float(robot.gravity), box, np.inf if floor is None else floor)
     depth = _depth(centres, space.normal)

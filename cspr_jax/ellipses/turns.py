@@ -3,8 +3,11 @@
 Time is the angle of the turn here: so turns that get slower and slower have a limit, which has no velocity.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import math
+from typing import TYPE_CHECKING
 
 import jax
 import numpy as np
@@ -17,6 +20,9 @@ from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import MotionProof, proofs_of
 from cspr_jax.robots.state_bounds import StateBounds
 from cspr_jax.runtime.persistent_jit import persistent_jit
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Int
 
 # Blocks of which bounds are computed at a time, and turns that are proved together.
 BATCH, TOGETHER = 64, 1024
@@ -36,17 +42,10 @@ class Turns:
     ellipses: Ellipse
     frequencies: np.ndarray
 
-    def bounds(self, motion: np.ndarray, start: np.ndarray, end: np.ndarray) -> StateBounds:
-        """Bounds of the states over blocks.
-
-        Args:
-            motion: (k,) numbers of the ellipses, from 0 on.
-            start: (k,) angle, rad.
-            end: (k,) angle, rad.
-
-        Returns:
-            the bounds, leaves (k, ...).
-        """
+    def bounds(
+        self, motion: Int[np.ndarray, "k"], start: Float[np.ndarray, "k"], end: Float[np.ndarray, "k"]
+    ) -> StateBounds:
+        """Bounds of the states over blocks."""
         chosen = Ellipse(*(np.asarray(leaf)[motion] for leaf in self.ellipses))
         return in_batches(_bounds, (chosen, self.frequencies[motion], start, end), size=BATCH)
 
@@ -64,11 +63,7 @@ def _bounds(blocks: tuple) -> StateBounds:
 
 
 def turn_proofs(problem: Problem, turns: Turns) -> list[MotionProof]:
-    """Proofs of one turn on each ellipse.
-
-    Returns:
-        n proofs.
-    """
+    """Proofs of one turn on each ellipse."""
     proofs: list[MotionProof] = []
     for first in range(0, len(turns.frequencies), TOGETHER):
         part = slice(first, first + TOGETHER)

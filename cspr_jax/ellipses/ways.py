@@ -47,11 +47,7 @@ class Turning:
         return self.frequency == 0.0
 
     def is_same(self, other: "Turning") -> bool:
-        """Tell whether another one is on the same ellipse at the same pace, at any angle.
-
-        Returns:
-            whether it is.
-        """
+        """Tell whether another one is on the same ellipse at the same pace, at any angle."""
         return all(np.array_equal(a, b) for a, b in zip(self._parts, other._parts, strict=True))
 
     @property
@@ -77,38 +73,21 @@ class Way(NamedTuple):
 
 
 def step_of(first: Turning, last: Turning) -> int:
-    """Step between numbers of arcs of a way: 1 where the angle at a rest is free, else 2; 0 where there is no way.
-
-    Returns:
-        the step.
-    """
+    """Step between numbers of arcs of a way: 1 where the angle at a rest is free, else 2; 0 where there is no way."""
     if first.is_same(last):
         return 0
     return 1 if first.rests or last.rests else 2
 
 
 def between(first: Turning, last: Turning) -> float:
-    """Angle from the one to the other, the shortest in the direction of the motion.
-
-    Returns:
-        rad, from 0 to less than a turn.
-    """
+    """Angle from the one to the other, the shortest in the direction of the motion."""
     full = 2.0 * math.pi
     angle = (last.phase - first.phase) % full
     return 0.0 if min(angle, full - angle) < SAME_ANGLE else angle
 
 
 def motion_between(amplitude: Amplitude, first: Turning, last: Turning, arcs: int, turns: float) -> EllipseMotion:
-    """Way from one ellipse to another one, and turns on that.
-
-    Args:
-        amplitude: law of the way.
-        arcs: half turns of the way, begun or whole; of no account on one and the same ellipse.
-        turns: on the last ellipse.
-
-    Returns:
-        the motion; of a way to rest, its end may have any angle.
-    """
+    """Way from one ellipse to another one, and turns on that."""
     step, full = step_of(first, last), 2.0 * math.pi
     start, end = first.frequency or last.frequency, last.frequency or first.frequency
     rest = between(first, last)
@@ -123,11 +102,7 @@ def motion_between(amplitude: Amplitude, first: Turning, last: Turning, arcs: in
 
 
 def rotation_between(first: Turning, last: Turning) -> Rotation | None:
-    """Rotation of a platform on the way from one ellipse to another.
-
-    Returns:
-        the rotation; None for a point mass.
-    """
+    """Rotation of a platform on the way from one ellipse to another."""
     if first.quaternion is None or last.quaternion is None:
         return None
     axis = last.axis if last.oscillation.any() else first.axis
@@ -138,16 +113,7 @@ def rotation_between(first: Turning, last: Turning) -> Rotation | None:
 def least_way(
     problem: Problem, first: Turning, last: Turning, turns: float, scene: Scene | None, *, arcs: int, max_arcs: int
 ) -> Way:
-    """The way with the least number of arcs that is proved, with the turns behind it.
-
-    Args:
-        turns: on the last ellipse.
-        arcs: fixed number of arcs; 0: free.
-        max_arcs: largest number of arcs tried, at least the step of the way.
-
-    Returns:
-        the way; without a proof the one whose smallest slack is the largest.
-    """
+    """The way with the least number of arcs that is proved, with the turns behind it."""
     step = step_of(first, last)
     undecided: Way | None = None
     refuted: list[tuple[float, Way]] = []

@@ -118,35 +118,17 @@ DEEPEST, LONGEST = 3, 12
 
 
 def demand(allowed: str) -> str:
-    """Phrase what a message demands of a value.
-
-    Args:
-        allowed: what would be right; or, from "cannot" on, what is wrong, and from "did you mean" on, a whole clause.
-
-    Returns:
-        the words behind the value.
-    """
+    """Phrase what a message demands of a value."""
     return allowed if allowed.startswith(("cannot ", "did you mean ")) else f"must be {allowed}"
 
 
 def printable(text: object) -> str:
-    """Text that neither breaks a line nor commands a terminal, whoever wrote it: names, paths, records, logs.
-
-    Line breaks, escapes, other control characters, marks that turn the direction of writing, and halves of surrogate
-    pairs are written out, as in a string of Python. Text that is printable already stays as it is.
-
-    Returns:
-        one line.
-    """
+    """Text that neither breaks a line nor commands a terminal, whoever wrote it: names, paths, records, logs."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in str(text))
 
 
 def shown(value: object) -> str:
-    """A value as a message shows it: TOML spelling, at most 60 characters.
-
-    Returns:
-        the text.
-    """
+    """A value as a message shows it: TOML spelling, at most 60 characters."""
     text = _toml(value, DEEPEST)
     return text if len(text) <= 60 else text[:57] + "..."
 

@@ -56,11 +56,7 @@ _PLAIN = {character: plain for plain, characters in _LOOK_ALIKES.items() for cha
 
 
 def nearest(text: str, allowed: Iterable[str]) -> str | None:
-    """The allowed name that a user probably meant.
-
-    Returns:
-        one of them; None if none is near.
-    """
+    """The allowed name that a user probably meant."""
     names = list(allowed)
     if len(text) > LONGEST:
         return None
@@ -78,14 +74,7 @@ def nearest(text: str, allowed: Iterable[str]) -> str | None:
 
 
 def look_alike(text: str) -> str:
-    """Clause for a message about text that holds a character that only looks like a plain one.
-
-    Args:
-        text: that could not be read.
-
-    Returns:
-        the clause, about the first such character, which begins with a colon; "" if there is none.
-    """
+    """Clause for a message about text that holds a character that only looks like a plain one."""
     character = next((character for character in text if character in _PLAIN), "")
     if not character:
         return ""
@@ -94,25 +83,13 @@ def look_alike(text: str) -> str:
 
 
 def did_you_mean(text: str, allowed: Iterable[str]) -> str:
-    """The question for an error's line.
-
-    Returns:
-        "did you mean NAME? ", or nothing.
-    """
+    """The question for an error's line."""
     near = nearest(text, allowed)
     return f"did you mean {near}? " if near else ""
 
 
 def one_of(value: object, names: Iterable[str], allowed: str = "") -> str:
-    """Demand of an error's line about a name: the one that was probably meant, then all of them.
-
-    Args:
-        value: that was given; only a text is like a name.
-        allowed: in words, where these are not "one of" them all.
-
-    Returns:
-        the words behind the value, for `InputError` and `demand`.
-    """
+    """Demand of an error's line about a name: the one that was probably meant, then all of them."""
     names = list(names)
     allowed = allowed or f"one of {', '.join(names)}"
     question = did_you_mean(value, names) if isinstance(value, str) else ""
@@ -128,11 +105,7 @@ def ask_about_keywords(function: str, keywords: Iterable[str], known: Collection
 
 
 def with_suggestions(kind: Kind) -> Kind:
-    """Make a class ask about keywords that are nearly those of its constructor.
-
-    Returns:
-        the class; its signature stays.
-    """
+    """Make a class ask about keywords that are nearly those of its constructor."""
     plain = kind.__init__  # type: ignore[misc]
     known = tuple(inspect.signature(kind).parameters)
 

@@ -1,11 +1,16 @@
 """Quintic B-splines on equal intervals of normalised time, clamped, and the instants at which motions are looked at."""
 
+from __future__ import annotations
+
 from functools import lru_cache
 from math import comb
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.interpolate import BSpline
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 DEGREE = 5
 # Control points that count in one interval.
@@ -55,40 +60,18 @@ class Basis(NamedTuple):
         shares[:3], shares[-3:] = GREGORY, GREGORY[::-1]
         return shares.reshape(self.tau.shape) / (self.tau.size - 1)
 
-    def in_intervals(self, controls: np.ndarray) -> np.ndarray:
-        """Control points that count in each interval.
-
-        Args:
-            controls: (..., K, d).
-
-        Returns:
-            (..., m, 6, d).
-        """
+    def in_intervals(self, controls: np.ndarray) -> Float[np.ndarray, "... m 6 d"]:
+        """Control points that count in each interval."""
         return np.stack([controls[..., m : m + LOCAL, :] for m in range(len(self.tau))], axis=-3)
 
-    def places(self, controls: np.ndarray) -> np.ndarray:
-        """Values and two derivatives at all instants.
-
-        Args:
-            controls: (..., K, d).
-
-        Returns:
-            (..., m, n, 3, d).
-        """
+    def places(self, controls: np.ndarray) -> Float[np.ndarray, "... m n 3 d"]:
+        """Values and two derivatives at all instants."""
         return np.einsum("mnrk,...mkd->...mnrd", self.rows, self.in_intervals(controls), optimize=True)
 
 
 @lru_cache(maxsize=8)
 def basis(intervals: int, instants: int) -> Basis:
-    """Basis functions.
-
-    Args:
-        intervals: their number m.
-        instants: number n of instants an interval.
-
-    Returns:
-        the basis.
-    """
+    """Basis functions."""
     borders = np.linspace(0.0, 1.0, intervals + 1)
     knots = np.concatenate([np.zeros(DEGREE), borders, np.ones(DEGREE)])
     count = intervals + DEGREE

@@ -41,25 +41,14 @@ class ClosedForm(NamedTuple):
     answers: ProvedAnswers | None = None
 
     def segment(self, i: int) -> "ClosedForm":
-        """The motion of one segment alone.
-
-        Returns:
-            the form.
-        """
+        """The motion of one segment alone."""
         rows = slice(i, i + 1)
         answers = None if self.answers is None else self.answers.rows(np.arange(i, i + 1))
         return ClosedForm(self.family, self.motions[rows], self.is_feasible[rows], self.duration[rows], answers)
 
 
 def closed_forms(legs: Sequence[Leg], problem: Problem, poses: FreePoses) -> list[ClosedForm]:
-    """Join poses by other families.
-
-    Args:
-        legs: of these families.
-
-    Returns:
-        the forms of the families that join these poses, within all limits.
-    """
+    """Join poses by other families."""
     forms = list[ClosedForm]()
     for leg in legs:
         try:
@@ -92,14 +81,7 @@ def _passes(form: ClosedForm, problem: Problem, poses: FreePoses) -> bool:
 
 
 def controls_of(single: Tasks, motion: Motion) -> np.ndarray:
-    """Control points of a spline that is near a motion.
-
-    Args:
-        single: one segment.
-
-    Returns:
-        (K, d); no numbers where the motion is half a turn from the orientation half-way.
-    """
+    """Control points of a spline that is near a motion."""
     along, about = coordinates(single.robot.pattern)
     state = states_at(motion, single.basis.averages)
     places = np.asarray(state.position)[:, along]
@@ -111,16 +93,7 @@ def controls_of(single: Tasks, motion: Motion) -> np.ndarray:
 
 
 def form_starts(single: Tasks, rows: np.ndarray, forms: Sequence[ClosedForm]) -> Starts:
-    """Starts of a search from closed forms.
-
-    Args:
-        single: all segments as tasks of their own.
-        rows: numbers of the segments in question.
-
-    Returns:
-        the starts, of the first form on all segments on which it is proved, then of the second one, ...; none of
-        motions that turn too far from the orientation half-way.
-    """
+    """Starts of a search from closed forms."""
     places = [(i, form, k) for form in forms for i, k in enumerate(rows.tolist()) if form.is_feasible[k]]
     controls = np.zeros((len(places), 1, single.basis.controls, single.places.shape[-1]))
     for n, (_, form, k) in enumerate(places):

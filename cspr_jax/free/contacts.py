@@ -46,17 +46,7 @@ class _Gap(NamedTuple):
 def apart(
     question: FreeQuestion, tasks: Tasks, unknowns: Unknowns, slacks: PieceSlacks, number: int
 ) -> tuple[Tasks, Unknowns] | None:
-    """Bounds that keep bodies apart where a motion brings them too near.
-
-    Args:
-        question: about the planned robot.
-        tasks: one.
-        slacks: of the motion, over its pieces.
-        number: as of `question.more`.
-
-    Returns:
-        the task within planes, and the motion as one of it; None where no two bodies are too near.
-    """
+    """Bounds that keep bodies apart where a motion brings them too near."""
     missed = -_clearances(question, slacks).min(0, initial=np.inf)
     if not (missed > 0.0).any():
         return None
@@ -70,18 +60,7 @@ def apart(
 def around(
     question: FreeQuestion, tasks: Tasks, unknowns: Unknowns, slacks: PieceSlacks
 ) -> tuple[Tasks, Unknowns] | None:
-    """The best motion of those that lead round the obstacles in the way of one, bent to all sides.
-
-    Args:
-        question: about the planned robot.
-        slacks: of the motion, over its pieces.
-
-    Returns:
-        the task within planes, and the motion; None where no obstacle is in the way, or no search converges.
-
-    Raises:
-        OutOfTime: the time has ended before one has.
-    """
+    """The best motion of those that lead round the obstacles in the way of one, bent to all sides."""
     is_met, size = _clearances(question, slacks) < 0.0, float(spool_radius(tasks.robot))
     _, pairs = _bodies(question)
     if not any("obstacle" in pairs[k].kind for k in np.flatnonzero(is_met.any(axis=0))):

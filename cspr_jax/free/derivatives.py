@@ -4,9 +4,11 @@ Derivatives are taken by the coordinates and their derivatives in time, of which
 the duration, and in normalised time, follow from them.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -20,6 +22,9 @@ from cspr_jax.motions.criteria import judged_poses
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
 from cspr_jax.runtime.persistent_jit import persistent_jit
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 BATCH = 256
 # Entries of x behind the coordinates.
@@ -127,31 +132,17 @@ def _chained(
     return jnp.pad(slopes, [(0, 0), (0, 1)]), jnp.pad(jnp.block(whole), (0, 1))
 
 
-def instant_values(robot: AnyRobot, limits: Limits, longest: np.ndarray | None, *instants: np.ndarray) -> InstantValues:
-    """Equations at many instants.
-
-    Args:
-        robot: centred, z down.
-        longest: () longest duration, s; None for any.
-        instants: references (..., 4), places (..., 3, d), durations (...), tensions (..., n_cables) over the weight,
-            and multipliers (..., n_equations), as of `state_of` and `InstantValues`.
-
-    Returns:
-        the equations, leaves (..., ...).
-    """
+def instant_values(
+    robot: AnyRobot, limits: Limits, longest: Float[np.ndarray, ""] | None, *instants: np.ndarray
+) -> InstantValues:
+    """Equations at many instants."""
     return InstantValues(*_at_all(partial(_kernel, robot, limits, longest), instants))
 
 
-def residuals(robot: AnyRobot, limits: Limits, longest: np.ndarray | None, *instants: np.ndarray) -> np.ndarray:
-    """Residuals of the equations at many instants, for trials of steps, which need no derivatives.
-
-    Args:
-        longest: () longest duration, s; None for any.
-        instants: as of `instant_values`, without multipliers.
-
-    Returns:
-        (..., n_equations).
-    """
+def residuals(
+    robot: AnyRobot, limits: Limits, longest: Float[np.ndarray, ""] | None, *instants: np.ndarray
+) -> Float[np.ndarray, "... n_equations"]:
+    """Residuals of the equations at many instants, for trials of steps, which need no derivatives."""
     return _at_all(lambda part: (_residual_kernel(robot, limits, longest, part),), instants)[0]
 
 

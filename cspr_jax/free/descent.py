@@ -54,9 +54,6 @@ def descended(points: SearchPoints, step: Step, levels: Levels) -> SearchPoints:
 
     A trial from which it does not fall is tried once more with values that make up for the curvature of the equations
     (a second-order correction): for platforms, whose wrenches change with every turn, steps are too short without.
-
-    Returns:
-        the motions after it.
     """
     primal, dual = _lengths(points, step)
     before = _merit(points.tasks, points.unknowns, points.residual, levels)

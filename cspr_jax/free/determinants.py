@@ -5,10 +5,12 @@ second derivatives need no more than first derivatives of the wrenches, and cofa
 numbers where the determinant vanishes, too.
 """
 
+from __future__ import annotations
+
 import itertools
 from collections.abc import Callable
 from functools import cache
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -17,6 +19,9 @@ from jax import Array
 
 from cspr_jax.robots.cables import AnyRobot, wrench_units
 from cspr_jax.robots.state import State
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Rows of a minor; of forces and moments of a platform in space.
 ROWS = 3
@@ -39,24 +44,13 @@ class Determinant(NamedTuple):
     cofactors: Array
 
 
-def unit_wrenches(robot: AnyRobot, state: State) -> Array:
-    """Wrenches of unit tensions, moments over the size of the platform.
-
-    Returns:
-        (dof, n_cables).
-    """
+def unit_wrenches(robot: AnyRobot, state: State) -> Float[Array, "dof n_cables"]:
+    """Wrenches of unit tensions, moments over the size of the platform."""
     return robot.wrench_matrix(state) / wrench_units(robot)[:, None]
 
 
-def determinant(robot: AnyRobot, state: State) -> Array:
-    """Determinant of the wrenches of unit tensions.
-
-    Args:
-        robot: a platform on as many cables as degrees of freedom.
-
-    Returns:
-        ().
-    """
+def determinant(robot: AnyRobot, state: State) -> Float[Array, ""]:
+    """Determinant of the wrenches of unit tensions."""
     matrix = unit_wrenches(robot, state)
     if len(matrix) == ROWS:
         return _minors(matrix)[0]
@@ -64,16 +58,8 @@ def determinant(robot: AnyRobot, state: State) -> Array:
     return jnp.dot(signs * _minors(matrix[FORCES]), _minors(matrix[MOMENTS])[others])
 
 
-def with_derivatives(matrix: Callable[[Array], Array], place: Array) -> Determinant:
-    """Determinant of a matrix, with derivatives.
-
-    Args:
-        matrix: of coordinates (d,), returns (3, 3) or (6, 6).
-        place: (d,) coordinates.
-
-    Returns:
-        the determinant.
-    """
+def with_derivatives(matrix: Callable[[Array], Array], place: Float[Array, "d"]) -> Determinant:
+    """Determinant of a matrix, with derivatives."""
     rows, slopes = matrix(place), jax.jacfwd(matrix)(place)
     if len(rows) == ROWS:
         value, (cofactors, bend) = _minors(rows)[0], _weighted(jnp.ones(1), rows, slopes)

@@ -7,38 +7,28 @@ With changes dx of the state, dv of the values and new multipliers y, and the we
 where S softens the equations: they may be missed by S (y - y0), which the objective pays for.
 """
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cspr_jax.free.derivatives import InstantValues
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # Part of its trace that keeps a matrix regular which is only so within rounding.
 ROUNDED = 1e-14
 
 
-def transposed(matrix: np.ndarray) -> np.ndarray:
-    """Transposes.
-
-    Args:
-        matrix: (..., m, n).
-
-    Returns:
-        (..., n, m).
-    """
+def transposed(matrix: Float[np.ndarray, "... m n"]) -> Float[np.ndarray, "... n m"]:
+    """Transposes."""
     return np.swapaxes(matrix, -1, -2)
 
 
-def times(matrix: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """Products with vectors.
-
-    Args:
-        matrix: (..., m, n).
-        vector: (..., n).
-
-    Returns:
-        (..., m).
-    """
+def times(matrix: Float[np.ndarray, "... m n"], vector: Float[np.ndarray, "... n"]) -> Float[np.ndarray, "... m"]:
+    """Products with vectors."""
     return (matrix @ vector[..., None])[..., 0]
 
 
@@ -55,28 +45,14 @@ class Softness(NamedTuple):
     metric: np.ndarray
     level: np.ndarray
 
-    def missed(self, multipliers: np.ndarray) -> np.ndarray:
-        """S times vectors.
-
-        Args:
-            multipliers: (l, s, m, n, n_equations).
-
-        Returns:
-            likewise.
-        """
+    def missed(self, multipliers: Float[np.ndarray, "l s m n n_equations"]) -> np.ndarray:
+        """S times vectors."""
         dof = self.metric.shape[-1]
         parts = times(self.metric, multipliers[..., :dof]), multipliers[..., dof:]
         return self.size[:, None, None, None, None] * np.concatenate(parts, axis=-1)
 
-    def paid(self, residual: np.ndarray) -> np.ndarray:
-        """Vectors over S.
-
-        Args:
-            residual: (l, s, m, n, n_equations).
-
-        Returns:
-            likewise.
-        """
+    def paid(self, residual: Float[np.ndarray, "l s m n n_equations"]) -> np.ndarray:
+        """Vectors over S."""
         dof = self.metric.shape[-1]
         tensions = np.linalg.solve(self.metric, residual[..., :dof, None])[..., 0]
         return np.concatenate([tensions, residual[..., dof:]], axis=-1) / self.size[:, None, None, None, None]
@@ -98,17 +74,10 @@ class Eliminated(NamedTuple):
     start: np.ndarray
     fall: np.ndarray
 
-    def changes(self, step: np.ndarray, n_cables: int, dof: int) -> tuple[np.ndarray, np.ndarray]:
-        """Changes of the values, and new multipliers.
-
-        Args:
-            step: (..., n_x).
-            n_cables: number of tensions.
-            dof: number of their equations.
-
-        Returns:
-            (..., n_values), (..., n_equations).
-        """
+    def changes(
+        self, step: Float[np.ndarray, "... n_x"], n_cables: int, dof: int
+    ) -> tuple[Float[np.ndarray, "... n_values"], Float[np.ndarray, "... n_equations"]]:
+        """Changes of the values, and new multipliers."""
         both = self.start - times(self.fall, step)
         others = (both.shape[-1] - n_cables - dof) // 2
         parts = np.split(both, np.cumsum([n_cables, dof, others]), axis=-1)
@@ -116,18 +85,13 @@ class Eliminated(NamedTuple):
 
 
 def eliminated(
-    equations: InstantValues, weights: np.ndarray, push: np.ndarray, aim: np.ndarray, soft: Softness
+    equations: InstantValues,
+    weights: Float[np.ndarray, "... n_values"],
+    push: Float[np.ndarray, "... n_values"],
+    aim: Float[np.ndarray, "... n_equations"],
+    soft: Softness,
 ) -> Eliminated:
-    """Eliminate values and multipliers.
-
-    Args:
-        weights: (..., n_values) W.
-        push: (..., n_values).
-        aim: (..., n_equations).
-
-    Returns:
-        the equations that are left.
-    """
+    """Eliminate values and multipliers."""
     matrix, size = equations.matrix, soft.size[:, None, None, None, None]
     dof, cables = matrix.shape[-2:]
     system = np.zeros((*weights.shape[:-1], cables + dof, cables + dof))
@@ -152,18 +116,15 @@ def eliminated(
     return Eliminated(bend, slope, np.concatenate(starts, axis=-1), np.concatenate(falls, axis=-2))
 
 
-def less_missed(matrix: np.ndarray, weights: np.ndarray, missed: np.ndarray, soft: Softness) -> np.ndarray:
+def less_missed(
+    matrix: Float[np.ndarray, "l s m n dof n_cables"],
+    weights: Float[np.ndarray, "l s m n n_values"],
+    missed: Float[np.ndarray, "l s m n n_equations"],
+    soft: Softness,
+) -> Float[np.ndarray, "l s m n n_values"]:
     """Changes dv of the values that make up for what equations miss, e, with the state as it is.
 
     They make dv^T W dv + (e + A dv)^T (e + A dv) / S least.
-
-    Args:
-        matrix: (l, s, m, n, dof, n_cables) A of the tensions.
-        weights: (l, s, m, n, n_values) W.
-        missed: (l, s, m, n, n_equations) e.
-
-    Returns:
-        (l, s, m, n, n_values).
     """
     dof, cables = matrix.shape[-2:]
     size = soft.size[:, None, None, None, None]

@@ -4,8 +4,11 @@ Orientations are splines of quaternions of their own, and no Rodrigues vectors: 
 than half a turn from the orientation half-way, where these end.
 """
 
+from __future__ import annotations
+
 import dataclasses
 from functools import partial
+from typing import TYPE_CHECKING
 
 import jax
 import numpy as np
@@ -23,21 +26,14 @@ from cspr_jax.motions.motion import Motion, common_shape, states_at
 from cspr_jax.robots.cables import AnyRobot, tensions
 from cspr_jax.robots.limits import Limits
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 BATCH = 128
 
 
-def followed(tasks: Tasks, motions: list[Motion], duration: np.ndarray, z0: float) -> list[Spline]:
-    """Splines of a task that follow motions.
-
-    Args:
-        tasks: one; its accelerations at poses are kept, and where they are free, those of the motions.
-        motions: one a segment, at rest or without rotation at its ends.
-        duration: (s,) s.
-        z0: depth of P0, m.
-
-    Returns:
-        the splines, one a segment.
-    """
+def followed(tasks: Tasks, motions: list[Motion], duration: Float[np.ndarray, "s"], z0: float) -> list[Spline]:
+    """Splines of a task that follow motions."""
     along, about = coordinates(tasks.robot.pattern)
     places = [np.asarray(states_at(motion, tasks.basis.averages).position)[:, along] for motion in motions]
     controls = np.einsum("kj,sjd->skd", tasks.basis.fit, np.array(places))
@@ -72,14 +68,7 @@ def _turning(tasks: Tasks, segment: int, motion: Motion, duration: float) -> np.
 
 
 def energy_along(tasks: Tasks, motion: Motion) -> float:
-    """Integral of the sum of the squares of the tensions.
-
-    Args:
-        motion: along a segment of the tasks.
-
-    Returns:
-        N^2 s.
-    """
+    """Integral of the sum of the squares of the tensions."""
     kernel = partial(_tensions, tasks.robot, tasks.limits, common_shape(motion))
     force = in_batches(kernel, tasks.basis.tau.ravel(), size=BATCH)
     return float(motion.duration()) * float(np.sum(tasks.basis.shares.ravel() * np.sum(force**2, axis=1)))

@@ -104,21 +104,7 @@ def free_motion(
     forms: Sequence[ClosedForm] = (),
     lines: Sequence[ClosedForm] = (),
 ) -> FreeMotion:
-    """Search for the fastest motion through poses, all its segments together, and prove it.
-
-    Args:
-        scene: bodies that can meet; the search keeps them apart where the best motion brings them too near, but not for
-            all robots within an uncertainty: then they are judged alone.
-        before: what a search from the usual starts has come to, which goes on from other ones.
-        forms: these are motions of other families.
-        lines: motions from which it begins beside the usual starts.
-
-    Returns:
-        the motion; where tightening ends before all is proved, the last one.
-
-    Raises:
-        InputError: a robot for which no free motion is sought, or a cable without a largest tension.
-    """
+    """Search for the fastest motion through poses, all its segments together, and prove it."""
     question = FreeQuestion.of(planned_problem(problem), scene, poses, settings)
     uncertainty = problem.limits.uncertainty
     if len(divided(problem, poses)):

@@ -5,8 +5,10 @@ own: equations say that they balance the motion, and that all other values are t
 need no rule, and no matrix is inverted, which may be singular on the way.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -26,6 +28,9 @@ from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.schema.limits import Limit
 from cspr_jax.schema.verdicts import Verdict
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 BATCH = 128
 # Entries of x behind the coordinates.
 SCALARS = 2
@@ -34,29 +39,13 @@ DEPTH = 0.02
 
 
 def coordinates(pattern: str) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates of an effector.
-
-    Args:
-        pattern: name of a row of `robots.patterns`.
-
-    Returns:
-        axes along which it moves, and axes of the components of a Rodrigues vector, from 0 to 2.
-    """
+    """Coordinates of an effector."""
     row = PATTERNS[pattern]
     return np.array(row.forces, int), np.array(row.moments, int)
 
 
-def state_of(robot: AnyRobot, reference: Array, *motion: Array) -> State:
-    """State of a motion at one instant.
-
-    Args:
-        reference: (4,) orientation from which the Rodrigues vector counts.
-        motion: coordinates (d,), m, and their first and second derivatives, 1/s, 1/s^2: arguments of their own, so that
-            derivatives by one of them cost nothing of the others.
-
-    Returns:
-        the state.
-    """
+def state_of(robot: AnyRobot, reference: Float[Array, "4"], *motion: Float[Array, "d"]) -> State:
+    """State of a motion at one instant."""
     along, about = coordinates(robot.pattern)
     position, velocity, acceleration = (jnp.zeros(3).at[along].set(part[: len(along)]) for part in motion)
     if not len(about):
@@ -70,23 +59,12 @@ def state_of(robot: AnyRobot, reference: Array, *motion: Array) -> State:
 
 
 def keeps_depth(robot: AnyRobot) -> bool:
-    """Tell whether the depth below the plane of the spools is a value.
-
-    Nobody judges it where cables of a point mass are redundant. But in a plane that holds all spools they carry no load
-    across it, so that a motion through it is not proved, although its instants on either side may be within all limits.
-
-    Returns:
-        whether it is.
-    """
+    """Tell whether the depth below the plane of the spools is a value."""
     return judged_poses(robot)[1] or (robot.pattern in BELOW and not PATTERNS[robot.pattern].is_body)
 
 
 def other_rows(limits: Limits) -> list[Limit]:
-    """Rows of the limits that are set, but those of tensions.
-
-    Returns:
-        the rows.
-    """
+    """Rows of the limits that are set, but those of tensions."""
     return [row for row in limits_set(limits) if row.quantity != "tension"]
 
 
@@ -113,18 +91,14 @@ def _other_values(robot: AnyRobot, limits: Limits, state: State) -> Array:
     return jnp.concatenate(parts) if parts else jnp.zeros(0)
 
 
-def residual_at(robot: AnyRobot, limits: Limits, reference: Array, motion: Sequence[Array], tensions: Array) -> Array:
-    """Residual of the equations, but those of duration and determinant, at an instant.
-
-    Args:
-        robot: centred, z down.
-        reference: (4,) as of `state_of`.
-        motion: three (d,), likewise.
-        tensions: (n_cables,) over the weight.
-
-    Returns:
-        (n_equations,) what tensions miss of the wrench, over the weight; then less the other values of the state.
-    """
+def residual_at(
+    robot: AnyRobot,
+    limits: Limits,
+    reference: Float[Array, "4"],
+    motion: Sequence[Array],
+    tensions: Float[Array, "n_cables"],
+) -> Float[Array, "n_equations"]:
+    """Residual of the equations, but those of duration and determinant, at an instant."""
     state, unit = state_of(robot, reference, *motion), wrench_units(robot)
     wrench = robot.wrench_matrix(state) @ tensions - robot.inertial_wrench(state) / (robot.mass * robot.gravity)
     return jnp.concatenate([wrench / unit, -_other_values(robot, limits, state)])
@@ -162,16 +136,7 @@ class _Value(NamedTuple):
 
 
 def bounds(robot: AnyRobot, limits: Limits, rows: Sequence[Criterion], is_timed: bool = False) -> ValueBounds:
-    """Bounds of the values.
-
-    Args:
-        robot: centred, z down.
-        rows: its criteria.
-        is_timed: whether a longest duration is a limit, too.
-
-    Returns:
-        the bounds.
-    """
+    """Bounds of the values."""
     weight, size = float(robot.mass * robot.gravity), float(spool_radius(robot))
     together, numbers = Verdict.WRENCH_INFEASIBLE, range(robot.n_cables)
     low, high = (np.asarray(side) / weight for side in tension_range(robot, limits))

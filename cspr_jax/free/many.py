@@ -47,19 +47,7 @@ class ManyFreeMotions(NamedTuple):
 def free_motions(
     problem: Problem, scene: Scene | None, pairs: Sequence[FreePoses], meshes: Sequence[tuple[int, int]] = MESHES
 ) -> ManyFreeMotions:
-    """Search for the fastest motions of many pairs of poses, and prove them.
-
-    Args:
-        scene: bodies that can meet; searches keep them apart where the best motion brings them too near.
-        pairs: two poses each, at least one pair.
-        meshes: intervals of the first searches, and of the motions in the end, even.
-
-    Returns:
-        the motions.
-
-    Raises:
-        InputError: a robot for which no free motion is sought, or a cable without a largest tension.
-    """
+    """Search for the fastest motions of many pairs of poses, and prove them."""
     questions = [FreeQuestion.of(planned_problem(problem), scene, pair, FreeSettings()) for pair in pairs]
     best = dict[int, tuple[Spline, MotionProof]]()
     sought = [k for k, pair in enumerate(pairs) if not len(divided(problem, pair))]

@@ -31,12 +31,7 @@ class Neighbours:
     """
 
     def __init__(self, tasks: Tasks, depths: Sequence[float]) -> None:
-        """Begin without any.
-
-        Args:
-            tasks: n of one segment each.
-            depths: (n,) of P0, about which swings are, m.
-        """
+        """Begin without any."""
         self._tasks, self._depths, count = tasks, depths, len(depths)
         self.controls = np.zeros((count, tasks.basis.controls, tasks.places.shape[-1]))
         self.duration = np.full(count, np.inf)

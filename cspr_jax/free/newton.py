@@ -1,6 +1,8 @@
 """Steps of Newton's method: banded matrices of segments, with durations and accelerations at poses as borders."""
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.linalg.lapack import dpbtrf, dpbtrs
@@ -9,6 +11,9 @@ from cspr_jax.free.basis import LOCAL, Basis
 from cspr_jax.free.derivatives import SCALARS, InstantValues
 from cspr_jax.free.elimination import Softness, eliminated, times, transposed
 from cspr_jax.free.tasks import OUTER, Tasks, Unknowns, wide
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Added to the diagonal where the matrix has a negative curvature: least, at first; by what it grows and shrinks; tries.
 CURVED, MOST_CURVED, GROWING, SHRINKING, TRIES = 1e-6, 1e6, 6.0, 3.0, 25
@@ -32,14 +37,7 @@ class Step(NamedTuple):
     weights: np.ndarray
 
     def taken(self, rows: np.ndarray) -> "Step":
-        """Steps of some of the motions.
-
-        Args:
-            rows: numbers, or a mask.
-
-        Returns:
-            the steps.
-        """
+        """Steps of some of the motions."""
         return Step(self.change.taken(rows), *(leaf[rows] for leaf in self[1:]))
 
 
@@ -53,14 +51,7 @@ class _Bordered(NamedTuple):
 
 
 def gathered(basis: Basis, push: np.ndarray) -> np.ndarray:
-    """Gradient of a sum over instants.
-
-    Args:
-        push: (l, s, m, n, 3 d + 2) gradients by coordinates with two derivatives, by the duration and the level.
-
-    Returns:
-        (l, s, K d + 2) by the coordinates of control points, by the duration and the level.
-    """
+    """Gradient of a sum over instants."""
     d = (push.shape[-1] - SCALARS) // 3
     places = push[..., :-SCALARS].reshape(*push.shape[:-1], 3, d)
     local = np.einsum("mnrk,lsmnrd->lsmkd", basis.rows, places, optimize=True)
@@ -167,22 +158,12 @@ def newton_step(
     tasks: Tasks,
     unknowns: Unknowns,
     equations: InstantValues,
-    residual: np.ndarray,
-    barrier: np.ndarray,
+    residual: Float[np.ndarray, "l s m n n_equations"],
+    barrier: Float[np.ndarray, "l"],
     soft: Softness,
-    curved: np.ndarray,
+    curved: Float[np.ndarray, "l"],
 ) -> Step:
-    """Step towards the optimum with a barrier before the bounds.
-
-    Args:
-        equations: at the unknowns.
-        residual: (l, s, m, n, n_equations) of them.
-        barrier: (l,) weight of the logarithms of the distances from the bounds.
-        curved: (l,) what was added to the diagonal last.
-
-    Returns:
-        the step.
-    """
+    """Step towards the optimum with a barrier before the bounds."""
     cables, gaps = tasks.robot.n_cables, tasks.gaps(unknowns)
     equations, weights, push, by_scalars = _with_objective(tasks, unknowns, equations, gaps, wide(barrier))
     local = eliminated(equations, weights, push, -residual - soft.missed(soft.level), soft)

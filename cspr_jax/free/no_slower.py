@@ -1,8 +1,10 @@
 """Motions of other families in place of what a search finds, where they are faster, or it finds nothing."""
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Sequence
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -19,19 +21,15 @@ from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import ProvedAnswers, proved_answers
 from cspr_jax.robots.clearance import Scene
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # Intervals of each half swing of a spline that follows a closed form, at first, and how often they are doubled.
 INTERVALS, DOUBLINGS = 16, 3
 
 
 def can_be_faster(free: FreeMotion, problem: Problem, poses: FreePoses, settings: FreeSettings) -> bool:
-    """Tell whether closed forms may take the place of a motion: an arc takes about half a swing.
-
-    Args:
-        free: as it was found.
-
-    Returns:
-        False of a motion that is proved, and no slower than the swings from which searches begin.
-    """
+    """Tell whether closed forms may take the place of a motion: an arc takes about half a swing."""
     if not free.answers.feasible.all():
         return True
     return settings.objective == "time" and free.duration > ARCS * len(free.motions) * half_swing(problem, poses)
@@ -45,14 +43,7 @@ def no_slower(
     settings: FreeSettings,
     forms: Sequence[ClosedForm],
 ) -> FreeMotion:
-    """A motion that is at most as slow as closed forms through the same poses.
-
-    Args:
-        free: as it was found.
-
-    Returns:
-        the motion, or a spline that follows the fastest of the forms, which it then names.
-    """
+    """A motion that is at most as slow as closed forms through the same poses."""
     is_proved = bool(free.answers.feasible.all())
     for form in sorted(forms, key=lambda one: float(one.duration.sum())):
         whole = float(form.duration.sum())
@@ -86,11 +77,7 @@ def _followed(
 def stood_in(
     problem: Problem, scene: Scene | None, poses: FreePoses, settings: FreeSettings, line: ClosedForm
 ) -> FreeMotion:
-    """Lines in place of a search that has been stopped before it has found anything.
-
-    Returns:
-        their motions.
-    """
+    """Lines in place of a search that has been stopped before it has found anything."""
     motions, answers = cast(list[Spline], line.motions), cast(ProvedAnswers, line.answers)
     energy = _energies(FreeQuestion.of(problem, scene, poses, settings), line.motions)
     families, level = (line.family,) * len(motions), np.full(len(motions), np.nan)
@@ -105,15 +92,7 @@ def no_slower_than_lines(
     settings: FreeSettings,
     lines: Sequence[ClosedForm],
 ) -> FreeMotion:
-    """A motion of whose segments none is slower than a line between the same poses, or missing beside one.
-
-    Args:
-        free: as it was found.
-        poses: with the accelerations that are asked for.
-
-    Returns:
-        the motion, with lines as they are on some segments: their accelerations jump.
-    """
+    """A motion of whose segments none is slower than a line between the same poses, or missing beside one."""
     for line in lines:
         is_better = ~free.answers.feasible
         if settings.objective == "time":
@@ -135,12 +114,8 @@ def _with(free: FreeMotion, line: FreeMotion, indices: np.ndarray) -> FreeMotion
     return dataclasses.replace(free, motions=motions, answers=answers, energy=energy, level=level, families=families)
 
 
-def fits(line: ClosedForm, problem: Problem, poses: FreePoses, settings: FreeSettings) -> np.ndarray:
-    """Tell whether lines are proved, short enough, and accelerate at the poses as is asked.
-
-    Returns:
-        (n,).
-    """
+def fits(line: ClosedForm, problem: Problem, poses: FreePoses, settings: FreeSettings) -> Float[np.ndarray, "n"]:
+    """Tell whether lines are proved, short enough, and accelerate at the poses as is asked."""
     is_short = line.duration <= (np.inf if settings.longest is None else settings.longest)
     return line.is_feasible & is_short & (_accelerations_missed(line, poses) <= NEAR * float(problem.robot.gravity))
 

@@ -4,12 +4,17 @@ Time and energy are sums over the motion. The largest tension and the margin are
 all tensions move, together. Between motions with the same level, time decides.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cspr_jax.free.instants import ValueBounds
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Share of the time in objectives that are levels, in half swings: a hundredth of it costs a millionth of the weight.
 LITTLE = 1e-4
@@ -36,15 +41,8 @@ class Objective(NamedTuple):
     start: float = 0.0
     largest: float = np.inf
 
-    def keeps_limits(self, level: np.ndarray) -> np.ndarray:
-        """Tell whether motions with these levels keep the limits of the tensions.
-
-        Args:
-            level: (l, s) of their segments.
-
-        Returns:
-            (l,).
-        """
+    def keeps_limits(self, level: Float[np.ndarray, "l s"]) -> Float[np.ndarray, "l"]:
+        """Tell whether motions with these levels keep the limits of the tensions."""
         return np.all(level <= self.largest, axis=1)
 
 

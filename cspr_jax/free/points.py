@@ -1,7 +1,9 @@
 """Motions with their equations at all instants, during a search, and how far they are from an optimum."""
 
+from __future__ import annotations
+
 import dataclasses
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -9,6 +11,9 @@ from cspr_jax.free.derivatives import SCALARS, InstantValues
 from cspr_jax.free.elimination import Softness, times, transposed
 from cspr_jax.free.newton import gathered
 from cspr_jax.free.tasks import OUTER, Tasks, Unknowns, wide
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Multipliers of equations beyond which their mean counts as the unit of errors; keeps the metric of the tensions
 # regular.
@@ -22,14 +27,7 @@ class Levels(NamedTuple):
     soft: Softness
 
     def taken(self, rows: np.ndarray) -> "Levels":
-        """Levels of some of the motions.
-
-        Args:
-            rows: numbers, or a mask.
-
-        Returns:
-            the levels.
-        """
+        """Levels of some of the motions."""
         return Levels(self.barrier[rows], Softness(*(leaf[rows] for leaf in self.soft)))
 
 
@@ -49,48 +47,25 @@ class SearchPoints:
 
     @classmethod
     def of(cls, tasks: Tasks, unknowns: Unknowns) -> "SearchPoints":
-        """Look at motions.
-
-        Returns:
-            them with their equations.
-        """
+        """Look at motions."""
         return cls(tasks, unknowns, *tasks.equations(unknowns))
 
     def taken(self, rows: np.ndarray) -> "SearchPoints":
-        """Some of the motions.
-
-        Args:
-            rows: numbers, or a mask.
-
-        Returns:
-            them.
-        """
+        """Some of the motions."""
         equations = InstantValues(*(leaf[rows] for leaf in self.equations))
         return SearchPoints(self.tasks.taken(rows), self.unknowns.taken(rows), equations, self.residual[rows])
 
-    def metric(self) -> np.ndarray:
-        """Metric in which the equations of tensions may be missed: a force counts as the tensions that it would take.
-
-        Returns:
-            (l, s, m, n, dof, dof).
-        """
+    def metric(self) -> Float[np.ndarray, "l s m n dof dof"]:
+        """Metric of the residual of tensions' equations: a force counts as the tensions that it would take."""
         matrix = self.equations.matrix
         return matrix @ transposed(matrix) + REGULAR * np.eye(matrix.shape[-2])
 
-    def missed(self) -> np.ndarray:
-        """By how much equations are missed, at most.
-
-        Returns:
-            (l,).
-        """
+    def missed(self) -> Float[np.ndarray, "l"]:
+        """By how much equations are missed, at most."""
         return np.abs(self.residual).reshape(len(self.residual), -1).max(1)
 
-    def errors(self, levels: Levels) -> np.ndarray:
-        """Largest errors of Newton's equations.
-
-        Returns:
-            (l,).
-        """
+    def errors(self, levels: Levels) -> Float[np.ndarray, "l"]:
+        """Largest errors of Newton's equations."""
         tasks, unknowns, soft = self.tasks, self.unknowns, levels.soft
         count, dof, d, cables = len(unknowns.values), tasks.robot.dof, tasks.places.shape[-1], tasks.robot.n_cables
         slope = gathered(tasks.basis, times(transposed(self.equations.slope), unknowns.multipliers))

@@ -1,8 +1,10 @@
 """Poses between which free motions are sought, as tasks of the search, and motions from what it finds."""
 
+from __future__ import annotations
+
 import dataclasses
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import numpy as np
@@ -24,6 +26,9 @@ from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.point_mass import plane_normal, spool_radius
 from cspr_jax.robots.wrench_balance import at_rest
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Int
 
 # Part of the smaller determinant of both ends that a motion keeps, and of the smaller depth below the spools.
 REGULAR, SHALLOW = 1e-2, 0.5
@@ -60,11 +65,7 @@ class _Joined(NamedTuple):
 
 
 def check_searched(problem: Problem) -> None:
-    """Refuse a problem for which no free motion is sought.
-
-    Raises:
-        InputError: a pattern that is not moved, or a cable without a largest tension.
-    """
+    """Refuse a problem for which no free motion is sought."""
     robot, most = problem.robot, problem.limits.tension_max
     row = PATTERNS[robot.pattern]
     if row.is_jointed or row.along_line:
@@ -99,12 +100,8 @@ def _joined(problem: Problem, poses: FreePoses) -> _Joined:
     return _Joined(places, velocities, references, turns, accelerations)
 
 
-def determinants(problem: Problem, poses: FreePoses) -> np.ndarray:
-    """Determinants at the poses of a platform on as many cables as degrees of freedom; see `determinants.determinant`.
-
-    Returns:
-        (k,).
-    """
+def determinants(problem: Problem, poses: FreePoses) -> Float[np.ndarray, "k"]:
+    """Determinants at poses of a platform with as many cables as degrees of freedom; see `determinants.determinant`."""
     return np.asarray(_determinants(problem.robot, leaf(poses.positions), leaf(poses.quaternions)))
 
 
@@ -115,21 +112,14 @@ def _determinants(robot: AnyRobot, positions: Array, quaternions: Array) -> Arra
 
 
 def half_swing(problem: Problem, poses: FreePoses) -> float:
-    """Duration of half a swing about P0, over which durations count.
-
-    Returns:
-        s.
-    """
+    """Duration of half a swing about P0, over which durations count."""
     return float(np.pi * np.sqrt(poses.z0 / float(problem.robot.gravity)))
 
 
-def divided(problem: Problem, poses: FreePoses) -> np.ndarray:
+def divided(problem: Problem, poses: FreePoses) -> Int[np.ndarray, "n 3"]:
     """Segments whose ends lie on opposite sides of singular poses.
 
     Every motion between them passes one, where the cables cannot carry every wrench, so that none is proved.
-
-    Returns:
-        (n, 3) number of the segment, and determinants at both ends.
     """
     if not judged_poses(problem.robot)[0]:
         return np.zeros((0, 3))
@@ -154,15 +144,7 @@ def _depths(problem: Problem, poses: FreePoses) -> np.ndarray:
 def tasks_of(
     problem: Problem, basis: Basis, bounds: ValueBounds, objective: Objective, poses: FreePoses, longest: float | None
 ) -> Tasks:
-    """The task of moving through all poses.
-
-    Args:
-        bounds: of the values at each instant.
-        longest: duration of a segment, s; None for any.
-
-    Returns:
-        one task.
-    """
+    """The task of moving through all poses."""
     places, velocities, references, turns, accelerations = _joined(problem, poses)
     is_free = np.isnan(accelerations).any(1)
     shape = 1, len(places), *basis.tau.shape, len(bounds.low)
@@ -192,11 +174,7 @@ def tasks_of(
 
 
 def segments_of(tasks: Tasks) -> Tasks:
-    """Segments of tasks as tasks of their own, one behind another.
-
-    Returns:
-        l s tasks of one segment.
-    """
+    """Segments of tasks as tasks of their own, one behind another."""
 
     def one(part: np.ndarray) -> np.ndarray:
         return part.reshape(-1, 1, *part.shape[2:])
@@ -220,15 +198,8 @@ def segments_of(tasks: Tasks) -> Tasks:
     )
 
 
-def quaternions_of(tasks: Tasks, places: np.ndarray) -> np.ndarray | None:
-    """Orientations of the platforms of tasks.
-
-    Args:
-        places: (l, s, ..., d) coordinates.
-
-    Returns:
-        (l, s, ..., 4) unit quaternions, scalar first; None for a point mass.
-    """
+def quaternions_of(tasks: Tasks, places: Float[np.ndarray, "l s ... d"]) -> Float[np.ndarray, "l s ... 4"] | None:
+    """Orientations of the platforms of tasks."""
     along, about = coordinates(tasks.robot.pattern)
     if not len(about):
         return None
@@ -241,15 +212,7 @@ def quaternions_of(tasks: Tasks, places: np.ndarray) -> np.ndarray | None:
 
 
 def motions_of(tasks: Tasks, unknowns: Unknowns, z0: float) -> list[Spline]:
-    """Motions along all segments of a task.
-
-    Args:
-        unknowns: of one task.
-        z0: depth of P0, m.
-
-    Returns:
-        the motions, one a segment.
-    """
+    """Motions along all segments of a task."""
     along, about = coordinates(tasks.robot.pattern)
     controls = tasks.basis.in_intervals(tasks.controls(unknowns)[0])
     tables = np.einsum("mbk,smkd->smbd", tasks.basis.pieces, controls)

@@ -42,19 +42,7 @@ class FreeProof(NamedTuple):
 
 
 def first_optimum(tasks: Tasks, begun: Iterable[tuple[Unknowns, float, float]], until: float) -> Unknowns | None:
-    """The optimum of the first search that converges.
-
-    Args:
-        tasks: one.
-        begun: starts, and the weight of barriers and the softness with which each search begins.
-        until: as of `FreeSettings`, s.
-
-    Returns:
-        the optimum; None where no search converges.
-
-    Raises:
-        OutOfTime: the time has ended.
-    """
+    """The optimum of the first search that converges."""
     for start in begun:
         result = optima(tasks, *start, Ending(until))
         if result.is_optimal[0] and tasks.objective.keeps_limits(result.unknowns.level)[0]:
@@ -63,16 +51,7 @@ def first_optimum(tasks: Tasks, begun: Iterable[tuple[Unknowns, float, float]], 
 
 
 def proved(question: FreeQuestion, tasks: Tasks, unknowns: Unknowns, *, is_optimal: bool = True) -> FreeProof:
-    """A motion that is tightened until the limits of a question are proved.
-
-    Args:
-        question: about the planned robot, or about all within an uncertainty.
-        tasks: one.
-        is_optimal: whether the search has met all limits; else bounds are not tightened.
-
-    Returns:
-        the motion; where tightening ends before all is proved, the last one.
-    """
+    """A motion that is tightened until the limits of a question are proved."""
     planned, is_stopped = question.planned, False
     for number in range(1, ROUNDS + 1):
         stage(f"free motion: proof {number}")
@@ -120,16 +99,7 @@ def _again(question: FreeQuestion, tasks: Tasks, unknowns: Unknowns) -> tuple[Ta
 def robust_proof(
     question: FreeQuestion, uncertainty: Uncertainty, tasks: Tasks, unknowns: Unknowns
 ) -> FreeProof | None:
-    """The best motion for all robots within an uncertainty, from that of the planned robot.
-
-    Args:
-        question: about the planned robot.
-        tasks: one.
-        unknowns: those of the fastest, or otherwise best, motion of the planned robot, from which the search goes on.
-
-    Returns:
-        the motion; where none is found for all robots, one for those within a part of the uncertainty; None without.
-    """
+    """The best motion for all robots within an uncertainty, from that of the planned robot."""
     all_robots, fewer = (for_all_robots(question, uncertainty, multiple) for multiple in (1.0, PART))
     try:
         whole = _with_room(all_robots, tasks, tasks, unknowns)

@@ -46,11 +46,7 @@ class FreeSettings(NamedTuple):
 
 
 def planned_problem(problem: Problem) -> Problem:
-    """A problem without uncertainty.
-
-    Returns:
-        the problem.
-    """
+    """A problem without uncertainty."""
     return problem._replace(limits=dataclasses.replace(problem.limits, uncertainty=None))
 
 
@@ -71,11 +67,7 @@ class FreeQuestion:
 
     @classmethod
     def of(cls, problem: Problem, scene: Scene | None, poses: FreePoses, settings: FreeSettings) -> "FreeQuestion":
-        """Take limits from the robot, and the objective from the settings.
-
-        Raises:
-            InputError: a robot for which no free motion is sought, or a cable without a largest tension.
-        """
+        """Take limits from the robot, and the objective from the settings."""
         check_searched(problem)
         robot = problem.robot
         limits = bounds(robot, problem.limits, criteria(robot, problem.limits, scene), settings.longest is not None)
@@ -99,52 +91,24 @@ class FreeQuestion:
         return self.settings.instants or INSTANTS[turns]
 
     def tasks(self, intervals: int, instants: int) -> Tasks:
-        """The question on some intervals.
-
-        Args:
-            instants: of each interval.
-
-        Returns:
-            one task.
-        """
+        """The question on some intervals."""
         numbers = basis(intervals, instants)
         return tasks_of(self.problem, numbers, self.limits, self.objective, self.poses, self.settings.longest)
 
 
 def more(number: int) -> float:
-    """By what more than is missed bounds tighten.
-
-    Args:
-        number: how many times they have tightened with this one, from 1 on.
-
-    Returns:
-        the factor.
-    """
+    """By what more than is missed bounds tighten."""
     return MORE ** max(1, number - PATIENCE + 1)
 
 
 def slacks_of(question: FreeQuestion, motions: list[Spline]) -> PieceSlacks:
-    """Slacks of motions, one behind the other, over their pieces.
-
-    Returns:
-        the slacks.
-    """
+    """Slacks of motions, one behind the other, over their pieces."""
     whole = chained(motions)
     return piece_slacks(question.problem, whole, np.asarray(whole.knots), question.scene)
 
 
 def tightened(question: FreeQuestion, tasks: Tasks, slacks: PieceSlacks, number: int) -> Tasks | None:
-    """Tighter bounds where the proof finds less slack than is needed.
-
-    Args:
-        question: with the same limits as the tasks.
-        tasks: l of s segments each.
-        slacks: of l s motions, along all segments.
-        number: as of `more`.
-
-    Returns:
-        the tasks; None where the proof finds enough everywhere, or no more helps.
-    """
+    """Tighter bounds where the proof finds less slack than is needed."""
     limits = question.limits
     changes = np.abs(limits.rises) + np.abs(limits.falls)
     unit = changes.max(1)

@@ -32,15 +32,7 @@ DEPENDING = Verdict.SLACK_CABLE, Verdict.ABOVE_SPOOLS
 
 
 def for_all_robots(question: FreeQuestion, uncertainty: Uncertainty, multiple: float) -> FreeQuestion:
-    """A question about all robots within a multiple of an uncertainty.
-
-    Args:
-        question: about the planned robot.
-        multiple: a little more of the uncertainty is asked about.
-
-    Returns:
-        the question.
-    """
+    """A question about all robots within a multiple of an uncertainty."""
     share = MULTIPLE * multiple
     sizes = share * uncertainty.spool_positions, share * uncertainty.mass_centre, uncertainty.mass_factor**share
     limits = dataclasses.replace(question.problem.limits, uncertainty=Uncertainty(*sizes))
@@ -48,16 +40,7 @@ def for_all_robots(question: FreeQuestion, uncertainty: Uncertainty, multiple: f
 
 
 def widened(question: FreeQuestion, tasks: Tasks, motions: list[Spline]) -> Tasks:
-    """Bounds that leave room for all robots within an uncertainty.
-
-    Args:
-        question: about all robots, with the same limits as the tasks.
-        tasks: l of s segments each, whose bounds leave no such room.
-        motions: l s of them, along all segments.
-
-    Returns:
-        the tasks; where no room is left, lower bounds above upper ones.
-    """
+    """Bounds that leave room for all robots within an uncertainty."""
     problem, limits, states = question.problem, question.limits, _states(tasks, motions)
     before, after = (all_robots_slacks(problem, states, multiple) for multiple in (0.0, 1.0))
     half, count = 0.5 * (limits.high - limits.low), before.shape[1]

@@ -5,9 +5,11 @@ Bounds are kept by barriers. Equations may be missed at a price, whose multiplie
 missed fall together. Steps are Newton's, no longer than the merit falls.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import time
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -16,6 +18,9 @@ from cspr_jax.free.elimination import Softness, times, transposed
 from cspr_jax.free.newton import newton_step
 from cspr_jax.free.points import REGULAR, Levels, SearchPoints
 from cspr_jax.free.tasks import OUTER, Tasks, Unknowns, wide
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Weight of the barriers and softness of the equations: at the start, at the end, and by what they fall.
 BARRIERS, BARRIER_FALL, BARRIER_POWER = (1e-1, 3e-8), 0.2, 1.5
@@ -48,15 +53,8 @@ class Ending(NamedTuple):
     enough: float = np.inf
     of_task: np.ndarray = np.zeros(0, int)
 
-    def is_over(self, is_optimal: np.ndarray) -> bool:
-        """Tell whether searches end now.
-
-        Args:
-            is_optimal: (l,) which have converged.
-
-        Returns:
-            whether they end.
-        """
+    def is_over(self, is_optimal: Float[np.ndarray, "l"]) -> bool:
+        """Tell whether searches end now."""
         instant = time.monotonic()
         return instant > self.until or (
             instant > self.enough and bool(np.isin(self.of_task, self.of_task[is_optimal]).all())
@@ -112,20 +110,7 @@ def optima(
     *,
     keeps: bool = False,
 ) -> Optima:
-    """Search for the best motions.
-
-    Args:
-        start: from which the search begins.
-        barrier: weight of the barriers at the start.
-        softness: of the equations at the start.
-        keeps: whether what has converged stays where the time ends, or Ctrl-C is pressed.
-
-    Returns:
-        the motions; those that have not converged as they were last.
-
-    Raises:
-        OutOfTime: the time has ended, and nothing is kept.
-    """
+    """Search for the best motions."""
     count, points = len(start.duration), SearchPoints.of(tasks, start)
     soft = Softness(np.full(count, softness), points.metric(), start.multipliers.copy())
     result = Optima(Unknowns(*(leaf.copy() for leaf in start)), np.zeros(count, bool), np.zeros(count, int))
@@ -177,14 +162,7 @@ def _safeguarded(points: SearchPoints, barrier: np.ndarray) -> SearchPoints:
 
 
 def again(tasks: Tasks, unknowns: Unknowns, barrier: float) -> Unknowns:
-    """Unknowns of motions found before, from which a search within other bounds begins.
-
-    Args:
-        barrier: weight of the barriers.
-
-    Returns:
-        the unknowns: values inside their bounds.
-    """
+    """Unknowns of motions found before, from which a search within other bounds begins."""
     low, high = tasks.bounds(unknowns.level)
     inside = np.minimum(np.sqrt(barrier), INSIDE * (high - low))
     return _pushed(tasks, unknowns._replace(values=np.clip(unknowns.values, low + inside, high - inside)), barrier)
@@ -195,17 +173,10 @@ def _pushed(tasks: Tasks, unknowns: Unknowns, barrier: float) -> Unknowns:
     return unknowns._replace(low_push=low, high_push=high)
 
 
-def started(tasks: Tasks, controls: np.ndarray, duration: np.ndarray, barrier: float = BARRIERS[0]) -> Unknowns:
-    """Unknowns of motions from which a search begins.
-
-    Args:
-        controls: (l, s, K, d) control points, of which the outer ones only say the accelerations that are free.
-        duration: (l, s) s.
-        barrier: weight of the barriers.
-
-    Returns:
-        the unknowns: values inside their bounds.
-    """
+def started(
+    tasks: Tasks, controls: np.ndarray, duration: Float[np.ndarray, "l s"], barrier: float = BARRIERS[0]
+) -> Unknowns:
+    """Unknowns of motions from which a search begins."""
     count, cables, dof = duration.shape[1], tasks.robot.n_cables, tasks.robot.dof
     acceleration = tasks.accelerations.copy()
     for side, index, sign in ((0, OUTER - 1, 3.0), (1, -OUTER, -3.0)):

@@ -1,14 +1,19 @@
 """Motions from which searches begin: lines, lines bent to all sides, and swings about P0."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from itertools import zip_longest
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cspr_jax.free.instants import coordinates
 from cspr_jax.free.tasks import Tasks
 from cspr_jax.robots.point_mass import rest_point, spool_radius
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Largest number of arcs of swings; by how much of their length lines are bent.
 ARCS, BENT = 3, 0.35
@@ -31,25 +36,12 @@ class Starts(NamedTuple):
 
 
 def joined_starts(parts: Sequence[Starts]) -> Starts:
-    """Starts of several kinds for the same tasks.
-
-    Returns:
-        the starts, one kind after the other.
-    """
+    """Starts of several kinds for the same tasks."""
     return Starts(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
 def starts(tasks: Tasks, z0: float, most: int | None = None) -> Starts:
-    """Starts of searches, in the same order for each task.
-
-    Args:
-        tasks: of one segment each.
-        z0: depth of P0, m.
-        most: number of starts of each task; None for the usual ones. More of them are swings of more arcs.
-
-    Returns:
-        the starts of the first task, then of the second one, ...
-    """
+    """Starts of searches, in the same order for each task."""
     begun = list[_Start]()
     for start, end in tasks.places[:, 0]:
         lines = _lines(tasks, start, end)
@@ -98,28 +90,13 @@ def _swings(tasks: Tasks, start: np.ndarray, end: np.ndarray, z0: float, most: i
     return swings
 
 
-def bulge(tau: np.ndarray) -> np.ndarray:
-    """How far motions are bent, at most 1 half-way; at the ends neither place nor velocity changes.
-
-    Args:
-        tau: (...) normalised time.
-
-    Returns:
-        (...).
-    """
+def bulge(tau: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
+    """How far motions are bent, at most 1 half-way; at the ends neither place nor velocity changes."""
     return 16.0 * (tau * (1.0 - tau)) ** 2
 
 
-def ways(chord: np.ndarray, along: np.ndarray) -> list[np.ndarray]:
-    """Directions in which motions are bent.
-
-    Args:
-        chord: (d,) from start to end, of coordinates.
-        along: axes of those of a place.
-
-    Returns:
-        (d,) each: none, up and down, and to both sides.
-    """
+def ways(chord: Float[np.ndarray, "d"], along: np.ndarray) -> list[np.ndarray]:
+    """Directions in which motions are bent."""
     down = np.zeros(len(chord))
     down[np.flatnonzero(along == 2)] = 1.0
     directions = [np.zeros(len(chord)), -down, down]

@@ -24,14 +24,7 @@ OF_PLACES = functools.reduce(operator.or_, _OF_PLACES)
 
 
 def first_refused(problem: Problem, scene: Scene | None, poses: FreePoses, frame: Frame) -> tuple[int, Cause] | None:
-    """The first pose that no motion can have.
-
-    Args:
-        frame: of the robot file, in whose axes causes are.
-
-    Returns:
-        its number, and the worst reason; None where there is no such pose.
-    """
+    """The first pose that no motion can have."""
     units = [None] * len(poses.positions) if poses.quaternions is None else list(poses.quaternions)
     at_rest = [
         Spline(leaf(np.array([0.0, 1.0])), leaf(position[None, None]), None if unit is None else leaf(unit[None, None]))

@@ -4,8 +4,10 @@ A motion is at a pose at each end of its segments, with a given velocity there, 
 both sides share. So the outer three control points at each end follow from the duration and the acceleration.
 """
 
+from __future__ import annotations
+
 import dataclasses
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -15,19 +17,15 @@ from cspr_jax.free.objectives import Objective
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.limits import Limits
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # Control points at each end that follow from the others.
 OUTER = 3
 
 
 def wide(numbers: np.ndarray) -> np.ndarray:
-    """Numbers of motions, or of their segments, beside their values at instants.
-
-    Args:
-        numbers: (l,) or (l, s).
-
-    Returns:
-        (l, 1, 1, 1, 1) or (l, s, 1, 1, 1).
-    """
+    """Numbers of motions, or of their segments, beside their values at instants."""
     return numbers.reshape(*numbers.shape, *[1] * (5 - numbers.ndim))
 
 
@@ -55,14 +53,7 @@ class Unknowns(NamedTuple):
     high_push: np.ndarray
 
     def taken(self, rows: np.ndarray) -> "Unknowns":
-        """Unknowns of some of the motions.
-
-        Args:
-            rows: numbers, or a mask.
-
-        Returns:
-            the unknowns.
-        """
+        """Unknowns of some of the motions."""
         return Unknowns(*(leaf[rows] for leaf in self))
 
 
@@ -119,14 +110,7 @@ class Tasks:
     planes: ClearancePlanes | None = None
 
     def taken(self, rows: np.ndarray) -> "Tasks":
-        """Some of the motions.
-
-        Args:
-            rows: numbers, or a mask.
-
-        Returns:
-            the tasks.
-        """
+        """Some of the motions."""
         names = ("places", "velocities", "references", "turns", "accelerations", "is_free", "low", "high", "scale")
         planes = self.planes
         if planes is not None:
@@ -139,14 +123,7 @@ class Tasks:
         return self.low.shape[-1] - (0 if self.planes is None else self.planes.at.shape[-1])
 
     def within(self, planes: ClearancePlanes, low: np.ndarray) -> "Tasks":
-        """Tasks with other planes.
-
-        Args:
-            low: (l, s, m, n, K) lower bounds of their values, -inf for none.
-
-        Returns:
-            the tasks.
-        """
+        """Tasks with other planes."""
         count, none, objective = self.n_limited, np.full(low.shape, np.inf), self.objective
         low_lift, high_lift = (
             np.pad(lift[:count], (0, low.shape[-1])) for lift in (objective.low_lift, objective.high_lift)
@@ -160,14 +137,7 @@ class Tasks:
         )
 
     def beside(self, unknowns: Unknowns, values: np.ndarray) -> Unknowns:
-        """Unknowns of these tasks as those of tasks with other planes.
-
-        Args:
-            values: (l, s, m, n, K) of the planes.
-
-        Returns:
-            the unknowns; what planes push is not known.
-        """
+        """Unknowns of these tasks as those of tasks with other planes."""
         old, new = self.low.shape[-1] - self.n_limited, values.shape[-1]
 
         def changed(leaf: np.ndarray) -> np.ndarray:
@@ -178,33 +148,18 @@ class Tasks:
         unknowns.values[..., self.n_limited :] = values
         return unknowns
 
-    def bounds(self, level: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Bounds of the values.
-
-        Args:
-            level: (l, s).
-
-        Returns:
-            lower and upper ones, (l, s, m, n, n_values).
-        """
+    def bounds(self, level: Float[np.ndarray, "l s"]) -> tuple[np.ndarray, np.ndarray]:
+        """Bounds of the values."""
         level = wide(level)
         return self.low + level * self.objective.low_lift, self.high + level * self.objective.high_lift
 
     def gaps(self, unknowns: Unknowns) -> tuple[np.ndarray, np.ndarray]:
-        """Distances of the values from their bounds.
-
-        Returns:
-            from lower and upper ones, (l, s, m, n, n_values); inf for none.
-        """
+        """Distances of the values from their bounds."""
         low, high = self.bounds(unknowns.level)
         return unknowns.values - low, high - unknowns.values
 
     def gap_changes(self, change: Unknowns) -> tuple[np.ndarray, np.ndarray]:
-        """Changes of the distances of the values from their bounds.
-
-        Returns:
-            from lower and upper ones, (l, s, m, n, n_values).
-        """
+        """Changes of the distances of the values from their bounds."""
         level = wide(change.level)
         low, high = level * self.objective.low_lift, level * self.objective.high_lift
         return change.values - low, high - change.values
@@ -214,33 +169,21 @@ class Tasks:
         """Shares of the instants in the objective, of the squares of tensions times the duration, (l, 1, m, n, 1)."""
         return self.objective.energy / wide(self.scale) * self.basis.shares[..., None]
 
-    def cost(self, unknowns: Unknowns) -> np.ndarray:
-        """The objective.
-
-        Returns:
-            (l,).
-        """
+    def cost(self, unknowns: Unknowns) -> Float[np.ndarray, "l"]:
+        """The objective."""
         time = self.objective.time * unknowns.duration.sum(1) / self.scale
         squares = unknowns.values[..., : self.robot.n_cables] ** 2 * wide(unknowns.duration)
         energy = np.sum(self.energy_shares * squares, axis=(1, 2, 3, 4))
         return time + energy + self.objective.level * unknowns.level.sum(1)
 
-    def energies(self, unknowns: Unknowns) -> np.ndarray:
-        """Integrals of the sum of the squares of the tensions.
-
-        Returns:
-            (l, s) N^2 s.
-        """
+    def energies(self, unknowns: Unknowns) -> Float[np.ndarray, "l s"]:
+        """Integrals of the sum of the squares of the tensions."""
         squares = np.sum(unknowns.values[..., : self.robot.n_cables] ** 2, axis=-1)
         weight = float(self.robot.mass * self.robot.gravity)
         return weight**2 * unknowns.duration * np.sum(self.basis.shares * squares, axis=(2, 3))
 
-    def cost_change(self, unknowns: Unknowns, change: Unknowns) -> np.ndarray:
-        """Slope of the objective along a change.
-
-        Returns:
-            (l,).
-        """
+    def cost_change(self, unknowns: Unknowns, change: Unknowns) -> Float[np.ndarray, "l"]:
+        """Slope of the objective along a change."""
         cables = self.robot.n_cables
         tensions, duration = unknowns.values[..., :cables], wide(unknowns.duration)
         squares = wide(change.duration) * tensions**2
@@ -256,11 +199,7 @@ class Tasks:
         return np.concatenate([np.arange(d, 3 * d), np.arange(last - 3 * d, last - d)])
 
     def controls(self, unknowns: Unknowns) -> np.ndarray:
-        """All control points.
-
-        Returns:
-            (l, s, K, d).
-        """
+        """All control points."""
         shape = *unknowns.duration.shape, self.basis.controls, self.places.shape[-1]
         controls, time = np.empty(shape), unknowns.duration[..., None]
         controls[:, :, OUTER:-OUTER] = unknowns.inner
@@ -279,11 +218,7 @@ class Tasks:
         return (self.turns[:, :, side] @ acceleration[..., None])[..., 0]
 
     def border_slopes(self, unknowns: Unknowns) -> np.ndarray:
-        """Derivatives of the outer coordinates that move, by what moves them.
-
-        Returns:
-            (l, s, 4 d, 1 + 2 d) in the order of `border`, by the duration and both accelerations of a segment.
-        """
+        """Derivatives of the outer coordinates that move, by what moves them."""
         d, time, basis = self.places.shape[-1], unknowns.duration[..., None], self.basis
         slopes = np.zeros((*unknowns.duration.shape, 4 * d, 1 + 2 * d))
         for side, sign in ((0, 1.0), (1, -1.0)):
@@ -297,14 +232,7 @@ class Tasks:
         return slopes
 
     def border_bends(self, unknowns: Unknowns, push: np.ndarray) -> np.ndarray:
-        """Second derivatives of the outer coordinates, times multipliers.
-
-        Args:
-            push: (l, s, 4 d) multipliers, in the order of `border`.
-
-        Returns:
-            (l, s, 1 + 2 d, 1 + 2 d) by the duration and both accelerations of a segment.
-        """
+        """Second derivatives of the outer coordinates, times multipliers."""
         d, twice = self.places.shape[-1], 2.0 * self.basis.end_bend
         bends = np.zeros((*unknowns.duration.shape, 1 + 2 * d, 1 + 2 * d))
         for side in (0, 1):
@@ -317,11 +245,7 @@ class Tasks:
         return bends
 
     def equations(self, unknowns: Unknowns) -> tuple[InstantValues, np.ndarray]:
-        """Equations at all instants.
-
-        Returns:
-            the equations, leaves (l, s, m, n, ...); their residuals with all values.
-        """
+        """Equations at all instants."""
         planes = self.planes
         count = unknowns.multipliers.shape[-1] - (0 if planes is None else planes.at.shape[-1])
         equations = instant_values(*self._instants(unknowns), unknowns.multipliers[..., :count])
@@ -332,12 +256,8 @@ class Tasks:
             equations = equations._replace(residual=residual, slope=slope)
         return equations, self._with_values(equations.residual.copy(), unknowns)
 
-    def residual(self, unknowns: Unknowns) -> np.ndarray:
-        """Residuals of the equations at all instants, with all values.
-
-        Returns:
-            (l, s, m, n, n_equations).
-        """
+    def residual(self, unknowns: Unknowns) -> Float[np.ndarray, "l s m n n_equations"]:
+        """Residuals of the equations at all instants, with all values."""
         missed, planes = residuals(*self._instants(unknowns)), self.planes
         return self._with_values(missed if planes is None else self._with_planes(missed, planes, unknowns), unknowns)
 

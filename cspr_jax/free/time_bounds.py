@@ -6,6 +6,10 @@ holds for the length of each cable, and for the way of the mass centre in every 
 than e . g + s sum(t_max) / m, where s is the largest e . u of a cable's direction u. Below level spools u points up.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -21,6 +25,9 @@ from cspr_jax.robots.point_mass import spool_radius
 from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # Directions in the vertical plane through both places; what bounds are lowered by, more than their rounding.
 ANGLES, SAFE = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 181), 1e-9
 # Heights of spools over the robot's size that count as equal, and what that may add to a share.
@@ -28,18 +35,10 @@ LEVEL, SLANTED = 1e-12, 1e-5
 Numbers = np.ndarray | float
 
 
-def least_time(way: np.ndarray, speeding: Numbers, slowing: Numbers, speed: Numbers) -> np.ndarray:
-    """Least time of a way from rest to rest.
-
-    Args:
-        way: (...) m, not negative.
-        speeding: (...) largest acceleration on the way, m/s^2; inf for none.
-        slowing: (...) largest acceleration against it, likewise.
-        speed: (...) largest speed, m/s; inf for none.
-
-    Returns:
-        (...) s.
-    """
+def least_time(
+    way: Float[np.ndarray, "..."], speeding: Numbers, slowing: Numbers, speed: Numbers
+) -> Float[np.ndarray, "..."]:
+    """Least time of a way from rest to rest."""
     slowness = 1.0 / np.asarray(speeding) + 1.0 / np.asarray(slowing)
     with np.errstate(invalid="ignore", divide="ignore"):  # of no cap, no largest acceleration, no way
         is_capped = np.sqrt(2.0 * way / slowness) > speed
@@ -47,15 +46,8 @@ def least_time(way: np.ndarray, speeding: Numbers, slowing: Numbers, speed: Numb
         return np.where(way > 0.0, np.where(is_capped, capped, np.sqrt(2.0 * way * slowness)), 0.0)
 
 
-def time_bounds(problem: Problem, motions: list[Spline]) -> np.ndarray:
-    """Lower bounds of the time of all motions with the same ends.
-
-    Args:
-        motions: n of them, at zero velocity where they begin and end.
-
-    Returns:
-        (n,) s.
-    """
+def time_bounds(problem: Problem, motions: list[Spline]) -> Float[np.ndarray, "n"]:
+    """Lower bounds of the time of all motions with the same ends."""
     return np.array([(1.0 - SAFE) * _time_bound(problem, motion) for motion in motions])
 
 

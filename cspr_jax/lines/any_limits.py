@@ -5,7 +5,9 @@ not rest, from below. The largest q is looked for at samples, between which a pa
 each smallest bound; the ratio is looked for on finer and finer grids.
 """
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -16,6 +18,9 @@ from cspr_jax.lines.motion import s_curve
 from cspr_jax.lines.s_model import Least
 from cspr_jax.lines.slacks import Instants, LineSlacks, slacks, tensions_at
 from cspr_jax.motions.amplitudes import Amplitude, derivatives
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Samples of a piece of the S-model, and of half of another law.
 SAMPLES = 33
@@ -48,18 +53,14 @@ class Gain(NamedTuple):
     down: Array
 
 
-def gain(line: LineSlacks, law: Amplitude, edges: Array, middle: Array, largest: Array) -> Gain:
-    """Feasible q of one law.
-
-    Args:
-        law: s(tau).
-        edges: (n_pieces + 1,) instants between which the law is smooth.
-        middle: () instant that parts the halves.
-        largest: () largest size of s'', inf for none, 1/s^2.
-
-    Returns:
-        the range.
-    """
+def gain(
+    line: LineSlacks,
+    law: Amplitude,
+    edges: Float[Array, "n_pieces+1"],
+    middle: Float[Array, ""],
+    largest: Float[Array, ""],
+) -> Gain:
+    """Feasible q of one law."""
     share = jnp.linspace(0.0, 1.0, SAMPLES if edges.shape[0] > 2 else 2 * HALF)
     tau = edges[:-1, None] + jnp.diff(edges)[:, None] * share[None]
     s, speed, bend = (x[..., None] for x in derivatives(law, tau, order=2))
@@ -99,16 +100,10 @@ def _above(most: Array, needed: Array, is_known: Array) -> Array:
     return jnp.where((most <= 0.0) & (needed >= 0.0), -1.0, above)
 
 
-def _near_spools(line: LineSlacks, law: Amplitude) -> tuple[Array, Array]:
-    """Largest q under the limits of motion, near the place where each cable is shortest.
-
-    Args:
-        line: of one line, its leaves without dimensions in front.
-        law: s(tau).
-
-    Returns:
-        (n_cables, n_samples, n_rows) 1/s^2, and tau (n_cables, n_samples, 1).
-    """
+def _near_spools(
+    line: LineSlacks, law: Amplitude
+) -> tuple[Float[Array, "n_cables n_samples n_rows"], Float[Array, "n_cables n_samples 1"]]:
+    """Largest q under the limits of motion, near the place where each cable is shortest."""
     line = jax.tree.map(lambda x: x[0, 0, 0], line)
     s = jnp.clip(line.nearest[:, None] + jnp.sqrt(line.apart / line.square)[:, None] * BESIDE[None], 0.0, 1.0)
 
@@ -172,33 +167,16 @@ def _from_end(values: Array, is_known: Array) -> Array:
     return jnp.where(rises, a + slope**2 / (2.0 * jnp.where(rises, curvature, 1.0)), a)
 
 
-def gain_of_law(line: LineSlacks, ratio: Array, largest: Array, law: Amplitude | None) -> Gain:
-    """Feasible q of one motion.
-
-    Args:
-        ratio: () p / T of the S-model.
-        largest: () largest size of s'', inf for none, 1/s^2.
-        law: s(tau) without a parameter; None: the S-model.
-
-    Returns:
-        the range.
-    """
+def gain_of_law(line: LineSlacks, ratio: Float[Array, ""], largest: Float[Array, ""], law: Amplitude | None) -> Gain:
+    """Feasible q of one motion."""
     if law is not None:
         return gain(line, law, jnp.asarray([0.0, 1.0]), jnp.asarray(0.5), largest)
     edges = jnp.stack([0.0 * ratio, 0.5 * ratio, ratio, 0.5 * (1.0 + ratio), jnp.ones_like(ratio)])
     return gain(line, s_curve(ratio), edges, ratio, largest)
 
 
-def least_by_search(line: LineSlacks, largest: Array, law: Amplitude | None) -> Least:
-    """Least duration along a line under its limits.
-
-    Args:
-        largest: () largest size of s'', inf for none, 1/s^2.
-        law: s(tau) without a parameter; None: the S-model.
-
-    Returns:
-        ratio and duration, inf where none was found; the numbers are of rows.
-    """
+def least_by_search(line: LineSlacks, largest: Float[Array, ""], law: Amplitude | None) -> Least:
+    """Least duration along a line under its limits."""
     if law is not None:
         half = jnp.asarray(0.5)
         return _least(gain_of_law(line, half, largest, law), half)

@@ -1,8 +1,10 @@
 """Durations of lines before their proof: by formulas where these hold, by search elsewhere."""
 
+from __future__ import annotations
+
 import dataclasses
 from functools import partial
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import jax
 import jax.numpy as jnp
@@ -21,6 +23,9 @@ from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot, in_one_plane, plane_normal
 from cspr_jax.robots.wrench_sets import spanning
 from cspr_jax.schema.limits import LIMITS
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float
 
 BATCH, BATCH_OF_SEARCH = 4096, 16
 Rule = Literal["optimum", "thesis"]
@@ -52,67 +57,39 @@ class Durations:
     up: np.ndarray
     down: np.ndarray
 
-    def part(self, rows: np.ndarray) -> "Durations":
-        """Durations of some of the lines.
-
-        Args:
-            rows: a mask (n,), or numbers of lines.
-
-        Returns:
-            the durations of these lines.
-        """
+    def part(self, rows: Bool[np.ndarray, "n"]) -> "Durations":
+        """Durations of some of the lines."""
         return Durations(**{name: value[rows] for name, value in vars(self).items()})
 
     def replace(self, rows: np.ndarray, part: "Durations") -> None:
-        """Replace the durations of some of the lines.
-
-        Args:
-            rows: numbers of the lines.
-        """
+        """Replace the durations of some of the lines."""
         for name, values in vars(part).items():
             getattr(self, name)[rows] = values
 
 
 def moving(limits: Limits) -> tuple[str, ...]:
-    """Limits that depend on how the effector moves.
-
-    Args:
-        limits: the limits, without tracers.
-
-    Returns:
-        names of those that are set; a smallest tension of zero is left out, since taut cables keep it anyway.
-    """
+    """Limits that depend on how the effector moves."""
     known = [name for name in MOVING if getattr(limits, name) is not None]
     return tuple(name for name in known if name != "tension_min" or np.asarray(limits.tension_min).any())
 
 
 def names_of(robot: PointMassRobot, limits: Limits) -> tuple[str, ...]:
-    """Names of the bounds along a line.
-
-    Returns:
-        such as "cables 3, 4", one for each choice of cables, "max_acceleration", and the limits that depend on how the
-        effector moves.
-    """
+    """Names of the bounds along a line."""
     chosen = spanning(robot.n_cables, robot.dof) + 1
     cables = ("cables " + ", ".join(map(str, row)) for row in chosen.tolist())
     return (*cables, "max_acceleration", *moving(limits))
 
 
 def by_formula(
-    robot: PointMassRobot, starts: np.ndarray, ends: np.ndarray, *, law: str, rule: Rule, max_acceleration: float
+    robot: PointMassRobot,
+    starts: Float[np.ndarray, "n 3"],
+    ends: Float[np.ndarray, "n 3"],
+    *,
+    law: str,
+    rule: Rule,
+    max_acceleration: float,
 ) -> Durations:
-    """Least durations along straight lines under taut cables and the largest acceleration alone.
-
-    Args:
-        robot: centred, z down.
-        starts: (n, 3) m; at rest.
-        ends: (n, 3) m; at rest.
-        law: one of `lines.motion.LAWS`.
-        max_acceleration: largest size of the acceleration, m/s^2.
-
-    Returns:
-        the durations that formulas give; NaN if the spools are not in one plane.
-    """
+    """Least durations along straight lines under taut cables and the largest acceleration alone."""
     in_plane, largest = in_one_plane(robot), np.full(len(starts), float(max_acceleration))
     kernel = partial(_by_formula, robot, law=law, rule=rule, in_plane=in_plane)
     least, bound, rest, depth, is_bounded = in_batches(kernel, (starts, ends, largest), size=BATCH)
@@ -126,49 +103,29 @@ def _lines(problem: Problem, arguments) -> LineSlacks:
     return jax.vmap(partial(line_slacks, problem))(*arguments)
 
 
-def lines_of(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> LineSlacks:
-    """Return the coefficients that slacks along lines depend on.
-
-    Args:
-        starts: (n, 3) m.
-        ends: (n, 3) m, elsewhere.
-
-    Returns:
-        NumPy leaves with a leading dimension n.
-    """
+def lines_of(problem: Problem, starts: Float[np.ndarray, "n 3"], ends: Float[np.ndarray, "n 3"]) -> LineSlacks:
+    """Return the coefficients that slacks along lines depend on."""
     return in_batches(partial(_lines, problem), (starts, ends), size=BATCH)
 
 
-def by_cells(problem: Problem, starts: np.ndarray, ends: np.ndarray, max_acceleration: float) -> np.ndarray:
-    """Lower bounds of the duration of any motion along lines, under limits of tensions and cables too.
-
-    Args:
-        starts: (n, 3) m; at rest.
-        ends: (n, 3) m, elsewhere; at rest.
-        max_acceleration: largest size of the acceleration, m/s^2.
-
-    Returns:
-        (n,) s.
-    """
+def by_cells(
+    problem: Problem, starts: Float[np.ndarray, "n 3"], ends: Float[np.ndarray, "n 3"], max_acceleration: float
+) -> Float[np.ndarray, "n"]:
+    """Lower bounds of the duration of any motion along lines, under limits of tensions and cables too."""
     largest = max_acceleration / np.linalg.norm(ends - starts, axis=1)
     return least_durations(lines_of(problem, starts, ends), largest)
 
 
 def by_search(
-    problem: Problem, starts: np.ndarray, ends: np.ndarray, timings: Durations, *, law: str, max_acceleration: float
+    problem: Problem,
+    starts: Float[np.ndarray, "n 3"],
+    ends: Float[np.ndarray, "n 3"],
+    timings: Durations,
+    *,
+    law: str,
+    max_acceleration: float,
 ) -> Durations:
-    """Least durations along straight lines under any limits, of spools in any layout.
-
-    Args:
-        starts: (n, 3) m; at rest.
-        ends: (n, 3) m, elsewhere; at rest.
-        timings: of `by_formula`.
-        law: one of `lines.motion.LAWS`.
-        max_acceleration: largest size of the acceleration, m/s^2.
-
-    Returns:
-        the timings, with durations that a search gives.
-    """
+    """Least durations along straight lines under any limits, of spools in any layout."""
     moving_problem = problem._replace(
         limits=Limits(**{name: getattr(problem.limits, name) for name in moving(problem.limits)})
     )

@@ -7,8 +7,10 @@ The product of n(s) with another cable's ray is affine too: a face bounds the co
 positive. If the spools lie in one plane, that is so everywhere below them or nowhere.
 """
 
+from __future__ import annotations
+
 import dataclasses
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -17,6 +19,9 @@ from jax import Array
 
 from cspr_jax.robots.point_mass import PLANAR, PointMassRobot, relative_acceleration, spool_radius
 from cspr_jax.robots.wrench_sets import FLAT, normals_to, spanning
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 
 @jax.tree_util.register_dataclass
@@ -71,20 +76,8 @@ def _normals(robot: PointMassRobot, place: Array) -> tuple[Array, Array]:
     return normal, jnp.where(spans | (jnp.abs(along) <= FLAT * size), 0.0, along)
 
 
-def line_faces(robot: PointMassRobot, start: Array, end: Array, *, in_plane: bool) -> LineFaces:
-    """Half-planes of a line between two points.
-
-    Args:
-        robot: a point mass, z down.
-        start: (3,) from the centroid of the spools, m.
-        end: (3,) likewise.
-        in_plane: whether the spools are known to lie in one plane, with both points below it: then one side of each
-            face will do.
-
-    Returns:
-        one for each choice of cables that span a face, in the order of `wrench_sets.spanning`; those of the other side
-        follow unless `in_plane`.
-    """
+def line_faces(robot: PointMassRobot, start: Float[Array, "3"], end: Float[Array, "3"], *, in_plane: bool) -> LineFaces:
+    """Half-planes of a line between two points."""
     (normal, along), (at_end, along_end) = _normals(robot, start), _normals(robot, end)
     if in_plane:
         # Which side the other cables are on is the same everywhere below the spools: seen from far enough below them.
@@ -142,15 +135,8 @@ class Sides(NamedTuple):
     last: Array
 
 
-def sides(faces: LineFaces, largest: Array) -> Sides:
-    """Bounds of the path acceleration; the last one of each side is that of the largest acceleration.
-
-    Args:
-        largest: () largest size of s'', inf for none, 1/s^2.
-
-    Returns:
-        the bounds.
-    """
+def sides(faces: LineFaces, largest: Float[Array, ""]) -> Sides:
+    """Bounds of the path acceleration; the last one of each side is that of the largest acceleration."""
     steep = faces.steepness
     is_up, is_down = faces.bounds & (steep < 0.0), faces.bounds & (steep > 0.0)
     over = jnp.where(is_up | is_down, steep, 1.0)

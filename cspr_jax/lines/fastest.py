@@ -1,9 +1,11 @@
 """Fastest motions along straight lines with their verdicts: formulas first, a search where these break a limit."""
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -17,6 +19,9 @@ from cspr_jax.motions.proved_verdicts import Verdicts
 from cspr_jax.robots.point_mass import in_one_plane, spool_radius
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import FLAGS, Verdict
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Lines that a thread works on at a time, where there is something to search or to prove.
 PART = 256
@@ -50,28 +55,15 @@ class Fastest(NamedTuple):
 
 def fastest(
     problem: Problem,
-    starts: np.ndarray,
-    ends: np.ndarray,
+    starts: Float[np.ndarray, "n 3"],
+    ends: Float[np.ndarray, "n 3"],
     *,
     law: str,
     rule: Rule,
     max_acceleration: float,
     sharp: bool,
 ) -> Fastest:
-    """Fastest motions along straight lines.
-
-    Args:
-        problem: robot, a point mass, centred, z down, and limits.
-        starts: (n, 3) m; at rest.
-        ends: (n, 3) m; at rest.
-        law: one of `lines.motion.LAWS`.
-        rule: of the S-model: "thesis" knows no limits, and spools in one plane only.
-        max_acceleration: largest size of the acceleration, m/s^2.
-        sharp: whether margins must be sharp; else only verdicts count.
-
-    Returns:
-        the motions.
-    """
+    """Fastest motions along straight lines."""
     how: dict[str, Any] = {"law": law, "rule": rule, "max_acceleration": max_acceleration, "sharp": sharp}
     if len(starts) <= PART or (in_one_plane(problem.robot) and not moving(problem.limits)):
         return _fastest(problem, starts, ends, **how)

@@ -5,7 +5,10 @@ by proof: the bounds of every face are met all along (see `lines.s_model`), with
 where p or T - p is so short that its digits are lost, every motion has a proof of its own.
 """
 
+from __future__ import annotations
+
 import dataclasses
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +17,9 @@ from cspr_jax.lines.fastest import fastest
 from cspr_jax.motions.problem import Problem
 from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.verdicts import Verdict
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,25 +51,14 @@ class LeastTimes(Columns):
 
 def least_times(
     problem: Problem,
-    starts: np.ndarray,
-    ends: np.ndarray,
+    starts: Float[np.ndarray, "n 3"],
+    ends: Float[np.ndarray, "n 3"],
     *,
     law: str = "s-curve",
     rule: Rule = "optimum",
     max_acceleration: float = np.inf,
 ) -> LeastTimes:
-    """Least durations along straight lines.
-
-    Args:
-        problem: robot, a point mass, centred, z down, and limits.
-        starts: (n, 3) m; at rest.
-        ends: (n, 3) m; at rest.
-        law: one of `lines.motion.LAWS`.
-        max_acceleration: largest size of the acceleration, m/s^2.
-
-    Returns:
-        the durations.
-    """
+    """Least durations along straight lines."""
     timings, judgements, moves = fastest(
         problem, starts, ends, law=law, rule=rule, max_acceleration=max_acceleration, sharp=False
     )

@@ -5,27 +5,26 @@ above, by interval arithmetic; nothing is faster than to accelerate at these bou
 The limit of the cables' accelerations restricts fast motions further; that is left out, which makes the bound lower.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import jax
 import numpy as np
 
 from cspr_jax.arithmetic.interval_jets import Jet, lowest
 from cspr_jax.lines.slacks import LineSlacks
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 CELLS = 256
 # Numbers that are looked at together: cells by faces by cables.
 TOGETHER = 1 << 20
 
 
-def least_durations(lines: LineSlacks, largest: np.ndarray) -> np.ndarray:
-    """Lower bounds of durations.
-
-    Args:
-        lines: NumPy leaves with a leading dimension n.
-        largest: (n,) largest size of s'', inf for none, 1/s^2.
-
-    Returns:
-        (n,) s.
-    """
+def least_durations(lines: LineSlacks, largest: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
+    """Lower bounds of durations."""
     size = max(TOGETHER // (CELLS * max(lines.along[0].size, 1)), 1)
     parts = [slice(i, i + size) for i in range(0, len(largest), size)]
     return np.concatenate([_least(jax.tree.map(lambda x, part=part: x[part], lines), largest[part]) for part in parts])

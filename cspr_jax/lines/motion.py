@@ -5,8 +5,11 @@ The law s(tau) runs from 0 to 1 and is a piecewise polynomial, an `Amplitude` li
 time, p / T, and one down for the rest. The quintic's acceleration is smooth, the cubic's jumps at both ends.
 """
 
+from __future__ import annotations
+
 import dataclasses
 from functools import partial
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -21,20 +24,16 @@ from cspr_jax.robots.state import State
 from cspr_jax.robots.state_bounds import StateBounds
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # Blocks of which bounds are computed at a time.
 BATCH = 64
 LAWS = ("s-curve", "quintic", "cubic")
 
 
-def s_curve(ratio: Array) -> Amplitude:
-    """Law of the S-model.
-
-    Args:
-        ratio: () p / T, in ]0, 1[.
-
-    Returns:
-        the law: knots at p / 2, p and (T + p) / 2 over T.
-    """
+def s_curve(ratio: Float[Array, ""]) -> Amplitude:
+    """Law of the S-model."""
     ratio = jnp.asarray(ratio, float)
     rest, zero, one = 1.0 - ratio, jnp.zeros_like(ratio), jnp.ones_like(ratio)
     up, down = 4.0 / (3.0 * ratio**2), 4.0 / (3.0 * rest**2)
@@ -58,27 +57,12 @@ def s_curve(ratio: Array) -> Amplitude:
 
 
 def fixed_law(name: str) -> Amplitude:
-    """Law that has no parameter.
-
-    Args:
-        name: "quintic" or "cubic".
-
-    Returns:
-        the law.
-    """
+    """Law that has no parameter."""
     return amplitudes.named("quintic") if name == "quintic" else amplitudes.from_polynomial([0.0, 0.0, 3.0, -2.0])
 
 
-def largest_bend(law: str, ratio: np.ndarray) -> np.ndarray:
-    """Largest size of s'' over tau of a law.
-
-    Args:
-        law: one of `LAWS`.
-        ratio: (n,) p / T of the S-model.
-
-    Returns:
-        (n,) an upper bound, exact but for rounding.
-    """
+def largest_bend(law: str, ratio: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
+    """Largest size of s'' over tau of a law."""
     if law == "s-curve":
         return 4.0 / np.minimum(ratio, 1.0 - ratio)
     return np.full(np.shape(ratio), np.asarray(fixed_law(law).largest)[2])

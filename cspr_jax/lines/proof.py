@@ -6,7 +6,10 @@ of a block, and a bound of the second derivative by interval arithmetic says how
 Blocks whose bound lies below a slack that is attained elsewhere are halved until the two agree.
 """
 
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import jax
 import numpy as np
@@ -17,25 +20,17 @@ from cspr_jax.arithmetic.polynomials import bounds, derivatives, over
 from cspr_jax.lines.slacks import Instants, LineSlacks, slacks, tensions_at, tensions_over
 from cspr_jax.motions.amplitudes import Amplitude
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # Numbers that are looked at together, blocks by faces by cables.
 TOGETHER = 1 << 20
 
 
 def smallest_slacks(
-    lines: LineSlacks, laws: Amplitude, durations: np.ndarray, gravity: float, *, enough: float = math.inf
+    lines: LineSlacks, laws: Amplitude, durations: Float[np.ndarray, "n"], gravity: float, *, enough: float = math.inf
 ) -> Proved:
-    """Smallest slacks along lines.
-
-    Args:
-        lines: NumPy leaves with a leading dimension n.
-        laws: s(tau), likewise.
-        durations: (n,) s.
-        gravity: m/s^2.
-        enough: bounds above this one, of distances over gravity, need not be sharp.
-
-    Returns:
-        slacks in the order of `LineSlacks.names`: of faces in m/s^2, of speeds 1 - (rate / limit)^2.
-    """
+    """Smallest slacks along lines."""
     scales = np.array([gravity if name in lines.low else 1.0 for name in lines.names])
     size = max(TOGETHER // max(lines.along[0].size, 1), 1)
 

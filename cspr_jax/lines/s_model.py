@@ -7,7 +7,9 @@ so that 1 / T^2 is largest where they meet. Whatever the law, nothing is faster 
 then to brake at it.
 """
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -17,6 +19,9 @@ from jax import Array, lax
 from cspr_jax.arithmetic.minima import Bracket, golden_step, inner_points
 from cspr_jax.lines.faces import Sides
 from cspr_jax.motions.amplitudes import Amplitude, derivatives
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 ROUNDS = 24
 # Samples of half a motion by a law without a parameter, and golden sections between two of them.
@@ -53,15 +58,7 @@ class Least(NamedTuple):
 
 
 def least_s_curve(sides: Sides, *, touching: bool = True) -> Least:
-    """The S-model of least duration.
-
-    Args:
-        sides: bounds of a line, those at its ends positive.
-        touching: whether bounds may be touched anywhere; False: the rule of the text, Q3 and Q7 on their lines.
-
-    Returns:
-        the ratio and the duration, exact up to rounding.
-    """
+    """The S-model of least duration."""
 
     def gains(ratio):
         up = _gain(ratio, sides.up, sides.up_slope, touching)
@@ -84,14 +81,7 @@ def least_s_curve(sides: Sides, *, touching: bool = True) -> Least:
 
 
 def thesis_s_curve(sides: Sides) -> Least:
-    """The S-model by the rule of the text: both branches for Q3, the one with the smaller path coordinate.
-
-    Args:
-        sides: bounds of a line, those at its ends positive.
-
-    Returns:
-        the ratio and the duration, which a bound that is touched elsewhere may refute.
-    """
+    """The S-model by the rule of the text: both branches for Q3, the one with the smaller path coordinate."""
     first = least_s_curve(sides, touching=False)
     start, slope = sides.up[first.up], sides.up_slope[first.up]
     # 1 / T^2 on the line of Q3 alone is largest at r = -3 b / m.
@@ -103,15 +93,7 @@ def thesis_s_curve(sides: Sides) -> Least:
 
 
 def least_of_law(law: Amplitude, sides: Sides) -> Least:
-    """Least duration by a law without a parameter.
-
-    Args:
-        law: s(tau), its acceleration positive in the first half and the same backwards in the second.
-        sides: bounds of a line, those at its ends positive.
-
-    Returns:
-        the duration; the ratio is a half.
-    """
+    """Least duration by a law without a parameter."""
     tau = jnp.linspace(0.0, 0.5, SAMPLES + 1)[1:-1]
 
     def smallest(start, slope):
@@ -140,16 +122,8 @@ def least_of_law(law: Amplitude, sides: Sides) -> Least:
     return Least(jnp.full_like(gain, 0.5), duration, jnp.argmin(up), jnp.argmin(down))
 
 
-def least_time(sides: Sides, *, everywhere: bool = True) -> Array:
-    """Least duration of any motion along a line from rest to rest: it accelerates at the bound, then brakes at it.
-
-    Args:
-        sides: bounds of a line, those at its ends positive and finite.
-        everywhere: whether each bound is known to hold either on the whole line or nowhere.
-
-    Returns:
-        () s; 0 where on a part of the line nothing bounds the acceleration, or a place can be passed only in motion.
-    """
+def least_time(sides: Sides, *, everywhere: bool = True) -> Float[Array, ""]:
+    """Least duration of any motion along a line from rest to rest: it accelerates at the bound, then brakes at it."""
     braking = (sides.down + sides.down_slope, -sides.down_slope)  # over s
     parts = [] if everywhere else [sides.first, sides.last]
     nodes = jnp.concatenate([_crossings(sides.up, sides.up_slope), _crossings(*braking), *parts])

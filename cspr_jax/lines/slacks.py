@@ -5,8 +5,10 @@ derivative with h^2 / l^3. Every slack here is affine in s'^2 and s'', so that f
 formulas are written once: arrays go in where a motion is searched, interval jets where it is proved.
 """
 
+from __future__ import annotations
+
 import dataclasses
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -19,6 +21,9 @@ from cspr_jax.motions.limits import limits_set
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.schema.limits import LIMITS
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float
 
 TAUT = "taut"
 
@@ -74,16 +79,8 @@ class LineSlacks:
         return [name for name in self.names if name in self.low][-1]
 
 
-def line_slacks(problem: Problem, start: Array, end: Array) -> LineSlacks:
-    """Return the coefficients that slacks along a line depend on.
-
-    Args:
-        start: (3,) from the centroid of the spools, z down, m.
-        end: (3,) likewise, elsewhere.
-
-    Returns:
-        the coefficients.
-    """
+def line_slacks(problem: Problem, start: Float[Array, "3"], end: Float[Array, "3"]) -> LineSlacks:
+    """Return the coefficients that slacks along a line depend on."""
     robot, direction = problem.robot, end - start
     faces = line_faces(robot, start, end, in_plane=False)
     square = direction @ direction
@@ -148,18 +145,7 @@ class Instants(NamedTuple):
 
 
 def slacks(line: LineSlacks, name: str, at: Instants, tensions: Any = None) -> Any:
-    """Slacks of a group at instants, or a lower bound of them.
-
-    Args:
-        line: of the line, with leading dimensions of the instants or none.
-        at: the instants, (..., 1).
-        tensions: of a group of faces, (..., n_faces, n_cables) over the mass: of `tensions_at`, or of `tensions_over`
-            for a lower bound.
-
-    Returns:
-        (..., n_rows): distances from the faces in m/s^2, positive inside, inf of a face that bounds nothing; of limits
-        of a motion without a unit, of speeds 1 - (rate / limit)^2.
-    """
+    """Slacks of a group at instants, or a lower bound of them."""
     if name == "speed_max":
         return 1.0 - at.speed * (line.square[..., None] / line.largest[name] ** 2)
     if name == "acceleration_max":
@@ -188,33 +174,17 @@ def _pulled(line: LineSlacks, s: Any, shortness: Any, tensions: Any) -> Any:
 
 
 def tensions_at(line: LineSlacks, name: str, s: Any) -> Any:
-    """Tensions within their limits that pull least towards the inside of each face.
-
-    Args:
-        name: of a group of faces.
-        s: (..., 1) path coordinates.
-
-    Returns:
-        (..., n_faces, n_cables) over the mass, m/s^2; inf where nothing is the least.
-    """
+    """Tensions within their limits that pull least towards the inside of each face."""
     xp = np if isinstance(s, np.ndarray) else jnp
     low, high = line.low[name][..., None, :], line.high[name][..., None, :]
     along = line.along + line.along_change * s[..., None]
     return xp.where(along > 0.0, low, xp.where(along < 0.0, high, 0.0))
 
 
-def tensions_over(line: LineSlacks, name: str, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """One choice of tensions for all of a stretch, with which slacks are bounded from below.
-
-    Args:
-        line: of the lines, with a leading dimension.
-        name: of a group of faces.
-        first: (n, 1) where the stretches begin.
-        last: (n, 1) where they end.
-
-    Returns:
-        the tensions, (n, n_faces, n_cables) over the mass; (n, n_faces) whether a face bounds nothing on the stretch.
-    """
+def tensions_over(
+    line: LineSlacks, name: str, first: Float[np.ndarray, "n 1"], last: Float[np.ndarray, "n 1"]
+) -> tuple[Float[np.ndarray, "n n_faces n_cables"], Bool[np.ndarray, "n n_faces"]]:
+    """One choice of tensions for all of a stretch, with which slacks are bounded from below."""
     low, high = line.low[name][:, None, :], line.high[name][:, None, :]
     ends = [line.along + line.along_change * s[..., None] for s in (first, last)]
     endless = ~np.isfinite(high)
@@ -223,15 +193,7 @@ def tensions_over(line: LineSlacks, name: str, first: np.ndarray, last: np.ndarr
 
 
 def joined(first: Any, second: Any) -> Any:
-    """Rows of two groups in one.
-
-    Args:
-        first: (..., n) arrays or jets.
-        second: likewise.
-
-    Returns:
-        (..., 2 n).
-    """
+    """Rows of two groups in one."""
     if isinstance(first, Jet):
         return first.joined(second)
     xp = np if isinstance(first, np.ndarray) else jnp

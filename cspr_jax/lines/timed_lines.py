@@ -1,7 +1,9 @@
 """Straight lines from rest to rest in the least time: arrays of ends in, answers out."""
 
+from __future__ import annotations
+
 import dataclasses
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax
 import numpy as np
@@ -13,6 +15,9 @@ from cspr_jax.lines.motion import TimedLine
 from cspr_jax.lines.verdicts import laws_of
 from cspr_jax.motions.answers import Answers
 from cspr_jax.motions.problem import Problem
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,24 +55,14 @@ class LineAnswers(Answers):
 
 def timed_lines(
     problem: Problem,
-    starts: np.ndarray,
-    ends: np.ndarray,
+    starts: Float[np.ndarray, "n 3"],
+    ends: Float[np.ndarray, "n 3"],
     *,
     law: str = "s-curve",
     rule: Rule = "optimum",
     max_acceleration: float = np.inf,
 ) -> LineAnswers:
-    """The fastest motions along straight lines by a law of time, proved.
-
-    Args:
-        starts: (n, 3) from the centroid of the spools, z down, m; at rest.
-        ends: (n, 3) likewise, elsewhere.
-        law: one of `lines.motion.LAWS`.
-        max_acceleration: largest size of the acceleration, m/s^2.
-
-    Returns:
-        the answers, margins in m/s^2; durations are NaN where there is no motion.
-    """
+    """The fastest motions along straight lines by a law of time, proved."""
     timings, judgements, moves = fastest(
         problem, starts, ends, law=law, rule=rule, max_acceleration=max_acceleration, sharp=True
     )
@@ -89,17 +84,10 @@ def timed_lines(
     )
 
 
-def motions_of(answers: LineAnswers, starts: np.ndarray, ends: np.ndarray, *, law: str) -> list[TimedLine]:
-    """Motions along straight lines.
-
-    Args:
-        starts: (n, 3) from the centroid of the spools, z down, m.
-        ends: (n, 3) likewise.
-        law: one of `lines.motion.LAWS`.
-
-    Returns:
-        one for each line; not finite where there is no motion.
-    """
+def motions_of(
+    answers: LineAnswers, starts: Float[np.ndarray, "n 3"], ends: Float[np.ndarray, "n 3"], *, law: str
+) -> list[TimedLine]:
+    """Motions along straight lines."""
     with np.errstate(invalid="ignore"):
         ratios = answers.acceleration_time / answers.duration
     laws = laws_of(law, np.where(np.isfinite(ratios), ratios, 0.5))

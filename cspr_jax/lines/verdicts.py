@@ -1,7 +1,9 @@
 """Verdicts of motions along straight lines: proved where every slack has a bound above zero, refuted by one below."""
 
+from __future__ import annotations
+
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax
 import jax.numpy as jnp
@@ -22,6 +24,9 @@ from cspr_jax.robots.point_mass import spool_radius
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # Margins nearer to zero, over gravity or a limit's size, are undecided; rest with a smaller margin does not count.
 TOLERANCE = 1e-12
 
@@ -31,16 +36,8 @@ def _s_curves(ratios) -> Amplitude:
     return jax.vmap(s_curve)(ratios)
 
 
-def laws_of(law: str, ratios: np.ndarray) -> Amplitude:
-    """Laws of time.
-
-    Args:
-        law: one of `lines.motion.LAWS`.
-        ratios: (n,) p / T of the S-model.
-
-    Returns:
-        NumPy leaves with a leading dimension n.
-    """
+def laws_of(law: str, ratios: Float[np.ndarray, "n"]) -> Amplitude:
+    """Laws of time."""
     if law == "s-curve":
         return in_batches(_s_curves, ratios, size=BATCH)
     one = jax.tree.map(np.asarray, fixed_law(law))
@@ -48,18 +45,14 @@ def laws_of(law: str, ratios: np.ndarray) -> Amplitude:
 
 
 def acceleration_slack(
-    starts: np.ndarray, ends: np.ndarray, timings: Durations, *, law: str, max_acceleration: float
-) -> np.ndarray:
-    """Slack of the largest acceleration along lines: a closed form, since the peak of s'' of each law is known.
-
-    Args:
-        starts: (n, 3) m.
-        ends: (n, 3) m.
-        max_acceleration: m/s^2.
-
-    Returns:
-        (n,) 1 - (largest acceleration) / max_acceleration; NaN without a duration.
-    """
+    starts: Float[np.ndarray, "n 3"],
+    ends: Float[np.ndarray, "n 3"],
+    timings: Durations,
+    *,
+    law: str,
+    max_acceleration: float,
+) -> Float[np.ndarray, "n"]:
+    """Slack of the largest acceleration along lines: a closed form, since the peak of s'' of each law is known."""
     largest = np.linalg.norm(ends - starts, axis=1) * largest_bend(law, timings.ratio)
     with np.errstate(invalid="ignore", divide="ignore"):
         return 1.0 - largest / timings.duration**2 / max_acceleration
@@ -67,26 +60,15 @@ def acceleration_slack(
 
 def verdicts(
     problem: Problem,
-    starts: np.ndarray,
-    ends: np.ndarray,
+    starts: Float[np.ndarray, "n 3"],
+    ends: Float[np.ndarray, "n 3"],
     timings: Durations,
     *,
     law: str,
     max_acceleration: float,
     sharp: bool,
 ) -> Verdicts:
-    """Verdicts of motions whose durations are known.
-
-    Args:
-        starts: (n, 3) m.
-        ends: (n, 3) m, elsewhere.
-        timings: finite durations.
-        max_acceleration: largest size of the acceleration, m/s^2; a motion beyond it is undecided.
-        sharp: whether margins must be sharp; else only verdicts count.
-
-    Returns:
-        the verdicts.
-    """
+    """Verdicts of motions whose durations are known."""
     gravity = float(np.asarray(problem.robot.gravity))
     lines = lines_of(problem, starts, ends)
     enough = np.inf if sharp else TOLERANCE
@@ -120,16 +102,10 @@ def _at_ends(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> tuple[np
     return room, flags, ~(room > TOLERANCE)
 
 
-def limits_at_rest(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Limits that rest at either end breaks.
-
-    Args:
-        starts: (n, 3) m.
-        ends: (n, 3) m.
-
-    Returns:
-        (n,) flags of `Verdict`.
-    """
+def limits_at_rest(
+    problem: Problem, starts: Float[np.ndarray, "n 3"], ends: Float[np.ndarray, "n 3"]
+) -> Float[np.ndarray, "n"]:
+    """Limits that rest at either end breaks."""
     _, flags, _ = _at_ends(problem, starts, ends)
     limits = {
         row.name: getattr(problem.limits, row.name) for row in limits_set(problem.limits) if row.quantity == "tension"

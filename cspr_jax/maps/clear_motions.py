@@ -10,18 +10,7 @@ from cspr_jax.robots.clearance import Scene
 def clear_motions(
     problem: Problem, scene: Scene, join: Join, count: int, *, max_arcs: int, step: int = 1
 ) -> dict[str, np.ndarray]:
-    """Columns of a map among obstacles.
-
-    Args:
-        scene: in the robot's axes.
-        join: gives answers without obstacles, and `SeveralMotions`, of some cells.
-        count: number of cells.
-        step: between numbers of arcs.
-
-    Returns:
-        (count, ...) each: those of the answers, and the smallest clearance, m, NaN of motions that are not feasible
-        without obstacles.
-    """
+    """Columns of a map among obstacles."""
     judge = Judge(problem, scene, intervals=False)
     answers, proofs, _ = judge.smallest(join, np.zeros(count, int), step=step, max_arcs=max_arcs)
     clearance = np.array([np.nan if proof is None else proof.proof.high.min() for proof in proofs])

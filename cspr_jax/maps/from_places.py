@@ -7,15 +7,7 @@ from cspr_jax.maps.grid_map import PointMassMap
 
 
 def check_place(robot_file: RobotFile, keys: SweepFile, file: object, *, rests: bool = False) -> None:
-    """Refuse a start that is no place of a robot.
-
-    Args:
-        file: named in errors.
-        rests: whether the start may be at rest in P0.
-
-    Raises:
-        ConfigError: such a start.
-    """
+    """Refuse a start that is no place of a robot."""
     start = keys.trajectory.start
     if robot_file.is_planar and start is not None and start.position is not None and start.position[1] != 0.0:
         raise ConfigError(file, "trajectory.from.position: must have y = 0: a planar robot")

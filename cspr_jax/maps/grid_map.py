@@ -1,7 +1,9 @@
 """Base of all maps of a sweep: robot, limits, amplitude function, and the targets of a grid."""
 
+from __future__ import annotations
+
 import abc
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -16,6 +18,9 @@ from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.point_mass import AT_P0, plane_normal, rest_point, spool_radius
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import FLAGS, NOT_PROVED, Verdict
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float
 
 # How far a refined margin may lie below the bound proved for it.
 ROUNDING = 1e-8
@@ -67,43 +72,18 @@ class GridMap(abc.ABC):
 
     @abc.abstractmethod
     def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Answers of the cells of a tile.
-
-        Args:
-            cells: (n,) coordinates for each axis, in the file's axes.
-
-        Returns:
-            (n,) for each quantity.
-        """
+        """Answers of the cells of a tile."""
 
     @abc.abstractmethod
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Cells whose numbers contradict each other, as a broken processor, driver or compiler gives them.
-
-        Args:
-            answers: (n,) each.
-
-        Returns:
-            for each kind of contradiction, (n,) where it is.
-        """
+        """Cells whose numbers contradict each other, as a broken processor, driver or compiler gives them."""
 
     def undecided(self, answers: dict[str, np.ndarray]) -> int | None:
-        """Number of cells whose answer is not proved: a feasible motion, the smallest number of arcs, or none at all.
-
-        Args:
-            answers: (n,) each.
-
-        Returns:
-            the number; None: the map proves nothing.
-        """
+        """Number of cells without a proved answer: a feasible motion, the smallest number of arcs, or none at all."""
         return int(((answers["verdict"] & NOT_PROVED) != 0).sum()) if self.proves else None
 
     def refuse_hopeless(self, grid: Grid) -> None:
-        """Refuse a grid in which no cell can have an answer, as where all targets are out of reach.
-
-        Raises:
-            ConfigError: what is wrong with all cells.
-        """
+        """Refuse a grid in which no cell can have an answer, as where all targets are out of reach."""
         self._refuse_out_of_reach(self._targets(self._corners(grid, _OF_TARGETS)), "axes")
 
     def _refuse_out_of_plane(self, grid: Grid) -> None:
@@ -215,15 +195,7 @@ class PointMassMap(GridMap):
         }
 
 
-def exceeds(bound: np.ndarray, margin: np.ndarray) -> np.ndarray:
-    """Tell where a bound is above its margin, but for rounding; cables that span too little have a margin of -inf.
-
-    Args:
-        bound: (n,) proved.
-        margin: (n,) in the same unit.
-
-    Returns:
-        (n,) whether it is.
-    """
+def exceeds(bound: Float[np.ndarray, "n"], margin: Float[np.ndarray, "n"]) -> Bool[np.ndarray, "n"]:
+    """Tell where a bound is above its margin, but for rounding; cables that span too little have a margin of -inf."""
     with np.errstate(invalid="ignore"):
         return bound > margin + ROUNDING * (1.0 + np.abs(margin))

@@ -78,14 +78,7 @@ class ProvedMap(GridMap):
 
 
 def proved_columns(answers: ProvedAnswers) -> dict[str, np.ndarray]:
-    """Columns of a map of proved motions.
-
-    Args:
-        answers: of n motions.
-
-    Returns:
-        (n,) for each quantity but those of time.
-    """
+    """Columns of a map of proved motions."""
     columns = {name: getattr(answers, name) for name in ("verdict", "tolerated", "not_tolerated")}
     columns |= {name: getattr(answers, source) for name, source in _COLUMNS.items()}
     clear = np.array([proof.least(proof.proof.high, CONTACTS) for proof in answers.proof])
@@ -93,14 +86,7 @@ def proved_columns(answers: ProvedAnswers) -> dict[str, np.ndarray]:
 
 
 def joined_columns(parts: list[tuple[np.ndarray, dict[str, np.ndarray]]]) -> dict[str, np.ndarray]:
-    """Columns of all cells from those of some.
-
-    Args:
-        parts: (n,) masks of cells, and their columns; together they are all.
-
-    Returns:
-        (n,) for each quantity.
-    """
+    """Columns of all cells from those of some."""
     joined = {name: np.empty(len(parts[0][0]), column.dtype) for name, column in parts[0][1].items()}
     for rows, columns in parts:
         for name, column in columns.items():

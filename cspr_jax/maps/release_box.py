@@ -28,19 +28,7 @@ class ReleaseBox(NamedTuple):
 
 
 def box_of(robot: PointMassRobot, frame: Frame, releases: Sequence[Range] = (None, None, None)) -> ReleaseBox:
-    """Bounds of places of release.
-
-    Args:
-        robot: centred.
-        releases: least and largest x, y and z of the release, in the axes of the robot file, m; None: as far aside as
-            `ASIDE`, and as deep as `DEEP`, times the size of the robot.
-
-    Returns:
-        the bounds.
-
-    Raises:
-        InputError: a planar robot whose y is not 0.
-    """
+    """Bounds of places of release."""
     size = float(spool_radius(robot))
     aside = 0.0 if robot.dof == PLANAR else ASIDE * size
     corners = frame.outward([[-ASIDE * size, -aside, 0.0], [ASIDE * size, aside, DEEP * size]])

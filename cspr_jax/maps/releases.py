@@ -42,10 +42,6 @@ class Releases(Columns):
         return np.stack([self.release_x, self.release_y, self.release_z], axis=1)
 
     def placed(self, frame: Frame) -> Self:
-        """The same, with the places of the releases in other axes.
-
-        Returns:
-            the releases.
-        """
+        """The same, with the places of the releases in other axes."""
         x, y, z = frame.outward(self.releases).T
         return dataclasses.replace(self, release_x=x, release_y=y, release_z=z)

@@ -12,10 +12,6 @@ class ReleasesMap(FromPlacesMap):
     any_cables = True
 
     def refuse_hopeless(self, grid: Grid) -> None:
-        """Refuse places that are all out of reach, since objects may land anywhere; see `GridMap.refuse_hopeless`.
-
-        Raises:
-            ConfigError: what is wrong with all places.
-        """
+        """Refuse places that are all out of reach, since objects may land anywhere; see `GridMap.refuse_hopeless`."""
         self._refuse_out_of_plane(grid)
         self._refuse_out_of_reach(self._starts(self._corners(grid, _START)), "trajectory.from")

@@ -4,8 +4,10 @@ A place belongs to the static workspace if no cable has to push at rest there, t
 tensions at rest also keep their limits, to the wrench-closure workspace if the cables can resist any force.
 """
 
+from __future__ import annotations
+
 import itertools
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -17,37 +19,24 @@ from cspr_jax.robots.point_mass import PointMassRobot, is_planar, plane_normal
 from cspr_jax.robots.wrench_sets import Faces, acceleration_faces, tension_range
 from cspr_jax.schema.verdicts import Verdict
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # Margins nearer to zero than this, over gravity, are undecided.
 TOLERANCE = 1e-9
 # Components of unit normals below this count as zero.
 LEVEL = 1e-12
 
 
-def faces_at(robot: PointMassRobot, limits: Limits, position: Array) -> Faces:
-    """Faces of the set of feasible accelerations at one place.
-
-    Args:
-        robot: a point mass, centred, z down.
-        limits: smallest and largest tensions count.
-        position: (3,) m.
-
-    Returns:
-        the faces.
-    """
+def faces_at(robot: PointMassRobot, limits: Limits, position: Float[Array, "3"]) -> Faces:
+    """Faces of the set of feasible accelerations at one place."""
     return acceleration_faces(robot, position, *tension_range(robot, limits))
 
 
-def verdict(robot: PointMassRobot, faces: Faces, position: Array, acceleration: Array) -> Array:
-    """Verdict of an acceleration at one place.
-
-    Args:
-        robot: a point mass, centred, z down.
-        position: (3,) m.
-        acceleration: (3,) m/s^2.
-
-    Returns:
-        () flags of `Verdict`; 0 is feasible.
-    """
+def verdict(
+    robot: PointMassRobot, faces: Faces, position: Float[Array, "3"], acceleration: Float[Array, "3"]
+) -> Float[Array, ""]:
+    """Verdict of an acceleration at one place."""
     margin = faces.margin(acceleration)
     doubt = jnp.maximum(TOLERANCE * robot.gravity, faces.rounding(acceleration))
     broken = faces.slacks(acceleration) < -doubt
@@ -91,17 +80,8 @@ class AccelerationReach(NamedTuple):
     downward_acceleration: Array
 
 
-def reach(robot: PointMassRobot, limits: Limits, position: Array) -> AccelerationReach:
-    """Feasible accelerations at one place.
-
-    Args:
-        robot: a point mass, centred, z down.
-        limits: smallest and largest tensions count.
-        position: (3,) m.
-
-    Returns:
-        the numbers; accelerations from rest are 0 where rest is not feasible, infinite where nothing bounds them.
-    """
+def reach(robot: PointMassRobot, limits: Limits, position: Float[Array, "3"]) -> AccelerationReach:
+    """Feasible accelerations at one place."""
     faces, cone = faces_at(robot, limits, position), faces_at(robot, NO_LIMITS, position)
     still = jnp.zeros_like(position)
     slack, margin = faces.slacks(still), faces.margin(still)
@@ -153,18 +133,10 @@ def _largest_level(faces: Faces, planar: bool) -> Array:
     return jnp.where(faces.is_regular, jnp.where(is_open & inside.any(), jnp.inf, largest), 0.0)
 
 
-def along(robot: PointMassRobot, limits: Limits, position: Array, direction: Array) -> Array:
-    """Accelerations along a direction that are feasible at one place, Boralugoda (15) to (21) and figure 4.1.
-
-    Args:
-        robot: a point mass, centred, z down.
-        limits: smallest and largest tensions count.
-        position: (3,) m.
-        direction: (3,) of unit length.
-
-    Returns:
-        (2,) the smallest and the largest acceleration, m/s^2; infinite where nothing bounds it, NaN if there is none.
-    """
+def along(
+    robot: PointMassRobot, limits: Limits, position: Float[Array, "3"], direction: Float[Array, "3"]
+) -> Float[Array, "2"]:
+    """Accelerations along a direction that are feasible at one place, Boralugoda (15) to (21) and figure 4.1."""
     faces = faces_at(robot, limits, position)
     steep = faces.normals @ direction
     ends = faces.offsets / jnp.where(jnp.abs(steep) > LEVEL, steep, 1.0)
@@ -175,15 +147,6 @@ def along(robot: PointMassRobot, limits: Limits, position: Array, direction: Arr
 
 
 @jax.jit
-def reaches(robot: PointMassRobot, limits: Limits, positions: Array) -> AccelerationReach:
-    """Feasible accelerations at many places.
-
-    Args:
-        robot: a point mass, centred, z down.
-        limits: smallest and largest tensions count.
-        positions: (n, 3) m.
-
-    Returns:
-        the numbers, (n,) each.
-    """
+def reaches(robot: PointMassRobot, limits: Limits, positions: Float[Array, "n 3"]) -> AccelerationReach:
+    """Feasible accelerations at many places."""
     return jax.vmap(lambda position: reach(robot, limits, position))(positions)

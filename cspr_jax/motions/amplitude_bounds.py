@@ -1,13 +1,18 @@
 """Affine bounds of amplitude functions, and of other laws of normalised time, over blocks of time."""
 
+from __future__ import annotations
+
 import math
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from cspr_jax.arithmetic.affine_bounds import ROUNDING, AffineBounds
 from cspr_jax.arithmetic.piecewise_bounds import bernstein_of_powers, overlaps, piecewise_bounds
 from cspr_jax.motions.amplitudes import Amplitude
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 
 class TimeBounds(NamedTuple):
@@ -22,35 +27,16 @@ class TimeBounds(NamedTuple):
     values: tuple[AffineBounds, ...]
 
 
-def normalised(duration: Any, start: np.ndarray, end: np.ndarray) -> AffineBounds:
-    """Bounds of the normalised time over blocks.
-
-    Args:
-        duration: () or (k,) s.
-        start: (k,) s.
-        end: (k,) s, later than `start`.
-
-    Returns:
-        (k,).
-    """
+def normalised(duration: Any, start: Float[np.ndarray, "k"], end: Float[np.ndarray, "k"]) -> AffineBounds:
+    """Bounds of the normalised time over blocks."""
     first, last = (np.clip(np.asarray(x) / np.asarray(duration, float), 0.0, 1.0) for x in (start, end))
     return AffineBounds(0.5 * (first + last), 0.5 * (last - first), np.full(len(first), ROUNDING))
 
 
 def time_bounds(
-    amplitude: Amplitude, duration: Any, start: np.ndarray, end: np.ndarray, *, orders: int = 3
+    amplitude: Amplitude, duration: Any, start: Float[np.ndarray, "k"], end: Float[np.ndarray, "k"], *, orders: int = 3
 ) -> TimeBounds:
-    """Bounds of an amplitude function over blocks of time.
-
-    Args:
-        duration: () of the motion, or (k,) of the motion of each block, s.
-        start: (k,) s.
-        end: (k,) s, later than `start`.
-        orders: how many functions: A, and its derivatives below this order.
-
-    Returns:
-        the bounds.
-    """
+    """Bounds of an amplitude function over blocks of time."""
     tau = normalised(duration, start, end)
     knots = np.concatenate([[0.0], np.asarray(amplitude.knots, float), [1.0]])
     pieces, errors = _pieces(amplitude, knots, orders)

@@ -4,9 +4,12 @@ Each is a piecewise polynomial: values and derivatives are exact, a new function
 largest value of any derivative is known, which proofs between samples need.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -17,6 +20,9 @@ from cspr_jax.arithmetic.elementary import leaf, polynomial
 from cspr_jax.errors import InputError
 from cspr_jax.errors.suggestions import one_of
 from cspr_jax.runtime.persistent_jit import persistent_jit
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 HIGHEST_DERIVATIVE = 5
 NAMES = ("A1", "quintic", "A2", "A3", "effective", "effective-c3", "ideal")
@@ -52,16 +58,8 @@ class Amplitude:
     highest: Array
     name: str = ""
 
-    def at(self, tau, order: int = 0) -> Array:
-        """Value of A, or of one of its derivatives with respect to tau.
-
-        Args:
-            tau: (...) normalised time in [0, 1].
-            order: of the derivative, at most 5; 0: A itself.
-
-        Returns:
-            (...) in the precision that jax is set to.
-        """
+    def at(self, tau, order: int = 0) -> Float[Array, "..."]:
+        """Value of A, or of one of its derivatives with respect to tau."""
         return derivatives(self, jnp.asarray(tau, float), order=order)[order]
 
 
@@ -71,16 +69,8 @@ jax.tree_util.register_dataclass(Amplitude, _FIELDS[:-1], [], drop_fields=["name
 
 
 @persistent_jit(static_argnames="order")
-def derivatives(amplitude: Amplitude, tau: Array, *, order: int) -> tuple[Array, ...]:
-    """A and its derivatives with respect to tau.
-
-    Args:
-        tau: (...) normalised time in [0, 1]; a knot belongs to the piece on its right.
-        order: of the highest derivative, at most 5.
-
-    Returns:
-        (A, A', ..., A^(order)), each (...), in the dtype of `tau`.
-    """
+def derivatives(amplitude: Amplitude, tau: Float[Array, "..."], *, order: int) -> tuple[Float[Array, "..."], ...]:
+    """A and its derivatives with respect to tau."""
     table = amplitude.coefficients.astype(tau.dtype)
     origins = amplitude.origins.astype(tau.dtype)
     local = jnp.broadcast_to(origins[0], tau.shape)
@@ -95,19 +85,10 @@ def derivatives(amplitude: Amplitude, tau: Array, *, order: int) -> tuple[Array,
     )
 
 
-def local_bounds(amplitude: Amplitude, middle: Array, radius: Array) -> tuple[Array, ...]:
-    """Upper bounds of |A|, |A'|, ..., |A''''| on an interval that holds no knot inside.
-
-    Each bound is the value in the middle plus the radius times the largest next derivative (mean value theorem), and
-    never more than the largest value over [0, 1].
-
-    Args:
-        middle: (...) middle of the interval.
-        radius: (...) half of its width.
-
-    Returns:
-        five arrays (...).
-    """
+def local_bounds(
+    amplitude: Amplitude, middle: Float[Array, "..."], radius: Float[Array, "..."]
+) -> tuple[Float[Array, "..."], ...]:
+    """Upper bounds of |A|, |A'|, ..., |A''''| on an interval that holds no knot inside."""
     values = derivatives(amplitude, middle, order=HIGHEST_DERIVATIVE - 1)
     largest = amplitude.largest.astype(middle.dtype)
     return tuple(jnp.minimum(jnp.abs(v) + radius * largest[j + 1], largest[j]) for j, v in enumerate(values))
@@ -116,16 +97,7 @@ def local_bounds(amplitude: Amplitude, middle: Array, radius: Array) -> tuple[Ar
 def from_pieces(
     name: str, knots: Sequence[float], origins: Sequence[float], pieces: Sequence[Sequence[float]]
 ) -> Amplitude:
-    """Amplitude function from its pieces, with its extreme values computed.
-
-    Args:
-        knots: (n_pieces - 1,) increasing, inside ]0, 1[.
-        origins: (n_pieces,).
-        pieces: n_pieces sequences of coefficients, lowest power first.
-
-    Returns:
-        the amplitude function, float64.
-    """
+    """Amplitude function from its pieces, with its extreme values computed."""
     table = np.zeros((len(pieces), max(COLUMNS, *(len(piece) for piece in pieces))))
     for row, piece in zip(table, pieces, strict=True):
         row[: len(piece)] = piece
@@ -206,31 +178,14 @@ def _with_straight_middle(name: str, epsilon: float) -> Amplitude:
 
 
 def from_polynomial(coefficients: Sequence[float]) -> Amplitude:
-    """Amplitude function of a user, c[0] + c[1] tau + c[2] tau^2 + ...
-
-    Args:
-        coefficients: at least one finite number, lowest power first, at most 20.
-
-    Returns:
-        the amplitude function; its boundary conditions are checked by the trajectory that uses it.
-
-    Raises:
-        InputError: no coefficient, too many, or one that is not finite.
-    """
+    """Amplitude function of a user, c[0] + c[1] tau + c[2] tau^2 + ..."""
     if not 1 <= len(coefficients) <= 20 or not all(abs(c) <= LARGEST_COEFFICIENT for c in coefficients):
         raise InputError("polynomial", list(coefficients), "1 to 20 coefficients of at most 1e9, lowest power first")
     return from_pieces("polynomial", (), (0.0,), (tuple(coefficients),))
 
 
 def boundary_errors(amplitude: Amplitude, *, free_end: bool = False) -> list[str]:
-    """The conditions of thesis (2.49) that a function breaks: A(0) = 0, A(1) = 1, A' and A'' zero at both ends.
-
-    Args:
-        free_end: whether A''(1) may be anything: then the conditions are (1.27) and (1.28), those of a transition.
-
-    Returns:
-        one text such as "A''(1) = -12, must be 0" for each broken condition.
-    """
+    """The conditions of thesis (2.49) that a function breaks: A(0) = 0, A(1) = 1, A' and A'' zero at both ends."""
     first, last = np.asarray(amplitude.coefficients)[[0, -1]]
     errors = []
     for tau, row, origin in ((0, first, amplitude.origins[0]), (1, last, amplitude.origins[-1])):

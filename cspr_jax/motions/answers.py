@@ -1,13 +1,18 @@
 """Answers about segments of motions: the record that every family returns."""
 
+from __future__ import annotations
+
 import dataclasses
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.motions.cause import Cause
 from cspr_jax.schema.columns import Columns
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float
 
 AnyAnswers = TypeVar("AnyAnswers", bound="Answers")
 
@@ -46,72 +51,32 @@ class Answers(Columns):
         """Tell whether each segment is proved feasible, (n,)."""
         return self.arcs > 0
 
-    def rows(self: AnyAnswers, index: np.ndarray) -> AnyAnswers:
-        """Some of the answers.
-
-        Args:
-            index: (m,) their numbers, or a mask (n,).
-
-        Returns:
-            the answers.
-        """
+    def rows(self: AnyAnswers, index: Bool[np.ndarray, "m"]) -> AnyAnswers:
+        """Some of the answers."""
         return type(self)(**{name: values[index] for name, values in vars(self).items()})
 
     def details(self, i: int) -> dict[str, Any]:
-        """Details of a segment that only this kind of answers has, by their names in a plan's JSON.
-
-        Args:
-            i: number of the segment.
-
-        Returns:
-            plain values.
-        """
+        """Details of a segment that only this kind of answers has, by their names in a plan's JSON."""
         return {}
 
     def every_section(self) -> list[Any]:
-        """Sections of paths that the segments run along.
-
-        Returns:
-            `paths.answers.SectionAnswer` of each, in their order; none of other families.
-        """
+        """Sections of paths that the segments run along."""
         return []
 
     def proved_causes(self, i: int, frame: Frame) -> tuple[Cause, ...] | None:
-        """Causes why a segment is not feasible, where the family knows them itself.
-
-        Args:
-            i: number of the segment.
-            frame: of the robot file, in whose axes causes are.
-
-        Returns:
-            the causes, the worst one first; None: they are to be sought along its motion.
-        """
+        """Causes why a segment is not feasible, where the family knows them itself."""
         return None
 
 
 def joined(parts: list[AnyAnswers]) -> AnyAnswers:
-    """Answers of several parts as one record.
-
-    Args:
-        parts: at least one.
-
-    Returns:
-        the answers, those of one part after the other.
-    """
+    """Answers of several parts as one record."""
     return type(parts[0])(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])})
 
 
-def replaced(answers: AnyAnswers, rows: np.ndarray, others: Answers, chosen: np.ndarray) -> AnyAnswers:
-    """Answers, some of which others replace.
-
-    Args:
-        rows: (m,) numbers of the answers that are replaced.
-        others: have at least the same columns.
-        chosen: (m,) numbers of the others in their place.
-
-    Returns:
-        the answers.
-    """
+def replaced(
+    answers: AnyAnswers, rows: Float[np.ndarray, "m"], others: Answers, chosen: Float[np.ndarray, "m"]
+) -> AnyAnswers:
+    """Answers, some of which others replace."""
     columns = {name: np.array(values) for name, values in vars(answers).items()}
     for name, values in columns.items():
         values[rows] = getattr(others, name)[chosen]

@@ -31,15 +31,7 @@ AnyProved = TypeVar("AnyProved", bound=ProvedAnswers)
 def with_attained(
     problem: Problem, answers: AnyProved, motions: Sequence[Motion], scene: Scene | None = None
 ) -> AnyProved:
-    """Answers whose margins and causes are those that motions attain.
-
-    Args:
-        motions: n of them, as for `attained`.
-        scene: bodies that can meet, as for `attained`; None: the cables of a platform alone.
-
-    Returns:
-        the answers.
-    """
+    """Answers whose margins and causes are those that motions attain."""
     proofs = np.array(answers.proof)
     for i, motion in enumerate(motions):
         proofs[i] = attained(problem, motion, answers.proof[i], scene)
@@ -49,16 +41,7 @@ def with_attained(
 def attained(
     problem: Problem, motion: Motion, case: MotionProof, scene: Scene | None = None, *, contacts_alone: bool = False
 ) -> MotionProof:
-    """A proof whose smallest slacks, and their times, are those that the motion attains.
-
-    Args:
-        motion: that is proved, from the centroid of the spools, z down.
-        scene: bodies that can meet, as its proof takes them; None: the cables of a platform alone.
-        contacts_alone: whether the proof is of contacts alone.
-
-    Returns:
-        the proof.
-    """
+    """A proof whose smallest slacks, and their times, are those that the motion attains."""
     proof, duration = case.proof, float(motion.duration())
     columns = _nearest(case)
     if proof.near is None or not len(columns) or not np.isfinite(duration):

@@ -5,12 +5,17 @@ level, or the upper one below zero, needs no second look. Where the rest is a sm
 there; the rest shrinks with the square of its length at a simple root, while halves would take a step for each digit.
 """
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cspr_jax.arithmetic.affine_bounds import ROUNDING
 from cspr_jax.motions.block_slacks import BlockSlacks
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Complex, Float
 
 # A block is halved unless the rest is a smaller part of it than this; the rest is widened by this part of the block.
 SMALL, WIDER = 0.5, 1e-3
@@ -32,36 +37,18 @@ class TimeBlocks(NamedTuple):
     slacks: BlockSlacks
 
     def taken(self, chosen: np.ndarray) -> "TimeBlocks":
-        """Some of the blocks.
-
-        Args:
-            chosen: (k,) mask, or (m,) numbers.
-
-        Returns:
-            them.
-        """
+        """Some of the blocks."""
         slacks = BlockSlacks(*(bounds[chosen] for bounds in self.slacks))
         return TimeBlocks(self.motion[chosen], self.start[chosen], self.end[chosen], slacks)
 
-    def undecided(self) -> np.ndarray:
-        """Tell which criteria are neither met nor broken throughout.
-
-        Returns:
-            (k, n_criteria) mask.
-        """
+    def undecided(self) -> Bool[np.ndarray, "k n_criteria"]:
+        """Tell which criteria are neither met nor broken throughout."""
         return ~((self.slacks.low > 0.0) | (self.slacks.high < 0.0))
 
-    def rest(self, level: np.ndarray, matters: np.ndarray, *, has_upper: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Part of each block outside of which no lower line is below a level, or the upper one is below zero.
-
-        Args:
-            level: (k, n_criteria).
-            matters: (k, n_criteria) mask of the criteria that are looked at.
-            has_upper: whether upper lines count.
-
-        Returns:
-            first and last: (k,) shares of the block from 0 to 1, widened a little.
-        """
+    def rest(
+        self, level: Float[np.ndarray, "k n_criteria"], matters: Bool[np.ndarray, "k n_criteria"], *, has_upper: bool
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Part of each block outside of which no lower line is below a level, or the upper one is below zero."""
         low, high, low_rise, high_rise = self.slacks
         sides = [_below(low + np.maximum(-low_rise, 0.0) - level, low_rise)]
         if has_upper:
@@ -71,17 +58,10 @@ class TimeBlocks(NamedTuple):
         first, last = first - WIDER, last + WIDER
         return np.where(first < WIDER, 0.0, first), np.where(last > 1.0 - WIDER, 1.0, last)
 
-    def cut(self, first: np.ndarray, last: np.ndarray, jumps: np.ndarray) -> "tuple[TimeBlocks, TimeBlocks]":
-        """Cut each block before and after its rest, or in two; where accelerations jump within a block, there.
-
-        Args:
-            first: (k,) shares of the block at which its rest begins, from `rest`.
-            last: (k,) where it ends.
-            jumps: (n,) complex, increasing: numbers of motions, plus i times instants at which accelerations jump, s.
-
-        Returns:
-            parts outside of the rests, with bounds; what is left to look at, with the bounds of the blocks themselves.
-        """
+    def cut(
+        self, first: Float[np.ndarray, "k"], last: Float[np.ndarray, "k"], jumps: Complex[np.ndarray, "n"]
+    ) -> "tuple[TimeBlocks, TimeBlocks]":
+        """Cut each block before and after its rest, or in two; where accelerations jump within a block, there."""
         width = self.end - self.start
         before, after = self.start + first * width, np.where(last < 1.0, self.start + last * width, self.end)
         is_cut = (last - first < SMALL) & (before < after)
@@ -108,14 +88,7 @@ class TimeBlocks(NamedTuple):
         return self._replace(slacks=BlockSlacks(low, high, level, level), **edges).taken(chosen)
 
     def no_looser_than(self, whole: BlockSlacks) -> "TimeBlocks":
-        """The blocks with the better of two bounds.
-
-        Args:
-            whole: bounds of the blocks of which these are parts.
-
-        Returns:
-            the blocks.
-        """
+        """The blocks with the better of two bounds."""
         low, high, low_rise, high_rise = self.slacks
         is_low, is_high = low < whole.low, high > whole.high
         return self._replace(
@@ -129,11 +102,7 @@ class TimeBlocks(NamedTuple):
 
 
 def joined(several: "list[TimeBlocks]") -> TimeBlocks:
-    """All blocks of several lists.
-
-    Returns:
-        the blocks.
-    """
+    """All blocks of several lists."""
     bounds = (np.concatenate(parts) for parts in zip(*(blocks.slacks for blocks in several), strict=True))
     motion, start, end = (np.concatenate(parts) for parts in zip(*(blocks[:3] for blocks in several), strict=True))
     return TimeBlocks(motion, start, end, BlockSlacks(*bounds))

@@ -4,9 +4,11 @@ A motion passes a singularity, and cables without thickness pass through each ot
 proved to happen within a block that is short enough, the slack counts as negative there.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -31,6 +33,9 @@ from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.verdicts import Verdict
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Blocks that are bounded together, with contacts and without.
 BATCH, RATES_BATCH = 64, 128
@@ -60,11 +65,7 @@ class BlockSlacks(NamedTuple):
     high_rise: np.ndarray = None  # type: ignore[assignment]
 
     def complete(self) -> "BlockSlacks":
-        """The bounds with lines, level ones where none are known.
-
-        Returns:
-            the bounds.
-        """
+        """The bounds with lines, level ones where none are known."""
         rises = (np.zeros_like(self.low) if rise is None else rise for rise in (self.low_rise, self.high_rise))
         return BlockSlacks(self.low, self.high, *rises)
 
@@ -145,15 +146,7 @@ def _rates_kernel(robot: AnyRobot, limits: Limits, states: StateBounds) -> tuple
 
 
 def tension_slacks(robot: AnyRobot, limits: Limits, matrix: AffineBounds, wrench: AffineBounds) -> list[Part]:
-    """Bounds of the slacks of tensions over one block.
-
-    Args:
-        matrix: (dof, n_cables) wrenches of unit tensions, over their units.
-        wrench: (dof,) what the cables must supply, likewise, N.
-
-    Returns:
-        the bounds; from bounds around parabolas of the smallest slack in the block, without lines.
-    """
+    """Bounds of the slacks of tensions over one block."""
     low, high = tension_range(robot, limits)
     tensions = witness_tensions(matrix, wrench, low, high)
     if robot.n_cables > robot.dof:
@@ -183,14 +176,7 @@ def _passes(robot: AnyRobot, bodies: Bodies, matrix: AffineBounds, state: StateB
 
 
 def limit_slacks(limits: Limits, state: StateBounds, cables: CableBounds) -> list[Part]:
-    """Bounds of the slacks of all other limits over one block; of speeds and accelerations that of the worse sign.
-
-    Args:
-        cables: of the same block.
-
-    Returns:
-        the bounds, as `tension_slacks` gives them.
-    """
+    """Bounds of the slacks of all other limits over one block; of speeds and accelerations that of the worse sign."""
     parts: list[Part] = []
     values = {"depth": state.position.each(lambda x: x[2:]), "length": cables.length}
     rates = {"speed": cables.rate, "acceleration": cables.acceleration}
@@ -222,25 +208,13 @@ def block_slacks(
     robot: AnyRobot,
     limits: Limits,
     bounds: Callable[[np.ndarray, np.ndarray], StateBounds],
-    start: np.ndarray,
-    end: np.ndarray,
+    start: Float[np.ndarray, "k"],
+    end: Float[np.ndarray, "k"],
     scene: Scene | None = None,
     *,
     contacts_alone: bool = False,
 ) -> BlockSlacks:
-    """Bounds of the slacks of a motion over blocks of time.
-
-    Args:
-        robot: centred, z down.
-        bounds: gives those of the motion's states over blocks, from their starts and ends, (k,) s each.
-        start: (k,) s.
-        end: (k,) s.
-        scene: bodies that can meet, in the robot's axes; None: the cables of a platform alone.
-        contacts_alone: whether the slacks are those of `criteria.contact_criteria` alone.
-
-    Returns:
-        the bounds.
-    """
+    """Bounds of the slacks of a motion over blocks of time."""
     bodies = bodies_of(robot, scene or default_scene(robot))
     slacks = partial(_kernel, robot, limits, bodies, contacts_alone=contacts_alone)
     low, high, *rises = in_batches(slacks, bounds(start, end), size=BATCH)
@@ -263,23 +237,13 @@ def block_slacks(
     return BlockSlacks(low, high, *rises)
 
 
-def rate_slacks(robot: AnyRobot, limits: Limits, states: StateBounds) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds of the smallest slacks of tensions and limits over blocks: of the first criteria alone.
-
-    Args:
-        robot: centred, z down.
-        states: over k blocks; of a robot without pulleys they may be around parabolas.
-
-    Returns:
-        (k, n) each: lower bounds, -inf where nothing is known, and upper ones, inf where nothing is known.
-    """
+def rate_slacks(
+    robot: AnyRobot, limits: Limits, states: StateBounds
+) -> tuple[Float[np.ndarray, "k n"], Float[np.ndarray, "k n"]]:
+    """Bounds of the smallest slacks of tensions and limits over blocks: of the first criteria alone."""
     return in_batches(partial(_rates_kernel, robot, limits), states, size=RATES_BATCH)
 
 
 def speed_slacks(states: StateBounds) -> BlockSlacks:
-    """Bounds of the negative speed of the mass centre over k blocks: of its slack, less what is allowed.
-
-    Returns:
-        the bounds, (k, 1) each.
-    """
+    """Bounds of the negative speed of the mass centre over k blocks: of its slack, less what is allowed."""
     return BlockSlacks(*in_batches(_speeds_kernel, states.velocity, size=RATES_BATCH))

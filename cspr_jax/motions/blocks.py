@@ -1,12 +1,17 @@
 """Blocks of motions: parts of arcs, cut at the knots of the amplitude function, and halved while undecided."""
 
+from __future__ import annotations
+
 import itertools
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cspr_jax.motions.amplitudes import Amplitude
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
 
 # A remainder of up to this share of a block does not add a block to a piece between knots.
 SLIVER = 0.3
@@ -30,15 +35,8 @@ class Blocks(NamedTuple):
         """Blocks chosen by indices, or by a mask (k,)."""
         return Blocks(*(x[rows] for x in self))
 
-    def instants(self, places: np.ndarray) -> np.ndarray:
-        """Instants at the same places of each block.
-
-        Args:
-            places: (m, 1) for all blocks, or (m, k) for each its own, from -1 at the start to 1 at the stop.
-
-        Returns:
-            (m, k) tau.
-        """
+    def instants(self, places: np.ndarray) -> Float[np.ndarray, "m k"]:
+        """Instants at the same places of each block."""
         return 0.5 * (self.start + self.stop) + places * (0.5 * (self.stop - self.start))
 
     def halves(self) -> "Blocks":
@@ -63,26 +61,14 @@ class Parts(NamedTuple):
     at_cusps: np.ndarray
     at_middles: np.ndarray
 
-    def of(self, arcs: int) -> np.ndarray:
-        """Number of parts of an arc, along a motion of so many arcs.
-
-        Returns:
-            (m,).
-        """
+    def of(self, arcs: int) -> Float[np.ndarray, "m"]:
+        """Number of parts of an arc, along a motion of so many arcs."""
         share = np.sin(math.pi * arcs * np.linspace(0.0, 1.0, len(self.at_cusps))) ** 2
         return self.at_cusps + (self.at_middles - self.at_cusps) * share
 
 
 def growing(amplitude: Amplitude, at_cusps: tuple[float, float], at_middles: tuple[float, float]) -> Parts:
-    """Number of parts of an arc along a motion from rest: more where it swings farther.
-
-    Args:
-        at_cusps: numbers at a cusp where A is 0, and where A is 1; linear in between, constant beyond.
-        at_middles: likewise halfway between two cusps.
-
-    Returns:
-        the parts.
-    """
+    """Number of parts of an arc along a motion from rest: more where it swings farther."""
     tau = np.linspace(0.0, 1.0, INSTANTS)
     piece = np.searchsorted(np.asarray(amplitude.knots), tau)
     coefficients, origins = np.asarray(amplitude.coefficients)[piece], np.asarray(amplitude.origins)[piece]
@@ -90,17 +76,8 @@ def growing(amplitude: Amplitude, at_cusps: tuple[float, float], at_middles: tup
     return Parts(*(np.interp(values, (0.0, 1.0), ramp) for ramp in (at_cusps, at_middles)))
 
 
-def parts_of_arcs(arcs: np.ndarray, knots: np.ndarray, parts: float | Parts) -> Blocks:
-    """Cut all arcs of motions into blocks.
-
-    Args:
-        arcs: (n,) number of arcs of each motion, 1 or more.
-        knots: (n_knots,) of the amplitude function, inside ]0, 1[.
-        parts: number of blocks of an arc, which the knots may change a little.
-
-    Returns:
-        the blocks, motion by motion, in the order of time.
-    """
+def parts_of_arcs(arcs: Num[np.ndarray, "n"], knots: Float[np.ndarray, "n_knots"], parts: float | Parts) -> Blocks:
+    """Cut all arcs of motions into blocks."""
     numbers, group = np.unique(arcs, return_inverse=True)
     edges = [_edges(int(p), [0.0, *knots.tolist(), 1.0], parts) for p in numbers]
     lengths = np.array([len(x) for x in edges], int)

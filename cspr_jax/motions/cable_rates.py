@@ -1,21 +1,23 @@
 """Speeds and accelerations of the cables of all robots whose spools are displaced a little, over blocks of time."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from cspr_jax.arithmetic.elementary import unit_vectors
 from cspr_jax.motions.enclosures import TOUCHED, Enclosure, Influence
 from cspr_jax.robots.limits import Limits
 
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float
 
-def rates_hold(known: Enclosure, influence: Influence, limits: Limits, spools: np.ndarray) -> np.ndarray:
-    """Prove that every cable of every robot keeps its limits of speed and acceleration within blocks.
 
-    Args:
-        spools: (k,) largest displacement of a spool, m.
-
-    Returns:
-        (k,) whether it is proved.
-    """
+def rates_hold(
+    known: Enclosure, influence: Influence, limits: Limits, spools: Float[np.ndarray, "k"]
+) -> Bool[np.ndarray, "k"]:
+    """Prove that every cable of every robot keeps its limits of speed and acceleration within blocks."""
     is_met, largest = np.ones(len(spools), bool), _limits_of_rates(limits)
     if largest is None:
         return is_met
@@ -53,16 +55,12 @@ def _along(units: np.ndarray, vectors: np.ndarray, ball: np.ndarray) -> tuple[np
     return size * np.cos(np.minimum(inclination + angle, np.pi)), size * np.cos(np.maximum(inclination - angle, 0.0))
 
 
-def rates_fail(known: Enclosure, influence: Influence, limits: Limits, spools: np.ndarray) -> np.ndarray:
+def rates_fail(
+    known: Enclosure, influence: Influence, limits: Limits, spools: Float[np.ndarray, "k"]
+) -> Float[np.ndarray, "k"]:
     """Tell whether a cable of some robot breaks a limit of speed or acceleration in the middle of each block.
 
     Spools are displaced along their rays, and across them in the direction of the velocity or the acceleration.
-
-    Args:
-        spools: (k,) displacement of the spools, m.
-
-    Returns:
-        (k,).
     """
     broken, largest = np.zeros(len(spools), bool), _limits_of_rates(limits)
     if largest is None:

@@ -54,11 +54,7 @@ class Cause:
     obstacle: str = ""
 
     def to_dict(self) -> dict[str, Any]:
-        """The cause as a plan's JSON has it.
-
-        Returns:
-            plain values.
-        """
+        """The cause as a plan's JSON has it."""
         table: dict[str, Any] = {"criterion": self.criterion, "cable": self.cables[0] if self.cables else None}
         if len(self.cables) > 1:
             table["cables"] = list(self.cables)

@@ -59,26 +59,12 @@ class Criterion(NamedTuple):
     sense: Literal["least", "most"] = "least"
 
     def value(self, slack: float) -> float:
-        """Value of the quantity that is bounded.
-
-        Args:
-            slack: (), in `unit`.
-
-        Returns:
-            () likewise.
-        """
+        """Value of the quantity that is bounded."""
         return self.allowed + slack if self.sense == "least" else self.allowed - slack
 
 
 def criteria(robot: AnyRobot, limits: Limits, scene: Scene | None = None) -> list[Criterion]:
-    """Criteria, in the order of their slacks.
-
-    Args:
-        scene: bodies that can meet, in the robot's axes; None: the cables of a platform alone.
-
-    Returns:
-        n_criteria of them.
-    """
+    """Criteria, in the order of their slacks."""
     numbers = range(robot.n_cables)
     if robot.n_cables > robot.dof:
         rows = [Criterion(Verdict.WRENCH_INFEASIBLE, (), "N")]
@@ -104,14 +90,7 @@ def criteria(robot: AnyRobot, limits: Limits, scene: Scene | None = None) -> lis
 
 
 def contact_criteria(robot: AnyRobot, limits: Limits, scene: Scene | None = None) -> list[Criterion]:
-    """Criteria of bodies that can meet: the last of all criteria.
-
-    Args:
-        scene: as for `criteria`.
-
-    Returns:
-        n_contacts of them.
-    """
+    """Criteria of bodies that can meet: the last of all criteria."""
     rows, around = [], scene or default_scene(robot)
     for kind, cable, other in meetings(robot, around):
         bodies = [k for k in (cable, other if kind == "cables" else -1) if k >= 0]
@@ -122,19 +101,11 @@ def contact_criteria(robot: AnyRobot, limits: Limits, scene: Scene | None = None
 
 
 def has_extent(robot: AnyRobot, scene: Scene) -> bool:
-    """Tell whether a robot has points beside its mass centre that must be above a floor.
-
-    Returns:
-        whether it is a platform, or has a shape.
-    """
+    """Tell whether a robot has points beside its mass centre that must be above a floor."""
     return isinstance(robot, PlatformRobot) or scene.body is not None
 
 
 def judged_poses(robot: AnyRobot) -> tuple[bool, bool]:
-    """Tell which conditions of poses are judged.
-
-    Returns:
-        whether the determinant, and whether the depth below the spools.
-    """
+    """Tell which conditions of poses are judged."""
     is_determined = robot.n_cables == robot.dof
     return is_determined and PATTERNS[robot.pattern].is_body, is_determined and robot.pattern in BELOW

@@ -1,9 +1,11 @@
 """Demands of motions on the robot: tensions, heights, cable lengths and speeds, at their extremes."""
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax
 import jax.numpy as jnp
@@ -20,6 +22,9 @@ from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.tension_rule_table import CENTRED
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.runtime.stages import stage
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Samples of an arc, at least, and instants computed at a time.
 SAMPLES, BATCH = 64, 512
@@ -113,21 +118,9 @@ def demands(
     samples: Sequence[int],
     limits: Limits = NO_LIMITS,
     rule: str = CENTRED,
-    corners: np.ndarray | None = None,
+    corners: Float[np.ndarray, "m 3"] | None = None,
 ) -> Demands:
-    """Demands of motions on the robot, narrowed down where a value is extreme.
-
-    Args:
-        robot: centred.
-        motions: n of them, from the centroid of the spools, z down.
-        samples: for each motion, the number of equidistant instants from 0 to 1 to begin with.
-        limits: limits that the rule for redundant cables takes into account.
-        rule: rule that chooses the tensions of redundant cables, a name of `robots.tension_rule_table`.
-        corners: (m, 3) of the shape of a platform, as for `limits.lowest_depth`.
-
-    Returns:
-        the demands.
-    """
+    """Demands of motions on the robot, narrowed down where a value is extreme."""
     table = np.empty((len(motions), 3, len(EXTREMES)))
     times = [sample_times(motion, count) for motion, count in zip(motions, samples, strict=True)]
     alike: dict[Any, list[int]] = {}

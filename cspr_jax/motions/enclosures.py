@@ -4,9 +4,14 @@ NumPy throughout: blocks are few, and the inverse of the structure matrix is LAP
 of the platform, in which the attachment points do not move; for a point mass, these are the fixed axes.
 """
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Share of a limit by which it may be missed, so that a limit that is just touched counts as met.
 TOUCHED = 2e-6
@@ -35,29 +40,15 @@ class Distances(NamedTuple):
     here: np.ndarray
     here_spools: np.ndarray
 
-    def hold(self, spools: np.ndarray) -> np.ndarray:
-        """Tell whether all distances stay positive within blocks, however spools move: proved.
-
-        Args:
-            spools: (k,) largest displacement, m.
-
-        Returns:
-            (k,).
-        """
+    def hold(self, spools: Float[np.ndarray, "k"]) -> Float[np.ndarray, "k"]:
+        """Tell whether all distances stay positive within blocks, however spools move: proved."""
         far = spools[:, None]
         cosine = np.sqrt(np.maximum(1.0 - (far * self.slope) ** 2, 0.0))
         low = cosine * self.bound - self.change + far * (self.tilt - self.swing)
         return ((low > self.spools * far) & (far * self.slope < 1.0)).all(1)
 
-    def fail(self, spools: np.ndarray) -> np.ndarray:
-        """Tell whether the worst displacements of the spools use up a distance in the middle of each block.
-
-        Args:
-            spools: (k,) largest displacement, m.
-
-        Returns:
-            (k,).
-        """
+    def fail(self, spools: Float[np.ndarray, "k"]) -> Float[np.ndarray, "k"]:
+        """Tell whether the worst displacements of the spools use up a distance in the middle of each block."""
         return (self.here < self.here_spools * spools[:, None]).any(1)
 
 
@@ -126,15 +117,8 @@ class Enclosure(NamedTuple):
         }
         return self._replace(**fields, distances=distances, rates=rates)
 
-    def middle(self, mu: np.ndarray) -> "Enclosure":
-        """Enclosure of the middle instants alone, as if blocks had no length.
-
-        Args:
-            mu: (k, n_cables) tensions per mass and length there, 1/s^2.
-
-        Returns:
-            the enclosure.
-        """
+    def middle(self, mu: Float[np.ndarray, "k n_cables"]) -> "Enclosure":
+        """Enclosure of the middle instants alone, as if blocks had no length."""
         names = "way", "bent", "force_change", "whirl_change"
         changes = {name: np.zeros_like(getattr(self, name)) for name in names}
         still = {name: np.zeros_like(getattr(self.rates, name)) for name in ("velocity_change", "acceleration_change")}
@@ -143,29 +127,15 @@ class Enclosure(NamedTuple):
         return self._replace(**changes, low=mu, high=mu, distances=distances, rates=self.rates._replace(**still))
 
 
-def largest_moves(way: np.ndarray, bent: np.ndarray) -> np.ndarray:
-    """Largest changes of rays from the middles of blocks.
-
-    Args:
-        way: (..., 3) how far the tangents lead, m.
-        bent: (...) largest distance from the tangents, m.
-
-    Returns:
-        (...) m.
-    """
+def largest_moves(way: Float[np.ndarray, "... 3"], bent: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
+    """Largest changes of rays from the middles of blocks."""
     return np.linalg.norm(way, axis=-1) + bent
 
 
-def structure(rays: np.ndarray, arms: np.ndarray, *, is_platform: bool) -> np.ndarray:
-    """Structure matrices: the wrenches per mass of tensions per mass and length.
-
-    Args:
-        rays: (k, n_cables, 3) from spool to attachment point, m.
-        arms: (n_cables, 3) attachment points from the mass centre, m.
-
-    Returns:
-        (k, 6 or 3, n_cables).
-    """
+def structure(
+    rays: Float[np.ndarray, "k n_cables 3"], arms: Float[np.ndarray, "n_cables 3"], *, is_platform: bool
+) -> np.ndarray:
+    """Structure matrices: the wrenches per mass of tensions per mass and length."""
     forces = -rays
     if not is_platform:
         return np.swapaxes(forces, 1, 2)
@@ -202,11 +172,7 @@ class Influence(NamedTuple):
 
 
 def influence(known: Enclosure) -> Influence:
-    """Influence in the middle of blocks.
-
-    Returns:
-        the influence; NaN where the structure matrix is singular.
-    """
+    """Influence in the middle of blocks."""
     is_platform = bool(known.arms.any())
     inverse = inverted(structure(known.rays, known.arms, is_platform=is_platform))
     forces = inverse[..., :3]
@@ -220,15 +186,8 @@ def influence(known: Enclosure) -> Influence:
     return Influence(spools, across, centre, forces, moments, lengths, (inverse @ wrench)[..., 0])
 
 
-def inverted(matrices: np.ndarray) -> np.ndarray:
-    """Inverse matrices; pseudo-inverses for two cables in the plane y = 0, which supply no force across it.
-
-    Args:
-        matrices: (k, m, n), m = n, or 3 and 2.
-
-    Returns:
-        (k, n, m); NaN where there is no inverse.
-    """
+def inverted(matrices: Float[np.ndarray, "k m n"]) -> Float[np.ndarray, "k n m"]:
+    """Inverse matrices; pseudo-inverses for two cables in the plane y = 0, which supply no force across it."""
     if matrices.shape[1] == matrices.shape[2]:
         is_regular = np.isfinite(matrices).all((1, 2)) & (np.linalg.det(matrices) != 0.0)
         safe = np.where(is_regular[:, None, None], matrices, np.eye(matrices.shape[1]))

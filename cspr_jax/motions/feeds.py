@@ -1,6 +1,8 @@
 """Feeds: largest speeds of the mass centre that hold over some pieces of a motion alone, such as those of G-code."""
 
-from typing import Any
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -9,17 +11,12 @@ from cspr_jax.motions.criteria import Criterion
 from cspr_jax.motions.time_proof import TimeProof, time_proof
 from cspr_jax.schema.verdicts import Verdict
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
-def feed_proof(motion: Any, feeds: np.ndarray) -> tuple[Criterion, TimeProof]:
-    """Proof that a motion keeps its feeds; without one, the slack counts as the largest feed.
 
-    Args:
-        motion: a `BoundedMotion` of m pieces between `knots`, s.
-        feeds: (m,) m/s, inf for none; at least one is finite.
-
-    Returns:
-        the criterion, with what is allowed where the slack is smallest; and its proof.
-    """
+def feed_proof(motion: Any, feeds: Float[np.ndarray, "m"]) -> tuple[Criterion, TimeProof]:
+    """Proof that a motion keeps its feeds; without one, the slack counts as the largest feed."""
     knots, largest = np.asarray(motion.knots), float(feeds[np.isfinite(feeds)].max())
 
     def slacks(start: np.ndarray, end: np.ndarray) -> BlockSlacks:

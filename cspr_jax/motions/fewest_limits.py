@@ -8,12 +8,17 @@ one limit is broken by all candidates, these limits are named. If every candidat
 reason, together with the limits that every number of arcs breaks.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cspr_jax.schema.verdicts import Verdict
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
 
 
 class Refused(NamedTuple):
@@ -28,16 +33,8 @@ class Refused(NamedTuple):
     broken: np.ndarray
 
 
-def rank(flags: Sequence[Verdict], broken: np.ndarray) -> np.ndarray:
-    """Rank of candidates by the limits that they break.
-
-    Args:
-        flags: of the criteria.
-        broken: (n, n_criteria) the limits.
-
-    Returns:
-        (n,) twice their number, and one more if a tension is below the smallest one; the smaller, the better.
-    """
+def rank(flags: Sequence[Verdict], broken: Float[np.ndarray, "n n_criteria"]) -> Float[np.ndarray, "n"]:
+    """Rank of candidates by the limits that they break."""
     is_slack = np.array([flag == Verdict.SLACK_CABLE for flag in flags])
     return 2 * broken.sum(1) + (broken & is_slack).any(1)
 
@@ -55,30 +52,20 @@ class FewestLimits:
         self._arcs, self._broken, self._common = np.zeros(count, int), np.zeros(shape, bool), np.ones(shape, bool)
         self._least = np.full(count, 2 * len(flags) + 2)
 
-    def take(self, rows: np.ndarray, arcs: np.ndarray, broken: np.ndarray) -> None:
-        """Take in candidates that are proved but for limits.
-
-        Args:
-            rows: (m,) numbers of their motions, each at most once.
-            arcs: (m,) numbers of arcs.
-            broken: (m, n_criteria) the limits that each breaks.
-        """
+    def take(
+        self, rows: Float[np.ndarray, "m"], arcs: Num[np.ndarray, "m"], broken: Float[np.ndarray, "m n_criteria"]
+    ) -> None:
+        """Take in candidates that are proved but for limits."""
         ranks = rank(self._flags, broken)
         better = ranks < self._least[rows]
         self._arcs[rows[better]], self._broken[rows[better]] = arcs[better], broken[better]
         self._least[rows[better]] = ranks[better]
         self._common[rows] &= broken
 
-    def may_change(self, rows: np.ndarray, broken: np.ndarray) -> np.ndarray:
-        """Tell which candidates can change what is known, since fewer limits may refuse them, or others.
-
-        Args:
-            rows: (m,) numbers of their motions.
-            broken: (m, n_criteria) limits that each is known to break; it may break more.
-
-        Returns:
-            (m,) false where taking in the candidate would change nothing.
-        """
+    def may_change(
+        self, rows: Float[np.ndarray, "m"], broken: Float[np.ndarray, "m n_criteria"]
+    ) -> Float[np.ndarray, "m"]:
+        """Tell which candidates can change what is known, since fewer limits may refuse them, or others."""
         return (rank(self._flags, broken) < self._least[rows]) | (self._common[rows] & ~broken).any(1)
 
     @property
@@ -87,10 +74,6 @@ class FewestLimits:
         return self._least <= 2
 
     def refused(self) -> Refused:
-        """Candidates that break the fewest limits, and the limits to name.
-
-        Returns:
-            the candidates.
-        """
+        """Candidates that break the fewest limits, and the limits to name."""
         is_common = (self._common.sum(1) > 1) & (self._arcs > 0)
         return Refused(self._arcs, np.where(is_common[:, None], self._common, self._broken))

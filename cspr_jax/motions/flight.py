@@ -1,57 +1,32 @@
 """Free flight of an object that is released from a moving effector."""
 
-from typing import Any
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
 
 import jax.numpy as jnp
 import numpy as np
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 
 def flown(position: Any, velocity: Any, gravity: Any, time: Any) -> tuple[Any, Any]:
-    """Position and velocity in free flight, launch paper (26).
-
-    Args:
-        position: (..., 3) at the release, z down, m.
-        velocity: (..., 3) likewise, m/s.
-        gravity: () m/s^2.
-        time: (..., 1) since the release, s; negative before it.
-
-    Returns:
-        (..., 3) m, (..., 3) m/s.
-    """
+    """Position and velocity in free flight, launch paper (26)."""
     down = jnp.asarray([0.0, 0.0, 1.0]) * gravity
     return position + velocity * time + 0.5 * down * time**2, velocity + down * time
 
 
 def aimed(position: Any, target: Any, gravity: Any, time: Any) -> Any:
-    """Velocity at the release with which a target is reached after a time, launch paper (26a).
-
-    Args:
-        position: (..., 3) of the release, z down, m.
-        target: (..., 3) m.
-        gravity: () m/s^2.
-        time: (..., 1) of the flight, s.
-
-    Returns:
-        (..., 3) m/s.
-    """
+    """Velocity at the release with which a target is reached after a time, launch paper (26a)."""
     down = jnp.asarray([0.0, 0.0, 1.0]) * gravity
     return (target - position) / time - 0.5 * down * time
 
 
 def nearest_time(
-    position: np.ndarray, target: np.ndarray, velocity: np.ndarray, gravity: float
+    position: Float[np.ndarray, "3"], target: Float[np.ndarray, "3"], velocity: Float[np.ndarray, "3"], gravity: float
 ) -> tuple[float, float] | None:
-    """Time of flight at which the parabola that reaches a target with a velocity comes nearest to a release.
-
-    Args:
-        position: (3,) of the release, z down, m.
-        target: (3,) m.
-        velocity: (3,) at the target, m/s.
-        gravity: m/s^2.
-
-    Returns:
-        the time, s, and the distance, m; None where the parabola never comes near before the target.
-    """
+    """Time of flight at which the parabola that reaches a target with a velocity comes nearest to a release."""
     down, way = 0.5 * gravity * np.array([0.0, 0.0, 1.0]), target - position
     # |way - velocity t + down t^2|^2, by powers of t, the highest first.
     square = [down @ down, -2.0 * down @ velocity, velocity @ velocity + 2.0 * way @ down, -2.0 * way @ velocity]

@@ -22,22 +22,7 @@ from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES, Limit
 def limits_of(
     robot: Any, limits: Mapping[str, Any], defaults: Mapping[str, Any], at: str, n_cables: int | None = None
 ) -> Limits:
-    """Limits, with those of a robot where none are given.
-
-    Args:
-        robot: has base_points and z_axis of its file.
-        limits: by name, one number or one for each cable; None: the one of `defaults`.
-        defaults: limits of the robot by name; None: no limit.
-        at: prefix of the keys in errors.
-        n_cables: number of cables that have the limits; None: as the robot has.
-
-    Returns:
-        the limits, the floor as a depth; some of the largest tensions may be infinite.
-
-    Raises:
-        InputError: a wrong count of numbers, or impossible limits: not finite, a length or speed that is not positive,
-            a smallest tension that is not below the largest.
-    """
+    """Limits, with those of a robot where none are given."""
     n_cables, values = n_cables or len(robot.base_points), dict[str, Any]()
     for row in LIMITS:
         value = limits.get(row.name)
@@ -78,14 +63,7 @@ def _uncertainty(uncertainty: Any, at: str) -> Uncertainty:
 
 
 def check_bounded(limits: Limits) -> None:
-    """Refuse largest tensions of which some are infinite.
-
-    Args:
-        limits: of a trajectory or a search.
-
-    Raises:
-        InputError: a largest tension is infinite.
-    """
+    """Refuse largest tensions of which some are infinite."""
     high = limits.tension_max
     if high is not None and not np.isfinite(high).all():
         raise InputError(
@@ -96,11 +74,7 @@ def check_bounded(limits: Limits) -> None:
 
 
 def check_of_motion(limits: Limits) -> None:
-    """Refuse limits of the mass centre's motion where none is judged.
-
-    Raises:
-        InputError: a limit that must be absent.
-    """
+    """Refuse limits of the mass centre's motion where none is judged."""
     for row in LIMITS:
         value = getattr(limits, row.name)
         if row.of_mass_centre and value is not None:
@@ -110,16 +84,7 @@ def check_of_motion(limits: Limits) -> None:
 def check_certain(
     robot: PointMassRobot | PlatformRobot, limits: Limits, families: tuple[str, ...], *, in_pairs: bool = False
 ) -> None:
-    """Refuse an uncertainty where verdicts do not take it into account.
-
-    Args:
-        limits: with an uncertainty, or without.
-        families: names of the trajectory families; empty: no motion of a family.
-        in_pairs: whether the cables of the robot stand for pairs of cables.
-
-    Raises:
-        InputError: an uncertainty that must be absent, and why.
-    """
+    """Refuse an uncertainty where verdicts do not take it into account."""
     uncertainty = limits.uncertainty
     if uncertainty is None:
         return
@@ -150,17 +115,7 @@ def _limit(row: Limit, value: Any, n_cables: int, at: str) -> Array:
 
 
 def pair_limits(limits: Limits, pairs: ParallelPairs) -> Limits:
-    """Limits of the three cables that stand for pairs of six.
-
-    Args:
-        limits: of the six cables; the floor is that of the effector.
-
-    Returns:
-        the limits, (3,) each.
-
-    Raises:
-        InputError: no tension of a pair is within the limits of both of its cables.
-    """
+    """Limits of the three cables that stand for pairs of six."""
     values: dict[str, Any] = {
         row.name: leaf(pairs.bound(value, is_tension=row.quantity == "tension", is_least=row.sense == "least"))
         for row in LIMITS
@@ -184,21 +139,7 @@ def limits_over(
     any_tensions: bool = False,
     families: tuple[str, ...] = (),
 ) -> Limits:
-    """Limits, with those of a robot where none are given, as the kernels take them.
-
-    Args:
-        robot: in its own axes.
-        limits: one number or one for each cable, in the robot's axes; None: those of the robot.
-        any_tensions: whether some of the largest tensions may be infinite.
-        families: names of the trajectories, which decide whether an uncertainty is allowed; none: it is not.
-
-    Returns:
-        the limits.
-
-    Raises:
-        InputError: a wrong count of numbers, or impossible limits: not finite, a length or speed that is not positive,
-            a smallest tension that is not below the largest.
-    """
+    """Limits, with those of a robot where none are given, as the kernels take them."""
     merged = limits_of(robot, vars(limits or NO_LIMITS), vars(robot.limits), "limits.")
     if not any_tensions:
         check_bounded(merged)

@@ -5,9 +5,11 @@ platform, contacts alone are then proved, since the family has proved the rest; 
 numbers of arcs are free, larger ones are tried until the motion is proved.
 """
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -17,6 +19,9 @@ from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.proved_answers import MotionProof, proof_of, proofs_of, sampled_proof
 from cspr_jax.robots.clearance import Scene
 from cspr_jax.schema.verdicts import FLAGS, Verdict
+
+if TYPE_CHECKING:
+    from jaxtyping import Num
 
 # Gives answers and motions of some segments, by their numbers, with numbers of arcs: those of `Waypoints.arcs`.
 Join = Callable[[np.ndarray, np.ndarray], tuple[Answers, Any]]
@@ -63,17 +68,8 @@ class Judge(NamedTuple):
         """Tell whether the robot has pulleys."""
         return self.problem.robot.pulleys is not None
 
-    def smallest(self, join: Join, arcs: np.ndarray, *, step: int, max_arcs: int) -> JudgedSegments:
-        """Smallest numbers of arcs whose motions are proved.
-
-        Args:
-            arcs: (n,) prescribed numbers of arcs; 0: free.
-            step: between numbers of arcs that segments can have; 0: they have none.
-            max_arcs: largest number tried; 0: only what the family chooses is judged.
-
-        Returns:
-            the answers; where no number of arcs is proved, those of the motion that the family chooses.
-        """
+    def smallest(self, join: Join, arcs: Num[np.ndarray, "n"], *, step: int, max_arcs: int) -> JudgedSegments:
+        """Smallest numbers of arcs whose motions are proved."""
         trial = self._trial(*join(np.arange(len(arcs)), arcs), self.intervals)
         answers, proofs, arcs = trial.answers, list(trial.proofs), arcs.copy()
         verdict, is_free = trial.verdict.copy(), (arcs == 0) & (step * max_arcs > 0)

@@ -6,9 +6,11 @@ is least. From there the object flies to the height of its target. A random samp
 landings, and the derivatives of the landing with respect to all errors the covariance for small errors.
 """
 
+from __future__ import annotations
+
 import dataclasses
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -24,6 +26,9 @@ from cspr_jax.robots.force_balance import cable_motion
 from cspr_jax.robots.point_mass import PointMassRobot, is_planar
 from cspr_jax.robots.state import State
 from cspr_jax.schema.given_numbers import Numbers, whole
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 BATCH, NEWTON = 1024, 12
 # As in the keys of a plan file.
@@ -88,13 +93,7 @@ class Scatter:
     first_order: np.ndarray
 
     def to_dict(self) -> dict[str, Any]:
-        """Figures of the scatter.
-
-        Returns:
-            plain values: "throws", "missed" (never at the height of the target), "mean", "covariance",
-            "covariance_first_order", and of the distances from the target "mean_error", "standard_deviation" and
-            "largest_error".
-        """
+        """Figures of the scatter."""
         known = self.landings[np.isfinite(self.landings).all(1)]
         sizes = np.linalg.norm(known, axis=1)
         return {
@@ -109,15 +108,8 @@ class Scatter:
         }
 
 
-def state_at(throw: Throw, late: Array) -> State:
-    """State of the effector some time after the planned release; before and after all motions it rests at an end.
-
-    Args:
-        late: () s; negative before it.
-
-    Returns:
-        the state.
-    """
+def state_at(throw: Throw, late: Float[Array, ""]) -> State:
+    """State of the effector some time after the planned release; before and after all motions it rests at an end."""
     # Between two motions nothing is clipped: a clip would halve the derivative of a release there.
     time = jnp.maximum(throw.release + late, 0.0)
     *others, last = throw.motions
@@ -132,16 +124,8 @@ def state_at(throw: Throw, late: Array) -> State:
     return state
 
 
-def landing(robot: PointMassRobot, throw: Throw, errors: Array) -> Array:
-    """Landing of one throw.
-
-    Args:
-        robot: a point mass; centred.
-        errors: (1 + 2 n_cables,) of the instant, s, of the lengths, m, and of their rates, m/s.
-
-    Returns:
-        (2,) x and y over those of the target, m; NaN where the object never comes to its height.
-    """
+def landing(robot: PointMassRobot, throw: Throw, errors: Array) -> Float[Array, "2"]:
+    """Landing of one throw."""
     count = robot.n_cables
     state = state_at(throw, errors[0])
     lengths, rates, _ = cable_motion(robot, *state[:3])
@@ -185,14 +169,7 @@ def _slopes(robot: PointMassRobot, throw: Throw, errors: Array) -> Array:
 
 
 def scatter(robot: PointMassRobot, throw: Throw, errors: LaunchErrors) -> Scatter:
-    """Scatter of the landings of a launch.
-
-    Args:
-        robot: a point mass; centred.
-
-    Returns:
-        the scatter, in the axes of the kernels.
-    """
+    """Scatter of the landings of a launch."""
     count, random = robot.n_cables, np.random.default_rng(errors.seed)
     # Errors are drawn in this order, so that a sample of one kind of error is that of a larger one, scaled.
     release = random.normal(size=(errors.throws, 1)) * errors.release

@@ -1,8 +1,10 @@
 """LegOutcome of a launch: the release and the flight of an object, and where throws with errors land."""
 
+from __future__ import annotations
+
 import dataclasses
 import math
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import jax.numpy as jnp
 import numpy as np
@@ -13,6 +15,9 @@ from cspr_jax.motions.flight import flown
 from cspr_jax.motions.landings import LaunchErrors, Scatter, Throw, scatter, state_at
 from cspr_jax.motions.outcome import LegOutcome
 from cspr_jax.robots.point_mass import PointMassRobot
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 FLIGHT_ROWS = 101
 
@@ -97,14 +102,7 @@ class LaunchOutcome(LegOutcome):
         return columns
 
     def scatter_of(self, errors: LaunchErrors) -> Scatter:
-        """Scatter of the landings.
-
-        Args:
-            errors: of the release and of the cables.
-
-        Returns:
-            the scatter, in the axes of the robot file.
-        """
+        """Scatter of the landings."""
         kernel_scatter = scatter(self.robot, self.throw, errors)
         # Axes of the file are turned against those of the kernels about x.
         signs = np.asarray(self.frame.turned(np.ones(3)))[:2]
@@ -122,22 +120,10 @@ def launch_outcome(
     time: float,
     flight_time: float,
     tension_min: float,
-    control_points: np.ndarray | None = None,
-    half_axes: np.ndarray | None = None,
+    control_points: Float[np.ndarray, "3 3"] | None = None,
+    half_axes: Float[np.ndarray, "2 3"] | None = None,
 ) -> LaunchOutcome:
-    """Outcome of a planned release, with the scatter that its table asks for.
-
-    Args:
-        robot: centred, z down.
-        time: of the release, since the start of the plan, s.
-        flight_time: s.
-        tension_min: smallest tension on the segment, N.
-        control_points: (3, 3) of a Bezier segment, m.
-        half_axes: (2, 3) of an ellipse, m.
-
-    Returns:
-        the outcome.
-    """
+    """Outcome of a planned release, with the scatter that its table asks for."""
     state = state_at(throw, jnp.asarray(0.0))
     landing, _ = flown(state.position, state.velocity, robot.gravity, flight_time)
     launch = LaunchOutcome(

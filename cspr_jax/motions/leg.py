@@ -1,9 +1,11 @@
 """Leg of a plan: consecutive poses, and how a trajectory family joins them."""
 
+from __future__ import annotations
+
 import abc
 import dataclasses
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import jax
 import numpy as np
@@ -14,6 +16,9 @@ from cspr_jax.motions.motion import Motion
 from cspr_jax.motions.outcome import LegOutcome
 from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.waypoints import Waypoints
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,11 +65,7 @@ class Leg(abc.ABC):
         return len(self.stops)
 
     def check(self, problem: Problem) -> None:  # noqa: B027
-        """Refuse poses at which no motion can begin or end; called before z0 is chosen.
-
-        Raises:
-            ConfigError: which pose, and why.
-        """
+        """Refuse poses at which no motion can begin or end; called before z0 is chosen."""
 
     @classmethod
     def for_searches(cls, stops: Waypoints) -> "Leg":
@@ -76,56 +77,23 @@ class Leg(abc.ABC):
 
     @abc.abstractmethod
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
-        """Join the poses.
+        """Join the poses."""
 
-        Args:
-            z0: depth of P0 below the centroid of the spools, m.
-
-        Returns:
-            answers of the n segments, and their motions, with the number of arcs found, else that of
-            the best candidate.
-        """
-
-    def answers(self, problem: Problem, depths: np.ndarray) -> Answers:
-        """Answers for several depths of P0.
-
-        Args:
-            depths: (n_depths,) m.
-
-        Returns:
-            the answers of n_depths * n_segments, those of one depth side by side.
-        """
+    def answers(self, problem: Problem, depths: Float[np.ndarray, "n_depths"]) -> Answers:
+        """Answers for several depths of P0."""
         return joined([self.join(problem, float(z0))[0] for z0 in depths])
 
-    def outcome(self, problem: Problem, joined: JoinedLeg, tension_min: np.ndarray, start: float) -> LegOutcome | None:
-        """Outcome of the joined leg beyond its motion; a plan calls this once.
-
-        Args:
-            tension_min: (n,) smallest tension of any cable on each segment, N.
-            start: start of the leg, since the start of the plan, s.
-
-        Returns:
-            the outcome; None if the leg has none.
-        """
+    def outcome(
+        self, problem: Problem, joined: JoinedLeg, tension_min: Float[np.ndarray, "n"], start: float
+    ) -> LegOutcome | None:
+        """Outcome of the joined leg beyond its motion; a plan calls this once."""
         return None
 
     def warnings(self, problem: Problem) -> list[str]:
-        """Warnings for the user of the plan.
-
-        Returns:
-            one line each.
-        """
+        """Warnings for the user of the plan."""
         return []
 
 
 def each(leaves, count: int) -> list:
-    """Parts of a pytree whose leaves have a leading dimension.
-
-    Args:
-        leaves: (count, ...) each.
-        count: number of the parts.
-
-    Returns:
-        one pytree each, with NumPy leaves.
-    """
+    """Parts of a pytree whose leaves have a leading dimension."""
     return [jax.tree.map(lambda leaf, i=i: np.asarray(leaf)[i], leaves) for i in range(count)]

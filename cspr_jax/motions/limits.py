@@ -1,7 +1,9 @@
 """Limits of a state: which are set, the quantities that they bound, and the slacks that follow."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax.numpy as jnp
 from jax import Array
@@ -13,13 +15,12 @@ from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.state import State
 from cspr_jax.schema.limits import LIMITS, Limit
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 
 def limits_set(limits: Limits) -> tuple[Limit, ...]:
-    """Rows of the limits that are set, in the order of their slacks.
-
-    Returns:
-        the rows.
-    """
+    """Rows of the limits that are set, in the order of their slacks."""
     return tuple(row for row in LIMITS if getattr(limits, row.name) is not None)
 
 
@@ -46,28 +47,12 @@ class Values(NamedTuple):
 
 
 def values(robot: AnyRobot, state: State) -> Values:
-    """Quantities of a state that limits bound.
-
-    Args:
-        robot: with as many cables as degrees of freedom.
-        state: z down.
-
-    Returns:
-        the quantities.
-    """
+    """Quantities of a state that limits bound."""
     return _values(robot, state, cables.tensions(robot, state))
 
 
-def lowest_depth(robot: AnyRobot, state: State, corners: Array | None = None) -> Array:
-    """Depth of the lowest point of the effector: mass centre, or joint, attachment points, and corners of its shape.
-
-    Args:
-        state: z down.
-        corners: (m, 3) of the shape of a platform, from the mass centre, platform axes, m; None: it has none.
-
-    Returns:
-        () m.
-    """
+def lowest_depth(robot: AnyRobot, state: State, corners: Float[Array, "m 3"] | None = None) -> Float[Array, ""]:
+    """Depth of the lowest point of the effector: mass centre, or joint, attachment points, and corners of its shape."""
     if not isinstance(robot, PlatformRobot):
         return state.position[2]
     points = robot.platform_points if corners is None else jnp.concatenate([robot.platform_points, corners])
@@ -80,30 +65,15 @@ def _values(robot: AnyRobot, state: State, tensions: Array) -> Values:
     return Values(tensions, lowest_depth(robot, state), length, jnp.abs(rate), jnp.abs(bend), speed, pull)
 
 
-def scales(n_cables: int, weight: Array, z0: Array) -> dict[str, tuple[float, Array]]:
-    """Scales that make slacks dimensionless; the slack of a quantity that has none is relative to its limit.
-
-    Args:
-        weight: () N.
-        z0: (...) m.
-
-    Returns:
-        by quantity, a factor and a divisor: of tensions n_cables and the weight, of depths 1 and z0.
-    """
+def scales(n_cables: int, weight: Float[Array, ""], z0: Float[Array, "..."]) -> dict[str, tuple[float, Array]]:
+    """Scales that make slacks dimensionless; the slack of a quantity that has none is relative to its limit."""
     return {"tension": (float(n_cables), weight), "depth": (1.0, z0)}
 
 
-def slack(row: Limit, limit: Array, value: Array, scale: Mapping[str, tuple[float, Array]]) -> Array:
-    """Slack of a limit: positive exactly while it is met, and free of units.
-
-    Args:
-        limit: (...) value of the limit.
-        value: (...) of the quantity.
-        scale: as `scales` returns it.
-
-    Returns:
-        (...).
-    """
+def slack(
+    row: Limit, limit: Float[Array, "..."], value: Float[Array, "..."], scale: Mapping[str, tuple[float, Array]]
+) -> Float[Array, "..."]:
+    """Slack of a limit: positive exactly while it is met, and free of units."""
     if row.quantity not in scale:
         share = value / limit
         return 1.0 - share if row.sense == "most" else share - 1.0
@@ -112,24 +82,12 @@ def slack(row: Limit, limit: Array, value: Array, scale: Mapping[str, tuple[floa
 
 
 def other_limits(limits: Limits) -> list[Limit]:
-    """Rows of the limits that are set, except those of tensions, which the margin of redundant cables contains.
-
-    Returns:
-        the rows.
-    """
+    """Rows of the limits that are set, except those of tensions, which the margin of redundant cables contains."""
     return [row for row in limits_set(limits) if row.quantity != "tension"]
 
 
-def other_slacks(robot: AnyRobot, limits: Limits, state: State, z0: Array) -> list[Array]:
-    """Smallest slack of each of `other_limits`.
-
-    Args:
-        state: z down.
-        z0: () m.
-
-    Returns:
-        () each.
-    """
+def other_slacks(robot: AnyRobot, limits: Limits, state: State, z0: Float[Array, ""]) -> list[Array]:
+    """Smallest slack of each of `other_limits`."""
     quantities = _values(robot, state, jnp.zeros(robot.n_cables))
     scale = scales(robot.n_cables, robot.mass * robot.gravity, z0)
     return [

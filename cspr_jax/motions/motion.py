@@ -4,10 +4,12 @@ A motion is a pytree that holds its own amplitude function, number of arcs and d
 vmapped and differentiated. Normalised time tau runs from 0 to 1.
 """
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Callable
 from functools import partial
-from typing import Any, Generic, Protocol, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar, cast
 
 import jax
 import jax.numpy as jnp
@@ -21,6 +23,9 @@ from cspr_jax.robots import state_bounds
 from cspr_jax.robots.state import State
 from cspr_jax.robots.state_bounds import StateBounds
 from cspr_jax.runtime.persistent_jit import persistent_jit
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # States that are computed at once.
 STATES = 64
@@ -151,16 +156,8 @@ class Placed(Generic[Kind]):
         return self.motion.breaks()
 
 
-def sample_times(motion: Motion, count: int, each: int = 4) -> np.ndarray:
-    """Times at which extremes of a motion are looked for: equidistant ones, and some in each piece and at its ends.
-
-    Args:
-        count: of equidistant times, at least three.
-        each: intervals of a piece, at least.
-
-    Returns:
-        (n,) increasing tau; at joints on both sides of them.
-    """
+def sample_times(motion: Motion, count: int, each: int = 4) -> Float[np.ndarray, "n"]:
+    """Times at which extremes of a motion are looked for: equidistant ones, and some in each piece and at its ends."""
     breaks = np.asarray(motion.breaks(), float)
     edges = np.concatenate([[0.0], breaks, [1.0]])
     inner = edges[:-1, None] + np.diff(edges)[:, None] * np.linspace(0.0, 1.0, each + 1)[1:-1]
@@ -169,23 +166,12 @@ def sample_times(motion: Motion, count: int, each: int = 4) -> np.ndarray:
 
 
 def common_shape(motion: Kind) -> Kind:
-    """The same motion, of which pieces are repeated until their number is a usual one, so that compiled code is shared.
-
-    Args:
-        motion: NumPy leaves.
-
-    Returns:
-        the motion; where nothing in it has pieces, itself.
-    """
+    """The same motion with pieces repeated until their number is a usual one, so that compiled code is shared."""
     return jax.tree.map(lambda part: part.padded() if _is_in_pieces(part) else part, motion, is_leaf=_is_in_pieces)
 
 
 def has_pieces(motion: Motion) -> bool:
-    """Tell whether a motion has pieces, of which there may be very many.
-
-    Returns:
-        true if anything in it has.
-    """
+    """Tell whether a motion has pieces, of which there may be very many."""
     return any(map(_is_in_pieces, jax.tree.leaves(motion, is_leaf=_is_in_pieces)))
 
 
@@ -193,16 +179,8 @@ def _is_in_pieces(part: Any) -> bool:
     return hasattr(part, "padded")
 
 
-def states_at(motion: Motion, tau: np.ndarray, size: int = STATES) -> State:
-    """States of a motion at many instants.
-
-    Args:
-        tau: (k,) normalised time.
-        size: of the batches.
-
-    Returns:
-        the states, leaves (k, ...).
-    """
+def states_at(motion: Motion, tau: Float[np.ndarray, "k"], size: int = STATES) -> State:
+    """States of a motion at many instants."""
     state: Any = in_batches(partial(_states, common_shape(motion)), tau, size=size)
     return state
 
@@ -213,28 +191,14 @@ def _states(motion: Motion, tau: Array) -> State:
 
 
 def inward(frame: Frame, state: State) -> State:
-    """State in the kernels' axes, from the axes of a robot file.
-
-    Args:
-        state: in the axes of the file; leaves (..., 3), (..., 4) or (..., 3, 3).
-
-    Returns:
-        the state, from the centroid of the spools, z down.
-    """
+    """State in the kernels' axes, from the axes of a robot file."""
     # The rotation between the axes is its own inverse.
     place: Any = frame.inward(state.position)
     return outward(frame, state)._replace(position=place)
 
 
 def outward(frame: Frame, state: State) -> State:
-    """State in the axes of a robot file.
-
-    Args:
-        state: from the centroid of the spools, z down; leaves (..., 3), (..., 4) or (..., 3, 3).
-
-    Returns:
-        the state.
-    """
+    """State in the axes of a robot file."""
     vector, tensor, quaternion = frame.turned, frame.turned_tensor, frame.turned_quaternions
     # In the order of the fields of a state; a point mass has no orientation.
     changes: tuple[Callable[..., Any], ...] = (frame.outward, vector, vector, tensor, vector, vector, quaternion)

@@ -3,8 +3,11 @@
 The search is that of `motions.tolerances`; blocks are proved and refuted by `motions.uncertain_slacks`.
 """
 
+from __future__ import annotations
+
 import dataclasses
 from functools import partial
+from typing import TYPE_CHECKING
 
 import jax
 import numpy as np
@@ -22,6 +25,9 @@ from cspr_jax.robots.clearance import Scene
 from cspr_jax.robots.contact_bodies import Bodies, bodies_of, default_scene
 from cspr_jax.robots.state_bounds import StateBounds
 from cspr_jax.runtime.persistent_jit import persistent_jit
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 INSTANTS = 256  # in one batch
 
@@ -84,32 +90,15 @@ def _instants(motion: Motion, tau) -> StateBounds:
     return StateBounds(**{name: constant(getattr(states, name)) for name in names})
 
 
-def instant_states(motion: Motion, tau: np.ndarray) -> StateBounds:
-    """States of a motion, as bounds of blocks without a length.
-
-    Args:
-        tau: (k,) from 0 to 1.
-
-    Returns:
-        the states, leaves (k, ...).
-    """
+def instant_states(motion: Motion, tau: Float[np.ndarray, "k"]) -> StateBounds:
+    """States of a motion, as bounds of blocks without a length."""
     return in_batches(partial(_instants, common_shape(motion)), tau, size=INSTANTS)
 
 
 def motion_tolerances(
     problem: Problem, motion: BoundedMotion, scene: Scene | None = None, *, contacts_alone: bool = False
 ) -> Tolerated:
-    """Multiples of the uncertainty that a motion tolerates.
-
-    Args:
-        problem: robot without pulleys, limits with an uncertainty.
-        motion: feasible as planned, from the centroid of the spools, z down.
-        scene: bodies that can meet; None: the cables of a platform alone.
-        contacts_alone: whether the multiples are of contacts alone.
-
-    Returns:
-        the multiples, () each in arrays (1,).
-    """
+    """Multiples of the uncertainty that a motion tolerates."""
     duration = float(motion.duration())
     jumps = motion.jumps() if hasattr(motion, "jumps") else np.zeros(0)
     edges = np.unique(

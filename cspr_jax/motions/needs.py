@@ -57,15 +57,7 @@ class _Criterion(NamedTuple):
 
 
 def needs(problem: Problem, motion: Motion, samples: int) -> list[Need]:
-    """Needs of a motion, one for each criterion; criteria of tensions only where the motion determines the tensions.
-
-    Args:
-        motion: from the centroid of the spools, z down; one without a finite duration is taken to rest everywhere.
-        samples: equidistant instants to begin with, at least three.
-
-    Returns:
-        the needs, the worst one first; numbers of a motion that is not finite are NaN.
-    """
+    """Needs of a motion, one for each criterion; criteria of tensions only where the motion determines the tensions."""
     robot, limits = problem.robot, _with_tensions(problem.robot, problem.limits)
     moves = bool(np.isfinite(float(motion.duration())))
     leaves, structure = jax.tree.flatten(common_shape(motion))

@@ -17,24 +17,12 @@ class LegOutcome(abc.ABC):
 
     @abc.abstractmethod
     def to_dict(self) -> dict[str, Any]:
-        """The outcome as a plan's JSON has it.
-
-        Returns:
-            plain values.
-        """
+        """The outcome as a plan's JSON has it."""
 
     @abc.abstractmethod
     def lines(self) -> list[str]:
-        """The outcome as text.
-
-        Returns:
-            lines below the table of a plan.
-        """
+        """The outcome as text."""
 
     @abc.abstractmethod
     def columns(self) -> dict[str, np.ndarray]:
-        """Datasets that the outcome adds to a motion file.
-
-        Returns:
-            arrays by the names of `schema.quantities.FLIGHT`.
-        """
+        """Datasets that the outcome adds to a motion file."""

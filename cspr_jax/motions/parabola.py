@@ -31,18 +31,7 @@ class Parabola(NamedTuple):
 
 
 def parabola_of(table: LaunchTable, frame: Frame, gravity: float, path: Path) -> Parabola:
-    """Flight that a table asks for.
-
-    Args:
-        gravity: m/s^2.
-        path: named in errors.
-
-    Returns:
-        the flight, of which the table gives two: place of release, velocity at the target, time.
-
-    Raises:
-        ConfigError: a place of release that is not on the parabola of the velocity at the target.
-    """
+    """Flight that a table asks for."""
     target = np.asarray(frame.inward(table.target))
     point = None if table.point is None else np.asarray(frame.inward(table.point))
     velocity = None if table.velocity is None else np.asarray(frame.turned(np.asarray(table.velocity)))

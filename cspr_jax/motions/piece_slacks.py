@@ -1,8 +1,10 @@
 """Slacks of motions over their pieces, so that a search can be tightened where they are too small."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -14,6 +16,9 @@ from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.uncertain_slacks import lower_slacks, share_of
 from cspr_jax.robots.clearance import Scene
 from cspr_jax.robots.state_bounds import StateBounds
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Half the length of short blocks over the usual one.
 SHORT = 1e-6
@@ -37,17 +42,10 @@ class PieceSlacks(NamedTuple):
     high: np.ndarray
 
 
-def piece_slacks(problem: Problem, motion: BoundedMotion, knots: np.ndarray, scene: Scene | None) -> PieceSlacks:
-    """Bounds of the slacks over pieces, close where they are negative; of all robots within an uncertainty.
-
-    Args:
-        problem: of a robot without pulleys, if its limits have an uncertainty.
-        knots: (n_pieces + 1,) borders of the pieces, s.
-        scene: as for `motions.proved_answers.proved_answers`.
-
-    Returns:
-        the bounds.
-    """
+def piece_slacks(
+    problem: Problem, motion: BoundedMotion, knots: Float[np.ndarray, "n_pieces+1"], scene: Scene | None
+) -> PieceSlacks:
+    """Bounds of the slacks over pieces, close where they are negative; of all robots within an uncertainty."""
 
     def bounded(_: np.ndarray, start: np.ndarray, end: np.ndarray) -> Sides:
         slacks = block_slacks(problem.robot, problem.limits, motion.bounds, start, end, scene)
@@ -62,31 +60,14 @@ def piece_slacks(problem: Problem, motion: BoundedMotion, knots: np.ndarray, sce
     return PieceSlacks(rows, *close_bounds(bounded, (knots[:-1], knots[1:]), LEAST, HALVINGS))
 
 
-def all_robots_slacks(problem: Problem, states: StateBounds, multiple: float = 1.0) -> np.ndarray:
-    """Lower bounds of the slacks of tensions and limits of all robots within an uncertainty.
-
-    Args:
-        problem: robot without pulleys, limits with an uncertainty.
-        states: over k blocks.
-        multiple: () by which all parts of the uncertainty grow; 0 for the planned robot.
-
-    Returns:
-        (k, n) of the first n criteria, as `uncertain_slacks.lower_slacks` gives them.
-    """
+def all_robots_slacks(problem: Problem, states: StateBounds, multiple: float = 1.0) -> Float[np.ndarray, "k n"]:
+    """Lower bounds of the slacks of tensions and limits of all robots within an uncertainty."""
     share = share_of(problem.limits, np.full(len(states.position.middle), multiple))
     return in_batches(partial(lower_slacks, problem.robot, problem.limits), (states, share), size=BATCH)
 
 
-def short_blocks(instants: np.ndarray, sizes: np.ndarray) -> Sides:
-    """Blocks that are so short that what is bounded over them is known.
-
-    Args:
-        instants: (k,) in their middles, s.
-        sizes: (k,) of blocks of usual length, s.
-
-    Returns:
-        (k,) starts and ends, s.
-    """
+def short_blocks(instants: Float[np.ndarray, "k"], sizes: Float[np.ndarray, "k"]) -> Sides:
+    """Blocks that are so short that what is bounded over them is known."""
     return instants - SHORT * sizes, instants + SHORT * sizes
 
 
@@ -99,17 +80,7 @@ def _first_less(slacks: np.ndarray, others: np.ndarray) -> np.ndarray:
 def close_bounds(
     bounded: Callable[[np.ndarray, np.ndarray, np.ndarray], Sides], ends: Sides, least: float, halvings: int
 ) -> Sides:
-    """Bounds of the smallest slacks over pieces, which are halved where a negative lower bound is not close.
-
-    Args:
-        bounded: lower and upper bounds (k, n) over blocks, from the numbers of their pieces, their starts and ends.
-        ends: (n_pieces,) starts and ends of the pieces, s.
-        least: by how much bounds may be apart in any case.
-        halvings: most halvings of a piece.
-
-    Returns:
-        (n_pieces, n) each, lower and upper bounds.
-    """
+    """Bounds of the smallest slacks over pieces, which are halved where a negative lower bound is not close."""
     start, end = ends
     piece, bounds = np.arange(len(start)), None
     for level in range(halvings + 1):

@@ -38,14 +38,7 @@ class ProofSummary(NamedTuple):
 
 
 def proved(problem: Problem, motion: BoundedMotion) -> ProofSummary:
-    """Decide whether a motion is feasible.
-
-    Args:
-        motion: from the centroid of the spools, z down.
-
-    Returns:
-        the proof in short.
-    """
+    """Decide whether a motion is feasible."""
     duration = float(motion.duration())
     if not (np.isfinite(duration) and duration > 0.0):
         return ProofSummary(Verdict.NOT_FINITE.value, np.nan, np.nan, np.nan, np.nan)
@@ -53,14 +46,7 @@ def proved(problem: Problem, motion: BoundedMotion) -> ProofSummary:
 
 
 def summary(case: MotionProof, z0: float) -> ProofSummary:
-    """A proof in short.
-
-    Args:
-        z0: depth over which the slack of the floor is told, m.
-
-    Returns:
-        the summary.
-    """
+    """A proof in short."""
     proof = case.proof
     rooms = [
         float(high) / (row.allowed if row.cables else z0)

@@ -1,9 +1,11 @@
 """Answers of motions that give bounds of their states: proved or refuted over their whole time, in natural units."""
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -22,6 +24,9 @@ from cspr_jax.robots.clearance import Scene
 from cspr_jax.robots.point_mass import spool_radius
 from cspr_jax.robots.state_bounds import StateBounds
 from cspr_jax.schema.verdicts import FLAGS, Verdict
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Intervals between instants of a motion that is only sampled.
 SAMPLES = 2000
@@ -62,29 +67,13 @@ class MotionProof(NamedTuple):
             return flags
         return Verdict.UNDECIDED
 
-    def least(self, side: np.ndarray, flags: Verdict, *, others: bool = False) -> float:
-        """Smallest of the bounds of some criteria.
-
-        Args:
-            side: (n_criteria,) bounds, in the units of their slacks.
-            flags: of the criteria that count.
-            others: whether those of all other flags count instead, over their scales.
-
-        Returns:
-            () inf without such criteria.
-        """
+    def least(self, side: Float[np.ndarray, "n_criteria"], flags: Verdict, *, others: bool = False) -> float:
+        """Smallest of the bounds of some criteria."""
         chosen = np.array([bool(row.flag & flags) != others for row in self.criteria])
         return float(np.min((side / self.scales if others else side)[chosen], initial=np.inf))
 
     def with_feeds(self, motion: Any, feeds: np.ndarray | None) -> "MotionProof":
-        """The proof of a motion of pieces that has to keep feeds, too.
-
-        Args:
-            feeds: as of the field.
-
-        Returns:
-            the proof.
-        """
+        """The proof of a motion of pieces that has to keep feeds, too."""
         if feeds is None or not np.isfinite(feeds).any():
             return self
         from cspr_jax.motions.feeds import feed_proof  # only paths of G-code have feeds
@@ -122,14 +111,7 @@ class MotionProof(NamedTuple):
         return {"failing": self.failing.tolist(), "failing_by_criterion": self.failing_by_criterion}
 
     def causes(self, frame: Frame) -> tuple[Cause, ...]:
-        """The worst cable of each criterion that fails, the worst one first; else of the criterion nearest to it.
-
-        Args:
-            frame: of the robot file, in whose axes causes are.
-
-        Returns:
-            the causes.
-        """
+        """The worst cable of each criterion that fails, the worst one first; else of the criterion nearest to it."""
         order = np.argsort(self.proof.high / self.scales).tolist()
         if not self.broken.any():
             return (dataclasses.replace(cause_of(self, order[0], frame), criterion=Verdict.UNDECIDED.text),)
@@ -166,15 +148,7 @@ class ProvedAnswers(Answers):
 
 
 def cause_of(case: MotionProof, k: int, frame: Frame) -> Cause:
-    """A criterion of a proof as a cause.
-
-    Args:
-        k: its number.
-        frame: of the robot file, in whose axes causes are.
-
-    Returns:
-        the cause, where its slack is smallest.
-    """
+    """A criterion of a proof as a cause."""
     row, proof = case.criteria[k], case.proof
     needed, allowed = row.value(float(proof.high[k])), row.allowed
     if row.flag == Verdict.BELOW_FLOOR:
@@ -186,16 +160,7 @@ def cause_of(case: MotionProof, k: int, frame: Frame) -> Cause:
 def proved_answers(
     problem: Problem, motions: Sequence[Any], scene: Scene | None = None, feeds: Sequence[np.ndarray | None] = ()
 ) -> ProvedAnswers:
-    """Answers of motions, by bounds of their states; a motion that gives none is sampled.
-
-    Args:
-        motions: n of them, from the centroid of the spools, z down.
-        scene: bodies that can meet; None: the cables of a platform alone.
-        feeds: for each motion as of `MotionProof`; empty: there are none.
-
-    Returns:
-        the answers: no numbers of arcs.
-    """
+    """Answers of motions, by bounds of their states; a motion that gives none is sampled."""
     proofs = [(proof_of if hasattr(motion, "bounds") else sampled_proof)(problem, motion, scene) for motion in motions]
     for i, speeds in enumerate(feeds):
         proofs[i] = proofs[i].with_feeds(motions[i], speeds)
@@ -207,13 +172,7 @@ def proved_answers(
 def judge_all_robots(
     problem: Problem, answers: ProvedAnswers, motions: Sequence[Any], scene: Scene | None = None
 ) -> None:
-    """Judge feasible motions for all robots within an uncertainty, if there is one.
-
-    Args:
-        answers: of the robot itself, which take the verdicts.
-        motions: n of them, from the centroid of the spools, z down.
-        scene: as for `proved_answers`.
-    """
+    """Judge feasible motions for all robots within an uncertainty, if there is one."""
     if problem.limits.uncertainty is not None:
         for i in np.flatnonzero(answers.feasible).tolist():
             proved, refuted = (float(side[0]) for side in motion_tolerances(problem, motions[i], scene))
@@ -230,17 +189,7 @@ def proof_of(
     contacts_alone: bool = False,
     intervals: bool = True,
 ) -> MotionProof:
-    """Proof of one motion.
-
-    Args:
-        motion: from the centroid of the spools, z down.
-        scene: as for `proved_answers`.
-        contacts_alone: as for `proofs_of`.
-        intervals: as for `time_proofs`.
-
-    Returns:
-        the proof.
-    """
+    """Proof of one motion."""
     jumps = [motion.jumps()] if hasattr(motion, "jumps") else []
     durations = np.array([float(motion.duration())])
 
@@ -254,26 +203,14 @@ def proof_of(
 def proofs_of(
     problem: Problem,
     bounds: ManyBounds,
-    durations: np.ndarray,
+    durations: Float[np.ndarray, "n"],
     scene: Scene | None = None,
     jumps: Sequence[np.ndarray] = (),
     *,
     contacts_alone: bool = False,
     intervals: bool = True,
 ) -> list[MotionProof]:
-    """Proofs of several motions at once.
-
-    Args:
-        bounds: of their states over blocks, from the numbers of the motions, and the starts and ends of the blocks, s.
-        durations: (n,) s.
-        scene: as for `proved_answers`.
-        jumps: for each motion the instants at which its acceleration jumps, s; empty: nowhere.
-        contacts_alone: whether the proofs are of `criteria.contact_criteria` alone, since others are proved elsewhere.
-        intervals: as for `time_proofs`.
-
-    Returns:
-        n proofs.
-    """
+    """Proofs of several motions at once."""
     rows = _criteria(problem, scene, contacts_alone)
 
     def slacks(motion: np.ndarray, start: np.ndarray, end: np.ndarray) -> BlockSlacks:
@@ -296,16 +233,8 @@ def _proof(problem: Problem, rows: tuple[Criterion, ...], proof: TimeProof, scen
     return MotionProof(rows, proof, _scales(problem, rows), names)
 
 
-def answers_of(proofs: Sequence[MotionProof], duration: np.ndarray) -> ProvedAnswers:
-    """Answers of proofs.
-
-    Args:
-        proofs: n of them.
-        duration: (n,) s.
-
-    Returns:
-        the answers.
-    """
+def answers_of(proofs: Sequence[MotionProof], duration: Float[np.ndarray, "n"]) -> ProvedAnswers:
+    """Answers of proofs."""
     count = len(proofs)
     none, nothing = np.zeros(count, int), np.full(count, np.nan)
     each = np.empty(count, object)
@@ -324,11 +253,7 @@ def answers_of(proofs: Sequence[MotionProof], duration: np.ndarray) -> ProvedAns
 
 
 def margins_of(proofs: Sequence[MotionProof]) -> dict[str, np.ndarray]:
-    """Margins of proofs.
-
-    Returns:
-        (n,) each, by their names in `Answers`.
-    """
+    """Margins of proofs."""
     return {
         "margin": np.array([case.least(case.proof.high, TENSIONS) for case in proofs]),
         "margin_bound": np.array([case.least(case.proof.low, TENSIONS) for case in proofs]),
@@ -344,17 +269,7 @@ def sampled_proof(
     *,
     contacts_alone: bool = False,
 ) -> MotionProof:
-    """Refute a motion that has no bounds by its samples, or leave it undecided.
-
-    Args:
-        motion: from the centroid of the spools, z down.
-        scene: as for `proved_answers`.
-        samples: intervals between equidistant instants.
-        contacts_alone: as for `proofs_of`.
-
-    Returns:
-        a proof that bounds no slack from below; intervals of failure reach from instant to instant.
-    """
+    """Refute a motion that has no bounds by its samples, or leave it undecided."""
     tau = np.linspace(0.0, 1.0, samples + 1)
     # A block without a length has the slacks of its instant.
     states = instant_states(motion, tau)

@@ -1,8 +1,14 @@
 """Verdicts that rest on a proof, whatever the trajectory family."""
 
+from __future__ import annotations
+
 import dataclasses
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Limits whose slacks are proved of squares.
 SPEEDS = ("cable_speed_max", "speed_max")
@@ -26,23 +32,13 @@ class Verdicts:
     room: np.ndarray
 
     def replace(self, rows: np.ndarray, part: "Verdicts") -> None:
-        """Replace the verdicts of some of the motions.
-
-        Args:
-            rows: numbers of the motions.
-        """
+        """Replace the verdicts of some of the motions."""
         for name, values in vars(part).items():
             getattr(self, name)[rows] = values
 
 
-def plain_slack(name: str, values: np.ndarray, squared: tuple[str, ...] = SPEEDS) -> np.ndarray:
-    """Slack of a limit as it is shown.
-
-    Args:
-        values: (...) slack as it is proved: of squared rates 1 - (rate / limit)^2.
-        squared: names of the limits of which it is so.
-
-    Returns:
-        (...) 1 - rate / limit.
-    """
+def plain_slack(
+    name: str, values: Float[np.ndarray, "..."], squared: tuple[str, ...] = SPEEDS
+) -> Float[np.ndarray, "..."]:
+    """Slack of a limit as it is shown."""
     return 1.0 - np.sqrt(np.maximum(1.0 - values, 0.0)) if name in squared else values

@@ -23,15 +23,7 @@ def _slacks(motion: Motion, problem: Problem, tau) -> jax.Array:
 
 
 def sampled_answers(problem: Problem, motions: list[Motion], samples: int = 400) -> Answers:
-    """Answers of motions that are only sampled.
-
-    Args:
-        motions: n of them, from the centroid of the spools, z down.
-        samples: intervals between instants; the smallest slacks are then narrowed down.
-
-    Returns:
-        the answers: no numbers of arcs, since nothing is proved; margins are smallest slacks.
-    """
+    """Answers of motions that are only sampled."""
     tau = np.linspace(0.0, 1.0, samples + 1)
     least, duration = [], []
     for motion in motions:

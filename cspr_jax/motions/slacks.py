@@ -10,6 +10,10 @@ order, with n the number of cables, kappa_k the tension of cable k over its leng
     limits     of each limit that is set, one slack for each cable, of the floor one: `motions.limits.slack`
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import jax
 import jax.numpy as jnp
 from jax import Array
@@ -24,17 +28,12 @@ from cspr_jax.robots.point_mass import PointMassRobot, plane_normal, rest_point
 from cspr_jax.robots.state import State
 from cspr_jax.schema.verdicts import Verdict
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
-def slacks(problem: Problem, motion: Motion, tau: Array) -> Array:
-    """Slacks of all criteria at one instant of a motion.
 
-    Args:
-        motion: from the centroid of the spools, z down.
-        tau: () normalised time in [0, 1].
-
-    Returns:
-        (n_slacks,) without a unit; all positive while the motion is feasible.
-    """
+def slacks(problem: Problem, motion: Motion, tau: Float[Array, ""]) -> Float[Array, "n_slacks"]:
+    """Slacks of all criteria at one instant of a motion."""
     robot, state, z0 = problem.robot, motion.state(tau), motion.z0
     balance = _of_platform if isinstance(robot, PlatformRobot) else _of_point_mass
     terms = [*balance(robot, state, z0), jnp.atleast_1d(plane_normal(robot) @ state.position / z0)]
@@ -48,11 +47,7 @@ def slacks(problem: Problem, motion: Motion, tau: Array) -> Array:
 
 
 def flags(problem: Problem) -> tuple[Verdict, ...]:
-    """Flag that each slack breaks.
-
-    Returns:
-        n_slacks flags, in the order of `slacks`.
-    """
+    """Flag that each slack breaks."""
     robot, verdicts = problem.robot, [Verdict.SLACK_CABLE] * problem.robot.n_cables
     if isinstance(robot, PlatformRobot):
         verdicts.append(Verdict.SINGULAR)
@@ -79,19 +74,8 @@ def _of_platform(robot: PlatformRobot, state: State, z0: Array) -> list[Array]:
     return [robot.n_cables * z0 / robot.gravity * per_length, jnp.atleast_1d(here / at_rest)]
 
 
-def sampled_margin(problem: Problem, motion: Motion, samples: int = 64) -> Array:
-    """Smallest slack at equidistant instants of a motion.
-
-    If it is positive, no sample refutes the motion, but nothing is proved. Its gradient is that of the smallest slack,
-    at the instant where it is smallest.
-
-    Args:
-        motion: from the centroid of the spools, z down.
-        samples: number of intervals between instants, ends included.
-
-    Returns:
-        () without a unit.
-    """
+def sampled_margin(problem: Problem, motion: Motion, samples: int = 64) -> Float[Array, ""]:
+    """Smallest slack at equidistant instants of a motion."""
     tau = jnp.linspace(0.0, 1.0, samples + 1)
     return jnp.min(jax.vmap(lambda t: slacks(problem, motion, t))(tau))
 

@@ -33,14 +33,7 @@ class Stretching(NamedTuple):
 
 
 def least_stretching(proved: Callable[[float], MotionProof]) -> Stretching:
-    """Find the least stretching that is proved feasible; at one shorter by `CLOSE` nothing is proved.
-
-    Args:
-        proved: proof of the motion stretched by a factor.
-
-    Returns:
-        the stretching.
-    """
+    """Find the least stretching that is proved feasible; at one shorter by `CLOSE` nothing is proved."""
     first = proved(1.0)
     if _is_feasible(first):
         return Stretching(1.0, first, is_static=False)

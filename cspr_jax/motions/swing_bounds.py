@@ -1,7 +1,9 @@
 """Affine bounds of swings about P0, hypocycloids of standard or variable amplitude, over a block of time."""
 
+from __future__ import annotations
+
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from jax import Array
 
@@ -9,23 +11,17 @@ from cspr_jax.arithmetic.affine_bounds import AffineBounds, stacked, turned
 from cspr_jax.arithmetic.function_bounds import sincospi
 from cspr_jax.motions.amplitude_bounds import TimeBounds
 
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
+
 
 def swing_bounds(
-    segment: Any, arcs: Array, duration: Array, block: TimeBounds, *, variable: bool = False
+    segment: Any, arcs: Num[Array, ""], duration: Float[Array, ""], block: TimeBounds, *, variable: bool = False
 ) -> tuple[AffineBounds, AffineBounds, AffineBounds]:
     """Bounds of position, velocity and acceleration over one block.
 
     Formulas are those of `platforms.platform_segment` in the precessing frame, which for a standard amplitude are the
     closed form of (2.32) to (2.48).
-
-    Args:
-        segment: has the plane, the hub, both radii, precession and sense, as `swings.hypocycloid.Segment` does.
-        arcs: () number of arcs, a float.
-        duration: () s.
-        block: of the amplitude function and its derivatives, four where it is variable, else three.
-
-    Returns:
-        (3,) m, m/s and m/s^2.
     """
     span, tau = segment.end_radius - segment.start_radius, block.tau
     r, r1, r2 = (value * span for value in block.values[:3])

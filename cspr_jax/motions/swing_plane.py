@@ -1,6 +1,9 @@
 """The plane in which the effector swings between two points, and the precession of the ellipse of its swing in it."""
 
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -9,27 +12,25 @@ from jax import Array
 from cspr_jax.arithmetic.elementary import length
 from cspr_jax.robots.point_mass import AT_P0
 
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float
+
 # Sine of an angle below which a plane counts as upright.
 UPRIGHT = 1e-12
 
 
 @jax.jit
-def swing_plane(v1: Array, v2: Array, size: Array, normal: Array, odd: Array) -> tuple[Array, Array, Array, Array]:
+def swing_plane(
+    v1: Float[Array, "3"],
+    v2: Float[Array, "3"],
+    size: Float[Array, ""],
+    normal: Float[Array, "3"],
+    odd: Bool[Array, ""],
+) -> tuple[Float[Array, "3 2"], Float[Array, ""], Float[Array, ""], Float[Array, ""]]:
     """Plane, radii and precession of a swing from one point to another.
 
     A rest end makes it a straight line. Where start and end lie on one line through p0 and the arcs still need a
     plane, it is the one least inclined to the spool plane.
-
-    Args:
-        v1: (3,) from p0 to the start, m.
-        v2: (3,) from p0 to the end, m.
-        size: () of the robot, m: a point nearer to p0 than `AT_P0` times it counts as p0; as near to a line through p0,
-            it counts as on that line.
-        normal: (3,) of the spool plane.
-        odd: () whether the number of arcs is odd.
-
-    Returns:
-        plane (3, 2): q_h1 and q_h2 of (2.30) as columns; r1 () and r2 () of (2.39), m; precession (), in half turns.
     """
     r1, r2 = length(v1), length(v2)  # (2.39)
     from_rest, to_rest = r1 < AT_P0 * size, r2 < AT_P0 * size

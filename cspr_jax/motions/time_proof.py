@@ -5,14 +5,20 @@ bound is negative. What is left when blocks are as short as the resolution are t
 criterion fails, or instants that are undecided. Open blocks of all motions are bounded together.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import itertools
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cspr_jax.motions.block_parts import TimeBlocks, joined
 from cspr_jax.motions.block_slacks import BlockSlacks
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Int
 
 # Blocks at the start, and the share of itself, or of a tenth of usual ones, to which the smallest slack is narrowed.
 FIRST = 32
@@ -53,46 +59,21 @@ def time_proof(
     resolution: float = 5e-7,
     jumps: np.ndarray | None = None,
 ) -> TimeProof:
-    """Decide criteria over a whole motion.
-
-    Args:
-        slacks: bounds of the slacks over blocks, from their starts and ends, (k,) s each.
-        duration: s.
-        resolution: length of the shortest blocks, s.
-        jumps: instants at which the acceleration jumps, increasing, s; None: nowhere.
-
-    Returns:
-        the proof.
-    """
+    """Decide criteria over a whole motion."""
     at_jumps = [] if jumps is None else [jumps]
     return time_proofs(lambda _, start, end: slacks(start, end), np.array([duration]), resolution, at_jumps)[0]
 
 
 def time_proofs(
     slacks: Callable[[np.ndarray, np.ndarray, np.ndarray], BlockSlacks],
-    durations: np.ndarray,
+    durations: Float[np.ndarray, "n_motions"],
     resolution: float = 5e-7,
     jumps: Sequence[np.ndarray] = (),
-    groups: np.ndarray | None = None,
+    groups: Int[np.ndarray, "n_criteria"] | None = None,
     *,
     intervals: bool = True,
 ) -> list[TimeProof]:
-    """Decide criteria over several whole motions at once.
-
-    Args:
-        slacks: bounds of the slacks over blocks, from the numbers of their motions, and from their starts and ends,
-            (k,) s each.
-        durations: (n_motions,) s.
-        resolution: length of the shortest blocks, s.
-        jumps: for each motion the instants at which its acceleration jumps, increasing, s; empty: it jumps nowhere.
-        groups: (n_criteria,) numbers, from 0 on, of groups of criteria of which the smallest slack alone is narrowed;
-            None: that of each criterion.
-        intervals: whether all intervals of failure are found, to the resolution; else of a motion that fails only the
-            smallest slacks are.
-
-    Returns:
-        one proof a motion, the same as it has alone.
-    """
+    """Decide criteria over several whole motions at once."""
     count = len(durations)
     if not count:
         return []

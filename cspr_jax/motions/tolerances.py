@@ -4,10 +4,12 @@ Blocks of a motion are proved for a multiple or halved (`uncertainty.holds`); a 
 middle of a block bounds the multiple from above (`uncertainty.fails`).
 """
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
@@ -15,6 +17,9 @@ from cspr_jax.motions.blocks import Blocks
 from cspr_jax.motions.enclosures import Enclosure, Influence, influence
 from cspr_jax.motions.uncertainty import Requirements, WorstDisplacements, fails, holds, worst
 from cspr_jax.schema.limits import LARGEST_MULTIPLE
+
+if TYPE_CHECKING:
+    from jaxtyping import Num
 
 # `ROW` is tried first, in its order. A multiple that fails is then divided by `RATIO` while it fails, down to `FIRST`.
 RATIO, FIRST = 8.0, 1e-6
@@ -114,38 +119,20 @@ class _Open:
 
 def tolerated(
     blocks: Blocks,
-    arcs: np.ndarray,
+    arcs: Num[np.ndarray, "n"],
     requirements: Requirements,
     enclose: Callable[[Blocks], Enclosure],
     *,
     whole: bool = True,
 ) -> Tolerated:
-    """Multiples of an uncertainty that motions are proved to tolerate, and that are refuted.
-
-    Args:
-        blocks: of n whole motions, each feasible as planned.
-        arcs: (n,) numbers of arcs.
-        enclose: gives the enclosure of blocks.
-        whole: True: find multiples as near to each other as can be; False: only decide on which side of 1 they lie.
-
-    Returns:
-        the multiples.
-    """
+    """Multiples of an uncertainty that motions are proved to tolerate, and that are refuted."""
     if not len(arcs):
         return Tolerated(np.zeros(0), np.zeros(0))
     return tolerated_by(_looked_at(requirements, enclose, blocks), arcs, whole=whole)
 
 
-def tolerated_by(pool: Pool, arcs: np.ndarray, *, whole: bool = True) -> Tolerated:
-    """Multiples of an uncertainty, as `tolerated` gives them, by any way to prove and to refute blocks.
-
-    Args:
-        pool: blocks of n whole motions, each feasible as planned.
-        arcs: (n,) numbers of arcs, or of as many parts as a motion needs blocks for.
-
-    Returns:
-        the multiples.
-    """
+def tolerated_by(pool: Pool, arcs: Num[np.ndarray, "n"], *, whole: bool = True) -> Tolerated:
+    """Multiples of an uncertainty, as `tolerated` gives them, by any way to prove and to refute blocks."""
     search = _MultipleSearch(arcs, whole=whole)
     search.refuted = (
         _refuted_first(pool, len(arcs)) if whole else _refuted_below(pool, search.refuted, np.ones(len(arcs)))

@@ -8,9 +8,11 @@ accelerations and clearances. Determinant and depth are judged for the planned r
 What is refuted rests on the slacks of single robots at instants, displaced along differences of these slacks.
 """
 
+from __future__ import annotations
+
 import dataclasses
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -32,6 +34,9 @@ from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # Displacement by which differences are taken, over the length of a cable; criteria of which the worst one is sought.
 STEP, NEAREST = 1e-6, 2
 BATCH = 256  # robots at instants
@@ -51,16 +56,8 @@ class Share(NamedTuple):
     factor: Array
 
 
-def share_of(limits: Limits, multiple: np.ndarray) -> Share:
-    """Multiples of an uncertainty.
-
-    Args:
-        limits: those with an uncertainty; others have no shares.
-        multiple: (k,).
-
-    Returns:
-        the shares, (k,).
-    """
+def share_of(limits: Limits, multiple: Float[np.ndarray, "k"]) -> Share:
+    """Multiples of an uncertainty."""
     uncertainty: Any = limits.uncertainty
     with np.errstate(over="ignore"):
         factor = leaf(float(uncertainty.mass_factor) ** multiple)
@@ -71,17 +68,8 @@ def share_of(limits: Limits, multiple: np.ndarray) -> Share:
 @persistent_jit(static_argnames="contacts_alone", compiler_options=compile_options.least())
 def blocks_hold(
     robot: AnyRobot, limits: Limits, bodies: Bodies, cases: tuple[StateBounds, Share], *, contacts_alone: bool = False
-) -> Array:
-    """Prove that all robots keep taut cables, limits and distances throughout blocks.
-
-    Args:
-        robot: without pulleys.
-        cases: bounds of k states, and shares (k,).
-        contacts_alone: whether only distances are asked about.
-
-    Returns:
-        (k,).
-    """
+) -> Float[Array, "k"]:
+    """Prove that all robots keep taut cables, limits and distances throughout blocks."""
 
     def one(state: StateBounds, share: Share) -> Array:
         cables = cable_bounds(robot, state)
@@ -100,17 +88,8 @@ def blocks_hold(
 
 
 @persistent_jit(compiler_options=compile_options.least())
-def lower_slacks(robot: AnyRobot, limits: Limits, cases: tuple[StateBounds, Share]) -> Array:
-    """Lower bounds of the slacks of tensions and limits of all robots over blocks.
-
-    Args:
-        robot: without pulleys.
-        cases: bounds of k states, and shares (k,).
-
-    Returns:
-        (k, n_slacks), the first ones of `criteria.criteria`; -inf where nothing is known, inf where a criterion is
-        judged for the planned robot alone.
-    """
+def lower_slacks(robot: AnyRobot, limits: Limits, cases: tuple[StateBounds, Share]) -> Float[Array, "k n_slacks"]:
+    """Lower bounds of the slacks of tensions and limits of all robots over blocks."""
 
     def one(state: StateBounds, share: Share) -> Array:
         slacks = jnp.concatenate(_cable_slacks(robot, limits, state, cable_bounds(robot, state), share))
@@ -218,18 +197,8 @@ def worst_ways(
     share: Share,
     *,
     contacts_alone: bool = False,
-) -> np.ndarray:
-    """Unit displacements that are worst, to first order, for the criteria that an uncertainty breaks first.
-
-    Args:
-        robot: without pulleys.
-        states: at k instants.
-        share: the uncertainty, (k,).
-        contacts_alone: as for `blocks_hold`.
-
-    Returns:
-        (k, 2, n_cables + 1, 3) of the spools and of the mass centre.
-    """
+) -> Float[np.ndarray, "k 2 n_cables+1 3"]:
+    """Unit displacements that are worst, to first order, for the criteria that an uncertainty breaks first."""
     count = robot.n_cables + 1
     rays = np.asarray(robot.base_points)[None] - states.position.middle[:, None]
     step = STEP * np.linalg.norm(rays, axis=2).max(1)[:, None, None, None]
@@ -258,19 +227,8 @@ def instants_fail(
     ways: np.ndarray,
     *,
     contacts_alone: bool = False,
-) -> np.ndarray:
-    """Tell at which instants a robot that is displaced, light or heavy, breaks a criterion.
-
-    Args:
-        robot: without pulleys.
-        states: at k instants.
-        share: (k,).
-        ways: unit displacements as of `worst_ways`.
-        contacts_alone: as for `blocks_hold`.
-
-    Returns:
-        (k,).
-    """
+) -> Float[np.ndarray, "k"]:
+    """Tell at which instants a robot that is displaced, light or heavy, breaks a criterion."""
     radii = np.repeat(np.stack([share.spools, share.centre], axis=1), [robot.n_cables, 1], axis=1)
     moved = np.repeat(radii[:, None, :, None] * ways, 2, axis=1)
     ratio = np.tile(np.stack([1.0 / share.factor, share.factor], axis=1), (1, ways.shape[1]))

@@ -11,8 +11,10 @@ B_kj is |g_kj across ray j| times the largest displacement of spool j, and b is 
 docs/theory.md. Then no such robot is singular either.
 """
 
+from __future__ import annotations
+
 import dataclasses
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import numpy as np
@@ -22,6 +24,9 @@ from cspr_jax.motions.cable_rates import rates_fail, rates_hold
 from cspr_jax.motions.enclosures import TOUCHED, Enclosure, Influence, inverted, structure
 from cspr_jax.motions.problem import Problem
 from cspr_jax.robots.limits import Limits, Uncertainty
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Tolerance as a part of the slacks of taut cables, as in other proofs.
 TOLERANCE = 1e-6
@@ -50,19 +55,8 @@ class Requirements:
     uncertainty: Uncertainty
 
 
-def requirements_of(problem: Problem, slack: np.ndarray) -> Requirements:
-    """Return the requirements on all robots within the uncertainty of a problem.
-
-    Args:
-        problem: robot, and limits with the uncertainty.
-        slack: (n,) as in `Requirements`.
-
-    Returns:
-        the requirements.
-
-    Raises:
-        ValueError: no uncertainty is given.
-    """
+def requirements_of(problem: Problem, slack: Float[np.ndarray, "n"]) -> Requirements:
+    """Return the requirements on all robots within the uncertainty of a problem."""
     limits = jax.tree.map(np.asarray, problem.limits)
     if limits.uncertainty is None:
         raise ValueError("limits of robots within an uncertainty have none")
@@ -123,16 +117,10 @@ def _changes(
 
 
 @UNKNOWN
-def deviations(known: Enclosure, influence: Influence, spools: np.ndarray, centre: np.ndarray) -> np.ndarray:
-    """Largest differences between tensions of robots and the planned ones, at the same instant of a block.
-
-    Args:
-        spools: (k,) largest displacement, m.
-        centre: (k,) likewise of the mass centre, m.
-
-    Returns:
-        (k, n_cables) per mass and length, 1/s^2; infinite where nothing is known, not even that no robot is singular.
-    """
+def deviations(
+    known: Enclosure, influence: Influence, spools: Float[np.ndarray, "k"], centre: Float[np.ndarray, "k"]
+) -> Float[np.ndarray, "k n_cables"]:
+    """Largest differences between tensions of robots and the planned ones, at the same instant of a block."""
     far = _reaches(known, influence, spools, centre)
     within, displaced = _changes(known, influence, influence.spools, far)
     rest = (displaced @ known.high[..., None])[..., 0] + ROUNDING * known.high + far.centre
@@ -155,10 +143,10 @@ class Changes(NamedTuple):
 def closer_changes(
     known: Enclosure,
     influence: Influence,
-    spools: np.ndarray,
-    centre: np.ndarray,
-    off: np.ndarray,
-    least: np.ndarray,
+    spools: Float[np.ndarray, "k"],
+    centre: Float[np.ndarray, "k"],
+    off: Float[np.ndarray, "k n_cables"],
+    least: Float[np.ndarray, "k n_cables"],
     *,
     upwards: bool,
 ) -> Changes:
@@ -168,16 +156,6 @@ def closer_changes(
     All others are then above theirs, and at least 0. With c_j the terms of row k of B, mu'_k has changed by at most
     the largest sum of c_j mu'_j over such tensions, in which mu'_k itself is known. That sum is at most y . w for every
     functional y of wrenches whose products with the columns of the other robot's W are at least c_j.
-
-    Args:
-        spools: (k,) largest displacement, m.
-        centre: (k,) likewise of the mass centre, m.
-        off: (k, n_cables) of `deviations`, finite.
-        least: (k, n_cables) smallest tensions per mass and length, at least 0, 1/s^2.
-
-    Returns:
-        the changes; infinite where they would lead below the smallest tensions, where nothing is known, and upwards
-        unless `upwards`.
     """
     far = _reaches(known, influence, spools, centre)
     within, displaced = _changes(known, influence, influence.spools, far)
@@ -217,16 +195,10 @@ def _solved(matrix: np.ndarray, rest: np.ndarray) -> np.ndarray:
 
 
 @UNKNOWN
-def holds(known: Enclosure, influence: Influence, requirements: Requirements, multiple: np.ndarray) -> np.ndarray:
-    """Prove that every robot within a multiple of the uncertainty meets all criteria within blocks.
-
-    Args:
-        requirements: its slack is that of each block, (k,).
-        multiple: (k,).
-
-    Returns:
-        (k,).
-    """
+def holds(
+    known: Enclosure, influence: Influence, requirements: Requirements, multiple: Float[np.ndarray, "k"]
+) -> Float[np.ndarray, "k"]:
+    """Prove that every robot within a multiple of the uncertainty meets all criteria within blocks."""
     share = _share(requirements, multiple)
     is_met = np.ones(len(multiple), bool)
     if float(requirements.uncertainty.spool_positions) > 0.0:
@@ -292,11 +264,7 @@ class WorstDisplacements(NamedTuple):
 
 @UNKNOWN
 def worst(known: Enclosure, influence: Influence, requirements: Requirements) -> WorstDisplacements:
-    """Displacements that are worst to first order.
-
-    Returns:
-        the displacements.
-    """
+    """Displacements that are worst to first order."""
     uncertainty, rows = requirements.uncertainty, np.arange(len(influence.mu))
     size = np.sum(np.linalg.norm(influence.across, axis=3) * np.abs(influence.mu)[:, None], axis=2)
     change = float(uncertainty.spool_positions) * size
@@ -316,17 +284,13 @@ def worst(known: Enclosure, influence: Influence, requirements: Requirements) ->
 
 @UNKNOWN
 def fails(
-    known: Enclosure, influence: Influence, worst: WorstDisplacements, requirements: Requirements, multiple: np.ndarray
-) -> np.ndarray:
-    """Tell whether a worst robot within a multiple of the uncertainty breaks a criterion in the middle of each block.
-
-    Args:
-        requirements: its slack is that of each block, (k,).
-        multiple: (k,).
-
-    Returns:
-        (k,).
-    """
+    known: Enclosure,
+    influence: Influence,
+    worst: WorstDisplacements,
+    requirements: Requirements,
+    multiple: Float[np.ndarray, "k"],
+) -> Float[np.ndarray, "k"]:
+    """Tell where a worst robot within a multiple of the uncertainty breaks a criterion in the middle of a block."""
     share, limits = _share(requirements, multiple), requirements.limits
     broken = np.zeros(len(multiple), bool)
     for spools, centre in zip(*worst, strict=True):
@@ -343,16 +307,10 @@ def fails(
     return broken
 
 
-def tensions(known: Enclosure, spools: np.ndarray, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Tensions of other robots in the middles of blocks.
-
-    Args:
-        spools: (k, n_cables, 3) displacements of the spools, m.
-        centre: (k, 3) of the mass centre, m.
-
-    Returns:
-        (k, n_cables) tensions per mass and length, 1/s^2, and lengths of the cables, m, of the other robots.
-    """
+def tensions(
+    known: Enclosure, spools: Float[np.ndarray, "k n_cables 3"], centre: Float[np.ndarray, "k 3"]
+) -> tuple[Float[np.ndarray, "k n_cables"], Float[np.ndarray, "k n_cables"]]:
+    """Tensions of other robots in the middles of blocks."""
     rays, is_platform = known.rays - spools, bool(known.arms.any())
     extra = np.einsum("kij,kj->ki", known.whirl, centre)
     force = known.force + extra

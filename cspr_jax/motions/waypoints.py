@@ -1,7 +1,10 @@
 """Way-points: consecutive poses of a plan that one family joins, as points of the kernels."""
 
+from __future__ import annotations
+
 import dataclasses
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +14,9 @@ from cspr_jax.config.pose import Pose
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.schema.families import FAMILIES
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -58,25 +64,11 @@ class Waypoints:
         return max(self.keys.max_arcs, int(self.arcs.max()))
 
     def name(self, i: int) -> str:
-        """Name of a pose in messages.
-
-        Args:
-            i: number of the pose among the way-points.
-
-        Returns:
-            the name in the plan, such as "pose[3]".
-        """
+        """Name of a pose in messages."""
         return f"pose[{self.first + i}]"
 
-    def points(self, z0) -> np.ndarray:
-        """Places of the poses; poses at rest are in P0.
-
-        Args:
-            z0: (...) m.
-
-        Returns:
-            (..., n_poses, 3) from the centroid of the spools, z down, m.
-        """
+    def points(self, z0) -> Float[np.ndarray, "... n_poses 3"]:
+        """Places of the poses; poses at rest are in P0."""
         at_rest = rest_point(np.asarray(z0))
         anywhere = FAMILIES[self.family].rests_anywhere
         in_p0 = [pose.position is None or (pose.rest and not anywhere) for pose in self.poses]

@@ -1,7 +1,9 @@
 """Binding criteria along a motion: at each time the one that is nearest to being broken, or broken by most."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,21 +15,18 @@ from cspr_jax.robots.state import State
 from cspr_jax.robots.wrench_sets import tension_range
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 
 def binding(
-    problem: Problem, state: State, of_cables: Mapping[str, np.ndarray], times: np.ndarray, details: Mapping[str, Any]
+    problem: Problem,
+    state: State,
+    of_cables: Mapping[str, np.ndarray],
+    times: Float[np.ndarray, "n"],
+    details: Mapping[str, Any],
 ) -> dict[str, np.ndarray]:
-    """Flags of what binds, and its cables.
-
-    Args:
-        state: of the motion, z down; leaves (m, ...), m at least n.
-        of_cables: "tension", "length", "rate" and "rate_slope", (m, n_cables) each.
-        times: (n,) since the start of the segment, s.
-        details: of the segment, with the intervals in which criteria fail, if they are known.
-
-    Returns:
-        (n,) each, by the names of `schema.quantities.TRAJECTORY`.
-    """
+    """Flags of what binds, and its cables."""
     slacks, names = [], []
     for flag, slack in _slacks(problem, state, of_cables):
         slacks.append(slack)

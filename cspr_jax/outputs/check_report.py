@@ -24,14 +24,7 @@ RETIMED = ("planned_duration", "gain", "lower_bound", "gap", "retimed", "path_de
 
 
 def check_object(plan: PlannedMotions) -> dict[str, Any]:
-    """The object that `cspr check --json` prints.
-
-    Args:
-        plan: of a single motion.
-
-    Returns:
-        plain values; what does not apply, or is not finite, is None.
-    """
+    """The object that `cspr check --json` prints."""
     answers, demands = plan.answers, plan.demands
     case = shown_proof(plan)
     fields = {
@@ -68,14 +61,7 @@ def check_object(plan: PlannedMotions) -> dict[str, Any]:
 
 
 def shown_proof(plan: PlannedMotions) -> MotionProof:
-    """The proof of a plan of a single motion.
-
-    Returns:
-        the proof.
-
-    Raises:
-        TypeError: the family of the plan has no such proofs.
-    """
+    """The proof of a plan of a single motion."""
     answers = plan.legs[0].answers
     if not isinstance(answers, ProvedAnswers):
         raise TypeError("a check is a plan of one spline")
@@ -146,11 +132,7 @@ def _bound(case: MotionProof, k: int) -> tuple[float, float]:
 
 
 def check_lines(plan: PlannedMotions) -> list[str]:
-    """The verdict of a check as text.
-
-    Returns:
-        lines above its table.
-    """
+    """The verdict of a check as text."""
     answers, case = plan.answers, shown_proof(plan)
     duration = float(answers.duration[0])
     lines = [f"{plan.robot_file.name}: motion of {duration:.6g} s, {_taken_as(plan)}; {axes_text(plan)}"]
@@ -202,11 +184,7 @@ def _taken_as(plan: PlannedMotions) -> str:
 
 
 def check_table(plan: PlannedMotions):
-    """Demands of a motion, and their limits, as a table for a terminal.
-
-    Returns:
-        a rich table.
-    """
+    """Demands of a motion, and their limits, as a table for a terminal."""
     from rich.table import Table  # only a terminal needs it
 
     case = shown_proof(plan)

@@ -11,14 +11,7 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def folder() -> Path:
-    """Folder of the examples: in the package where it was installed from a wheel, in the checkout beside it else.
-
-    Returns:
-        the folder.
-
-    Raises:
-        StoreError: there is none.
-    """
+    """Folder of the examples: in the package where it was installed from a wheel, in the checkout beside it else."""
     for place in (_PACKAGE / "examples", _PACKAGE.parent / "sweeps"):
         if place.is_dir():
             return place
@@ -26,14 +19,7 @@ def folder() -> Path:
 
 
 def examples() -> dict[str, str]:
-    """Names and purposes of the examples.
-
-    Returns:
-        for each name what it is for: the first line of the file.
-
-    Raises:
-        StoreError: they cannot be read.
-    """
+    """Names and purposes of the examples."""
     purposes = {}
     for path in sorted(folder().glob("*.toml")):
         first = path.read_text("utf-8").partition("\n")[0]
@@ -42,19 +28,7 @@ def examples() -> dict[str, str]:
 
 
 def copy(names: list[str], place: Path) -> list[Path]:
-    """Copy some of them; nothing is overwritten.
-
-    Args:
-        place: folder to copy them to; it is made if absent.
-
-    Returns:
-        the copies.
-
-    Raises:
-        ConfigError: no such example.
-        RefusedError: a file of that name is there.
-        StoreError: the folder or the disk refuses.
-    """
+    """Copy some of them; nothing is overwritten."""
     known, source = examples(), folder()
     for name in names:
         if name not in known:

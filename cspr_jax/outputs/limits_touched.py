@@ -36,11 +36,7 @@ class TouchedLimit(NamedTuple):
     tolerance: float
 
     def to_dict(self) -> dict[str, Any]:
-        """The criterion as the JSON of a check has it.
-
-        Returns:
-            plain values.
-        """
+        """The criterion as the JSON of a check has it."""
         return self.cause.to_dict() | {"tolerance": self.tolerance}
 
     @property
@@ -53,14 +49,7 @@ class TouchedLimit(NamedTuple):
 
 
 def limits_touched(plan: PlannedMotions, case: MotionProof) -> list[TouchedLimit]:
-    """Criteria that lie on their limits, as far as samples of positions and their rates tell.
-
-    Args:
-        plan: of a single motion, of which the case is the proof.
-
-    Returns:
-        the worst of each criterion, the worst one first; none of other motions than those of Hermite pieces.
-    """
+    """Criteria that lie on their limits, as far as samples of positions and their rates tell."""
     motion = plan.legs[0].motions[0] if plan.legs[0].motions else None
     if not isinstance(motion, Spline) or motion.interpolation != "hermite" or len(motion.knots) < 4:
         return []

@@ -16,17 +16,7 @@ PLACEHOLDER = "placeholder"
 
 
 def robots(names: Iterable[str | Path] = ()) -> list[dict[str, Any]]:
-    """The robots of the catalogue, or those that are named.
-
-    Args:
-        names: of the catalogue, or paths of robot files; none: all of the catalogue.
-
-    Returns:
-        the keys of each one's file, and "fault": why it cannot hang still with every cable taut, or None.
-
-    Raises:
-        ConfigError: no such robot, or a mistake in its file.
-    """
+    """The robots of the catalogue, or those that are named."""
     from cspr_jax.config.robot import resolve_robot  # takes longer than the list for people
 
     listed = []
@@ -44,11 +34,7 @@ def robots(names: Iterable[str | Path] = ()) -> list[dict[str, Any]]:
 
 
 def catalogue_table():
-    """The catalogue for a terminal, one line a robot.
-
-    Returns:
-        a rich table.
-    """
+    """The catalogue for a terminal, one line a robot."""
     rows = [
         (
             keys["name"],
@@ -77,14 +63,7 @@ def _remarks(keys: dict[str, Any]) -> list[str]:
 
 
 def robot_details(robot: dict[str, Any]):
-    """All about a robot for a terminal.
-
-    Args:
-        robot: as `robots` gives it.
-
-    Returns:
-        a rich table.
-    """
+    """All about a robot for a terminal."""
     pattern = _pattern(robot)
     shown = {"source": robot["source"], "moves": f"{pattern}, {_motion(pattern)}"}
     shown |= {"cables": str(len(robot["base_points"])), "mass (kg)": f"{robot['mass']:g}"}
@@ -109,25 +88,14 @@ def _written(value: Any) -> str:
 
 
 def quantities() -> list[dict[str, Any]]:
-    """The quantities that a result or a motion can hold.
-
-    Returns:
-        group, name, units and description of each.
-    """
+    """The quantities that a result or a motion can hold."""
     groups = {"axis": AXES, "map": QUANTITIES, "motion": TRAJECTORY, "segment": SEGMENTS}
     groups |= {"flight": FLIGHT, "failure": FAILURES, "path": PATHS}
     return [{"group": group, **dataclasses.asdict(q)} for group, table in groups.items() for q in table.values()]
 
 
 def quantities_table(listed: list[dict[str, Any]]):
-    """The quantities for a terminal.
-
-    Args:
-        listed: as `schema.quantities` gives them.
-
-    Returns:
-        a rich table.
-    """
+    """The quantities for a terminal."""
     heads = ("group", "name", "units", "description")
     return _table(heads, [tuple(row[head] for head in heads) for row in listed])
 

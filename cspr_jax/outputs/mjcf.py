@@ -42,17 +42,7 @@ BROWN, GLASS, HULL = (0.36, 0.24, 0.18, 0.6), (0.85, 0.45, 0.1, 0.35), "platform
 
 
 def model_xml(body: Suspended, moved: Played, step: float = STEP, control_file: str = "", note: str = "") -> str:
-    """A model of a robot for MuJoCo.
-
-    Args:
-        moved: its motion, whose first row is the keyframe.
-        step: of the integrator, s.
-        control_file: name of the control file, which the model mentions.
-        note: what a reader should know, for the comment.
-
-    Returns:
-        the text of an MJCF file.
-    """
+    """A model of a robot for MuJoCo."""
     root = ElementTree.Element("mujoco", model=printable(body.name))
     turned = "" if body.z_axis == "up" else ", turned by half a turn about x: (x, -y, -z) of the robot file"
     words = f"World axes are those of the robot file{turned}; z is up. A control is the tension of a cable, N."
@@ -221,28 +211,12 @@ def _motors(actuators: ElementTree.Element, body: Suspended, moved: Played) -> N
 
 
 def control_file_of(path: Path) -> Path:
-    """Control file beside a model.
-
-    Args:
-        path: of the model, NAME.xml.
-
-    Returns:
-        NAME_control.csv.
-    """
+    """Control file beside a model."""
     return path.with_name(f"{path.stem}_control.csv")
 
 
 def write_mjcf(plan: PlannedMotions, path: Path, step: float = STEP) -> None:
-    """Write a model of a plan's robot, and beside it the control file that plays the plan.
-
-    Args:
-        path: of the model, NAME.xml.
-        step: the longest step, s.
-
-    Raises:
-        ConfigError: a step that is no number > 0 or gives too many rows, or a plan without a finite motion.
-        StoreError: the disk or the folder refuses.
-    """
+    """Write a model of a plan's robot, and beside it the control file that plays the plan."""
     moved, beside = played(plan, step), control_file_of(path)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")

@@ -82,22 +82,7 @@ def _states(robot, limits: Limits, motion: Motion, tau, *, rule: str, with_coupl
 
 
 def rows(plan: PlannedMotions, *, rate: float | None = None) -> dict[str, np.ndarray]:
-    """States along a plan.
-
-    Args:
-        rate: rows per second over the whole plan, Hz, and one at its end; None: `samples` rows per segment, ends
-            included.
-
-    Returns:
-        "t" (n,) s and the other names of `schema.quantities.TRAJECTORY`, (n, 3), (n, 4) or (n, n_cables), in the plan's
-        axes; "tension_residual" (n,) only of redundant cables, "quaternion", "omega" and "omega_dot" only for a
-        platform, "mass_centre" only for one whose poses are those of its own axes, "tension_each" (n, 6) only for one
-        that only translates, "tension_couple" only for four spools at the corners of a level rectangle,
-        "path_acceleration" only where all segments are straight lines.
-
-    Raises:
-        ConfigError: a rate that is no number > 0, or too many rows.
-    """
+    """States along a plan."""
     if rate is not None and not 0.0 < rate < float("inf"):
         raise ConfigError("--rate", f"{rate}: must be a number > 0, in Hz")
     if rate is not None and not np.isfinite(plan.answers.duration).all():
@@ -126,14 +111,7 @@ def rows(plan: PlannedMotions, *, rate: float | None = None) -> dict[str, np.nda
 
 
 def rows_at(plan: PlannedMotions, taus: Sequence[np.ndarray]) -> dict[str, np.ndarray]:
-    """States at given instants of the segments of a plan.
-
-    Args:
-        taus: of each segment, (n_i,) normalised times in [0, 1].
-
-    Returns:
-        as `rows`.
-    """
+    """States at given instants of the segments of a plan."""
     duration, motions = plan.answers.duration, [motion for leg in plan.legs for motion in leg.motions]
     starts = np.concatenate([[0.0], np.cumsum(duration)])
     robot = plan.problem.robot
@@ -163,15 +141,7 @@ def rows_at(plan: PlannedMotions, taus: Sequence[np.ndarray]) -> dict[str, np.nd
 
 
 def write_rows(plan: PlannedMotions, path: Path, *, rate: float | None = None) -> None:
-    """Write the motion of a plan to a .csv or .h5 file; that of one that is not feasible says so.
-
-    Args:
-        rate: rows per second, Hz, or None.
-
-    Raises:
-        ConfigError: too many rows, or a best candidate that is not finite.
-        StoreError: the disk or the folder refuses.
-    """
+    """Write the motion of a plan to a .csv or .h5 file; that of one that is not feasible says so."""
     is_motion = np.isfinite(plan.answers.duration).all()
     columns = rows(plan, rate=rate) if is_motion else {"t": plan.answers.duration}
     if not all(np.isfinite(values).all() for name, values in columns.items() if name not in OPEN):
@@ -255,11 +225,7 @@ def _write_others(file: h5py.File, columns: dict[str, np.ndarray]) -> None:
 
 
 def failures(plan: PlannedMotions) -> dict[str, np.ndarray]:
-    """Intervals in which segments fail that are proved or refuted over their whole time.
-
-    Returns:
-        by the names of `schema.quantities.FAILURES`, s since the start of the plan; nothing without such intervals.
-    """
+    """Intervals in which segments fail that are proved or refuted over their whole time."""
     starts = np.cumsum(plan.answers.duration) - plan.answers.duration
     intervals = [
         start + np.reshape(plan.details(i).get("failing", ()), (-1, 2)) for i, start in enumerate(starts.tolist())
@@ -282,11 +248,7 @@ def failures(plan: PlannedMotions) -> dict[str, np.ndarray]:
 
 
 def attributes(plan: PlannedMotions) -> dict[str, Any]:
-    """Attributes of a motion file, from its plan.
-
-    Returns:
-        attributes of the whole file.
-    """
+    """Attributes of a motion file, from its plan."""
     robot_file = plan.robot_file
     return {
         "Conventions": "CF-1.11",
@@ -307,11 +269,7 @@ def attributes(plan: PlannedMotions) -> dict[str, Any]:
 
 
 def segments(plan: PlannedMotions) -> dict[str, np.ndarray]:
-    """Quantities of each segment in a motion file.
-
-    Returns:
-        (n,) each, by the names of `schema.quantities.SEGMENTS`.
-    """
+    """Quantities of each segment in a motion file."""
     answers, ends = plan.answers, np.cumsum(plan.answers.duration)
     columns = {
         "segment": np.arange(1, len(ends) + 1),

@@ -19,30 +19,14 @@ BESIDE = ("title", "software", "feasible", "family", "robot", "mass", "z_axis", 
 
 
 def rows_object(plan: PlannedMotions, rate: float | None) -> dict[str, Any]:
-    """The rows of a plan as plain values.
-
-    Args:
-        rate: as for `motion_files.rows`.
-
-    Returns:
-        "units" and "rows", by the names of `schema.quantities.TRAJECTORY`: lists of numbers, or of lists of them; null
-        for what is not finite.
-    """
+    """The rows of a plan as plain values."""
     columns = rows(plan, rate=rate)
     units = {name: TRAJECTORY[name].units for name in columns}
     return {"units": units, "rows": finite({name: values.tolist() for name, values in columns.items()})}
 
 
 def write_json(plan: PlannedMotions, path: Path, *, rate: float | None = None) -> None:
-    """Write the rows of a plan to a .json file, with their units and what is known of the robot.
-
-    Args:
-        rate: as for `motion_files.rows`.
-
-    Raises:
-        ConfigError: too many rows, or a motion that is not finite.
-        StoreError: the disk or the folder refuses.
-    """
+    """Write the rows of a plan to a .json file, with their units and what is known of the robot."""
     is_motion = np.isfinite(plan.answers.duration).all()
     fields: dict[str, Any] = rows_object(plan, rate) if is_motion else {"rows": {"t": [None]}}
     if any(None in np.ravel(values) for name, values in fields["rows"].items() if name not in OPEN):

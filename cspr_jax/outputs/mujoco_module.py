@@ -6,14 +6,7 @@ from cspr_jax.errors import ConfigError
 
 
 def need_mujoco() -> Any:
-    """MuJoCo, an optional dependency.
-
-    Returns:
-        the module.
-
-    Raises:
-        ConfigError: it is not installed.
-    """
+    """MuJoCo, an optional dependency."""
     try:
         import mujoco
     except ImportError as error:

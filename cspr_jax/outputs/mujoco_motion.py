@@ -5,6 +5,8 @@ both ends and in the middle of each step of the integrator, RK4, which asks for 
 instant where the acceleration, or its derivative, may jump.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import itertools
 import math
@@ -23,6 +25,7 @@ from cspr_jax.robots.pulleys import Pulleys
 from cspr_jax.robots.shapes import Body, Obstacle, inward, rotated
 
 if TYPE_CHECKING:
+    from jaxtyping import Float, Int
     from scipy.spatial.transform import Rotation
 
 STEP = 0.0005  # s, the longest that MuJoCo takes unless it is told another one
@@ -98,24 +101,14 @@ class Played:
     omega_dot: np.ndarray | None = None
 
     def runs(self) -> list[range]:
-        """Runs of steps without a jump.
-
-        Returns:
-            of each its rows: an odd number, first and last included.
-        """
+        """Runs of steps without a jump."""
         ends = np.flatnonzero(np.diff(self.time) == 0.0) + 1
         return [range(a, b) for a, b in itertools.pairwise([0, *ends.tolist(), len(self.time)])]
 
-    def coordinates(self, axes: Sequence[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Coordinates of MuJoCo's joints, their velocities and accelerations.
-
-        Args:
-            axes: of the slide joints; none: a free joint.
-
-        Returns:
-            (n, nq), (n, nv), (n, nv): m, of a free joint followed by the unit quaternion, scalar first; m/s, followed
-            by the angular velocity in body axes, rad/s; their derivatives.
-        """
+    def coordinates(
+        self, axes: Sequence[int]
+    ) -> tuple[Float[np.ndarray, "n nq"], Float[np.ndarray, "n nv"], Float[np.ndarray, "n nv"]]:
+        """Coordinates of MuJoCo's joints, their velocities and accelerations."""
         if self.rotation is None or self.omega is None or self.omega_dot is None:
             chosen = list(axes)
             return self.position[:, chosen], self.velocity[:, chosen], self.acceleration[:, chosen]
@@ -124,24 +117,12 @@ class Played:
 
 
 def upward(z_axis: str) -> Frame:
-    """Axes of a robot file beside those of MuJoCo; the origin is the same.
-
-    Args:
-        z_axis: where the file's z points, "down" or "up".
-
-    Returns:
-        the frame; inward: from the file's axes.
-    """
+    """Axes of a robot file beside those of MuJoCo; the origin is the same."""
     return Frame(np.array(_SIGNS[z_axis]), np.zeros(3), np.zeros(3))
 
 
 def suspended(plan: PlannedMotions) -> Suspended:
-    """The robot of a plan for MuJoCo.
-
-    Returns:
-        the robot; of a platform that only translates the platform, which its joints keep from turning as its winches
-        do, on all six cables.
-    """
+    """The robot of a plan for MuJoCo."""
     robot, written, world = plan.problem.robot, plan.robot_file.as_written, upward(plan.robot_file.z_axis)
     row, inertia = PATTERNS[robot.pattern], None
     points = np.zeros((len(written.base_points), 3))
@@ -185,25 +166,18 @@ def _body(plan: PlannedMotions, points: np.ndarray) -> Body | None:
     return rotated(shape, Rotation.align_vectors(points, np.asarray(written.platform_points) - centre)[0].as_matrix())
 
 
-def attachments(body: Suspended, moved: Played) -> np.ndarray:
-    """Points at which the cables are attached.
-
-    Returns:
-        (n, n_cables, 3) m.
-    """
+def attachments(body: Suspended, moved: Played) -> Float[np.ndarray, "n n_cables 3"]:
+    """Points at which the cables are attached."""
     arms = body.points[None]
     if moved.rotation is not None:
         arms = np.einsum("nij,kj->nki", moved.rotation.as_matrix(), body.points)
     return moved.position[:, None] + arms
 
 
-def coordinates(body: Suspended, moved: Played) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Coordinates of all of MuJoCo's joints, their velocities and accelerations.
-
-    Returns:
-        (n, nq), (n, nv), (n, nv): as `Played.coordinates`, followed by the angles of pulleys about their swivel axes
-        from where they are in the first row, rad, and their derivatives; accelerations of pulleys are left out, as 0.
-    """
+def coordinates(
+    body: Suspended, moved: Played
+) -> tuple[Float[np.ndarray, "n nq"], Float[np.ndarray, "n nv"], Float[np.ndarray, "n nv"]]:
+    """Coordinates of all of MuJoCo's joints, their velocities and accelerations."""
     places, rates, accelerations = moved.coordinates(body.axes)
     if body.pulleys is None or not len(body.wheels):
         return places, rates, accelerations
@@ -222,17 +196,7 @@ def coordinates(body: Suspended, moved: Played) -> tuple[np.ndarray, np.ndarray,
 
 
 def played(plan: PlannedMotions, step: float = STEP) -> Played:
-    """Motion and tensions of a plan, as MuJoCo asks for them.
-
-    Args:
-        step: the longest step, s.
-
-    Returns:
-        two rows a step.
-
-    Raises:
-        ConfigError: a step that is no number > 0 or gives too many rows, or a plan without a finite motion.
-    """
+    """Motion and tensions of a plan, as MuJoCo asks for them."""
     if not 0.0 < step < math.inf:
         raise ConfigError("--step", f"{shown(step)}: must be a number > 0, in s")
     if not np.isfinite(plan.answers.duration).all():
@@ -247,17 +211,8 @@ def played(plan: PlannedMotions, step: float = STEP) -> Played:
     return in_world(columns, segment, plan.robot_file.z_axis)
 
 
-def in_world(columns: Mapping[str, np.ndarray], segment: np.ndarray, z_axis: str) -> Played:
-    """A motion in MuJoCo's axes.
-
-    Args:
-        columns: by the names of `schema.quantities.TRAJECTORY`, in the axes of the robot file, (n, ...) each.
-        segment: (n,) numbers of the segments.
-        z_axis: where the file's z points, "down" or "up".
-
-    Returns:
-        the motion.
-    """
+def in_world(columns: Mapping[str, np.ndarray], segment: Int[np.ndarray, "n"], z_axis: str) -> Played:
+    """A motion in MuJoCo's axes."""
     world = upward(z_axis)
     moved: dict[str, Any] = {name: world.turned(columns[name]) for name in ("position", "velocity", "acceleration")}
     if "quaternion" in columns:

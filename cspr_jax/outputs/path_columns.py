@@ -9,11 +9,7 @@ from cspr_jax.schema.verdicts import FLAGS, Verdict
 
 
 def path_columns(plan: PlannedMotions) -> dict[str, np.ndarray]:
-    """Path speeds at the nodes of all sections of paths, in their order.
-
-    Returns:
-        by the names of `schema.quantities.PATHS`; nothing without paths.
-    """
+    """Path speeds at the nodes of all sections of paths, in their order."""
     parts, start = list[dict[str, np.ndarray]](), 0.0
     for leg in plan.legs:
         for section in leg.answers.every_section():

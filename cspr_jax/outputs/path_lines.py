@@ -7,14 +7,7 @@ MOST_NAMED, LEAST_NAMED = 4, 0.005
 
 
 def path_lines(segments: list[dict[str, Any]]) -> list[str]:
-    """Lines about paths, in the order of the segments.
-
-    Args:
-        segments: of the object that `cspr plan --json` prints.
-
-    Returns:
-        the lines; none without paths.
-    """
+    """Lines about paths, in the order of the segments."""
     lines = []
     for segment in segments:
         sections, words = segment["sections"] or [], []

@@ -18,11 +18,7 @@ DIGITS = 12
 
 
 def plan_object(plan: PlannedMotions) -> dict[str, Any]:
-    """The object that `cspr plan --json` prints.
-
-    Returns:
-        plain values; what does not apply, or is not finite, is None.
-    """
+    """The object that `cspr plan --json` prints."""
     segments = [_segment_object(plan, i) for i in range(len(plan.answers.arcs))]
     fields = {
         "schema": SCHEMA,
@@ -41,24 +37,13 @@ def plan_object(plan: PlannedMotions) -> dict[str, Any]:
 
 
 def axes_text(plan: PlannedMotions) -> str:
-    """Axes and point of the positions that files of a plan hold.
-
-    Returns:
-        the words.
-    """
+    """Axes and point of the positions that files of a plan hold."""
     point = "; files hold the positions of the origin of the platform's axes" if plan.is_at_origin else ""
     return f"z {plan.robot_file.z_axis}{point}"
 
 
 def verdict_text(verdict: int, feasible: bool) -> str:
-    """A verdict as a plan shows it.
-
-    Args:
-        feasible: whether the segment is; a smaller number of arcs may still be undecided.
-
-    Returns:
-        "feasible" (proved), "undecided", or the flags joined by "+".
-    """
+    """A verdict as a plan shows it."""
     return "feasible" if feasible else Verdict(int(verdict)).text
 
 
@@ -146,11 +131,7 @@ def _tension_margin(plan: PlannedMotions, i: int) -> float | None:
 
 
 def finite(value: Any) -> Any:
-    """Plain values for JSON.
-
-    Returns:
-        the values, with None for numbers that are not finite.
-    """
+    """Plain values for JSON."""
     if isinstance(value, dict):
         return {key: finite(inner) for key, inner in value.items()}
     if isinstance(value, list):
@@ -159,11 +140,7 @@ def finite(value: Any) -> Any:
 
 
 def plan_table(plan: PlannedMotions):
-    """The plan as a table for a terminal.
-
-    Returns:
-        a rich table.
-    """
+    """The plan as a table for a terminal."""
     from rich.table import Table  # only a terminal needs it
 
     words = [", ".join(plan.keys.families), plan.problem.amplitude.name if plan.keys.takes_amplitude else ""]
@@ -320,15 +297,7 @@ def _caption(plan: PlannedMotions) -> str:
 
 
 def retimed_words(before: float, after: float) -> str:
-    """Durations before and after running along a path again.
-
-    Args:
-        before: planned duration, s.
-        after: duration now, s.
-
-    Returns:
-        such as "retimed: 8 s -> 9.4 s (17 % longer)".
-    """
+    """Durations before and after running along a path again."""
     change = after / before - 1.0
     digits = 0 if abs(change) >= 0.1 else 1
     words = f"{100.0 * abs(change):.{digits}f} % {'longer' if change > 0.0 else 'shorter'}"

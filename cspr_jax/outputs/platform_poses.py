@@ -1,5 +1,7 @@
 """Poses of a platform's own axes, of their origin and of how they turn, in place of those of its mass centre."""
 
+from __future__ import annotations
+
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,19 +16,13 @@ from cspr_jax.curves.files import reference_of
 from cspr_jax.schema.quantities import TRAJECTORY
 
 if TYPE_CHECKING:  # pictures need no plans
+    from jaxtyping import Float
+
     from cspr_jax.plans.planning import PlannedMotions
 
 
 def at_origin(plan: "PlannedMotions", columns: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Rows of a plan whose point is the origin of a platform's axes, of that point and of these axes.
-
-    Args:
-        columns: rows of the mass centre, by the names of `schema.quantities.TRAJECTORY`, in the axes of the robot file;
-            orientations count from the reference orientation.
-
-    Returns:
-        the rows, with the mass centre as a column of its own.
-    """
+    """Rows of a plan whose point is the origin of a platform's axes, of that point and of these axes."""
     quaternion = of_own_axes(plan.robot_file, columns["quaternion"])
     centre = np.asarray(plan.robot_file.centre_of_mass or [0.0] * 3)
     arm = Rotation.from_quat(np.roll(quaternion, -1, axis=1)).apply(centre)
@@ -41,15 +37,8 @@ def at_origin(plan: "PlannedMotions", columns: dict[str, np.ndarray]) -> dict[st
     return {name: both[name] for name in TRAJECTORY if name in both}  # the order that readers of tables expect
 
 
-def of_own_axes(robot_file: RobotFile, quaternions: np.ndarray) -> np.ndarray:
-    """Orientations of a platform's axes in its file, of those from its reference orientation.
-
-    Args:
-        quaternions: (n, 4) in the axes of the robot file.
-
-    Returns:
-        (n, 4) likewise.
-    """
+def of_own_axes(robot_file: RobotFile, quaternions: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n 4"]:
+    """Orientations of a platform's axes in its file, of those from its reference orientation."""
     reference = reference_of(build_robot(robot_file, TrajectoryKeys(), robot_file.name))
     turned = frame_of(robot_file.base_points, robot_file.z_axis).turned_quaternions(reference)
     return products(quaternions, turned[None])

@@ -1,10 +1,12 @@
 """A plan played in MuJoCo: where its tensions take the model, and which tensions MuJoCo asks for along its path."""
 
+from __future__ import annotations
+
 import contextlib
 import dataclasses
 import threading
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -14,6 +16,9 @@ from cspr_jax.outputs.mujoco_module import need_mujoco
 from cspr_jax.outputs.mujoco_motion import STEP, Played, Suspended, coordinates, played, suspended, upward
 from cspr_jax.outputs.table_layout import two_digits
 from cspr_jax.plans.planning import PlannedMotions
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Int
 
 _LENT = threading.Lock()
 
@@ -73,11 +78,7 @@ class PlayedPlan:
         return np.linalg.norm(self.through.position - self.position, axis=1)
 
     def to_dict(self) -> dict[str, Any]:
-        """The largest deviations, and where they are.
-
-        Returns:
-            plain values, as `cspr replay --json` prints them.
-        """
+        """The largest deviations, and where they are."""
         cable = np.abs(self.tension_deviation).argmax(1)
         of_cables = np.abs(self.tension_deviation).max(1)
         deviations = {
@@ -96,11 +97,7 @@ class PlayedPlan:
         return {"value": float(values[row]), "units": units, **place}
 
     def lines(self) -> list[str]:
-        """The largest deviations for people.
-
-        Returns:
-            a line each.
-        """
+        """The largest deviations for people."""
         deviations = self.to_dict()["largest_deviation"]
         text = [f"{self.robot}: {self.time[-1]:.2f} s in {self.steps} steps of MuJoCo {self.mujoco}"]
         for name, how in (("", "each segment from its start"), ("_in_one_go", "all in one go")):
@@ -117,19 +114,7 @@ def _place(deviation: dict[str, Any]) -> str:
 
 
 def replay(plan: PlannedMotions, step: float = STEP) -> PlayedPlan:
-    """Play a plan in MuJoCo.
-
-    Args:
-        plan: the plan; of one that is not feasible, no cable of MuJoCo's pushes.
-        step: the longest step, s.
-
-    Returns:
-        what came of it.
-
-    Raises:
-        ConfigError: MuJoCo is not installed, a step that is no number > 0 or gives too many rows, or a plan without a
-            finite motion.
-    """
+    """Play a plan in MuJoCo."""
     mujoco = need_mujoco()
     body, moved = suspended(plan), played(plan, step)
     rows, world = ends_of_steps(moved), upward(plan.robot_file.z_axis)
@@ -150,28 +135,13 @@ def replay(plan: PlannedMotions, step: float = STEP) -> PlayedPlan:
     )
 
 
-def ends_of_steps(moved: Played) -> np.ndarray:
-    """Rows of a motion at which steps start or end.
-
-    Returns:
-        (n,) numbers of rows.
-    """
+def ends_of_steps(moved: Played) -> Int[np.ndarray, "n"]:
+    """Rows of a motion at which steps start or end."""
     return np.concatenate([np.asarray(run[::2]) for run in moved.runs()])
 
 
 def way_of(body: Suspended, moved: Played, step: float = STEP, *, by_segment: bool) -> PlayedPath:
-    """Path on which the tensions of a motion take MuJoCo's robot, by its own integrator.
-
-    Args:
-        step: the longest step, s.
-        by_segment: whether each segment starts as planned, and not only the first.
-
-    Returns:
-        the way at the ends of the steps.
-
-    Raises:
-        ConfigError: MuJoCo is not installed.
-    """
+    """Path on which the tensions of a motion take MuJoCo's robot, by its own integrator."""
     mujoco = need_mujoco()
     places, rates, _ = coordinates(body, moved)
     reached, row = [], 0
@@ -219,15 +189,8 @@ def _way(moved: Played, reached: np.ndarray, axes: Sequence[int]) -> PlayedPath:
     return PlayedPath(position, turned)
 
 
-def tension_deviation(body: Suspended, moved: Played) -> np.ndarray:
-    """How far the tensions of a motion are from those that MuJoCo's inverse dynamics asks for along its path.
-
-    Returns:
-        (n, n_cables) at the ends of the steps, N: the least change, in the sum of squares, that supplies the forces.
-
-    Raises:
-        ConfigError: MuJoCo is not installed.
-    """
+def tension_deviation(body: Suspended, moved: Played) -> Float[np.ndarray, "n n_cables"]:
+    """How far the tensions of a motion are from those that MuJoCo's inverse dynamics asks for along its path."""
     mujoco = need_mujoco()
     with _callback_lent(mujoco):
         model = mujoco.MjModel.from_xml_string(model_xml(body, moved))

@@ -63,18 +63,7 @@ def grid(
     is_full: bool = False,
     reason: Callable[[Cell], str] = lambda _: "",
 ) -> Any:
-    """A table for a terminal: one block for each reading of the source, or for the one that its numbers fit.
-
-    Args:
-        transposed: whether rows are printed as columns.
-        heads: names of rows and columns that are others in this table, as people read them.
-        reading: variant that the numbers of the source fit; empty: none is named.
-        is_full: whether the other variants are blocks too, and not a line each.
-        reason: why a cell differs, in a line; empty where that is not known.
-
-    Returns:
-        a rich renderable.
-    """
+    """A table for a terminal: one block for each reading of the source, or for the one that its numbers fit."""
     from rich.console import Group  # only a terminal needs it
 
     variants = list(dict.fromkeys(cell.variant for cell in cells))
@@ -136,11 +125,7 @@ def _text(cell: Cell, cells: list[Cell], mark: str) -> Any:
 
 
 def computed_text(cell: Cell, cells: list[Cell]) -> str:
-    """The computed number with the digits of the printed one, or of its column.
-
-    Returns:
-        text; `NOTHING` where nothing was found.
-    """
+    """The computed number with the digits of the printed one, or of its column."""
     if cell.computed is None:
         return NOTHING
     printed = [other.printed for other in cells if other.column == cell.column and other.printed]
@@ -151,14 +136,7 @@ def computed_text(cell: Cell, cells: list[Cell]) -> str:
 
 
 def two_digits(value: float) -> str:
-    """A number with two digits that count.
-
-    Args:
-        value: any.
-
-    Returns:
-        the number; large ones with all digits before the point, and only those below 0.0001 with an exponent.
-    """
+    """A number with two digits that count."""
     text = f"{value:.2g}"
     return f"{value:.0f}" if "e+" in text else text
 

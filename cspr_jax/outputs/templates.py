@@ -37,14 +37,7 @@ OWN = {"rule": ("s-curve",)}
 
 
 def robot_template(like: str) -> str:
-    """A robot file with the values of one of the catalogue.
-
-    Returns:
-        TOML.
-
-    Raises:
-        InputError: no such robot.
-    """
+    """A robot file with the values of one of the catalogue."""
     if like not in catalogue.catalogue_names():
         raise InputError("--like", like, one_of(like, catalogue.catalogue_names()))
     values = tomllib.loads((catalogue.CATALOGUE / f"{like}.toml").read_text("utf-8"))
@@ -54,14 +47,7 @@ def robot_template(like: str) -> str:
 
 
 def sweep_template(kind: str) -> str:
-    """A sweep file of a kind of map, with the values of an example.
-
-    Returns:
-        TOML.
-
-    Raises:
-        InputError: no such kind.
-    """
+    """A sweep file of a kind of map, with the values of an example."""
     if kind not in MAP_KINDS:
         raise InputError("--map", kind, one_of(kind, MAP_KINDS))
     row = MAP_KINDS[kind]
@@ -82,14 +68,7 @@ def sweep_template(kind: str) -> str:
 
 
 def plan_template(family: str) -> str:
-    """A plan file of a trajectory family, with the values of an example.
-
-    Returns:
-        TOML.
-
-    Raises:
-        InputError: no such family.
-    """
+    """A plan file of a trajectory family, with the values of an example."""
     if family not in FAMILIES:
         raise InputError("--family", family, one_of(family, FAMILIES))
     examples = _examples("family")
@@ -102,19 +81,7 @@ def plan_template(family: str) -> str:
 
 
 def write_new(path: Path, text: str) -> Path:
-    """Write a template; nothing is overwritten.
-
-    Args:
-        path: the file, .toml.
-
-    Returns:
-        the path.
-
-    Raises:
-        InputError: another ending.
-        RefusedError: a file of that name is there.
-        StoreError: the folder or the disk refuses.
-    """
+    """Write a template; nothing is overwritten."""
     if path.suffix != ".toml":
         raise InputError("file", str(path), "a name that ends in .toml")
     make_folders(Disk(), path.parent)

@@ -99,17 +99,7 @@ class WorkspaceVolume:
 
 
 def volume_of(result: Result) -> WorkspaceVolume:
-    """Volume of the workspace that a map has found, or its area where the map is a section.
-
-    Args:
-        result: of a sweep of a map with verdicts.
-
-    Returns:
-        the volume; arrays over the axes that are no coordinates of places, () without any.
-
-    Raises:
-        InputError: no map, no stored verdicts, or a single place.
-    """
+    """Volume of the workspace that a map has found, or its area where the map is a section."""
     if not result.is_map or "verdict" not in result.data:
         raise InputError("result", None, "must be a map that stores verdict", fault="no verdicts")
     names, axes = list(result.axes), POLAR if "radius" in result.axes else LEVEL

@@ -1,11 +1,13 @@
 """Answers of segments of paths: durations beside lower bounds, what binds, and where no motion passes."""
 
+from __future__ import annotations
+
 import dataclasses
 import functools
 import math
 import operator
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -18,6 +20,9 @@ from cspr_jax.paths.static_tension import StaticTension
 from cspr_jax.paths.tightening import BindingName
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import Verdict, criterion_words
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # An acceleration jumps where it changes by more than this part of the largest one; digits of numbers in lines, and
 # decimals of places, m.
@@ -43,12 +48,8 @@ class SectionAnswer(NamedTuple):
     ramp_time: float
     before: int = 0
 
-    def times(self, segment: int) -> np.ndarray:
-        """Times that its cells take in a segment.
-
-        Returns:
-            (n_cells,) s, 0 in other segments.
-        """
+    def times(self, segment: int) -> Float[np.ndarray, "n_cells"]:
+        """Times that its cells take in a segment."""
         return np.where(self.segments == segment, np.diff(np.asarray(self.least.motion.knots)), 0.0)
 
     @property
@@ -68,11 +69,7 @@ class SectionAnswer(NamedTuple):
         return len(motion.jumps(JUMP)) + int(at_ends.sum())
 
     def to_dict(self) -> dict[str, Any]:
-        """The section as a plan's JSON has it.
-
-        Returns:
-            plain values, NaN for what is not known.
-        """
+        """The section as a plan's JSON has it."""
         least = self.least
         points = np.asarray(least.motion.position)
         nodes = np.concatenate([points[:, 0], points[-1:, -1]])
@@ -107,15 +104,8 @@ def _binding(parts: Iterable[tuple[LeastTime, np.ndarray]]) -> list[dict[str, An
     ]
 
 
-def feeds_of(sections: Iterable[SectionAnswer], segment: int) -> np.ndarray:
-    """Feeds of the pieces of a segment's motion.
-
-    Args:
-        sections: all that run through it, in their order.
-
-    Returns:
-        (pieces,) m/s, inf for none.
-    """
+def feeds_of(sections: Iterable[SectionAnswer], segment: int) -> Float[np.ndarray, "pieces"]:
+    """Feeds of the pieces of a segment's motion."""
     return np.concatenate([section.least.feed[section.segments == segment] for section in sections])
 
 
@@ -211,14 +201,7 @@ class PathAnswers(ProvedAnswers):
         return [section for i, through in enumerate(self.sections) for section in through if section.ends[0] == i]
 
     def notes(self, key: str = "path.ramp_time") -> list[str]:
-        """Say in one line where ramps are shorter than they are to be.
-
-        Args:
-            key: name of their length.
-
-        Returns:
-            the line, if there is one to say.
-        """
+        """Say in one line where ramps are shorter than they are to be."""
         known = self.every_section()
         missing = [s for s in known if s.least.failure is None and s.least.ramp_time < (1.0 - JUMP) * s.ramp_time]
         if not missing:

@@ -1,6 +1,9 @@
 """Lower bound of the time along a section, from the multipliers of its grid."""
 
+from __future__ import annotations
+
 from functools import partial
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -20,20 +23,15 @@ from cspr_jax.robots.witness_tensions import right_inverse
 from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # x at which the search for multipliers begins, at least, over its largest value.
 LEAST = 1e-9
 
 
-def path_bound(problem: Problem, path: Discrete, x: np.ndarray) -> float:
-    """Rigorous lower bound of the time of any motion that goes forward along a section.
-
-    Args:
-        problem: robot and limits.
-        x: (n_nodes,) squared path speeds of a motion on the grid.
-
-    Returns:
-        the bound, s; -inf where none is known.
-    """
+def path_bound(problem: Problem, path: Discrete, x: Float[np.ndarray, "n_nodes"]) -> float:
+    """Rigorous lower bound of the time of any motion that goes forward along a section."""
     robot, limits, curve, grid = problem.robot, problem.limits, path.section.curve, path.grid
     middles = np.maximum(0.5 * (x[1:] + x[:-1]), LEAST * x.max())
     of_nodes, of_cells = dual_multipliers(path.dual_rows(), path.ends, middles)

@@ -9,7 +9,9 @@ Within a cell u changes at a constant rate that is chosen before; half-planes ho
 the last axis of all arrays, and are solved together.
 """
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -18,6 +20,9 @@ from jax import Array, lax
 from cspr_jax.paths.rows import Rows
 from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # A half-plane whose share of u is smaller bounds x alone. Steps of Newton, at most.
 FLAT, STEPS = 1e-12, 40
@@ -134,19 +139,14 @@ def _flat_range(u: Array, x_share: Array, most: Array, cap: Array) -> tuple[Arra
 
 
 @persistent_jit(compiler_options=compile_options.least())
-def fastest(sides: tuple[Rows, Rows], width: Array, bend: Array, cap: Array, ends: tuple[Array, Array]) -> GridSolution:
-    """Fastest motions along paths.
-
-    Args:
-        sides: half-planes at the starts and at the ends of the cells, (n_cells, n_rows, n_paths).
-        width: (n_cells, n_paths) m.
-        bend: (n_cells, n_paths) change of u along each cell, over its width.
-        cap: (n_cells + 1, n_paths) largest x at the nodes, finite.
-        ends: (n_paths,) x at the start, and at the end.
-
-    Returns:
-        the motions.
-    """
+def fastest(
+    sides: tuple[Rows, Rows],
+    width: Float[Array, "n_cells n_paths"],
+    bend: Float[Array, "n_cells n_paths"],
+    cap: Float[Array, "n_cells+1 n_paths"],
+    ends: tuple[Float[Array, "n_paths"], Float[Array, "n_paths"]],
+) -> GridSolution:
+    """Fastest motions along paths."""
     cells = _cells_of(sides, width, bend, cap)
     start, end = ends
 
@@ -191,16 +191,10 @@ def fastest(sides: tuple[Rows, Rows], width: Array, bend: Array, cap: Array, end
     return GridSolution(low, high, jnp.concatenate([beginning[None], x]), u, empty, is_start)
 
 
-def smallest_of_slopes(u: np.ndarray, width: np.ndarray) -> np.ndarray:
-    """Changes of u within cells: of the changes to both neighbours the smaller one, 0 where their signs differ.
-
-    Args:
-        u: (n_cells,) in the middle of the cells.
-        width: (n_cells,) m.
-
-    Returns:
-        (n_cells,) 0 in the first and the last cell.
-    """
+def smallest_of_slopes(
+    u: Float[np.ndarray, "n_cells"], width: Float[np.ndarray, "n_cells"]
+) -> Float[np.ndarray, "n_cells"]:
+    """Changes of u within cells: of the changes to both neighbours the smaller one, 0 where their signs differ."""
     steps = np.diff(u) / (0.5 * (width[1:] + width[:-1]))
     before, after = steps[:-1], steps[1:]
     slopes = np.where(before * after > 0.0, np.sign(before) * np.minimum(np.abs(before), np.abs(after)), 0.0)

@@ -27,16 +27,7 @@ Corners = Literal["every", "stop", "blend"]
 
 
 def tracks_of(elements: Sequence[Element], corners: Corners = "stop", tolerance: float = 0.0) -> list[Track]:
-    """Tracks from stop to stop; the points of each are the ends of its elements.
-
-    Args:
-        elements: each begins where the one before ends.
-        corners: "every": stops wherever two elements meet; "stop": at corners; "blend": where corners turn back alone.
-        tolerance: largest distance of a blend from its corner, m.
-
-    Returns:
-        the tracks.
-    """
+    """Tracks from stop to stop; the points of each are the ends of its elements."""
     lengths = _blend_lengths(elements, corners, tolerance)
     stops = [0, *(np.flatnonzero(np.isnan(lengths)) + 1).tolist(), len(elements)]
     return [

@@ -1,9 +1,11 @@
 """Courses of paths between poses: what a table of a plan says, as tracks with orientations at their marks."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -16,6 +18,9 @@ from cspr_jax.paths.corners import Corners, tracks_of
 from cspr_jax.paths.section import Section, Track, half_angles, section_of, turn
 from cspr_jax.paths.shapes import arc_of, elements_of
 from cspr_jax.paths.through_points import chords, through_points
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Distance within which a file begins at the pose before it, m.
 MEETING = 1e-6
@@ -69,29 +74,16 @@ class Course(NamedTuple):
     notes: Sequence[str] = ()
 
     def sections(self) -> list[Section]:
-        """The tracks with their orientations.
-
-        Returns:
-            the sections.
-        """
+        """The tracks with their orientations."""
         units = self.quaternions
         sections = [section_of(track, units[i] if units else None) for i, track in enumerate(self.tracks)]
         return [section._replace(feeds=self.feeds) for section in sections]
 
 
-def course_through(table: PathTable, points: np.ndarray, quaternions: np.ndarray | None) -> Course:
-    """Course through points.
-
-    Args:
-        points: (n, 3) m.
-        quaternions: (n, 4) unit quaternions; None: of a point mass.
-
-    Returns:
-        the course.
-
-    Raises:
-        InputError: points that make no path.
-    """
+def course_through(
+    table: PathTable, points: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"] | None
+) -> Course:
+    """Course through points."""
     closed = table.closed is True
     tolerance = table.blend_tolerance or 0.0
     tracks = through_points(
@@ -106,20 +98,7 @@ def course_through(table: PathTable, points: np.ndarray, quaternions: np.ndarray
 
 
 def course_of(table: PathTable, ends: CourseEnds, folder: Path, axes: FileAxes) -> Course:
-    """Course of a table that has its own places.
-
-    Args:
-        ends: what poses decide.
-        folder: of the plan.
-        axes: of the robot file.
-
-    Returns:
-        the course, in these axes.
-
-    Raises:
-        InputError: values that make no path.
-        ConfigError: a mistake in a file.
-    """
+    """Course of a table that has its own places."""
     if table.points is not None or table.kind == "csv":
         return _through_own(table, ends, folder, axes)
     units = orientations(table, 1 if table.kind == "gcode" else 2)
@@ -142,18 +121,8 @@ def course_of(table: PathTable, ends: CourseEnds, folder: Path, axes: FileAxes) 
     return Course(tracks, [] if ends.first is None or ends.last is None else [np.stack([ends.first, ends.last])])
 
 
-def orientations(table: PathTable, count: int) -> np.ndarray | None:
-    """Orientations that a table names.
-
-    Args:
-        count: of the points that have one.
-
-    Returns:
-        (count, 4) unit quaternions; None: it names none.
-
-    Raises:
-        InputError: another number of them, or one that is not of length 1.
-    """
+def orientations(table: PathTable, count: int) -> Float[np.ndarray, "count 4"] | None:
+    """Orientations that a table names."""
     if table.orientations is None:
         return None
     units = np.asarray(table.orientations, float)

@@ -1,8 +1,10 @@
 """A section of a path on its grid: half-planes at both sides of all cells, with margins, as solvers take them."""
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -13,6 +15,9 @@ from cspr_jax.paths.nodes import PathGrid, grid_of, side_rows
 from cspr_jax.paths.rows import Rows, face_count
 from cspr_jax.paths.section import Section, SectionSettings
 from cspr_jax.paths.smooth import NodeRows
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Path speeds are taken to be no larger than so many times that of a fall along the path.
 FASTER = 1e2
@@ -34,11 +39,7 @@ class GridMargins(NamedTuple):
     speed: np.ndarray
 
     def at_nodes(self) -> "GridMargins":
-        """At each node the larger of the margins of both cells.
-
-        Returns:
-            the margins, (n_cells + 1,) each.
-        """
+        """At each node the larger of the margins of both cells."""
         return GridMargins(*(np.fmax(np.append(x, x[-1]), np.insert(x, 0, x[0])) for x in self))
 
 
@@ -70,20 +71,12 @@ class Discrete:
         return GridMargins(*np.zeros((3, len(self.grid.width))))
 
     def can_rest(self) -> tuple[bool, bool]:
-        """Tell whether tensions within their limits hold the effector at rest.
-
-        Returns:
-            at the start, and at the end.
-        """
+        """Tell whether tensions within their limits hold the effector at rest."""
         first, last = ((rows.most[k] >= 0.0).all() for rows, k in ((self.start, 0), (self.end, -1)))
         return bool(first), bool(last)
 
     def with_margins(self, margins: GridMargins) -> "Discrete":
-        """The same with tighter half-planes and caps.
-
-        Returns:
-            the section.
-        """
+        """The same with tighter half-planes and caps."""
         nodes = margins.at_nodes()
         shares = np.arange(self.start.most.shape[1]) < self.n_faces
 
@@ -94,21 +87,13 @@ class Discrete:
         first, last = tighter(self.start, slice(None, -1)), tighter(self.end, slice(1, None))
         return dataclasses.replace(self, start=first, end=last)
 
-    def cap(self) -> np.ndarray:
-        """Largest x at the nodes.
-
-        Returns:
-            (n_cells + 1,) finite.
-        """
+    def cap(self) -> Float[np.ndarray, "n_cells+1"]:
+        """Largest x at the nodes."""
         both = np.append(self.start.cap, np.inf), np.insert(self.end.cap, 0, np.inf)
         return np.minimum(np.minimum(*both), self.largest)
 
     def node_rows(self) -> NodeRows:
-        """Half-planes at the nodes; where those of both sides differ, all of them.
-
-        Returns:
-            the half-planes.
-        """
+        """Half-planes at the nodes; where those of both sides differ, all of them."""
         sides = [np.concatenate([s, e[-1:]]).T for s, e in zip(self.start[:3], self.end[:3], strict=True)]
         jump = np.abs(self.start.x[1:] - self.end.x[:-1]).max(initial=0.0)
         if jump > SAME * np.abs(self.start.x).max():
@@ -118,11 +103,7 @@ class Discrete:
         return NodeRows(u, x, most, self.cap(), self.grid.width)
 
     def dual_rows(self) -> SideRows:
-        """Half-planes of the dual problem.
-
-        Returns:
-            the half-planes.
-        """
+        """Half-planes of the dual problem."""
         start, end = self.start, self.end
         return SideRows(
             u=np.concatenate([start.u, end.u[-1:]]).T,
@@ -135,14 +116,7 @@ class Discrete:
 
 
 def discretes(problem: Problem, sections: Sequence[Section], settings: Sequence[SectionSettings]) -> list[Discrete]:
-    """Sections on their grids.
-
-    Args:
-        problem: robot and limits.
-
-    Returns:
-        the sections, without margins.
-    """
+    """Sections on their grids."""
     robot = problem.robot
     speed_max = np.inf if problem.limits.speed_max is None else float(problem.limits.speed_max)
     grids = [

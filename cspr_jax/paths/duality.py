@@ -86,17 +86,7 @@ class _Cell(NamedTuple):
 def lower_bound(
     robot: AnyRobot, limits: Limits, path: Discrete, multipliers: Multipliers, rates: SpeedMultipliers
 ) -> float:
-    """Lower bound of the time of all motions that go forward along a section, with its speeds at the ends.
-
-    Args:
-        robot: centred, z down.
-        path: the section on its grid.
-        multipliers: at its nodes.
-        rates: of its cells.
-
-    Returns:
-        the bound, s; -inf where nothing is known.
-    """
+    """Lower bound of the time of all motions that go forward along a section, with its speeds at the ends."""
     nodes, curve, speed = path.grid.nodes, path.section.curve, path.grid.speed
     states = curve.bounds(nodes[:-1], nodes[1:])
     width = np.diff(nodes)

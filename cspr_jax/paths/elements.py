@@ -1,10 +1,15 @@
 """Elements of paths: straight lines and arcs, over their travelled length."""
 
+from __future__ import annotations
+
 import dataclasses
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Angle of one quintic piece of an arc, rad: it misses the arc by its sixth power over 46080 radii, 8.3e-11.
 LARGEST_PIECE = 0.125
@@ -57,26 +62,11 @@ class Straight:
         return float(np.linalg.norm(self.end - self.start)) if self.moves else self.turn
 
     def nodes(self, first: float, last: float) -> Nodes:
-        """Nodes between two lengths.
-
-        Args:
-            first: m from its start.
-            last: m from its start.
-
-        Returns:
-            two nodes.
-        """
+        """Nodes between two lengths."""
         return self.at(np.array([first, last]))
 
-    def at(self, s: np.ndarray) -> Nodes:
-        """States at lengths.
-
-        Args:
-            s: (n,) m from its start.
-
-        Returns:
-            the states.
-        """
+    def at(self, s: Float[np.ndarray, "n"]) -> Nodes:
+        """States at lengths."""
         share, step = (s / self.length)[:, None], (self.end - self.start) / self.length
         # Whole lines meet their ends without rounding.
         place = self.start * (1.0 - share) + self.end * share

@@ -97,14 +97,7 @@ def _length(pairs: list[tuple[np.ndarray, np.ndarray]]) -> float:
 
 
 def interior_point(problem: Constrained, z: np.ndarray) -> Optimum:
-    """Minimise.
-
-    Args:
-        z: start; its slacks may be negative.
-
-    Returns:
-        the optimum; where there is none, what was reached.
-    """
+    """Minimise."""
     slacks = problem.slacks(z)
     slacks = np.maximum(slacks, 0.05)
     pressures = 0.1 * problem.value(z) / len(slacks) / slacks

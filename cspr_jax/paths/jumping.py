@@ -1,8 +1,10 @@
 """The fastest motions along sections, whose accelerations jump: of several sections together."""
 
+from __future__ import annotations
+
 from collections import defaultdict
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import numpy as np
@@ -11,6 +13,9 @@ from cspr_jax.arithmetic.batches import padded, room
 from cspr_jax.paths.controllable import GridSolution, fastest, smallest_of_slopes
 from cspr_jax.paths.discrete import Discrete
 from cspr_jax.paths.timed import PathSpeeds, moving
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Sections that are solved together, beside one alone; how often changes of u within cells are taken from the solution.
 TOGETHER, BENT = 32, 2
@@ -29,15 +34,8 @@ class PathPace(NamedTuple):
     coordinate: np.ndarray
     acceleration: np.ndarray
 
-    def bend(self, nodes: np.ndarray) -> np.ndarray:
-        """Changes of the path acceleration within cells, over their widths.
-
-        Args:
-            nodes: (n_cells + 1,) m.
-
-        Returns:
-            (n_cells,) 1/s^2.
-        """
+    def bend(self, nodes: Float[np.ndarray, "n_cells+1"]) -> Float[np.ndarray, "n_cells"]:
+        """Changes of the path acceleration within cells, over their widths."""
         return np.diff(np.interp(nodes, *self)) / np.diff(nodes)
 
 
@@ -56,14 +54,7 @@ class Jumping(NamedTuple):
 
 
 def solved_together(paths: Sequence[Discrete], bends: Sequence[np.ndarray]) -> list[GridSolution]:
-    """Solutions on the grids of sections.
-
-    Args:
-        bends: (n_cells,) of each section, change of u within its cells over their widths.
-
-    Returns:
-        one a section, without the axis of paths.
-    """
+    """Solutions on the grids of sections."""
     solutions: dict[int, GridSolution] = {}
     groups = defaultdict(list)
     for k, path in enumerate(paths):
@@ -85,16 +76,8 @@ def solved_together(paths: Sequence[Discrete], bends: Sequence[np.ndarray]) -> l
     return [solutions[k] for k in range(len(paths))]
 
 
-def run_of(solution: GridSolution, path: Discrete, bend: np.ndarray) -> PathSpeeds | None:
-    """Path speeds and accelerations of a solution.
-
-    Args:
-        path: the section.
-        bend: (n_cells,) with which it was solved.
-
-    Returns:
-        them; None if there is no motion.
-    """
+def run_of(solution: GridSolution, path: Discrete, bend: Float[np.ndarray, "n_cells"]) -> PathSpeeds | None:
+    """Path speeds and accelerations of a solution."""
     if not _is_passable(solution):
         return None
     half = 0.5 * bend * path.grid.width
@@ -106,12 +89,6 @@ def jumping_motions(paths: Sequence[Discrete], paces: Sequence[PathPace | None] 
     """The fastest motions along sections.
 
     Within cells u changes as it does from cell to cell, where there is a motion that does.
-
-    Args:
-        paces: of a motion along each section; None, or empty: none is known.
-
-    Returns:
-        one a section.
     """
     bends = [np.zeros_like(path.grid.width) for path in paths]
     solutions = solved_together(paths, bends)
@@ -149,13 +126,6 @@ def _changes(solution: GridSolution, width: np.ndarray, known: np.ndarray | None
 
 
 def again(paths: Sequence[Discrete], bends: Sequence[np.ndarray]) -> list[PathSpeeds | None]:
-    """The fastest motions with changes of u within cells that are known.
-
-    Args:
-        bends: (n_cells,) of each section.
-
-    Returns:
-        one a section, None where there is no motion.
-    """
+    """The fastest motions with changes of u within cells that are known."""
     solutions = solved_together(paths, bends)
     return [run_of(*case) for case in zip(solutions, paths, bends, strict=True)]

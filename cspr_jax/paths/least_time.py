@@ -90,28 +90,14 @@ class LeastTime:
 def least_time_motion(
     problem: Problem, section: Section, settings: SectionSettings, pace: PathPace | None = None
 ) -> LeastTime:
-    """Find the fastest motion along a section.
-
-    Args:
-        pace: of a feasible motion; None: none is known.
-
-    Returns:
-        the motion; where tightening ends before all is proved, the last one.
-    """
+    """Find the fastest motion along a section."""
     return least_time_motions(problem, [section], [settings], [pace])[0]
 
 
 def least_times_along(
     problem: Problem, sections: Sequence[Section], settings: Sequence[SectionSettings], batch: int = TOGETHER
 ) -> Iterator[LeastTime]:
-    """Find the fastest motions along sections, however many, and announce how far that is.
-
-    Args:
-        batch: of how many sections are solved together.
-
-    Yields:
-        the motions, as `least_time_motion` finds them.
-    """
+    """Find the fastest motions along sections, however many, and announce how far that is."""
     count, pace = len(sections), Pace()
     for first in range(0, count, batch):
         pace.advance(first, count)
@@ -127,14 +113,7 @@ def least_time_motions(
     settings: Sequence[SectionSettings],
     paces: Sequence[PathPace | None] = (),
 ) -> list[LeastTime]:
-    """Find the fastest motions along sections.
-
-    Args:
-        paces: of feasible motions along them; empty: none is known.
-
-    Returns:
-        the motions, as `least_time_motion` finds them.
-    """
+    """Find the fastest motions along sections."""
     paths = discretes(problem, sections, settings)
     paces = paces or [None] * len(sections)
     cases = zip(paths, jumping_motions(paths, paces), settings, strict=True)

@@ -257,25 +257,14 @@ def _settled(run: CourseRun, sections: list[Section], segments: np.ndarray) -> l
 
 
 def section_answer(fastest: LeastTime, ride: Ride, before: int = 0) -> SectionAnswer:
-    """Motion of a ride, with the segments in which its cells lie.
-
-    Args:
-        before: number of segments of the plan before the leg.
-
-    Returns:
-        both.
-    """
+    """Motion of a ride, with the segments in which its cells lie."""
     middles = 0.5 * (fastest.coordinate[1:] + fastest.coordinate[:-1])
     parts = np.clip(np.searchsorted(ride.section.marks, middles) - 1, 0, len(ride.segments) - 1)
     return SectionAnswer(fastest, ride.segments[parts], ride.settings.ramp_time, before)
 
 
 def cut(fastest: LeastTime, ride: Ride) -> list[tuple[int, Spline]]:
-    """Parts of a motion between poses.
-
-    Returns:
-        numbers of their segments, and the parts.
-    """
+    """Parts of a motion between poses."""
     changes = np.flatnonzero(np.diff(ride.segments)) + 1
     marks = [0.0, *ride.section.marks[changes].tolist(), float(ride.section.marks[-1])]
     knots = [int(np.argmin(np.abs(fastest.coordinate - mark))) for mark in marks]

@@ -36,17 +36,7 @@ class PathTimes:
 def least_times(
     problem: Problem, scene: Scene | None, paths: Sequence[Sequence[Section]], grid: int, ramp_time: float
 ) -> PathTimes:
-    """Find the fastest motions along paths.
-
-    Args:
-        scene: bodies that can meet.
-        paths: sections of each, with a stop between them.
-        grid: cells of each section.
-        ramp_time: in which accelerations rise and fall, s; 0: they jump.
-
-    Returns:
-        the motions.
-    """
+    """Find the fastest motions along paths."""
     flat = [section for path in paths for section in path]
     motions_along = list(least_times_along(problem, flat, [SectionSettings(grid, ramp_time)] * len(flat)))
     ends = np.cumsum([len(path) for path in paths])

@@ -5,12 +5,17 @@ is constant in each cell, and half-planes hold at the nodes, where u is the diff
 widths, and x their mean. Its only unknowns are the cells' x: an interior-point method with a tridiagonal matrix.
 """
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.linalg import solveh_banded
 
 from cspr_jax.paths.interior_point import interior_point
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Shares of the x of a motion from which the search begins, one after the other: next to limits it may come to a halt.
 STARTS = (0.8, 0.4, 1.0)
@@ -36,16 +41,10 @@ class SideRows(NamedTuple):
     width: np.ndarray
 
 
-def dual_multipliers(rows: SideRows, ends: tuple[float, float], start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Multipliers of the half-planes, and of the caps.
-
-    Args:
-        ends: x at the start and at the end of the section.
-        start: (n_nodes - 1,) x of the cells from which the search begins, positive.
-
-    Returns:
-        (n_rows, n_nodes) and (n_nodes - 1,), a metre of path.
-    """
+def dual_multipliers(
+    rows: SideRows, ends: tuple[float, float], start: Float[np.ndarray, "n_nodes-1"]
+) -> tuple[Float[np.ndarray, "n_rows n_nodes"], Float[np.ndarray, "n_nodes-1"]]:
+    """Multipliers of the half-planes, and of the caps."""
     problem = _Staggered(rows, ends)
     for share in STARTS:
         optimum = interior_point(problem, share * start)

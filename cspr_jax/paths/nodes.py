@@ -1,8 +1,10 @@
 """Nodes of a section of a path: between them the path acceleration is sought, and at both sides of them half-planes."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import numpy as np
@@ -17,6 +19,9 @@ from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.state import State
 from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Part of the nodes over which cells become wider, from an end at zero speed on; cells there that are narrower still.
 RAMP, SMALLER = 0.25, 5
@@ -66,17 +71,7 @@ class Places(NamedTuple):
 
 
 def grid_of(section: Section, count: int, slow: tuple[bool, bool], speed_max: float = np.inf) -> PathGrid:
-    """Nodes of a section: close together where it is slow, as instants of a motion that speeds up and slows down are.
-
-    Args:
-        section: NumPy leaves.
-        count: number of cells; more where two such places are closer than nodes.
-        slow: whether it begins, and whether it ends, at zero speed.
-        speed_max: largest speed of the mass centre anywhere, m/s.
-
-    Returns:
-        the nodes.
-    """
+    """Nodes of a section: close together where it is slow, as times of a motion that speeds up and slows down are."""
     knots = np.asarray(section.curve.knots)
     nodes = knots[-1] * _shares(count, slow)
     changes = knots[1:-1][section.speed[1:] != section.speed[:-1]]
@@ -117,17 +112,8 @@ def _way(time: np.ndarray, slow: tuple[bool, bool]) -> np.ndarray:
     return way / total
 
 
-def places_on(curve: Spline, coordinates: np.ndarray, *, ahead: bool) -> Places:
-    """Places on a curve.
-
-    Args:
-        curve: NumPy leaves.
-        coordinates: (k,) path coordinates, m.
-        ahead: whether a place between two pieces lies on the later one.
-
-    Returns:
-        the places.
-    """
+def places_on(curve: Spline, coordinates: Float[np.ndarray, "k"], *, ahead: bool) -> Places:
+    """Places on a curve."""
     knots = np.asarray(curve.knots)
     near = NEAR * float(np.diff(knots).min())
     piece = _pieces(knots, coordinates + (near if ahead else -near))
@@ -149,11 +135,7 @@ def _raised(coefficients: np.ndarray) -> np.ndarray:
 
 
 def state_at(place: Places) -> State:
-    """State of a path that is run along at a unit path speed, at one place.
-
-    Returns:
-        the state.
-    """
+    """State of a path that is run along at a unit path speed, at one place."""
     return piece_state(*place)
 
 
@@ -165,16 +147,7 @@ def _rows(robot: AnyRobot, limits: Limits, arguments: tuple[Places, Array]) -> R
 def side_rows(
     robot: AnyRobot, limits: Limits, curves: Sequence[Spline], grids: Sequence[PathGrid]
 ) -> list[tuple[Rows, Rows]]:
-    """Half-planes at the starts and at the ends of the cells of several sections.
-
-    Args:
-        robot: centred, z down.
-        curves: NumPy leaves.
-        grids: of them.
-
-    Returns:
-        for each section two sets, leaves (n_cells, ...).
-    """
+    """Half-planes at the starts and at the ends of the cells of several sections."""
     places, speeds, apart = [], [], []
     for curve, grid in zip(curves, grids, strict=True):
         # One computation will do for both sides of a node, but where something jumps.
@@ -219,9 +192,5 @@ def _derivatives(places: Places) -> Any:
 
 
 def derivatives(places: Places) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Values and first two derivatives along the path.
-
-    Returns:
-        those of the position, and of the quaternion if there is one.
-    """
+    """Values and first two derivatives along the path."""
     return in_batches(_derivatives, places, size=BATCH)

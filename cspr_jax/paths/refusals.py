@@ -45,14 +45,7 @@ class NoMotion(NamedTuple):
 
 
 def refusal(problem: Problem, path: Discrete, solution: GridSolution) -> NoMotion:
-    """Tell why there is no motion.
-
-    Args:
-        solution: on the grid, without a motion.
-
-    Returns:
-        the reason.
-    """
+    """Tell why there is no motion."""
     cell, n_cells = int(solution.empty), len(path.grid.width)
     node = max(cell, 0)
     state = _state(path, node)

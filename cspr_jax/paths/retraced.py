@@ -88,11 +88,7 @@ class _Pieces:
 
 
 def size_of(robot: AnyRobot) -> float:
-    """Size of a platform, by which angles become lengths along paths.
-
-    Returns:
-        the largest distance of a cable from the mass centre, m; 1 for a point mass.
-    """
+    """Size of a platform, by which angles become lengths along paths."""
     if not isinstance(robot, PlatformRobot):
         return 1.0
     return float(np.linalg.norm(np.asarray(robot.platform_points), axis=1).max())
@@ -101,20 +97,7 @@ def size_of(robot: AnyRobot) -> float:
 def retraced(
     robot: AnyRobot, motions: Sequence[Motion], cells: int, feeds: Sequence[np.ndarray | None] = ()
 ) -> list[Retraced]:
-    """Paths of motions that go on from each other.
-
-    Args:
-        robot: centred, z down.
-        motions: from the centroid of the spools, z down.
-        cells: of the grids on which they will be run along; marks lie closer together than these.
-        feeds: for each motion as of `motions.proved_answers.MotionProof`; empty: there are none.
-
-    Returns:
-        the paths, from stop to stop; none of motions that stand still.
-
-    Raises:
-        InputError: a motion that does not go on from the one before, or that turns in place where it begins or ends.
-    """
+    """Paths of motions that go on from each other."""
     sequence = MotionSequence(motions, size_of(robot))
     paths: list[Retraced] = []
     run: list[SmoothPart] = []

@@ -1,5 +1,9 @@
 """Names of half-planes of a path: which limit each of them is, and of which cable."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from cspr_jax.motions.problem import Problem
@@ -9,22 +13,18 @@ from cspr_jax.robots.wrench_sets import spanning
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import Verdict
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 FLAGS = {row.name: row.flag for row in LIMITS}
 # Flag of a criterion, and its cable from 0 on, or None.
 RowName = tuple[Verdict, int | None]
 
 
-def row_names(problem: Problem, state: State, u: np.ndarray, x: np.ndarray) -> list[RowName]:
-    """Names of the half-planes of one place, in the order of `paths.rows.path_rows`.
-
-    Args:
-        state: of the path there, run along at a unit path speed.
-        u: (n_rows,) shares of the path acceleration.
-        x: (n_rows,) shares of the squared path speed.
-
-    Returns:
-        flag and cable of each.
-    """
+def row_names(
+    problem: Problem, state: State, u: Float[np.ndarray, "n_rows"], x: Float[np.ndarray, "n_rows"]
+) -> list[RowName]:
+    """Names of the half-planes of one place, in the order of `paths.rows.path_rows`."""
     robot, limits = problem.robot, problem.limits
     names = _of_faces(problem, state, np.stack([u, x], axis=1))
     if limits.cable_acceleration_max is not None:

@@ -6,7 +6,9 @@ the set of wrenches that the cables can give, each limit of a cable's accelerati
 Cartesian acceleration is one half-plane (Bobrow, Dubowsky and Gibson 1985; Verscheure et al. 2009; Pham and Pham 2018).
 """
 
-from typing import NamedTuple, TypeVar
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import jax.numpy as jnp
 import numpy as np
@@ -20,6 +22,9 @@ from cspr_jax.robots.state_bounds import StateBounds
 from cspr_jax.robots.tension_distribution import all_tensions
 from cspr_jax.robots.witness_tensions import right_inverse
 from cspr_jax.robots.wrench_sets import spanning, tension_range
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Tangents of the largest Cartesian acceleration: half of a polygon around the circle, in which p'' lies.
 TANGENTS = 24
@@ -47,11 +52,7 @@ class Rows(NamedTuple):
 
 
 def face_count(robot: AnyRobot) -> int:
-    """Number of the half-planes that bound tensions: the first ones.
-
-    Returns:
-        the number.
-    """
+    """Number of the half-planes that bound tensions: the first ones."""
     return 2 * len(spanning(robot.n_cables, robot.dof))
 
 
@@ -72,15 +73,7 @@ class UnitWrenches(NamedTuple):
 
 
 def still(state: StateKind, *, pushed: bool) -> StateKind:
-    """State of a path that stands still, or sets off from there at a unit path acceleration.
-
-    Args:
-        state: of the path, run along at a unit path speed; or its bounds.
-        pushed: whether it sets off.
-
-    Returns:
-        the state.
-    """
+    """State of a path that stands still, or sets off from there at a unit path acceleration."""
     none = state.velocity * 0.0
     changes = {"velocity": none, "acceleration": state.velocity if pushed else none}
     if state.rotation is not None:
@@ -89,15 +82,7 @@ def still(state: StateKind, *, pushed: bool) -> StateKind:
 
 
 def unit_wrenches(robot: AnyRobot, state: State) -> UnitWrenches:
-    """Parts of the wrench balance at one place.
-
-    Args:
-        robot: centred, z down.
-        state: of the path, run along at a unit path speed.
-
-    Returns:
-        the parts.
-    """
+    """Parts of the wrench balance at one place."""
     unit = wrench_units(robot)
     rest = robot.inertial_wrench(still(state, pushed=False)) / unit
     momentum = robot.inertial_wrench(still(state, pushed=True)) / unit - rest
@@ -105,17 +90,8 @@ def unit_wrenches(robot: AnyRobot, state: State) -> UnitWrenches:
     return UnitWrenches(robot.wrench_matrix(state) / unit[:, None], momentum, bend, rest)
 
 
-def path_rows(robot: AnyRobot, limits: Limits, state: State, speed: Array) -> Rows:
-    """Half-planes of one place.
-
-    Args:
-        robot: centred, z down.
-        state: of the path, run along at a unit path speed.
-        speed: () largest speed of the mass centre, m/s, inf for none.
-
-    Returns:
-        the half-planes: faces of the tensions, then accelerations of cables, then tangents.
-    """
+def path_rows(robot: AnyRobot, limits: Limits, state: State, speed: Float[Array, ""]) -> Rows:
+    """Half-planes of one place."""
     parts = [_of_tensions(robot, limits, unit_wrenches(robot, state))]
     cap = jnp.square(speed) / jnp.maximum(jnp.sum(state.velocity**2), TINY)
     _, rate, bend = cable_motion(robot, state)
@@ -143,15 +119,8 @@ class TensionFaces(NamedTuple):
     least: Array
 
 
-def tension_faces(robot: AnyRobot, limits: Limits, matrix: Array) -> TensionFaces:
-    """Faces at one place.
-
-    Args:
-        matrix: (dof, n_cables) wrenches of unit tensions, over their units.
-
-    Returns:
-        the faces, those of `wrench_sets.spanning` with one sign and then with the other.
-    """
+def tension_faces(robot: AnyRobot, limits: Limits, matrix: Float[Array, "dof n_cables"]) -> TensionFaces:
+    """Faces at one place."""
     count, dof = robot.n_cables, robot.dof
     low, high = tension_range(robot, limits)
     is_beside = (beside_faces(count, dof)[..., None] == np.arange(count)).astype(float)
@@ -174,16 +143,8 @@ def _of_tensions(robot: AnyRobot, limits: Limits, wrenches: UnitWrenches) -> tup
     return momentum, bend, jnp.where(bounds, most, 1.0), size
 
 
-def tangent_directions(velocity: Array, acceleration: Array) -> Array:
-    """Directions in which the Cartesian acceleration is bounded, in the plane of p' and p''.
-
-    Args:
-        velocity: (3,) p'.
-        acceleration: (3,) p'', to one side of which all of them point.
-
-    Returns:
-        (n_tangents, 3) unit vectors.
-    """
+def tangent_directions(velocity: Float[Array, "3"], acceleration: Float[Array, "3"]) -> Float[Array, "n_tangents 3"]:
+    """Directions in which the Cartesian acceleration is bounded, in the plane of p' and p''."""
     along = velocity / jnp.sqrt(jnp.maximum(jnp.sum(velocity**2), TINY))
     bend = acceleration - jnp.dot(acceleration, along) * along
     across = bend / jnp.sqrt(jnp.maximum(jnp.sum(bend**2), TINY))

@@ -1,9 +1,11 @@
 """Sections of paths: curves over the path coordinate s, without corners, made of quintic Hermite pieces."""
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.interpolate import BPoly
@@ -11,6 +13,9 @@ from scipy.interpolate import BPoly
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.curves.interpolation import continuous, hermite, interpolated
 from cspr_jax.curves.spline import Spline
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Orientations that differ by less are one orientation; half of the angle, rad.
 SAME_ORIENTATION = 1e-12
@@ -71,23 +76,12 @@ class Track:
     speed: np.ndarray
     marks: np.ndarray
 
-    def table(self) -> np.ndarray:
-        """Bernstein coefficients of the pieces that are not empty.
-
-        Returns:
-            (m, 6, 3).
-        """
+    def table(self) -> Float[np.ndarray, "m 6 3"]:
+        """Bernstein coefficients of the pieces that are not empty."""
         return hermite(self.s, [self.place, self.first, self.second])
 
-    def refined(self, s: np.ndarray) -> "Track":
-        """The same track with more nodes.
-
-        Args:
-            s: (k,) where they are to be, between its ends; increasing, none of them a node.
-
-        Returns:
-            the track.
-        """
+    def refined(self, s: Float[np.ndarray, "k"]) -> "Track":
+        """The same track with more nodes."""
         knots, behind = np.unique(self.s), np.searchsorted(self.s, s)
         curve = BPoly(np.moveaxis(self.table(), 1, 0), knots)
         added = {
@@ -98,16 +92,10 @@ class Track:
         return dataclasses.replace(self, s=np.insert(self.s, behind, s), speed=speed, **added)
 
 
-def section_of(track: Track, quaternions: np.ndarray | None = None) -> Section:
+def section_of(track: Track, quaternions: Float[np.ndarray, "k 4"] | None = None) -> Section:
     """Section of a track and of orientations at its marks.
 
     Between two marks the orientation turns at a constant rate, about one axis; through more it is a C2 spline.
-
-    Args:
-        quaternions: (k, 4) unit quaternions at the marks, scalar first; None: of a point mass.
-
-    Returns:
-        the section.
     """
     turning = None
     if quaternions is not None:
@@ -135,30 +123,14 @@ def _between(s: np.ndarray, width: float) -> np.ndarray:
     return np.concatenate(cuts)
 
 
-def half_angles(units: np.ndarray) -> np.ndarray:
-    """Halves of the angles between consecutive orientations.
-
-    Args:
-        units: (n, 4) unit quaternions, of continuous signs.
-
-    Returns:
-        (n - 1,) rad.
-    """
+def half_angles(units: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n-1"]:
+    """Halves of the angles between consecutive orientations."""
     apart, together = (np.linalg.norm(units[1:] + sign * units[:-1], axis=1) for sign in (-1.0, 1.0))
     return 2.0 * np.arctan2(apart, together)
 
 
-def turn(units: np.ndarray, share: np.ndarray, length: float = 1.0) -> list[np.ndarray]:
-    """Orientations at a constant rate from one to another, and their derivatives.
-
-    Args:
-        units: (2, 4) unit quaternions, of continuous signs.
-        share: (n,) of the way.
-        length: of the way, m.
-
-    Returns:
-        unit quaternions, and their first and second derivatives along the way, (n, 4) each.
-    """
+def turn(units: Float[np.ndarray, "2 4"], share: Float[np.ndarray, "n"], length: float = 1.0) -> list[np.ndarray]:
+    """Orientations at a constant rate from one to another, and their derivatives."""
     half = float(half_angles(units)[0])
     across = units[1] - (units[1] @ units[0]) * units[0]
     across /= np.linalg.norm(across) or 1.0

@@ -1,6 +1,9 @@
 """Arcs of a plan, and moves of G-code, as elements of paths."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -8,25 +11,17 @@ from cspr_jax.config.gcode import Move
 from cspr_jax.errors import InputError
 from cspr_jax.paths.elements import Arc, Element, Straight
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # Part of its radius by which an arc may begin beside the plane of its centre: rounding.
 BESIDE = 1e-6
 
 
-def arc_of(centre: np.ndarray, start: np.ndarray, normal: np.ndarray, angle: float) -> Arc:
-    """Arc of a circle.
-
-    Args:
-        centre: (3,) m.
-        start: (3,) m.
-        normal: (3,) about which it turns, of any length but zero.
-        angle: by which it turns, rad.
-
-    Returns:
-        the arc.
-
-    Raises:
-        InputError: an arc that begins in its centre, or not in the plane of its centre.
-    """
+def arc_of(
+    centre: Float[np.ndarray, "3"], start: Float[np.ndarray, "3"], normal: Float[np.ndarray, "3"], angle: float
+) -> Arc:
+    """Arc of a circle."""
     axis = normal / np.linalg.norm(normal)
     radius = start - centre
     height = float(radius @ axis)
@@ -38,14 +33,7 @@ def arc_of(centre: np.ndarray, start: np.ndarray, normal: np.ndarray, angle: flo
 
 
 def elements_of(moves: Sequence[Move]) -> list[Element]:
-    """Lines, arcs and helices of moves, each with a stop behind it where the program pauses.
-
-    Args:
-        moves: each begins where the one before ends.
-
-    Returns:
-        one element for each move.
-    """
+    """Lines, arcs and helices of moves, each with a stop behind it where the program pauses."""
     elements: list[Element] = []
     for move in moves:
         start, end = np.array(move.start), np.array(move.end)

@@ -8,12 +8,17 @@ is replaced by its tangents at a known motion, which lie inside, and the optimum
 From rest and to rest, s is the cube of time over the first and the last cell: a constant jerk.
 """
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.linalg import solve_banded
 
 from cspr_jax.paths.interior_point import interior_point
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Bands below and above the diagonal, with three unknowns a node; what keeps the matrix regular; smallest x over the
 # largest from which the search starts.
@@ -52,15 +57,8 @@ class NodeRows(NamedTuple):
     cap: np.ndarray
     width: np.ndarray
 
-    def nearest(self, x: np.ndarray) -> "NodeRows":
-        """The half-planes that bound u most, from either side, about a motion; duplicates among them.
-
-        Args:
-            x: (n_nodes,) squared path speeds of the motion.
-
-        Returns:
-            the half-planes; all if there are few.
-        """
+    def nearest(self, x: Float[np.ndarray, "n_nodes"]) -> "NodeRows":
+        """The half-planes that bound u most, from either side, about a motion; duplicates among them."""
         if len(self.u) <= 4 * NEAREST:
             return self
         chosen = []
@@ -75,23 +73,18 @@ class NodeRows(NamedTuple):
         return NodeRows(u, x, most, self.cap, self.width)
 
     def beside(self, others: "NodeRows") -> "NodeRows":
-        """These half-planes and others.
-
-        Args:
-            others: at the same nodes.
-
-        Returns:
-            all of them.
-        """
+        """These half-planes and others."""
         u, x, most = (np.concatenate(pair) for pair in zip(self[:3], others[:3], strict=True))
         return NodeRows(u, x, most, self.cap, self.width)
 
-    def with_cap(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Half-planes with the cap as the last one.
-
-        Returns:
-            u, x, most, (n_rows + 1, n_nodes) each.
-        """
+    def with_cap(
+        self,
+    ) -> tuple[
+        Float[np.ndarray, "n_rows+1 n_nodes"],
+        Float[np.ndarray, "n_rows+1 n_nodes"],
+        Float[np.ndarray, "n_rows+1 n_nodes"],
+    ]:
+        """Half-planes with the cap as the last one."""
         ones = np.ones((1, len(self.cap)))
         pairs = (self.u, 0.0 * ones), (self.x, ones / self.cap), (self.most, ones)
         u, x, most = (np.concatenate(pair) for pair in pairs)
@@ -111,17 +104,7 @@ class Smooth(NamedTuple):
 
 
 def smooth(rows: NodeRows, ends: SectionEnds, start: Smooth, jerk: float, times: int = 1) -> Smooth | None:
-    """Least time with a continuous path acceleration.
-
-    Args:
-        ends: speeds, and whether it rests there.
-        start: motion from which the search begins, and at which the path jerk is bounded at first.
-        jerk: largest path jerk, m/s^3.
-        times: number of optima, each with tangents at the one before, at least.
-
-    Returns:
-        the optimum; None if there is none, or none was reached.
-    """
+    """Least time with a continuous path acceleration."""
     near, motion = rows.nearest(start.x), start
     for time in range(times + MORE_ROWS):
         problem = _Problem(near, ends, jerk, motion.x)
@@ -136,18 +119,10 @@ def smooth(rows: NodeRows, ends: SectionEnds, start: Smooth, jerk: float, times:
     return None
 
 
-def below_ramps(x: np.ndarray, width: np.ndarray, jerk: float, ends: SectionEnds) -> Smooth:
-    """Motion that is no faster than another one, nor than ramps from rest and to rest are.
-
-    Args:
-        x: (n_nodes,) squared path speeds of the other one.
-        width: (n_nodes - 1,) m.
-        jerk: largest path jerk, m/s^3.
-        ends: speeds, and whether it rests there.
-
-    Returns:
-        the motion.
-    """
+def below_ramps(
+    x: Float[np.ndarray, "n_nodes"], width: Float[np.ndarray, "n_nodes-1"], jerk: float, ends: SectionEnds
+) -> Smooth:
+    """Motion that is no faster than another one, nor than ramps from rest and to rest are."""
     s = np.concatenate([[0.0], np.cumsum(width)])
     x = x.copy()
     for way, rest in zip((s, s[-1] - s), ends.rests, strict=True):

@@ -40,23 +40,12 @@ class StaticTension(NamedTuple):
         return f"cable {self.cable + 1} has a tension of {needed} N, at least {allowed} needed"
 
     def to_dict(self) -> dict[str, Any]:
-        """The tension as a plan's JSON has it.
-
-        Returns:
-            plain values.
-        """
+        """The tension as a plan's JSON has it."""
         return self._asdict() | {"position": self.position.tolist(), "unit": "N"}
 
 
 def static_tension(problem: Problem, state: State) -> StaticTension | None:
-    """The tension that misses its limits by most at rest, where all tensions together miss them by least.
-
-    Args:
-        state: of the place.
-
-    Returns:
-        the tension; None: the robot can stand still there, or no tensions hold it.
-    """
+    """The tension that misses its limits by most at rest, where all tensions together miss them by least."""
     robot = problem.robot
     wrenches, count = unit_wrenches(robot, state), robot.n_cables
     low, high = (np.broadcast_to(side, count) for side in tension_range(robot, problem.limits))

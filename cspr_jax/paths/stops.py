@@ -1,13 +1,18 @@
 """Motions of any kind one behind another: their states at many instants, and the smooth parts between their stops."""
 
+from __future__ import annotations
+
 import itertools
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from cspr_jax.errors import InputError
 from cspr_jax.motions.motion import Motion, states_at
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Samples of a motion among which stops are sought, and the fewest of a smooth part.
 SAMPLES, FEWEST = 2000, 8
@@ -77,16 +82,8 @@ class MotionSequence:
         self._motions, self.size = list(motions), size
         self.duration = np.array([float(motion.duration()) for motion in motions])
 
-    def rates(self, number: np.ndarray, tau: np.ndarray) -> MovingPlaces:
-        """Places and their derivatives.
-
-        Args:
-            number: (k,) of the motions.
-            tau: (k,) of the instants.
-
-        Returns:
-            them.
-        """
+    def rates(self, number: Float[np.ndarray, "k"], tau: Float[np.ndarray, "k"]) -> MovingPlaces:
+        """Places and their derivatives."""
         columns: list[np.ndarray] = []
         for k in np.unique(number).tolist():
             chosen = number == k
@@ -96,33 +93,19 @@ class MotionSequence:
                 column[chosen] = values
         return MovingPlaces(*columns)
 
-    def inside(self, parts: Sequence[SmoothPart], number: np.ndarray, share: np.ndarray) -> MovingPlaces:
-        """Places and their derivatives within smooth parts.
-
-        Args:
-            number: (k,) of the parts.
-            share: (k,) of the part that has passed.
-
-        Returns:
-            them.
-        """
+    def inside(
+        self, parts: Sequence[SmoothPart], number: Float[np.ndarray, "k"], share: Float[np.ndarray, "k"]
+    ) -> MovingPlaces:
+        """Places and their derivatives within smooth parts."""
         motion, start, end = (np.array([part[i] for part in parts])[number] for i in range(3))
         return self.rates(motion.astype(int), start + (end - start) * np.clip(share, INSIDE, 1.0 - INSIDE))
 
-    def ends(self, motion: int) -> np.ndarray:
-        """Starts and ends of the pieces of a motion.
-
-        Returns:
-            (pieces + 1,) tau.
-        """
+    def ends(self, motion: int) -> Float[np.ndarray, "pieces+1"]:
+        """Starts and ends of the pieces of a motion."""
         return np.concatenate([[0.0], np.asarray(self._motions[motion].breaks()), [1.0]])
 
-    def times(self, parts: Sequence[SmoothPart]) -> np.ndarray:
-        """Durations of smooth parts.
-
-        Returns:
-            (m,) s.
-        """
+    def times(self, parts: Sequence[SmoothPart]) -> Float[np.ndarray, "m"]:
+        """Durations of smooth parts."""
         return np.array([(part.end - part.start) * self.duration[part.motion] for part in parts])
 
     def _of_one(self, motion: Motion, tau: np.ndarray) -> MovingPlaces:
@@ -137,14 +120,7 @@ class MotionSequence:
         return MovingPlaces(*places, *[np.concatenate([x, self.size * y], axis=1) for x, y in ((v, w), (a, b))])
 
     def parts(self) -> list[SmoothPart]:
-        """Smooth parts of all motions, in their order, without those in which nothing moves.
-
-        Returns:
-            the parts.
-
-        Raises:
-            InputError: a motion that does not go on from the one before.
-        """
+        """Smooth parts of all motions, in their order, without those in which nothing moves."""
         breaks = [np.unique([0.0, *np.asarray(motion.breaks()), 1.0]) for motion in self._motions]
         smooth = [SmoothPart(k, *pair) for k, cuts in enumerate(breaks) for pair in itertools.pairwise(cuts)]
         lengths = np.array([part.end - part.start for part in smooth])

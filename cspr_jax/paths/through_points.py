@@ -1,6 +1,9 @@
 """Paths through points: straight lines between them, or C2 and C4 splines over the lengths of their chords."""
 
+from __future__ import annotations
+
 import itertools
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import BPoly
@@ -11,25 +14,19 @@ from cspr_jax.paths.corners import Corners, tracks_of
 from cspr_jax.paths.elements import SAME_PLACE, Straight
 from cspr_jax.paths.section import SAME_ORIENTATION, Track, half_angles
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # Part of the speed along the chords below which a spline stands still, and samples of each of its pieces.
 STANDING, SAMPLES = 1e-6, 32
 # Shortest chord of a spline over its longest one: the digits of its pieces are lost below.
 SMALLEST_CHORD = 1e-6
 
 
-def chords(points: np.ndarray, quaternions: np.ndarray | None = None) -> np.ndarray:
-    """Distances between consecutive points; where only the orientation changes, the angle.
-
-    Args:
-        points: (n, 3) m.
-        quaternions: (n, 4) unit quaternions, or None.
-
-    Returns:
-        (n - 1,) m, or rad.
-
-    Raises:
-        InputError: fewer than two points, or the same twice in a row.
-    """
+def chords(
+    points: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"] | None = None
+) -> Float[np.ndarray, "n-1"]:
+    """Distances between consecutive points; where only the orientation changes, the angle."""
     if len(points) < 2:
         raise InputError("points", None, "must be two or more", fault=f"{len(points)} of them")
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
@@ -44,29 +41,14 @@ def chords(points: np.ndarray, quaternions: np.ndarray | None = None) -> np.ndar
 
 def through_points(
     kind: str,
-    points: np.ndarray,
-    quaternions: np.ndarray | None = None,
+    points: Float[np.ndarray, "n 3"],
+    quaternions: Float[np.ndarray, "n 4"] | None = None,
     *,
     corner: str = "stop",
     tolerance: float = 0.0,
     closed: bool = False,
 ) -> list[Track]:
-    """Tracks through points; each mark is at one of them, or at the corner that is blended there.
-
-    Args:
-        kind: "line", "polyline", "cubic" or "quintic".
-        points: (n, 3) m; the last one of a closed path is the first.
-        quaternions: (n, 4) unit quaternions, or None.
-        corner: of a polyline, "stop" or "blend".
-        tolerance: of blends, m.
-        closed: whether a spline ends in the direction in which it begins.
-
-    Returns:
-        the tracks.
-
-    Raises:
-        InputError: points that make no path.
-    """
+    """Tracks through points; each mark is at one of them, or at the corner that is blended there."""
     lengths = chords(points, quaternions)
     if kind in ("line", "polyline") or len(points) == 2:
         lines = [Straight(a, b, turn) for a, b, turn in zip(points, points[1:], lengths.tolist(), strict=False)]

@@ -1,8 +1,10 @@
 """Limits that a motion along a path misses between the nodes, by proof, and those that bind it."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Generator, Mapping, Sequence
 from functools import partial
-from typing import NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
@@ -17,6 +19,9 @@ from cspr_jax.motions.proved_answers import TENSIONS
 from cspr_jax.paths.discrete import GridMargins
 from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.verdicts import Verdict, criterion_words
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Int
 
 # Slack, over its scale, that is left where a limit is met; by what more than is missed, and by how
 # much at least, margins grow; below which a criterion binds.
@@ -80,15 +85,7 @@ class CellSlacks(NamedTuple):
         return bool((self.low > 0.0).all())
 
     def grown(self, margins: GridMargins, weight: float) -> GridMargins:
-        """Margins with which what is missed will be met.
-
-        Args:
-            margins: with which the motion was sought.
-            weight: N.
-
-        Returns:
-            the margins.
-        """
+        """Margins with which what is missed will be met."""
         # A miss that is left when other cells became tighter moves on from cell to cell: margins grow around it, too.
         reach = len(self.low) // SPREAD if any(side.any() for side in margins) else 0
 
@@ -101,16 +98,10 @@ class CellSlacks(NamedTuple):
         others = (lacking([row.unit == unit for row in self.rows]) for unit in (ACCELERATIONS, SPEEDS))
         return GridMargins(*(old + more for old, more in zip(margins, (tension, *others), strict=True)))
 
-    def binding(self, feed: np.ndarray, words: Mapping[float, str]) -> tuple[tuple[BindingName, ...], np.ndarray]:
-        """The criterion that binds in each cell.
-
-        Args:
-            feed: (n_cells,) as of the motion.
-            words: of feeds, by their values.
-
-        Returns:
-            names of criteria, each feed one; (n_cells,) number of the one that is nearest to its limit; -1: none binds.
-        """
+    def binding(
+        self, feed: Float[np.ndarray, "n_cells"], words: Mapping[float, str]
+    ) -> tuple[tuple[BindingName, ...], Int[np.ndarray, "n_cells"]]:
+        """The criterion that binds in each cell."""
         nearest = self.high.argmin(1)
         names = [BindingName(row.flag.text, row.cables[0] if row.cables else None) for row in self.rows]
         binds = np.where(self.high[np.arange(len(nearest)), nearest] < BINDING, nearest, -1)
@@ -122,14 +113,7 @@ class CellSlacks(NamedTuple):
 
 
 def cell_slacks(problem: Problem, trials: Sequence[Trial]) -> list[CellSlacks]:
-    """Bounds of the slacks that depend on how fast motions are, over each of their pieces; the last is that of feeds.
-
-    Args:
-        trials: at least one, of motions of one degree.
-
-    Returns:
-        the bounds, one set a motion.
-    """
+    """Bounds of slacks that depend on how fast motions are, over each of their pieces; the last is that of feeds."""
     motions = [trial.motion for trial in trials]
     robot, limits, several = problem.robot, problem.limits, SeveralSplines(motions)
     rows = criteria(robot, limits)
@@ -160,14 +144,7 @@ def cell_slacks(problem: Problem, trials: Sequence[Trial]) -> list[CellSlacks]:
 
 
 def together(problem: Problem, searches: Sequence[Generator[Trial, CellSlacks, Answer]]) -> list[Answer]:
-    """Results of searches that go on with the bounds of the slacks of their motions, bounded together round by round.
-
-    Args:
-        searches: each yields trials, of motions of one degree, and receives their bounds.
-
-    Returns:
-        what they return.
-    """
+    """Results of searches that continue with bounds of their motions' slacks, bounded together round by round."""
     answers: dict[int, Answer] = {}
     trials: dict[int, Trial] = {}
 

@@ -4,8 +4,10 @@ The motion that controllers play, and that is proved, is this one. It meets the 
 off by what a quintic piece misses, which is told.
 """
 
+from __future__ import annotations
+
 import dataclasses
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -13,6 +15,9 @@ from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.curves.spline import Spline
 from cspr_jax.paths.nodes import PathGrid, derivatives, places_on
 from cspr_jax.paths.section import Section
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Instants in a cell at which the distance from the path is taken.
 SHARES = (0.25, 0.5, 0.75)
@@ -35,15 +40,8 @@ class PathSpeeds(NamedTuple):
     rests: tuple[bool, bool] = (False, False)
 
 
-def cell_times(run: PathSpeeds, width: np.ndarray) -> np.ndarray:
-    """Times that the cells take, where the path acceleration changes at a constant rate along each.
-
-    Args:
-        width: (n_cells,) m.
-
-    Returns:
-        (n_cells,) s.
-    """
+def cell_times(run: PathSpeeds, width: Float[np.ndarray, "n_cells"]) -> Float[np.ndarray, "n_cells"]:
+    """Times that the cells take, where the path acceleration changes at a constant rate along each."""
     # With s - s0 = D r^2 at a start from zero speed, and D (1 - (1 - r)^2) at an end, nothing is singular.
     r, weights = 0.5 * (_POINTS + 1.0), 0.5 * _WEIGHTS
     starts, ends = (run.x[:-1] == 0.0)[:, None], (run.x[1:] == 0.0)[:, None]
@@ -59,29 +57,13 @@ def cell_times(run: PathSpeeds, width: np.ndarray) -> np.ndarray:
     return times
 
 
-def moving(run: PathSpeeds, width: np.ndarray) -> PathSpeeds | None:
-    """Path speeds that run through all cells.
-
-    Args:
-        width: (n_cells,) m.
-
-    Returns:
-        the speeds; None if the motion stops, or turns back, within a cell.
-    """
+def moving(run: PathSpeeds, width: Float[np.ndarray, "n_cells"]) -> PathSpeeds | None:
+    """Path speeds that run through all cells."""
     return run if np.isfinite(cell_times(run, width)).all() else None
 
 
 def timed(section: Section, grid: PathGrid, run: PathSpeeds) -> Spline:
-    """The motion.
-
-    Args:
-        section: NumPy leaves.
-        grid: of the section.
-        run: finite.
-
-    Returns:
-        the motion, with one quintic piece a cell.
-    """
+    """The motion."""
     times = cell_times(run, grid.width)
     speeds = np.sqrt(run.x)
     sides = [
@@ -112,11 +94,7 @@ def _quintic(start: tuple, end: tuple, width: np.ndarray) -> np.ndarray:
 
 
 def distance_from_path(section: Section, grid: PathGrid, run: PathSpeeds, motion: Spline) -> float:
-    """Largest distance of the motion from the path, at some instants of each cell.
-
-    Returns:
-        the distance, m.
-    """
+    """Largest distance of the motion from the path, at some instants of each cell."""
     times, speeds = np.diff(motion.knots), np.sqrt(run.x)
     # The path coordinate as a quintic in time too; across the path its error is of no account.
     ends = (grid.nodes[:-1], speeds[:-1], run.before), (grid.nodes[1:], speeds[1:], run.after)

@@ -1,7 +1,10 @@
 """Why segments of a plan are not feasible, in numbers: what each needs, and what is allowed."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,19 +16,15 @@ from cspr_jax.motions.needs import Need, needs
 from cspr_jax.motions.problem import Problem
 from cspr_jax.schema.verdicts import NO_REASON, Verdict
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # A criterion with a larger slack, without a unit, is met: numbers would not say why.
 MET = 1e-6
 
 
 def cause_columns(each: Sequence[tuple[Cause, ...]]) -> dict[str, np.ndarray]:
-    """The worst cause of each segment, as motion files have it.
-
-    Args:
-        each: causes of n segments, the worst one first.
-
-    Returns:
-        (n,) by the names of `schema.quantities.SEGMENTS`.
-    """
+    """The worst cause of each segment, as motion files have it."""
 
     def is_usual(cause: Cause) -> bool:
         return cause.unit == UNITS.get(Verdict[cause.criterion.upper()], cause.unit)
@@ -42,15 +41,7 @@ def cause_columns(each: Sequence[tuple[Cause, ...]]) -> dict[str, np.ndarray]:
 
 
 def cause_text(columns: Mapping[str, np.ndarray], i: int) -> str:
-    """The worst cause of a segment in words.
-
-    Args:
-        columns: of `cause_columns`, or of a file that may lack them.
-        i: number of the segment.
-
-    Returns:
-        the words; empty where nothing is known.
-    """
+    """The worst cause of a segment in words."""
     flag = Verdict(int(columns["segment_cause"][i])) if "segment_cause" in columns else Verdict.FEASIBLE
     if flag.name is None or not flag:
         return ""
@@ -59,16 +50,10 @@ def cause_text(columns: Mapping[str, np.ndarray], i: int) -> str:
     return Cause(flag.text, (cable - 1,) if cable else (), t, needed, allowed, UNITS.get(flag, "m")).text
 
 
-def causes(problem: Problem, frame: Frame, answers: Answers, motions: list[Motion], samples: np.ndarray) -> list:
-    """Causes of segments of one family.
-
-    Args:
-        motions: theirs, from the centroid of the spools, z down.
-        samples: (n,) equidistant instants to begin with, at least three.
-
-    Returns:
-        for each segment a tuple of its causes, the worst one first; none of a feasible one.
-    """
+def causes(
+    problem: Problem, frame: Frame, answers: Answers, motions: list[Motion], samples: Float[np.ndarray, "n"]
+) -> list:
+    """Causes of segments of one family."""
     each = []
     for i, motion in enumerate(motions):
         flags = Verdict(int(answers.verdict[i])) & ~NO_REASON

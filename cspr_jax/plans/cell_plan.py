@@ -23,18 +23,7 @@ ORIENTATION = ("tilt_azimuth", "tilt", "torsion")
 def cell_plan(
     settings: Mapping[str, Any], place: Mapping[str, float], values: Mapping[str, Any], *, samples: int = 120
 ) -> dict[str, Any] | None:
-    """Plan of the motion of one cell, as a plan file has it.
-
-    Args:
-        settings: of the sweep, with its robot as a table.
-        place: coordinates of the cell by axis, SI units.
-        values: quantities of the cell; those of `COUNTS` fix the number of arcs where they are positive, beta_hat that
-            of the target.
-
-    Returns:
-        what a plan file holds; None of a kind of map whose cells are no motions from pose to pose, and of a cell
-        without a motion: an ellipse without a size, or without a frequency, a straight line without a length.
-    """
+    """Plan of the motion of one cell, as a plan file has it."""
     kind = MAP_KINDS[settings["map"]]
     if not kind.planned:
         return None

@@ -29,17 +29,7 @@ DEPTHS = 200
 
 
 def chosen_depth(problem: Any, sequence: PlanLegs) -> float:
-    """The plan's z0, given or chosen.
-
-    Args:
-        problem: robot, limits and amplitude, `Problem` or `Problem`.
-
-    Returns:
-        z0, m.
-
-    Raises:
-        ConfigError: a rest pose off P0, or no z0 that can be chosen.
-    """
+    """The plan's z0, given or chosen."""
     stops = sequence.stops
     keys, path, targets = stops.keys, stops.path, stops.targets
     if keys.z0 is None and not _needs_depth(stops):
@@ -104,15 +94,7 @@ def _check_rest(robot: Robot, stops: Waypoints, z0: float) -> None:
 
 
 def nearly_resting(stops: Waypoints, z0: float) -> list[str]:
-    """Poses that are P0 but for their last digits.
-
-    Args:
-        stops: all poses of the plan.
-        z0: of the plan, m; NaN where it has no P0.
-
-    Returns:
-        hints, one line each.
-    """
+    """Poses that are P0 but for their last digits."""
     lines = [
         almost_at_rest(f"{stops.name(i)}.position", pose.position, z0, stops.robot_file)
         for i, pose in enumerate(stops.poses)
@@ -175,15 +157,7 @@ def _fastest_depth(problem: Problem, sequence: PlanLegs) -> float:
 
 
 def best_amplitude(problem: Any, sequence: PlanLegs, z0: float) -> tuple[Amplitude, float]:
-    """The amplitude function whose epsilon gives the shortest plan; among equals, the largest margin.
-
-    Args:
-        problem: robot and limits, `Problem` or `Problem`.
-        z0: m.
-
-    Returns:
-        the function, and z0: another one where the best inclination depends on the function.
-    """
+    """The amplitude function whose epsilon gives the shortest plan; among equals, the largest margin."""
     ranked: list[tuple[float, float, int, Amplitude, float]] = []
     for epsilon in EPSILONS:
         amplitude = build_amplitude(sequence.stops.keys, sequence.stops.path, epsilon=float(epsilon))

@@ -20,14 +20,7 @@ OTHERS = ("ellipse", "path", "launch", "first_control_point", "velocity", "accel
 
 
 def with_mass_centres(robot_file: RobotFile, keys: PlanFile, path: Path) -> PlanFile:
-    """A plan whose poses have the positions of the mass centre.
-
-    Returns:
-        the plan.
-
-    Raises:
-        ConfigError: point = "origin" with what is always of the mass centre.
-    """
+    """A plan whose poses have the positions of the mass centre."""
     centre = centre_from(robot_file.as_written, keys.point)
     if centre is None or not centre.any():
         return keys

@@ -140,15 +140,7 @@ class JudgedLeg(Leg):
 
 
 def judged(leg: Leg, *, surroundings: bool, pulleys: bool) -> Leg:
-    """A leg whose verdicts take surroundings and pulleys into account.
-
-    Args:
-        surroundings: whether there are any.
-        pulleys: likewise.
-
-    Returns:
-        the leg itself where its family knows them.
-    """
+    """A leg whose verdicts take surroundings and pulleys into account."""
     row = FAMILIES[leg.stops.family]
     is_known = (row.knows_obstacles or not surroundings) and (row.knows_pulleys or not pulleys)
     return leg if is_known else JudgedLeg(leg)

@@ -45,14 +45,7 @@ class _Window(NamedTuple):
 
 
 def long_plan(keys: PlanFile, path: Path) -> PlannedMotions:
-    """Plan of one motion of a long table, without the motion itself: nothing can be written of it.
-
-    Returns:
-        the plan, feasible or not.
-
-    Raises:
-        ConfigError: a mistake in the table, or a key that needs all of it at once.
-    """
+    """Plan of one motion of a long table, without the motion itself: nothing can be written of it."""
     for key in ("smooth", "stretch"):
         if getattr(keys, key) is not None:
             raise ConfigError(path, f"{key}: must be absent in a table of so many rows")

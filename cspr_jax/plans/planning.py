@@ -88,14 +88,7 @@ class PlannedMotions:
         return joined([Answers(**{name: getattr(leg.answers, name) for name in names}) for leg in self.legs])
 
     def details(self, i: int) -> dict[str, Any]:
-        """Details of a segment that only its family has.
-
-        Args:
-            i: number of the segment.
-
-        Returns:
-            plain values, by their names in JSON.
-        """
+        """Details of a segment that only its family has."""
         for leg in self.legs:
             if i < len(leg.motions):
                 return leg.answers.details(i)
@@ -103,14 +96,7 @@ class PlannedMotions:
         raise IndexError(i)
 
     def margin_unit(self, i: int) -> str:
-        """Unit of the margin of a segment.
-
-        Args:
-            i: number of the segment.
-
-        Returns:
-            "N", "m/s^2", or "1" of margins that are 1 at rest.
-        """
+        """Unit of the margin of a segment."""
         of_family = "m/s^2" if FAMILIES[self.keys.family_of(i)].is_line else "1"
         return self.details(i).get("margin_unit") or of_family
 
@@ -141,30 +127,13 @@ class PlannedMotions:
 
 
 def plan(path: Path) -> PlannedMotions:
-    """Plan the sequence of a plan file.
-
-    Returns:
-        the plan, feasible or not.
-
-    Raises:
-        ConfigError: a mistake in the file.
-    """
+    """Plan the sequence of a plan file."""
     text = read_text(path)
     return dataclasses.replace(plan_of(read_plan(text, path), path), text=text)
 
 
 def plan_of(keys: PlanFile, path: Path) -> PlannedMotions:
-    """Plan the sequence of a plan file's content.
-
-    Args:
-        path: of the file, named in errors.
-
-    Returns:
-        the plan, feasible or not.
-
-    Raises:
-        ConfigError: a mistake in it.
-    """
+    """Plan the sequence of a plan file's content."""
     legs_of = [FAMILIES[name].legs for name in keys.families]
     robot_file = as_moved(resolve_robot(keys.robot, path, path.parent), legs_of)
     if keys.point == "origin":
@@ -226,17 +195,7 @@ def _attained(problem: Problem, leg: JoinedLeg, stops: Waypoints) -> JoinedLeg:
 
 
 def with_motions(plan: PlannedMotions, answers: Answers, motions: list[Motion], lines: list[str]) -> PlannedMotions:
-    """A plan with other motions between its poses.
-
-    Args:
-        plan: without outcomes.
-        answers: of the n motions.
-        motions: from the centroid of the spools, z down.
-        lines: warnings about them.
-
-    Returns:
-        the plan.
-    """
+    """A plan with other motions between its poses."""
     legs = (JoinedLeg(plan.keys.family, answers, motions),)
     why, extremes = _judged(plan.problem, plan.robot_file, plan.frame, legs, plan.keys)
     lines = [*plan.warnings, *lines, *_missed(plan.keys, answers.feasible, extremes)]

@@ -75,17 +75,6 @@ def retimed(plan: PlannedMotions, grid: int, ramp_time: float, path: Path) -> Pl
 
     Between two poses at rest the faster motion takes the place of the planned one where it is proved, and faster, or
     where the planned one is not feasible.
-
-    Args:
-        grid: as for `SectionSettings`.
-        ramp_time: s.
-        path: of the plan, named in errors.
-
-    Returns:
-        the plan; its answers are `RetimedAnswers`.
-
-    Raises:
-        ConfigError: motions that have no other speeds: launches, or none at all.
     """
     motions = [motion for leg in plan.legs for motion in leg.motions]
     _check(plan, motions, path)

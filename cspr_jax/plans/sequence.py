@@ -1,8 +1,11 @@
 """Sequence of a plan: its poses, in legs of one family each."""
 
+from __future__ import annotations
+
 import contextlib
 import dataclasses
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +20,9 @@ from cspr_jax.motions.problem import Problem
 from cspr_jax.motions.waypoints import Waypoints
 from cspr_jax.plans.judged_legs import judged
 from cspr_jax.schema.families import FAMILIES, moving
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 POINT_MASS = "3T"
 
@@ -52,15 +58,8 @@ class PlanLegs:
                 plain.begin_with(_others(plain.stops))
             self.legs.append(_judged(plain))
 
-    def table(self, problem: Problem, depths: np.ndarray) -> dict[str, np.ndarray]:
-        """Feasibility, durations and margins for several depths of P0.
-
-        Args:
-            depths: (n_depths,) m.
-
-        Returns:
-            "feasible", "duration" in s and "margin", (n_depths, n_segments) each.
-        """
+    def table(self, problem: Problem, depths: Float[np.ndarray, "n_depths"]) -> dict[str, np.ndarray]:
+        """Feasibility, durations and margins for several depths of P0."""
         answers = [leg.answers(problem, depths) for leg in self.legs]
         return {
             name: np.hstack([getattr(leg_answers, name).reshape(len(depths), -1) for leg_answers in answers])

@@ -5,10 +5,12 @@
 equal volume of SO(3); only here is the number of orientations proportional to a volume.
 """
 
+from __future__ import annotations
+
 import functools
 import math
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -20,6 +22,9 @@ from cspr_jax.platforms.orientation_steps import OrientationSteps
 from cspr_jax.robots.orientation_grids import OrientationGrid, equal_volume_grid, tilt_torsion_grid
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.runtime.stages import stage
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 DEFINITIONS = ("grid", "scan", "equal-volume")
 # Steps along rays that are tried at a time: few rays go farther, and with the usual number of rays these steps fill
@@ -47,18 +52,8 @@ def _grid(definition: str, divisions: int) -> OrientationGrid:
     return (tilt_torsion_grid if definition == "grid" else equal_volume_grid)(divisions)
 
 
-def accessible(robot: PlatformRobot, place: np.ndarray, definition: str, divisions: int) -> Accessible:
-    """The accessible orientations of a place.
-
-    Args:
-        robot: centred, in its reference axes.
-        place: (3,) from the centroid of the spools, z down, m.
-        definition: one of `DEFINITIONS`.
-        divisions: of pi: the step is pi / divisions.
-
-    Returns:
-        the orientations; none where the reference orientation itself is singular, or the place lies above the spools.
-    """
+def accessible(robot: PlatformRobot, place: Float[np.ndarray, "3"], definition: str, divisions: int) -> Accessible:
+    """The accessible orientations of a place."""
     stage("accessible orientations")
     steps = OrientationSteps(robot, place)
     towards = cylindrical_frames(np.asarray(place, float))
@@ -77,16 +72,7 @@ def accessible(robot: PlatformRobot, place: np.ndarray, definition: str, divisio
 
 
 def accessible_sets(robot: PlatformRobot, grids: Sequence[tuple[np.ndarray, int]], definition: str) -> list[Accessible]:
-    """The accessible orientations of many places, by two threads.
-
-    Args:
-        robot: centred, in its reference axes.
-        grids: the place (3,), m, and the divisions of pi of each.
-        definition: one of `DEFINITIONS`.
-
-    Returns:
-        the orientations of each place; see `accessible`.
-    """
+    """The accessible orientations of many places, by two threads."""
     return in_threads(lambda grid: accessible(robot, grid[0], definition, grid[1]), grids)
 
 

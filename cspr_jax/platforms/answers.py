@@ -1,9 +1,11 @@
 """Answers about motions between poses, once their numbers of arcs are known."""
 
+from __future__ import annotations
+
 import dataclasses
 import itertools
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +25,9 @@ from cspr_jax.platforms.motion_checker import MotionChecker, PlatformChecks
 from cspr_jax.platforms.motions import rows
 from cspr_jax.platforms.platform_segment import PlatformSegment
 from cspr_jax.schema.verdicts import FLAGS, Verdict
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 NEVER = np.iinfo(int).max
 
@@ -70,20 +75,7 @@ def settled(
     margins: bool = True,
     is_final: bool = True,
 ) -> tuple[PlatformMotionAnswers, PlatformSegment]:
-    """Answers about motions, with and without a feasible number of arcs.
-
-    Args:
-        candidates: one candidate of each of n motions.
-        smallest: numbers of arcs of the candidates; its checks are completed here.
-        refused: numbers of arcs at which only limits refuse the candidates.
-        max_arcs: largest number tried.
-        fixed: as for `smallest_arcs`.
-        margins: whether motions without a number of arcs get margins, and not only reasons.
-        is_final: whether these answers are shown: then motions that passed checks without a proof are proved.
-
-    Returns:
-        the answers, NaN for (2.55), which does not apply; the segments that they belong to.
-    """
+    """Answers about motions, with and without a feasible number of arcs."""
     tried = np.where(smallest.arcs > 0, smallest.arcs, refused.arcs)
     if fixed is not None:
         tried = np.where(tried > 0, tried, np.maximum(fixed, 0))
@@ -171,17 +163,10 @@ def _reasons(
     return np.where(by_limits, alone, basic | named)
 
 
-def trials(motions: Candidates, values: np.ndarray, *, same: bool = False) -> tuple[np.ndarray, Candidates]:
-    """Motions with each of several values of beta-hat at their ends.
-
-    Args:
-        motions: n motions, one candidate each, with the values of beta-hat at their starts.
-        values: (n, n_values) in the order in which they are tried; NaN for none.
-        same: whether the value at the end holds at the start too.
-
-    Returns:
-        motion of each candidate, (k,); the candidates.
-    """
+def trials(
+    motions: Candidates, values: Float[np.ndarray, "n n_values"], *, same: bool = False
+) -> tuple[Float[np.ndarray, "k"], Candidates]:
+    """Motions with each of several values of beta-hat at their ends."""
     cell, option = np.nonzero(~np.isnan(values))
     return cell, _with_ends(motions.rows(cell), values[cell, option], same=same)
 
@@ -189,25 +174,14 @@ def trials(motions: Candidates, values: np.ndarray, *, same: bool = False) -> tu
 def reached(
     checker: MotionChecker,
     motions: Candidates,
-    values: np.ndarray,
+    values: Float[np.ndarray, "n n_values"],
     *,
     max_arcs: int,
     same: bool = False,
     margins: bool = True,
     fixed: np.ndarray | None = None,
 ) -> PlatformMotionAnswers:
-    """Smallest numbers of arcs of motions, each with several values of beta-hat at its end.
-
-    Args:
-        motions: n motions, one candidate each, with the values of beta-hat at their starts.
-        values: (n, n_values) in the order in which they are tried; NaN for none.
-        max_arcs: largest number tried.
-        same: whether the value at the end holds at the start too.
-        fixed: as for `smallest_arcs`.
-
-    Returns:
-        the answers; where no value is feasible, the answer with the first value, or with the value at rest.
-    """
+    """Smallest numbers of arcs of motions, each with several values of beta-hat at its end."""
     cell, trial = trials(motions, values, same=same)
     of_trials = smallest_arcs(checker, trial, max_arcs=max_arcs, fixed=fixed, margins=margins)
     arcs, undecided, checks = np.zeros(len(values), int), np.full(len(values), NEVER), checker.nothing(len(values))

@@ -1,8 +1,10 @@
 """Smallest numbers of arcs between many pairs of poses, over values of beta-hat at their ends."""
 
+from __future__ import annotations
+
 import dataclasses
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -17,6 +19,9 @@ from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.verdicts import Verdict
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float, Num
 
 BATCH = 2048
 # Number of candidates that are held at a time.
@@ -107,23 +112,13 @@ def smallest_arcs(
     candidates: Candidates,
     *,
     max_arcs: int,
-    fixed: np.ndarray | None = None,
+    fixed: Num[np.ndarray, "m"] | None = None,
     beyond: int = -1,
     margins: bool = True,
 ) -> FewestArcs:
     """Smallest number of arcs that passes all tests, of each candidate.
 
     A few instants refute most motions before they are checked in full.
-
-    Args:
-        max_arcs: largest number tried.
-        fixed: (m,) a fixed number of arcs of each motion, -k where it is free from k on, 0 where free; None: all free.
-        beyond: how many arcs beyond the smallest number of a motion are tried for its other candidates; -1: the first
-            candidate that passes is enough.
-        margins: whether the checks have more than verdicts.
-
-    Returns:
-        the numbers, and the checks.
     """
     motion, count = candidates.motion, len(candidates.motion)
     smallest, undecided, checks = np.zeros(count, int), np.zeros(count, int), checker.nothing(count)
@@ -182,15 +177,7 @@ def _sieved(
 def refused_by_limits(
     checker: MotionChecker, candidates: Candidates, *, max_arcs: int, fixed: np.ndarray | None = None
 ) -> Refused:
-    """Smallest numbers of arcs at which only limits refuse candidates, of motions without a feasible candidate.
-
-    Args:
-        max_arcs: largest number tried.
-        fixed: as for `smallest_arcs`.
-
-    Returns:
-        the number and the broken limits of each candidate.
-    """
+    """Smallest numbers of arcs at which only limits refuse candidates, of motions without a feasible candidate."""
     motion, count = candidates.motion, len(candidates.motion)
     fewest, is_limit = FewestLimits(count, checker.flags), checker.is_limit
     if not count or not is_limit.any():
@@ -232,19 +219,14 @@ def _but_for_limits(checker: MotionChecker, segments: PlatformSegment, arcs: int
 
 
 def unavoidable(
-    checker: MotionChecker, candidates: Candidates, suspects: np.ndarray, *, max_arcs: int, fixed: np.ndarray | None
-) -> np.ndarray:
-    """Criteria that every number of arcs breaks.
-
-    Args:
-        candidates: n candidates, one of each motion.
-        suspects: (n, n_criteria) mask of criteria that some number of arcs breaks.
-        max_arcs: largest number tried.
-        fixed: as for `smallest_arcs`.
-
-    Returns:
-        (n, n_criteria): mask of criteria that, as far as the samples show, are broken with every number of arcs.
-    """
+    checker: MotionChecker,
+    candidates: Candidates,
+    suspects: Bool[np.ndarray, "n n_criteria"],
+    *,
+    max_arcs: int,
+    fixed: np.ndarray | None,
+) -> Bool[np.ndarray, "n n_criteria"]:
+    """Criteria that every number of arcs breaks."""
     if not suspects.any():
         return suspects
     only = np.zeros(len(suspects), int) if fixed is None else fixed
@@ -260,15 +242,8 @@ def unavoidable(
     return suspects | certain
 
 
-def best_candidates(checker: MotionChecker, candidates: Candidates, *, max_arcs: int) -> np.ndarray:
-    """Number of arcs whose smallest sampled tension is the largest, for motions without a feasible number.
-
-    Args:
-        max_arcs: largest number tried.
-
-    Returns:
-        (n,).
-    """
+def best_candidates(checker: MotionChecker, candidates: Candidates, *, max_arcs: int) -> Float[np.ndarray, "n"]:
+    """Number of arcs whose smallest sampled tension is the largest, for motions without a feasible number."""
     indices = np.arange(len(candidates.motion))
     best, highest = np.ones(len(indices), int), np.full(len(indices), -np.inf)
     if not len(best):
@@ -282,15 +257,8 @@ def best_candidates(checker: MotionChecker, candidates: Candidates, *, max_arcs:
     return best
 
 
-def segments_with(robot: PlatformRobot, candidates: Candidates, arcs: np.ndarray) -> PlatformSegment:
-    """The segments for given numbers of arcs.
-
-    Args:
-        arcs: (n,).
-
-    Returns:
-        leaves (n, ...), each of the parity of its number of arcs.
-    """
+def segments_with(robot: PlatformRobot, candidates: Candidates, arcs: Float[np.ndarray, "n"]) -> PlatformSegment:
+    """The segments for given numbers of arcs."""
     segments, indices = _Segments(robot, candidates), np.arange(len(arcs))
     even, odd = (segments(k, indices) for k in (0, 1))
     return jax.tree.map(lambda a, b: np.where((arcs % 2 == 1).reshape(-1, *[1] * (a.ndim - 1)), b, a), even, odd)

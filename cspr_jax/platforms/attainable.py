@@ -1,5 +1,9 @@
 """Accessible orientations of a place that a horizontal transition from rest attains, thesis section 3.12.3."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_parts
@@ -13,6 +17,9 @@ from cspr_jax.platforms.motion_checker import MotionChecker
 from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.robots.symmetries import NONE, Symmetries, alike
 
+if TYPE_CHECKING:
+    from jaxtyping import Float, Int
+
 # Values of beta-hat tried at the target.
 VALUES = 20
 # The preferred value is tried first, then every fifth of the others, then the rest.
@@ -24,29 +31,16 @@ LARGE, PART, MIXED = 4 * CANDIDATES, CANDIDATES // 4, 16
 
 def attainable(
     checker: MotionChecker,
-    places: np.ndarray,
-    angles: np.ndarray,
-    z0: np.ndarray,
+    places: Float[np.ndarray, "n 3"],
+    angles: Float[np.ndarray, "n 3"],
+    z0: Float[np.ndarray, "n"],
     *,
     max_arcs: int,
     values: int = VALUES,
     symmetry: Symmetries = NONE,
     margins: bool = True,
 ) -> PlatformMotionAnswers:
-    """Smallest numbers of arcs from rest to orientations of places.
-
-    Args:
-        places: (n, 3) from the centroid of the spools, z down, m.
-        angles: (n, 3) tilt and torsion in the cylindrical frame of each place, rad; n >= 1.
-        z0: (n,) m.
-        max_arcs: largest number tried.
-        values: number of values of beta-hat, the preferred one first.
-        symmetry: symmetries of the robot; orientations that they join are computed once.
-        margins: whether orientations that are not attained get margins, and not only reasons.
-
-    Returns:
-        the answers.
-    """
+    """Smallest numbers of arcs from rest to orientations of places."""
     representatives, inverse = _once(checker, places, angles, z0, symmetry)
 
     def part(rows):
@@ -59,30 +53,18 @@ def attainable(
 
 def attained(
     checker: MotionChecker,
-    places: np.ndarray,
-    angles: np.ndarray,
-    z0: np.ndarray,
+    places: Float[np.ndarray, "n 3"],
+    angles: Float[np.ndarray, "n 3"],
+    z0: Float[np.ndarray, "n"],
     *,
     max_arcs: int,
     values: int = VALUES,
-    tried: np.ndarray | None = None,
+    tried: Int[np.ndarray, "k"] | None = None,
     symmetry: Symmetries = NONE,
-) -> np.ndarray:
+) -> Float[np.ndarray, "n"]:
     """Orientations of places that some number of arcs and some value of beta-hat attains.
 
     `attainable` also tells how, or why not; this function does half of the work.
-
-    Args:
-        places: (n, 3) from the centroid of the spools, z down, m.
-        angles: (n, 3) tilt and torsion in the cylindrical frame of each place, rad; n >= 1.
-        z0: (n,) m.
-        max_arcs: largest number tried.
-        values: number of values of beta-hat, the preferred one first.
-        tried: (k,) numbers of the values to try, from 0 on; None: all, in `rounds`.
-        symmetry: symmetries of the robot; orientations that they join are computed once.
-
-    Returns:
-        (n,).
     """
     representatives, inverse = _once(checker, places, angles, z0, symmetry)
     each = rounds(values) if tried is None else (tried,)
@@ -109,14 +91,7 @@ def attained(
 
 
 def rounds(values: int = VALUES) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rounds in which values of beta-hat are tried, each with every number of arcs, where the one before fails.
-
-    Args:
-        values: how many values there are, the preferred one first.
-
-    Returns:
-        numbers of values, from 0 on: the preferred one; some of the others; the rest.
-    """
+    """Rounds in which values of beta-hat are tried, each with every number of arcs, where the one before fails."""
     numbers = np.arange(1, values)
     return np.array([0]), numbers[numbers % FEWER == 0], numbers[numbers % FEWER != 0]
 

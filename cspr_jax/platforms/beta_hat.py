@@ -1,6 +1,9 @@
 """Values of beta-hat to try at the ends of segments, poses where none can end, and the choice along a sequence."""
 
+from __future__ import annotations
+
 from functools import partial
+from typing import TYPE_CHECKING
 
 import jax
 import numpy as np
@@ -12,6 +15,9 @@ from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.wrench_balance import determinant_share, is_regular
 
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float
+
 # Larger values of beta-hat have never gained anything, docs/theory.md.
 LARGEST = 12.0
 OPTIONS = 11
@@ -21,20 +27,16 @@ BATCH = 1024
 BEYOND = 4
 
 
-def options(preferred: np.ndarray, lowest: np.ndarray, highest: np.ndarray, count: int = OPTIONS) -> np.ndarray:
+def options(
+    preferred: Float[np.ndarray, "n"],
+    lowest: Float[np.ndarray, "n"],
+    highest: Float[np.ndarray, "n"],
+    count: int = OPTIONS,
+) -> Float[np.ndarray, "n count"]:
     """Values of beta-hat in the order in which they are tried.
 
     First the preferred one of (3.91), if it keeps every cable taut, else the middle of the interval (3.92); then
     values that divide the interval evenly, the nearest to the first one first. The interval is cut at +-12.
-
-    Args:
-        preferred: (n,) beta-hat of (3.91).
-        lowest: (n,) start of the interval (3.92).
-        highest: (n,) end of the interval (3.92).
-        count: how many values in all.
-
-    Returns:
-        (n, count) values; NaN for missing ones, a whole row where no value keeps every cable taut.
     """
     preferred, lowest, highest = (np.asarray(x, float) for x in (preferred, lowest, highest))
     low, high = np.maximum(lowest, -LARGEST)[:, None], np.minimum(highest, LARGEST)[:, None]
@@ -59,21 +61,13 @@ def _ends(robot: PlatformRobot, poses) -> tuple[jax.Array, ...]:
 
 
 def end_options(
-    robot: PlatformRobot, positions: np.ndarray, quaternions: np.ndarray, z0: np.ndarray, count: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Values of beta-hat to try at poses.
-
-    Args:
-        robot: in its reference axes.
-        positions: (n, 3) m.
-        quaternions: (n, 4).
-        z0: (n,) m.
-        count: how many values for each.
-
-    Returns:
-        (n, count) of `options`; (n,) whether a motion can end there: below the spools, and not beyond a
-        singularity.
-    """
+    robot: PlatformRobot,
+    positions: Float[np.ndarray, "n 3"],
+    quaternions: Float[np.ndarray, "n 4"],
+    z0: Float[np.ndarray, "n"],
+    count: int,
+) -> tuple[Float[np.ndarray, "n count"], Bool[np.ndarray, "n"]]:
+    """Values of beta-hat to try at poses."""
     preferred, lowest, highest, share, depth = in_batches(
         partial(_ends, robot), (positions, quaternions, z0), size=BATCH
     )
@@ -85,12 +79,6 @@ def cheapest_path(costs: list[np.ndarray]) -> list[int]:
 
     Among equal sums the options that are tried first win; where no path is feasible, the path with the fewest
     infeasible segments.
-
-    Args:
-        costs: of each segment, (n_options_at_start, n_options_at_end); inf where it is infeasible.
-
-    Returns:
-        the option of each pose.
     """
     # An infeasible segment costs more than everything else together.
     finite = [c[np.isfinite(c)] for c in costs]

@@ -5,8 +5,11 @@ are then proved by `proof`, contacts and the limits on the pose by `place_proof`
 are attained, narrowed down around the smallest samples of every criterion; beside them stand the proved bounds.
 """
 
+from __future__ import annotations
+
 import threading
 from functools import partial
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -39,6 +42,9 @@ from cspr_jax.robots.wrench_lanes import cable_lanes
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.verdicts import Verdict
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # Largest number of blocks in a call, and of arcs that are held at a time.
 BLOCKS, ARCS = 1024, 32 * MANY
 # Instants that are looked at together.
@@ -52,18 +58,8 @@ _end = jax.jit(endpoint)
 
 
 @persistent_jit(static_argnames=("pairs", "kind"))
-def slacks_at(problem: Problem, items, *, pairs: tuple, kind: PlatformMotionKind) -> tuple[Array, ...]:
-    """Slacks and distances between cables at instants.
-
-    Args:
-        problem: robot, limits, amplitude.
-        items: segments (leaves (n, ...)), arcs (n,), instants (n,).
-        pairs: cables that can meet.
-
-    Returns:
-        n_criteria + 1 arrays (n,): slacks in the order of `slacks.flags`, infinite where the fast balance has too few
-        digits; the smallest distance between cables, m.
-    """
+def slacks_at(problem: Problem, items, *, pairs: tuple, kind: PlatformMotionKind) -> tuple[Float[Array, "n"], ...]:
+    """Slacks and distances between cables at instants."""
     segments, arcs, tau = items
     instant = instant_lanes(problem.amplitude, segments.sense, arcs, tau)
     here = state(segments, arcs, instant, kind)

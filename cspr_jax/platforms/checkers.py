@@ -8,14 +8,6 @@ from cspr_jax.platforms.redundant_checker import RedundantChecker
 
 
 def pose_checker(problem: Problem, kind: PlatformMotionKind = USUAL, *, batch: int = FEW) -> MotionChecker:
-    """Checker of motions of a platform.
-
-    Args:
-        problem: robot, limits, amplitude.
-        batch: how many motions are computed at a time.
-
-    Returns:
-        on six cables the checker of their unique tensions, on more the checker of the margin of all tensions.
-    """
+    """Checker of motions of a platform."""
     is_determined = problem.robot.n_cables == problem.robot.dof
     return (PlatformChecker if is_determined else RedundantChecker)(problem, kind, batch=batch)

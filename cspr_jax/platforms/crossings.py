@@ -1,10 +1,16 @@
 """Cables between samples: steps are halved until cables turn little within each."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cspr_jax.robots.interference import cables_cross, platform_hit
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 HALVINGS = 12
 # Steps in which the cosine of the angle by which a gap or a cable turns is below this are halved.
@@ -15,23 +21,12 @@ CableVectors = tuple[np.ndarray, np.ndarray]  # between cables (k, n_pairs, 3), 
 
 def passed_over(
     cable_vectors: Callable[[np.ndarray, np.ndarray], CableVectors],
-    platform: tuple[np.ndarray, np.ndarray] | None,
-    row: np.ndarray,
-    ends: tuple[np.ndarray, np.ndarray],
+    platform: tuple[Float[np.ndarray, "n_cables 2 3"], Float[np.ndarray, "3"]] | None,
+    row: Float[np.ndarray, "k"],
+    ends: tuple[Float[np.ndarray, "k"], Float[np.ndarray, "k"]],
     count: int,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Motions in whose steps cables cross, and motions in whose steps a cable passes over the platform.
-
-    Args:
-        cable_vectors: gives the vectors of motions (k,) at instants (k,).
-        platform: sides (n_cables, 2, 3) and normal (3,) of `interference.Contacts`; None: the platform is left out.
-        row: (k,) motion that each step belongs to.
-        ends: (k,) instants at the start and at the end of each step.
-        count: number n of motions.
-
-    Returns:
-        masks (n,).
-    """
+    """Motions in whose steps cables cross, and motions in whose steps a cable passes over the platform."""
     met, hit = (np.zeros(count, bool) for _ in range(2))
     if not len(row):
         return met, hit

@@ -1,10 +1,12 @@
 """Enclosures of a platform on its way, for bounds over robots that differ a little; vectors are in platform axes."""
 
+from __future__ import annotations
+
 import itertools
 import math
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -30,6 +32,9 @@ from cspr_jax.robots.interference_lanes import residual
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.wrench_lanes import CABLES
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Cables count as nearest between their ends, and as not parallel, only beyond these tolerances.
 INSIDE, PARALLEL = 1e-6, 1e-6
@@ -246,31 +251,14 @@ class Robustness:
         self._certifier = Certifier(problem, kind, batch=batch, count_instants=count_instants)
         self._knots = np.asarray(problem.amplitude.knots)
 
-    def tolerated(self, segments: PlatformSegment, arcs: np.ndarray, *, whole: bool = True) -> Tolerated:
-        """Multiples that motions stand.
-
-        Args:
-            segments: leaves (n, ...), of the parity of `arcs`; feasible as they are planned.
-            arcs: (n,).
-            whole: as in `tolerances.tolerated`.
-
-        Returns:
-            the multiples.
-        """
+    def tolerated(self, segments: PlatformSegment, arcs: Float[np.ndarray, "n"], *, whole: bool = True) -> Tolerated:
+        """Multiples that motions stand."""
         blocks = parts_of_arcs(arcs, self._knots, PARTS)
         requirements = requirements_of(self._problem, np.asarray(segments.rate) / CABLES)
         return tolerated(blocks, arcs, requirements, partial(self.enclosure, segments, arcs), whole=whole)
 
-    def enclosure(self, segments: PlatformSegment, arcs: np.ndarray, blocks: Blocks) -> Enclosure:
-        """Enclosure of blocks of motions.
-
-        Args:
-            segments: leaves (n, ...), of the parity of `arcs`.
-            arcs: (n,).
-
-        Returns:
-            the enclosure.
-        """
+    def enclosure(self, segments: PlatformSegment, arcs: Float[np.ndarray, "n"], blocks: Blocks) -> Enclosure:
+        """Enclosure of blocks of motions."""
         problem, block_arcs = self._problem._replace(limits=Limits()), arcs[blocks.row].astype(float)
         items = rows(segments, blocks.row), block_arcs, blocks.start, blocks.stop
         kernel = partial(_moving, problem, np.ones(()), kind=self._kind)

@@ -4,7 +4,9 @@ At the end the platform stands still, p'' = -(g / z0) (p - p0), and omega' = bet
 without its factor 2, since the angle of the rotation is gamma beta. The tensions are linear in beta-hat.
 """
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax.numpy as jnp
 from jax import Array
@@ -15,6 +17,9 @@ from cspr_jax.robots.platform import PlatformRobot, rays
 from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.robots.state import State
 from cspr_jax.robots.wrench_balance import jacobian
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # At rest the reference orientation makes beta-hat free; this value swings like a pendulum.
 AT_REST = -1.0
@@ -40,17 +45,10 @@ class Endpoint(NamedTuple):
     highest: Array
 
 
-def endpoint(robot: PlatformRobot, position: Array, quaternion: Array, z0: Array) -> Endpoint:
-    """Tensions at one end of a segment as functions of beta-hat.
-
-    Args:
-        position: (3,) from the centroid of the spools, z down, m.
-        quaternion: (4,) unit.
-        z0: () depth of p0 below the centroid of the spools, m.
-
-    Returns:
-        the endpoint; in the reference orientation beta-hat has no effect, `preferred` is -1 and the interval endless.
-    """
+def endpoint(
+    robot: PlatformRobot, position: Float[Array, "3"], quaternion: Float[Array, "4"], z0: Float[Array, ""]
+) -> Endpoint:
+    """Tensions at one end of a segment as functions of beta-hat."""
     rotation = rotations.matrix(quaternion)
     matrix = -jacobian(robot, position, rotation).T
     eta = robot.gravity / z0  # (3.78)
@@ -78,18 +76,14 @@ def endpoint(robot: PlatformRobot, position: Array, quaternion: Array, z0: Array
     )
 
 
-def end_state(robot: PlatformRobot, position: Array, quaternion: Array, z0: Array, beta_hat: Array) -> State:
-    """State at one end of a segment, of a robot on any number of cables.
-
-    Args:
-        position: (3,) from the centroid of the spools, z down, m.
-        quaternion: (4,) unit.
-        z0: () depth of p0 below the centroid of the spools, m.
-        beta_hat: () of (3.81).
-
-    Returns:
-        the state: standing still, accelerated towards p0 and about the axis of the orientation.
-    """
+def end_state(
+    robot: PlatformRobot,
+    position: Float[Array, "3"],
+    quaternion: Float[Array, "4"],
+    z0: Float[Array, ""],
+    beta_hat: Float[Array, ""],
+) -> State:
+    """State at one end of a segment, of a robot on any number of cables."""
     eta, still = robot.gravity / z0, jnp.zeros(3)
     away = position - rest_point(z0)
     rotation = rotations.matrix(quaternion)

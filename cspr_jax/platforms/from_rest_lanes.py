@@ -6,8 +6,10 @@ speed and angular acceleration are linear in the two values of beta-hat. The mec
 `platform_segment_lanes` (tests compare them).
 """
 
+from __future__ import annotations
+
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax.numpy as jnp
 from jax import Array
@@ -17,6 +19,9 @@ from cspr_jax.arithmetic.lanes import Matrix, Vector, about_axis
 from cspr_jax.motions.amplitudes import Amplitude, derivatives
 from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.platforms.platform_segment import PlatformSegment
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
 
 
 class Swings(NamedTuple):
@@ -60,14 +65,7 @@ class Swing(NamedTuple):
 
 
 def swings(segments: PlatformSegment) -> Swings:
-    """Swings of segments from rest.
-
-    Args:
-        segments: leaves (n, ...).
-
-    Returns:
-        the same motions.
-    """
+    """Swings of segments from rest."""
     slerp = segments.slerp
     return Swings(
         tuple(segments.hub[:, i] for i in range(3)),
@@ -80,18 +78,10 @@ def swings(segments: PlatformSegment) -> Swings:
     )
 
 
-def rest_table(amplitude: Amplitude, arcs: Array, tau: Array, kind: PlatformMotionKind) -> Array:
-    """Table that all segments from rest of one number of arcs share.
-
-    Args:
-        arcs: () number of arcs, a float.
-        tau: (m,) instants.
-
-    Returns:
-        (m, 11): position and acceleration; then of angle, speed and acceleration of the rotation each the constant
-        term and the factors of beta-hat in p0 and at the end. Derivatives are by the phase pi p tau; angles are in half
-        turns.
-    """
+def rest_table(
+    amplitude: Amplitude, arcs: Num[Array, ""], tau: Float[Array, "m"], kind: PlatformMotionKind
+) -> Float[Array, "m 11"]:
+    """Table that all segments from rest of one number of arcs share."""
     theta = math.pi * arcs
     a, a1, a2, a3 = (x / theta**k for k, x in enumerate(derivatives(amplitude, tau, order=3)))
     sine, cosine = sincospi(arcs * tau)
@@ -126,15 +116,8 @@ def _with_beta_hats(sine: Array, cosine: Array, tau: Array, theta: Array) -> lis
     return [steady, *parts]
 
 
-def swing(motions: Swings, row: Array) -> Swing:
-    """The state at one instant.
-
-    Args:
-        row: (11,) of `rest_table`.
-
-    Returns:
-        the state.
-    """
+def swing(motions: Swings, row: Float[Array, "11"]) -> Swing:
+    """The state at one instant."""
 
     def blended(k):
         return row[k] + motions.start_beta_hat * row[k + 1] + motions.end_beta_hat * row[k + 2]

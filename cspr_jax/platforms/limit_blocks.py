@@ -10,8 +10,10 @@ with x_k cable k as a vector and primes for derivatives in time. All but the fir
 is met.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax.numpy as jnp
 from jax import Array
@@ -19,6 +21,9 @@ from jax import Array
 from cspr_jax.arithmetic.lanes import dot
 from cspr_jax.platforms.platform_segment_lanes import StateLanes
 from cspr_jax.robots.wrench_lanes import CABLES, CableLanes, cable_rates
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # The length of a ray is analytic where the ray changes by less than this part of it: sqrt(2) - 1.
 STRAIGHT = 0.414
@@ -102,31 +107,15 @@ class LimitOnBlocks(NamedTuple):
     slacks: Callable[[Enclosed, Array, bool], Pair]
 
 
-def ratio(top: Array, regular: Pair) -> Array:
-    """Lower bounds of quotients of polynomials: the smallest one that their coefficients allow.
-
-    Args:
-        top: (...) coefficients of the numerator.
-        regular: lower and upper bounds of the coefficients of the denominator, (...) each.
-
-    Returns:
-        (...); -inf where the denominator may vanish.
-    """
+def ratio(top: Float[Array, "..."], regular: Pair) -> Float[Array, "..."]:
+    """Lower bounds of quotients of polynomials: the smallest one that their coefficients allow."""
     low, high = regular
     bottom = jnp.where(top > 0.0, high, low)
     return jnp.where(bottom > 0.0, top / jnp.where(bottom > 0.0, bottom, 1.0), -jnp.inf)
 
 
-def at_most(top: Array, regular: Pair) -> Array:
-    """Upper bounds of quotients where the denominator is positive.
-
-    Args:
-        top: (...) upper bounds of the numerator.
-        regular: lower and upper bounds of the denominator, (...) each.
-
-    Returns:
-        (...); infinite where the denominator is not positive for certain, nor the numerator negative.
-    """
+def at_most(top: Float[Array, "..."], regular: Pair) -> Float[Array, "..."]:
+    """Upper bounds of quotients where the denominator is positive."""
     return -ratio(-top, regular)
 
 

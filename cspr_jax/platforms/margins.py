@@ -1,9 +1,14 @@
 """Margins of a platform's motions: smallest values that are attained, narrowed down from samples by parabolas."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float, Int
 
 # Number of parabolas that follow one another, how much nearer the points of each are, and the spread of values below
 # which they are not narrowed down.
@@ -27,15 +32,12 @@ class Samples(NamedTuple):
 
 
 def narrowed(
-    values_at: Callable[[np.ndarray, np.ndarray], np.ndarray], least: np.ndarray, samples: Samples, selected: np.ndarray
+    values_at: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    least: Float[np.ndarray, "n_criteria n"],
+    samples: Samples,
+    selected: Bool[np.ndarray, "n"],
 ) -> None:
-    """Narrow down the smallest values around samples.
-
-    Args:
-        values_at: gives the values (n_criteria, j) of motions (j,) at instants (j,).
-        least: (n_criteria, n) smallest values so far; written into.
-        selected: (n,) mask of the motions that are looked at.
-    """
+    """Narrow down the smallest values around samples."""
     place, value, item = low_points(samples, selected)
     if not len(place):
         return
@@ -51,15 +53,8 @@ def narrowed(
     _values(values_at, least, row, tau[:, None], criterion)
 
 
-def low_points(samples: Samples, selected: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Samples no larger than their neighbours, where a parabola of twice the bend could reach the smallest value.
-
-    Args:
-        selected: (n,) mask of the motions that are looked at.
-
-    Returns:
-        indices of the samples along the axes of `Samples.values`, (j,) each.
-    """
+def low_points(samples: Samples, selected: Bool[np.ndarray, "n"]) -> tuple[Int[np.ndarray, "j"], ...]:
+    """Samples no larger than their neighbours, where a parabola of twice the bend could reach the smallest value."""
     values, row = samples.values, samples.row
     smallest = np.full((values.shape[1], len(selected)), np.inf)
     lowest = values.min(0)

@@ -9,9 +9,14 @@ length h; so what holds for all vectors within that distance holds during the st
 not looked at.
 """
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Int
 
 # Rounding may move F, or a height, by this part of the product of the sizes of its factors.
 ROUNDING = 1e-13
@@ -50,16 +55,10 @@ class _Around(NamedTuple):
         return _size(self.mean) * other.off + _size(other.mean) * self.off + self.off * other.off
 
 
-def cables_meet(base: np.ndarray, pairs: np.ndarray, cables: CablesOfStep) -> np.ndarray:
-    """Steps in which two cables meet for certain.
-
-    Args:
-        base: (n_cables, 3) spools, m.
-        pairs: (n_pairs, 2) cables that can meet.
-
-    Returns:
-        (n,) number of one such step of each block, from 0 on; -1: none.
-    """
+def cables_meet(
+    base: Float[np.ndarray, "n_cables 3"], pairs: Float[np.ndarray, "n_pairs 2"], cables: CablesOfStep
+) -> Int[np.ndarray, "n"]:
+    """Steps in which two cables meet for certain."""
     meets = np.full(cables.rays.shape[1], -1)
     i, j = pairs.T
     apart = base[j] - base[i]
@@ -80,16 +79,10 @@ def cables_meet(base: np.ndarray, pairs: np.ndarray, cables: CablesOfStep) -> np
     return meets
 
 
-def cables_hit(sides: np.ndarray, normal: np.ndarray, cables: CablesOfStep) -> np.ndarray:
-    """Steps in which a cable lies on the platform for certain.
-
-    Args:
-        sides: (n_cables, 2, 3) of `interference.contacts`.
-        normal: (3,) of `interference.contacts`.
-
-    Returns:
-        (n,) number of one such step of each block, from 0 on; -1: none.
-    """
+def cables_hit(
+    sides: Float[np.ndarray, "n_cables 2 3"], normal: Float[np.ndarray, "3"], cables: CablesOfStep
+) -> Int[np.ndarray, "n"]:
+    """Steps in which a cable lies on the platform for certain."""
     hits = np.full(cables.seen.shape[1], -1)
     step, block, cable = _sign_changes(cables.seen @ normal, _size(cables.seen).max(0))
     bent = np.broadcast_to(cables.seen_bent[:, None], cables.seen.shape[1:3])

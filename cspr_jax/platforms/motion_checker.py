@@ -1,8 +1,10 @@
 """Checkers of a platform's motions: what searches and plans ask of them, whatever the number of cables."""
 
+from __future__ import annotations
+
 import abc
 import dataclasses
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import jax
 import numpy as np
@@ -14,6 +16,9 @@ from cspr_jax.motions.tolerances import Tolerated
 from cspr_jax.platforms.platform_segment import PlatformSegment, duration
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.verdicts import Verdict
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float
 
 # Sizes of batches for few and for many cases: a batch is always full, and every size is compiled for.
 FEW, MANY = 256, 2048
@@ -48,24 +53,13 @@ class PlatformChecks:
     tolerated: np.ndarray
     not_tolerated: np.ndarray
 
-    def put(self, index: np.ndarray, others: "PlatformChecks") -> None:
-        """Write other checks into these.
-
-        Args:
-            index: (m,) their places.
-        """
+    def put(self, index: Float[np.ndarray, "m"], others: "PlatformChecks") -> None:
+        """Write other checks into these."""
         for column, new_column in zip(vars(self).values(), vars(others).values(), strict=True):
             column[index] = new_column
 
-    def rows(self, index: np.ndarray) -> "PlatformChecks":
-        """Checks of some of the motions.
-
-        Args:
-            index: (m,) indices.
-
-        Returns:
-            the checks of m motions.
-        """
+    def rows(self, index: Float[np.ndarray, "m"]) -> "PlatformChecks":
+        """Checks of some of the motions."""
         return PlatformChecks(**{name: values[index] for name, values in vars(self).items()})
 
 
@@ -125,50 +119,23 @@ class MotionChecker(abc.ABC):
         """Keep the problem, the kind of the motions, and the size of a batch."""
         self.problem, self.kind, self.batch = problem, kind, batch
 
-    def durations(self, segments: PlatformSegment, arcs: np.ndarray) -> np.ndarray:
-        """Durations of segments.
-
-        Args:
-            segments: leaves (n, ...).
-            arcs: (n,).
-
-        Returns:
-            (n,) s.
-        """
+    def durations(self, segments: PlatformSegment, arcs: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
+        """Durations of segments."""
         return in_batches(_durations, (segments, arcs.astype(float)), size=self.batch)
 
     def nothing(self, count: int) -> PlatformChecks:
-        """Checks to be filled in.
-
-        Returns:
-            verdicts 0, all else NaN.
-        """
+        """Checks to be filled in."""
         numbers = [np.full(count, np.nan) for _ in range(5)]
         return PlatformChecks(np.zeros(count, int), np.full((count, len(self.flags)), np.nan), *numbers)
 
-    def tolerated(self, segments: PlatformSegment, arcs: np.ndarray) -> Tolerated:
-        """Multiples of the uncertainty that motions stand, as closely as possible.
-
-        Args:
-            segments: leaves (n, ...), of the parity of `arcs`; feasible as they are planned.
-            arcs: (n,).
-
-        Returns:
-            the multiples; NaN where there is no uncertainty.
-        """
+    def tolerated(self, segments: PlatformSegment, arcs: Float[np.ndarray, "n"]) -> Tolerated:
+        """Multiples of the uncertainty that motions stand, as closely as possible."""
         return Tolerated(np.full(len(arcs), np.nan), np.full(len(arcs), np.nan))
 
-    def confirmed(self, segments: PlatformSegment, arcs: np.ndarray, checks: PlatformChecks) -> PlatformChecks:
-        """Checks of motions that passed, with a proof of each; here they are proofs already.
-
-        Args:
-            segments: leaves (n, ...), of the parity of `arcs`.
-            arcs: (n,).
-            checks: of these motions.
-
-        Returns:
-            the checks.
-        """
+    def confirmed(
+        self, segments: PlatformSegment, arcs: Float[np.ndarray, "n"], checks: PlatformChecks
+    ) -> PlatformChecks:
+        """Checks of motions that passed, with a proof of each; here they are proofs already."""
         return checks
 
     @property
@@ -177,78 +144,39 @@ class MotionChecker(abc.ABC):
         return np.arange(len(self.flags)) >= BASIC
 
     @abc.abstractmethod
-    def breaks(self, slack: np.ndarray) -> np.ndarray:
-        """Criteria that slacks break for certain.
-
-        Args:
-            slack: (n, n_criteria).
-
-        Returns:
-            (n, n_criteria).
-        """
+    def breaks(self, slack: Float[np.ndarray, "n n_criteria"]) -> Float[np.ndarray, "n n_criteria"]:
+        """Criteria that slacks break for certain."""
 
     @abc.abstractmethod
-    def sampled(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
-        """Smallest slacks at some instants.
-
-        Args:
-            segments: leaves (n, ...), all of this number of arcs.
-            arcs: the number.
-            tau: (m,) the instants.
-
-        Returns:
-            (n, n_criteria) in the order of `flags`.
-        """
+    def sampled(
+        self, segments: PlatformSegment, arcs: int, tau: Float[np.ndarray, "m"]
+    ) -> Float[np.ndarray, "n n_criteria"]:
+        """Smallest slacks at some instants."""
 
     @abc.abstractmethod
     def check(
         self,
         segments: PlatformSegment,
-        arcs: np.ndarray,
+        arcs: Float[np.ndarray, "n"],
         *,
         whole: bool = True,
         margins: bool = True,
-        ignored: np.ndarray | None = None,
+        ignored: Bool[np.ndarray, "n_criteria"] | None = None,
     ) -> PlatformChecks:
-        """Check motions in full.
-
-        Args:
-            segments: leaves (n, ...), of the parity of `arcs`.
-            arcs: (n,).
-            whole: whether to go on where tensions refute the motion; else all that follows is NaN there.
-            margins: whether slacks and gaps are narrowed down to margins; else only the verdict counts.
-            ignored: (n_criteria,) mask of criteria that have no part in the verdict, as then the uncertainty has none;
-                None: all have.
-
-        Returns:
-            the checks.
-        """
+        """Check motions in full."""
 
     @abc.abstractmethod
-    def end_interval(self, position: np.ndarray, quaternion: np.ndarray, z0: float) -> tuple[float, float, float]:
-        """Values of beta-hat at which a segment can end in a pose.
-
-        Args:
-            position: (3,) from the centroid of the spools, z down, m.
-            quaternion: (4,) unit.
-            z0: m.
-
-        Returns:
-            the preferred value; the lowest and the highest feasible value, in reverse order if there is none.
-        """
+    def end_interval(
+        self, position: Float[np.ndarray, "3"], quaternion: Float[np.ndarray, "4"], z0: float
+    ) -> tuple[float, float, float]:
+        """Values of beta-hat at which a segment can end in a pose."""
 
     @abc.abstractmethod
     def end_options(
-        self, positions: np.ndarray, quaternions: np.ndarray, z0: np.ndarray, count: int
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Values of beta-hat to try at poses.
-
-        Args:
-            positions: (n, 3) m.
-            quaternions: (n, 4).
-            z0: (n,) m.
-            count: how many values for each.
-
-        Returns:
-            (n, count) of `beta_hat.options`; (n,) whether a motion can end there.
-        """
+        self,
+        positions: Float[np.ndarray, "n 3"],
+        quaternions: Float[np.ndarray, "n 4"],
+        z0: Float[np.ndarray, "n"],
+        count: int,
+    ) -> tuple[Float[np.ndarray, "n count"], Bool[np.ndarray, "n"]]:
+        """Values of beta-hat to try at poses."""

@@ -1,23 +1,20 @@
 """Many motions of a platform, and rows chosen from them."""
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import numpy as np
 
 from cspr_jax.platforms.platform_segment import PlatformSegment
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 
 def rows(segments: PlatformSegment, index: np.ndarray) -> PlatformSegment:
-    """Segments chosen from many.
-
-    Args:
-        segments: leaves (n, ...).
-        index: indices, or (n,) a mask.
-
-    Returns:
-        leaves (m, ...), always NumPy arrays.
-    """
+    """Segments chosen from many."""
     # `take` is four times as fast as an index where a leaf is no vector.
     index = np.flatnonzero(index) if np.asarray(index).dtype == bool else index
     return jax.tree.map(lambda x: np.asarray(x).take(index, axis=0), segments)
@@ -38,13 +35,6 @@ class Motions(NamedTuple):
         """Motions chosen by indices, or by a mask (n,)."""
         return Motions(rows(self.segments, index), self.arcs[index])
 
-    def items(self, index: np.ndarray) -> tuple[PlatformSegment, np.ndarray]:
-        """Chosen motions as kernels take them.
-
-        Args:
-            index: (m,) indices.
-
-        Returns:
-            leaves (m, ...), and (m,) numbers of arcs as floats.
-        """
+    def items(self, index: Float[np.ndarray, "m"]) -> tuple[PlatformSegment, np.ndarray]:
+        """Chosen motions as kernels take them."""
         return rows(self.segments, index), self.arcs[index].astype(float)

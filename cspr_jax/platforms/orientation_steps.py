@@ -4,8 +4,10 @@ On more than six cables the wrench matrix has no determinant whose sign a path c
 the rank is full, on either side of the spools, and the platform is met only where its attachment points lie in a plane.
 """
 
+from __future__ import annotations
+
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -25,6 +27,9 @@ from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.wrench_balance import at_rest, determinant_share, is_regular, normalised_determinant
 from cspr_jax.robots.wrench_lanes import cable_lanes
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float, Int
 
 BATCH = 512
 # Gaps between cables below this part of the platform's size count as zero. A cable that makes a smaller angle with the
@@ -74,17 +79,8 @@ def _volumes(robot: PlatformRobot, places: Array, quaternions: Array) -> Array:
     return jax.vmap(one)(places, quaternions)
 
 
-def reference_share(robot: PlatformRobot, place: np.ndarray) -> float:
-    """Determinant of the reference orientation at a place, if its sign is the same as in the middle.
-
-    Args:
-        robot: in its reference axes.
-        place: (3,) m.
-
-    Returns:
-        the value of `robots.wrench_balance.normalised_determinant`; NaN if its sign is another one, or the place is not
-        below the spools. 1 on more than six cables.
-    """
+def reference_share(robot: PlatformRobot, place: Float[np.ndarray, "3"]) -> float:
+    """Determinant of the reference orientation at a place, if its sign is the same as in the middle."""
     if robot.n_cables > robot.dof:
         return 1.0
     here, depth, share = _upright(robot, np.asarray(place, float))
@@ -117,15 +113,8 @@ class OrientationSteps:
         self._side = np.zeros(robot.n_cables)  # of each cable; not yet known, and nothing lies in the platform there
         self._side = np.sign(self.at(np.array([IDENTITY])).cable_directions[0] @ self._contacts.normal)
 
-    def at(self, quaternions: np.ndarray) -> OrientationSamples:
-        """Determinants and vectors of cables of orientations.
-
-        Args:
-            quaternions: (n, 4) unit.
-
-        Returns:
-            the samples.
-        """
+    def at(self, quaternions: Float[np.ndarray, "n 4"]) -> OrientationSamples:
+        """Determinants and vectors of cables of orientations."""
         places = np.broadcast_to(self._place, (len(quaternions), 3))
         sampled = in_batches(
             partial(_sampled, self._robot, pairs=self._pairs), (places, np.asarray(quaternions)), size=BATCH
@@ -138,24 +127,14 @@ class OrientationSteps:
         height = np.where(np.abs(height) < least, 2.0 * least * self._side - height, 0.0)
         return OrientationSamples(share / self._reference, gaps, directions + height[..., None] * self._contacts.normal)
 
-    def regular(self, samples: OrientationSamples) -> np.ndarray:
-        """Orientations that are not beyond a singularity.
-
-        Returns:
-            (n,).
-        """
+    def regular(self, samples: OrientationSamples) -> Float[np.ndarray, "n"]:
+        """Orientations that are not beyond a singularity."""
         return is_regular(samples.share)
 
-    def passable(self, samples: OrientationSamples, first: np.ndarray, last: np.ndarray) -> np.ndarray:
-        """Possible steps from one orientation to a neighbouring one.
-
-        Args:
-            first: (n,) indices.
-            last: (n,) indices.
-
-        Returns:
-            (n,) whether both are regular, no cables cross, and no cable passes over the platform.
-        """
+    def passable(
+        self, samples: OrientationSamples, first: Int[np.ndarray, "n"], last: Int[np.ndarray, "n"]
+    ) -> Bool[np.ndarray, "n"]:
+        """Possible steps from one orientation to a neighbouring one."""
         is_regular = self.regular(samples)
         ways = np.flatnonzero(is_regular[first] & is_regular[last])
         free = np.zeros(len(first), bool)

@@ -6,8 +6,10 @@ half the envelope's angle, q = exp(beta u): no angle is divided by, so that noth
 The angle of the envelope stays within [0, pi], since both of its ends have a scalar part that is not negative.
 """
 
+from __future__ import annotations
+
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -16,6 +18,9 @@ from jax import Array
 
 from cspr_jax.arithmetic import rotations
 from cspr_jax.arithmetic.elementary import length, polynomial, sincospi
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float, Num
 
 # Series replace quotients whose numerators would cancel: arccos(s) / sqrt(1 - s^2) where 1 - s is below the first of
 # these numbers, sin(r) / r where r^2 is below the other.
@@ -46,19 +51,15 @@ class Slerp(NamedTuple):
 
 
 @jax.jit
-def slerp_between(start: Array, end: Array, start_beta_hat: Array, end_beta_hat: Array, *, odd: Array) -> Slerp:
-    """Parameters of the oscillating SLERP between two orientations.
-
-    Args:
-        start: (4,) unit quaternion.
-        end: (4,) unit quaternion.
-        start_beta_hat: () beta-hat of the first pose.
-        end_beta_hat: () beta-hat of the last pose.
-        odd: () whether the number of arcs is odd.
-
-    Returns:
-        the parameters.
-    """
+def slerp_between(
+    start: Float[Array, "4"],
+    end: Float[Array, "4"],
+    start_beta_hat: Float[Array, ""],
+    end_beta_hat: Float[Array, ""],
+    *,
+    odd: Bool[Array, ""],
+) -> Slerp:
+    """Parameters of the oscillating SLERP between two orientations."""
     first, last = rotations.upper(start), rotations.upper(end)
     last = jnp.where(odd, rotations.conjugate(last), last)  # (3.58)
     along = jnp.dot(first, last)
@@ -75,22 +76,16 @@ def slerp_between(start: Array, end: Array, start_beta_hat: Array, end_beta_hat:
 
 
 def beat(
-    start_beta_hat: Array, end_beta_hat: Array, share: Array, arcs: Array, tau: Array
-) -> tuple[Array, Array, Array]:
+    start_beta_hat: Float[Array, ""],
+    end_beta_hat: Float[Array, ""],
+    share: Float[Array, ""],
+    arcs: Num[Array, ""],
+    tau: Float[Array, ""],
+) -> tuple[Float[Array, ""], Float[Array, ""], Float[Array, ""]]:
     """beta_ff of (3.93) and its first two derivatives in tau.
 
     The function is linear in beta-hat, so that the mean of two beta_f is the beta_f of the mean beta-hat. With a
     beta-hat of -1 / share it is beta_1 of (3.66), with 0 beta_0 of (3.67).
-
-    Args:
-        start_beta_hat: () beta-hat of the first pose.
-        end_beta_hat: () beta-hat of the last pose.
-        share: () theta_h^2 (n_h - 1) / (pi p)^2.
-        arcs: () number of arcs p, a float.
-        tau: () normalised time.
-
-    Returns:
-        beta, beta', beta'', () each.
     """
     omega = math.pi * arcs
     slope = (end_beta_hat - start_beta_hat) * share
@@ -107,17 +102,9 @@ def beat(
 
 @jax.jit
 def orientation(
-    slerp: Slerp, amplitude_values: tuple[Array, ...], beats: tuple[Array, ...]
-) -> tuple[Array, Array, Array]:
-    """The orientation and its first two derivatives in tau, (3.59) to (3.65).
-
-    Args:
-        amplitude_values: A, A', A'', () each.
-        beats: beta, beta', beta'', () each.
-
-    Returns:
-        q, q', q'', (4,) each.
-    """
+    slerp: Slerp, amplitude_values: tuple[Float[Array, ""], ...], beats: tuple[Float[Array, ""], ...]
+) -> tuple[Float[Array, "4"], Float[Array, "4"], Float[Array, "4"]]:
+    """The orientation and its first two derivatives in tau, (3.59) to (3.65)."""
     half = _half_vector(slerp, amplitude_values)
     beta, beta1, beta2 = beats
     return _exponential(
@@ -141,17 +128,8 @@ def _half_vector(slerp: Slerp, amplitude_values: tuple[Array, ...]) -> tuple[Arr
     return v * w, v1 * w + v * w1 * s1, v2 * w + 2.0 * v1 * w1 * s1 + v * (w2 * s1**2 + w1 * s2)
 
 
-def angle_ratio(s: Array, square: Array, *, orders: int) -> tuple[Array, ...]:
-    """W = arccos(s) / sqrt(1 - s^2), and its derivatives in s, whose signs alternate.
-
-    Args:
-        s: () above -1.
-        square: () 1 - s^2.
-        orders: how many numbers, at most 5.
-
-    Returns:
-        W, W', ..., () each.
-    """
+def angle_ratio(s: Float[Array, ""], square: Float[Array, ""], *, orders: int) -> tuple[Float[Array, ""], ...]:
+    """W = arccos(s) / sqrt(1 - s^2), and its derivatives in s, whose signs alternate."""
     x = 1.0 - s
     is_near = x < _NEAR
     square = jnp.where(is_near, 1.0, square)
@@ -178,15 +156,10 @@ def _exponential(u: Array, u1: Array, u2: Array) -> tuple[Array, Array, Array]:
     return q, q1, jnp.concatenate([scalar[None], u2 * s + 2.0 * u1 * s1 * y1 + u * (s2 * y1**2 + s1 * y2)])
 
 
-def sinc(y: Array) -> tuple[Array, Array, Array, Array, Array]:
-    """Cosine of r, sin r / r, and the first three derivatives of the latter in y = r^2.
-
-    Args:
-        y: () not negative.
-
-    Returns:
-        the numbers, () each.
-    """
+def sinc(
+    y: Float[Array, ""],
+) -> tuple[Float[Array, ""], Float[Array, ""], Float[Array, ""], Float[Array, ""], Float[Array, ""]]:
+    """Cosine of r, sin r / r, and the first three derivatives of the latter in y = r^2."""
     is_small = y < _SMALL
     large = jnp.where(is_small, 1.0, y)
     r = jnp.sqrt(large)
@@ -203,14 +176,9 @@ def sinc(y: Array) -> tuple[Array, Array, Array, Array, Array]:
     return cosine, s, s1, s2, s3
 
 
-def rates(quaternions: tuple[Array, Array, Array]) -> tuple[Array, Array]:
-    """Angular velocity and acceleration in fixed axes, from a quaternion and its derivatives, (3.32) and (3.33).
-
-    Args:
-        quaternions: q, q', q'', (4,) each.
-
-    Returns:
-        omega (3,) and omega' (3,), per unit of the variable of the derivatives.
-    """
+def rates(
+    quaternions: tuple[Float[Array, "4"], Float[Array, "4"], Float[Array, "4"]],
+) -> tuple[Float[Array, "3"], Float[Array, "3"]]:
+    """Angular velocity and acceleration in fixed axes, from a quaternion and its derivatives, (3.32) and (3.33)."""
     back = rotations.conjugate(quaternions[0])
     return 2.0 * rotations.product(quaternions[1], back)[1:], 2.0 * rotations.product(quaternions[2], back)[1:]

@@ -8,7 +8,9 @@ projection of the cable onto the sector (Moreau).
 Between instants h apart a function f with |f''| <= C stays above its smaller end less C h^2 / 8.
 """
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -28,6 +30,9 @@ from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.wrench_lanes import CABLES, CableLanes, cable_lanes
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.limits import Limit
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Steps of a block, and the instants at their ends.
 STEPS = 4
@@ -67,34 +72,15 @@ class _Bends(NamedTuple):
 
 
 def of_pose(problem: Problem) -> list[Limit]:
-    """Rows of the limits on the pose that are set.
-
-    Args:
-        problem: robot, limits.
-
-    Returns:
-        the rows.
-    """
+    """Rows of the limits on the pose that are set."""
     return [row for row in limits_set(problem.limits) if not row.of_motion]
 
 
 @persistent_jit(static_argnames=("pairs", "kind", "margins"))
 def place_blocks(
-    problem: Problem, platform, one: Array, items, *, pairs: tuple, kind: PlatformMotionKind, margins: bool
+    problem: Problem, platform, one: Float[Array, ""], items, *, pairs: tuple, kind: PlatformMotionKind, margins: bool
 ) -> PlaceBounds:
-    """Bounds on blocks.
-
-    Args:
-        problem: robot, limits, amplitude.
-        platform: sides (n_cables, 2, 3) and normal (3,) of `interference.Contacts`.
-        one: () the number 1; see `arithmetic.lanes.stored`.
-        items: segments (leaves (n, ...)), arcs (n,), and where blocks start (n,) and stop (n,), with no knot inside.
-        pairs: of cables that can meet.
-        margins: whether to return the values at all instants, and distances between cables; else these are infinite.
-
-    Returns:
-        the bounds.
-    """
+    """Bounds on blocks."""
     segments, arcs, start, stop = items
     middle, half = middle_of(problem.amplitude, 0.5 * (start + stop)), 0.5 * (stop - start)
 

@@ -4,9 +4,12 @@ A motion is clear if all of its blocks are clear (`place_blocks`). It has a cont
 platform, are proved to meet between two instants (`meetings`). Else, after many halvings, it is undecided.
 """
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Callable
 from functools import partial
+from typing import TYPE_CHECKING
 
 import jax
 import numpy as np
@@ -26,6 +29,9 @@ from cspr_jax.platforms.work_list import BlockBounds, WorkList
 from cspr_jax.robots import interference_lanes
 from cspr_jax.robots.interference import contacts
 from cspr_jax.robots.wrench_lanes import cable_lanes
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float
 
 # Numbers of blocks of an arc to begin with: with margins; else, as in `proof`, at cusps and halfway between two cusps,
 # where a platform moves fastest.
@@ -66,16 +72,10 @@ class PlaceProof:
 
 
 @partial(jax.jit, static_argnames="kind")
-def cables_beside(problem: Problem, items, *, kind: PlatformMotionKind) -> tuple[Array, Array]:
-    """Cables at one instant beside the middle of each of many blocks.
-
-    Args:
-        problem: robot, limits, amplitude.
-        items: segments (leaves (n, ...)), arcs (n,), middles (n,) and distances of the instants from them (n,), in tau.
-
-    Returns:
-        (n, n_cables, 3) from spool to platform, and from platform to spool in platform axes, m.
-    """
+def cables_beside(
+    problem: Problem, items, *, kind: PlatformMotionKind
+) -> tuple[Float[Array, "n n_cables 3"], Float[Array, "n n_cables 3"]]:
+    """Cables at one instant beside the middle of each of many blocks."""
     segments, arcs, middles, off = items
     instant = instant_beside(middle_of(problem.amplitude, middles), segments.sense, arcs, off)
     here = state(segments, arcs, instant, kind)
@@ -108,19 +108,14 @@ class PlaceCertifier:
         self._parts = PARTS, growing(problem.amplitude, *(FROM_REST if kind.from_rest else BETWEEN))
 
     def prove(
-        self, segments: PlatformSegment, arcs: np.ndarray, *, margins: bool = False, ignored: np.ndarray | None = None
+        self,
+        segments: PlatformSegment,
+        arcs: Float[np.ndarray, "n"],
+        *,
+        margins: bool = False,
+        ignored: Bool[np.ndarray, "n_criteria"] | None = None,
     ) -> PlaceProof:
-        """Prove motions, or refute them.
-
-        Args:
-            segments: leaves (n, ...), of the parity of `arcs`.
-            arcs: (n,).
-            margins: whether to compute distances between cables.
-            ignored: (n_criteria,) mask of criteria that do not count; None: all count.
-
-        Returns:
-            the proofs.
-        """
+        """Prove motions, or refute them."""
         blocks, work = parts_of_arcs(arcs, self._knots, self._parts[not margins]), WorkList(arcs, self._limits, ignored)
         met, hit, touch = np.zeros(len(arcs), bool), np.zeros(len(arcs), bool), TOUCH * float(self._arms.max())
 

@@ -10,9 +10,11 @@ vector, v = beta u: for a complex v
 since a rotation leaves its own axis alone. With b = 0 these are bounds on an interval of real time: docs/theory.md.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax.numpy as jnp
 from jax import Array
@@ -22,6 +24,9 @@ from cspr_jax.motions.amplitudes import Amplitude, derivatives
 from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.platforms.platform_segment import PlatformSegment
 from cspr_jax.platforms.platform_segment_lanes import InstantLanes
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
 
 # arccos(s) / sqrt(1 - s^2) is bounded up to this 1 - s, since it is singular at 2; and 1 - s counts as this at least.
 FARTHEST, NEAREST = 1.9, 0.1
@@ -59,48 +64,29 @@ class Reach(NamedTuple):
     angular_acceleration: Array
 
 
-def middle_of(amplitude: Amplitude, tau: Array) -> Middle:
-    """The middle of a block.
-
-    Args:
-        tau: (n,) middles, none of them a knot.
-
-    Returns:
-        the middle.
-    """
+def middle_of(amplitude: Amplitude, tau: Float[Array, "n"]) -> Middle:
+    """The middle of a block."""
     values = derivatives(amplitude, tau, order=amplitude.coefficients.shape[1] - 1)
     return Middle(tau, [value / math.factorial(j) for j, value in enumerate(values)])
 
 
-def instant_beside(middle: Middle, sense: Array, arcs: Array, off: Array) -> InstantLanes:
-    """Instant beside the middle of a block, by the polynomial piece of the middle.
-
-    Args:
-        sense: (n,) +1 (odd) or -1 (even).
-        arcs: (n,) number of arcs, a float.
-        off: (n,) distance from the middle, in tau.
-
-    Returns:
-        the instant, (n,) each.
-    """
+def instant_beside(
+    middle: Middle, sense: Float[Array, "n"], arcs: Num[Array, "n"], off: Float[Array, "n"]
+) -> InstantLanes:
+    """Instant beside the middle of a block, by the polynomial piece of the middle."""
     tau, terms = middle.tau + off, middle.terms
     a, a1, a2, a3 = (polynomial([math.perm(i, j) * terms[i] for i in range(j, len(terms))], off) for j in range(4))
     return InstantLanes(tau, a, a1, a2, a3, *sincospi(sense * arcs * tau))
 
 
 def reach(
-    segment: PlatformSegment, arcs: Array, middle: Middle, axes: tuple[Array, Array], kind: PlatformMotionKind
+    segment: PlatformSegment,
+    arcs: Num[Array, "n"],
+    middle: Middle,
+    axes: tuple[Float[Array, "n"], Float[Array, "n"]],
+    kind: PlatformMotionKind,
 ) -> Reach:
-    """Bounds of motions around the middles of blocks.
-
-    Args:
-        segment: leaves (n, ...), of the parity of `arcs`.
-        arcs: (n,) number of arcs, a float.
-        axes: semi-axes a and b of the ellipses, (n,) each, in tau.
-
-    Returns:
-        the bounds; infinite where nothing is bounded.
-    """
+    """Bounds of motions around the middles of blocks."""
     along, aside = axes
     sizes = _polynomial_sizes(middle.terms, along)
     phase = math.pi * arcs * along, jnp.exp(math.pi * arcs * aside)

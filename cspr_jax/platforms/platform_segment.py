@@ -10,9 +10,12 @@ ellipse's axes, S = theta_h^2 (n_h - 1) = T^2 lambda, C and S_ the cosine and si
 so that the platform stands still at every cusp, not only at the ends as with the standard hypocycloid.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import math
 from functools import partial
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -37,6 +40,9 @@ from cspr_jax.robots.state_bounds import StateBounds
 from cspr_jax.robots.wrench_balance import normalised_determinant
 from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float, Num
 
 # Blocks of which bounds are computed at a time.
 BATCH = 64
@@ -73,26 +79,14 @@ class PlatformSegment:
 
 def pose_segment(
     robot: PlatformRobot,
-    start: tuple[Array, Array],
-    end: tuple[Array, Array],
-    z0: Array,
-    beta_hats: tuple[Array, Array],
+    start: tuple[Float[Array, "3"], Float[Array, "4"]],
+    end: tuple[Float[Array, "3"], Float[Array, "4"]],
+    z0: Float[Array, ""],
+    beta_hats: tuple[Float[Array, ""], Float[Array, ""]],
     *,
-    odd: Array,
+    odd: Bool[Array, ""],
 ) -> PlatformSegment:
-    """The segment from one pose to another.
-
-    Args:
-        robot: the robot, centred.
-        start: position (3,) m and orientation (4,) of the first pose.
-        end: position (3,) m and orientation (4,) of the last.
-        z0: () depth of p0 below the centroid of the spools, m.
-        beta_hats: beta-hat of the first and of the last pose, () each.
-        odd: () whether the number of arcs is odd.
-
-    Returns:
-        the segment for numbers of arcs of that parity.
-    """
+    """The segment from one pose to another."""
     hub = rest_point(z0)
     upright = jnp.zeros_like(hub).at[2].set(1.0)
     plane, r1, r2, precession = swing_plane(start[0] - hub, end[0] - hub, spool_radius(robot), upright, odd)
@@ -104,16 +98,8 @@ def pose_segment(
     return PlatformSegment(plane, hub, r1, r2, precession, sense, robot.gravity / z0, slerp, regular)
 
 
-def duration(segment: PlatformSegment, arcs: Array) -> Array:
-    """Duration T of a segment, (3.77).
-
-    Args:
-        segment: of the parity of `arcs`.
-        arcs: () number of arcs.
-
-    Returns:
-        () seconds; 0 for p = 1 between points on one ray from p0, which is no trajectory.
-    """
+def duration(segment: PlatformSegment, arcs: Num[Array, ""]) -> Float[Array, ""]:
+    """Duration T of a segment, (3.77)."""
     return math.pi * arcs * jnp.sqrt(_share(segment, arcs) / segment.rate)
 
 
@@ -125,19 +111,14 @@ def _share(segment: PlatformSegment, arcs: Array) -> Array:
 
 @persistent_jit(static_argnames="kind")
 def motion(
-    segment: PlatformSegment, amplitude: Amplitude, arcs: Array, tau: Array, *, kind: PlatformMotionKind = USUAL
+    segment: PlatformSegment,
+    amplitude: Amplitude,
+    arcs: Num[Array, ""],
+    tau: Float[Array, ""],
+    *,
+    kind: PlatformMotionKind = USUAL,
 ) -> State:
-    """The state of the platform at one instant.
-
-    Args:
-        segment: of the parity of `arcs`.
-        amplitude: A; with a variable amplitude its third derivative enters the acceleration.
-        arcs: () number of arcs, a float.
-        tau: () normalised time in [0, 1].
-
-    Returns:
-        the state, derivatives by time.
-    """
+    """The state of the platform at one instant."""
     values = derivatives(amplitude, tau, order=3)
     time = duration(segment, arcs)
     c, c1, c2 = _swing(segment, values, arcs, tau, variable=kind.variable)
@@ -154,18 +135,14 @@ def motion(
 
 
 def quaternion_at(
-    segment: PlatformSegment, amplitude: Amplitude, arcs: Array, tau: Array, *, kind: PlatformMotionKind = USUAL
-) -> Array:
-    """The orientation at one instant.
-
-    Args:
-        segment: of the parity of `arcs`.
-        arcs: () number of arcs, a float.
-        tau: () normalised time in [0, 1].
-
-    Returns:
-        (4,) unit quaternion; continuous along the segment.
-    """
+    segment: PlatformSegment,
+    amplitude: Amplitude,
+    arcs: Num[Array, ""],
+    tau: Float[Array, ""],
+    *,
+    kind: PlatformMotionKind = USUAL,
+) -> Float[Array, "4"]:
+    """The orientation at one instant."""
     return _quaternions(segment, derivatives(amplitude, tau, order=3), arcs, tau, kind)[0]
 
 
@@ -261,14 +238,7 @@ def _bounds(segment: PlatformSegment, arcs: Array, blocks: TimeBounds, *, kind: 
 
 @persistent_jit(static_argnames="kind")
 def several_bounds(cases: tuple[PlatformSegment, Array, TimeBounds], *, kind: PlatformMotionKind) -> StateBounds:
-    """Bounds of the states of several motions, over one block of each.
-
-    Args:
-        cases: segments and numbers of arcs, and bounds of the amplitude function; leaves (k, ...).
-
-    Returns:
-        the bounds, leaves (k, ...).
-    """
+    """Bounds of the states of several motions, over one block of each."""
     return jax.vmap(partial(_block_bounds, kind))(*cases)
 
 

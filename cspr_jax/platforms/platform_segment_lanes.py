@@ -4,9 +4,11 @@ The mechanics are the same (tests compare both forms), written for numbers inste
 rest needs neither an ellipse nor a quaternion: it is a straight swing and a rotation about one axis.
 """
 
+from __future__ import annotations
+
 import math
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -18,6 +20,9 @@ from cspr_jax.arithmetic.lanes import Matrix, Vector, about_axis, combined, cros
 from cspr_jax.motions.amplitudes import Amplitude, derivatives
 from cspr_jax.motions.platform_kind import PlatformMotionKind
 from cspr_jax.platforms.platform_segment import PlatformSegment
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
 
 # Degree of the Chebyshev fits, on s in [0, 1], of W = arccos(s) / sqrt(1 - s^2) and of each of its derivatives; they
 # are accurate to 2e-15. The derivative of the fit of W would be wrong by 3e-10.
@@ -67,50 +72,29 @@ class StateLanes(NamedTuple):
 
 
 @jax.jit
-def instant_lanes(amplitude: Amplitude, sense: Array, arcs: Array, tau: Array) -> InstantLanes:
-    """Instant common to segments of the same number of arcs.
-
-    Args:
-        sense: (...) +1 (odd) or -1 (even).
-        arcs: (...) number of arcs, a float.
-        tau: (...) normalised time.
-
-    Returns:
-        the instant, (...) each.
-    """
+def instant_lanes(
+    amplitude: Amplitude, sense: Float[Array, "..."], arcs: Num[Array, "..."], tau: Float[Array, "..."]
+) -> InstantLanes:
+    """Instant common to segments of the same number of arcs."""
     a, a1, a2, a3 = derivatives(amplitude, tau, order=3)
     return InstantLanes(tau, a, a1, a2, a3, *sincospi(sense * arcs * tau))
 
 
-def squared_duration(segment: PlatformSegment, arcs: Array) -> Array:
-    """T^2, (3.77).
-
-    Args:
-        segment: leaves (n, ...).
-        arcs: () or (n,).
-
-    Returns:
-        (n,) s^2.
-    """
+def squared_duration(segment: PlatformSegment, arcs: Array) -> Float[Array, "n"]:
+    """T^2, (3.77)."""
     nu = segment.precession / arcs
     return (math.pi * arcs) ** 2 * (1.0 - nu) * (1.0 + nu) / segment.rate
 
 
 @partial(jax.jit, static_argnames="kind")
 def state(
-    segment: PlatformSegment, arcs: Array, instant: InstantLanes, kind: PlatformMotionKind, one: Array | None = None
+    segment: PlatformSegment,
+    arcs: Array,
+    instant: InstantLanes,
+    kind: PlatformMotionKind,
+    one: Float[Array, ""] | None = None,
 ) -> StateLanes:
-    """The state of the platform.
-
-    Args:
-        segment: leaves (n, ...), of the parity of `arcs`.
-        arcs: () or (n,) number of arcs, a float.
-        one: () the number 1 as an argument of the compiled function, where the sine and cosine of a rotation about one
-            axis are to be stored; see `arithmetic.lanes.stored`.
-
-    Returns:
-        the state.
-    """
+    """The state of the platform."""
     if kind.from_rest:
         place = _straight(segment, arcs, instant, variable=kind.variable)
         rotation = _about_one_axis(segment, instant, _beat(segment, arcs, instant, kind), one)

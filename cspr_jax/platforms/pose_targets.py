@@ -1,6 +1,8 @@
 """Smallest numbers of arcs of motions of a platform to many poses, over values of beta-hat at their ends."""
 
-from typing import Literal
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -15,33 +17,21 @@ from cspr_jax.platforms.motion_checker import MotionChecker
 from cspr_jax.robots.point_mass import rest_point
 from cspr_jax.schema.families import WITHOUT_BETA_HAT
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # Time functions of the rotation that take a separate beta-hat at each end; None stands for the default.
 _SEPARATE = (None, "beta_ff")
 Poses = tuple[np.ndarray, np.ndarray]
 
 
-def rest_poses(z0: np.ndarray) -> Poses:
-    """Poses at rest in P0.
-
-    Args:
-        z0: (n,) m.
-
-    Returns:
-        positions (n, 3), m, and quaternions (n, 4).
-    """
+def rest_poses(z0: Float[np.ndarray, "n"]) -> Poses:
+    """Poses at rest in P0."""
     return rest_point(z0), np.tile(IDENTITY, (len(z0), 1))
 
 
-def start_beta_hat(checker: MotionChecker, starts: Poses, z0: np.ndarray) -> np.ndarray:
-    """Beta-hat at starts beyond P0: the preferred one, of (3.91) or of the largest margin, else that at rest.
-
-    Args:
-        starts: positions (n, 3) and quaternions (n, 4), from the centroid of the spools, z down.
-        z0: (n,) m.
-
-    Returns:
-        (n,).
-    """
+def start_beta_hat(checker: MotionChecker, starts: Poses, z0: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
+    """Beta-hat at starts beyond P0: the preferred one, of (3.91) or of the largest margin, else that at rest."""
     # Starts are few, and options cost as much for each.
     distinct, inverse = np.unique(np.c_[starts[0], starts[1], z0], axis=0, return_inverse=True)
     values = checker.end_options(distinct[:, :3], distinct[:, 3:7], distinct[:, 7], 1)[0][:, 0]
@@ -57,18 +47,7 @@ def pose_arcs(
     max_arcs: int = 30,
     fixed: np.ndarray | None = None,
 ) -> PlatformMotionAnswers:
-    """Smallest number of arcs of each motion.
-
-    Args:
-        motions: n motions, one candidate each, with the values of beta-hat at their starts.
-        beta_hat: at the ends: a number; "preferred" (3.91); or None: several values are tried, the preferred one first.
-        beat: time function of the rotation; None: "beta_ff".
-        max_arcs: largest number tried.
-        fixed: as for `platforms.arcs.smallest_arcs`.
-
-    Returns:
-        the answers.
-    """
+    """Smallest number of arcs of each motion."""
 
     def part(piece: slice) -> PlatformMotionAnswers:
         targets = motions.motions(np.arange(len(motions.z0))[piece])

@@ -9,11 +9,13 @@ Every block of a motion (`tension_blocks`) is proved, or refuted by an instant, 
 A limit that is touched counts as met, as with point masses: limits are allowed twice the tolerance.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import itertools
 from collections.abc import Callable
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -36,6 +38,9 @@ from cspr_jax.platforms.work_list import TOLERANCE, BlockBounds, WorkList
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.wrench_lanes import CABLES
 from cspr_jax.schema.limits import LIMITS
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float
 
 # Numbers of blocks of an arc to begin with, from rest and between poses, where orientations turn faster. Where margins
 # are narrowed down from the instants of blocks, the number is fixed; for verdicts alone it grows from the first to the
@@ -98,24 +103,13 @@ class Certifier:
     def prove(
         self,
         segments: PlatformSegment,
-        arcs: np.ndarray,
+        arcs: Float[np.ndarray, "n"],
         *,
         near: float = 0.0,
         margins: bool = False,
-        ignored: np.ndarray | None = None,
+        ignored: Bool[np.ndarray, "n_criteria"] | None = None,
     ) -> TensionProof:
-        """Prove motions, or refute them.
-
-        Args:
-            segments: leaves (n, ...), of the parity of `arcs`.
-            arcs: (n,).
-            near: part of the smallest attained slack of taut cables that its bound must reach.
-            margins: whether to compute the normalised determinant at the nodes.
-            ignored: (n_criteria,) mask of criteria that do not count; None: all count.
-
-        Returns:
-            the proofs.
-        """
+        """Prove motions, or refute them."""
         blocks = parts_of_arcs(arcs, self._knots, self._parts[not margins])
         motions = segments, arcs, determinant_at_rest(self._orders[0].problem, segments)
 
@@ -149,17 +143,7 @@ class Certifier:
         return bounds
 
     def bounds(self, order: int, blocks: Blocks, motions, *, margins: bool, least: bool = False) -> TensionBounds:
-        """Bounds on blocks.
-
-        Args:
-            order: number of the order of the cables, from 0 on, below `ORDERS`.
-            motions: segments (leaves (n, ...)), arcs (n,), and det J(P0) (n,) by the first order.
-            margins: whether to compute the normalised determinant at the nodes.
-            least: whether to return only the smallest value of each criterion at the nodes.
-
-        Returns:
-            the bounds, NumPy arrays.
-        """
+        """Bounds on blocks."""
         problem, items = self._items(order, blocks, motions)
         kernel = partial(tension_blocks, problem, np.ones(()), kind=self._kind, margins=margins, least=least)
         return in_batches(kernel, items, size=self._batch, axis=-1)
@@ -172,17 +156,10 @@ class Certifier:
         motion_items = rows(segments, blocks.row), arcs[blocks.row].astype(float), sign * standing[blocks.row]
         return problem, (*motion_items, blocks.start, blocks.stop)
 
-    def ranges(self, blocks: Blocks, segments: PlatformSegment, arcs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Ranges of the tensions on blocks.
-
-        Args:
-            segments: leaves (n, ...), of the parity of `arcs`.
-            arcs: (n,).
-
-        Returns:
-            (k, n_cables) proved lower and upper bounds, per mass and length, over the value at rest in P0 if all
-            tensions were equal.
-        """
+    def ranges(
+        self, blocks: Blocks, segments: PlatformSegment, arcs: Float[np.ndarray, "n"]
+    ) -> tuple[Float[np.ndarray, "k n_cables"], Float[np.ndarray, "k n_cables"]]:
+        """Ranges of the tensions on blocks."""
         motions = segments, arcs, determinant_at_rest(self._orders[0].problem, segments)
         count = len(blocks.row)
         low, high = np.full((count, CABLES), -np.inf), np.full((count, CABLES), np.inf)
@@ -240,15 +217,8 @@ def _reordered(problem: Problem, order: list[int]) -> Problem:
     return problem._replace(robot=changed, limits=Limits(**values))
 
 
-def determinant_at_rest(problem: Problem, segments: PlatformSegment) -> np.ndarray:
-    """Determinant of the Jacobian J (3.5) in the rest point, with the sign that `wrench_lanes.balance` gives it.
-
-    Args:
-        segments: leaves (n, ...).
-
-    Returns:
-        (n,) m^9.
-    """
+def determinant_at_rest(problem: Problem, segments: PlatformSegment) -> Float[np.ndarray, "n"]:
+    """Determinant of the Jacobian J (3.5) in the rest point, with the sign that `wrench_lanes.balance` gives it."""
     robot, (depths, inverse) = problem.robot, np.unique(np.asarray(segments.hub)[:, 2], return_inverse=True)
     arms = np.asarray(robot.platform_points)
     forces = np.asarray(robot.base_points) - arms - np.array([0.0, 0.0, 1.0]) * depths[:, None, None]

@@ -9,7 +9,10 @@ not touch each other. Contacts with the platform are judged where its attachment
 its shape.
 """
 
+from __future__ import annotations
+
 from functools import partial
+from typing import TYPE_CHECKING
 
 import jax
 import numpy as np
@@ -32,6 +35,9 @@ from cspr_jax.schema.verdicts import Verdict, conjunction
 from cspr_jax.workspaces import exact
 from cspr_jax.workspaces.questions import FEASIBLE, requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Number of samples that are held at a time, and of instants of the first look that are computed at a time.
 ROOM, CHUNK = 200_000, 8
@@ -94,16 +100,8 @@ class RedundantChecker(MotionChecker):
         knots = np.asarray(problem.amplitude.knots)
         self._knots = np.clip(np.concatenate([knots - BESIDE_KNOT, knots + BESIDE_KNOT]), 0.0, 1.0)
 
-    def values(self, motions: Motions, tau: np.ndarray) -> np.ndarray:
-        """Margins, other slacks and distances along motions.
-
-        Args:
-            tau: (n, m) instants.
-
-        Returns:
-            (n, m, n_values) the margin of the tensions over the weight a cable if all carried the same, -inf where the
-            cables do not span the wrench; the slacks of other limits; the smallest distance between cables, m.
-        """
+    def values(self, motions: Motions, tau: Float[np.ndarray, "n m"]) -> Float[np.ndarray, "n m n_values"]:
+        """Margins, other slacks and distances along motions."""
         row = np.repeat(np.arange(len(tau)), tau.shape[1])
         kernel = partial(instants, self.problem, self._pairs, kind=self.kind)
         states = in_batches(kernel, (*motions.items(row), tau.ravel()), size=self.batch)

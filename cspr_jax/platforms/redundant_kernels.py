@@ -1,7 +1,9 @@
 """Compiled states of motions on more than six cables, and the wrenches that they need, at many instants."""
 
+from __future__ import annotations
+
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -14,6 +16,9 @@ from cspr_jax.platforms.end_acceleration import end_state
 from cspr_jax.platforms.platform_segment import PlatformMotion, PlatformSegment
 from cspr_jax.robots.interference import cable_directions, gaps
 from cspr_jax.robots.platform import PlatformRobot
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 
 class PoseInstants(NamedTuple):
@@ -34,18 +39,13 @@ class PoseInstants(NamedTuple):
 
 @partial(jax.jit, static_argnames="kind")
 def instants(
-    problem: Problem, pairs: Array, items: tuple[PlatformSegment, Array, Array], *, kind: PlatformMotionKind
+    problem: Problem,
+    pairs: Float[Array, "n_pairs 2"],
+    items: tuple[PlatformSegment, Array, Array],
+    *,
+    kind: PlatformMotionKind,
 ) -> PoseInstants:
-    """Poses, wrenches and slacks of motions, each at an instant.
-
-    Args:
-        problem: robot, limits, amplitude.
-        pairs: (n_pairs, 2) cables that can meet.
-        items: segments (leaves (n, ...)), arcs (n,), instants (n,).
-
-    Returns:
-        the poses, wrenches and slacks.
-    """
+    """Poses, wrenches and slacks of motions, each at an instant."""
     robot, limits = problem.robot, problem.limits
 
     def one(segment, arcs, tau):
@@ -61,18 +61,13 @@ def instants(
 
 @partial(jax.jit, static_argnames="kind")
 def cable_vectors(
-    problem: Problem, pairs: Array, items: tuple[PlatformSegment, Array, Array], *, kind: PlatformMotionKind
-) -> tuple[Array, Array]:
-    """Vectors between cables, and directions of cables, of motions, each at an instant.
-
-    Args:
-        problem: robot, limits, amplitude.
-        pairs: (n_pairs, 2) cables that can meet.
-        items: segments (leaves (n, ...)), arcs (n,), instants (n,).
-
-    Returns:
-        (n, n_pairs, 3) m, and (n, n_cables, 3).
-    """
+    problem: Problem,
+    pairs: Float[Array, "n_pairs 2"],
+    items: tuple[PlatformSegment, Array, Array],
+    *,
+    kind: PlatformMotionKind,
+) -> tuple[Float[Array, "n n_pairs 3"], Float[Array, "n n_cables 3"]]:
+    """Vectors between cables, and directions of cables, of motions, each at an instant."""
 
     def one(segment, arcs, tau):
         state = PlatformMotion(segment, problem.amplitude, arcs, kind).state(tau)
@@ -83,16 +78,9 @@ def cable_vectors(
 
 
 @jax.jit
-def end_wrenches(robot: PlatformRobot, position: Array, quaternion: Array, z0: Array) -> tuple[Array, Array]:
-    """Wrenches at one end of a segment.
-
-    Args:
-        position: (3,) from the centroid of the spools, z down, m.
-        quaternion: (4,) unit.
-        z0: () depth of P0, m.
-
-    Returns:
-        the wrench matrix (6, n_cables); (2, 6) what the cables must supply with beta-hat 0 and 1, N and N m.
-    """
+def end_wrenches(
+    robot: PlatformRobot, position: Float[Array, "3"], quaternion: Float[Array, "4"], z0: Float[Array, ""]
+) -> tuple[Float[Array, "6 n_cables"], Float[Array, "2 6"]]:
+    """Wrenches at one end of a segment."""
     states = [end_state(robot, position, quaternion, z0, jnp.asarray(value)) for value in (0.0, 1.0)]
     return robot.wrench_matrix(states[0]), jnp.stack([robot.inertial_wrench(state) for state in states])

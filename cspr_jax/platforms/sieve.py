@@ -5,10 +5,12 @@ So the first look refutes nothing that float64 would not refute, and a motion th
 anyway.
 """
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -28,6 +30,9 @@ from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.wrench_lanes import balance, cable_lanes
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float, Int, Num
+
 # Instants of one call; how many times more motions are looked at than checked at a time; and the part of a batch up to
 # which motions count as few.
 CHUNK, FIRST, FEWER = 8, 2, 8
@@ -37,25 +42,14 @@ CHUNK, FIRST, FEWER = 8, 2, 8
 def smallest_tensions(
     robot: PlatformRobot,
     amplitude: Amplitude,
-    arcs: Array,
-    tau: Array,
+    arcs: Num[Array, ""],
+    tau: Float[Array, "m"],
     segments: PlatformSegment,
     *,
     kind: PlatformMotionKind,
     single_precision: bool = False,
-) -> tuple[Array, Array]:
-    """Smallest normalised tension of many segments over some instants.
-
-    Args:
-        robot: in its reference axes.
-        arcs: () number of arcs, the same for all, a float.
-        tau: (m,) instants.
-        segments: leaves (n, ...), of the parity of `arcs`.
-        single_precision: whether to compute in float32.
-
-    Returns:
-        (n,) of `slack_lanes.certain_tension`; (n,) index of the instant at which it is attained.
-    """
+) -> tuple[Float[Array, "n"], Int[Array, "n"]]:
+    """Smallest normalised tension of many segments over some instants."""
     if single_precision:
         robot, segments = _of_one_size(robot, segments)
     cast = partial(jax.tree.map, lambda x: jnp.asarray(x, jnp.float32 if single_precision else x.dtype))
@@ -151,35 +145,17 @@ class TensionSieve(NamedTuple):
     size: int
     count_instants: Callable[[int], None]
 
-    def lowest(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
-        """Smallest tension over some instants.
-
-        Args:
-            segments: leaves (n, ...), all of this number of arcs.
-            arcs: the number.
-            tau: (m,) instants.
-
-        Returns:
-            (n,) of `smallest_tensions`; -inf where that is not finite.
-        """
+    def lowest(self, segments: PlatformSegment, arcs: int, tau: Float[np.ndarray, "m"]) -> Float[np.ndarray, "n"]:
+        """Smallest tension over some instants."""
         lowest = np.full(len(segments.rate), np.inf)
         for chunk in _chunks(tau):
             lowest = np.minimum(lowest, self._lowest(segments, arcs, chunk))
         return np.where(np.isnan(lowest), -np.inf, lowest)
 
-    def refuted(self, segments: PlatformSegment, arcs: int, tau: np.ndarray, *, limits: bool = True) -> np.ndarray:
-        """Motions that some instants refute.
-
-        Args:
-            segments: leaves (n, ...), all of this number of arcs.
-            arcs: the number.
-            tau: (m,) instants, the most telling ones first.
-            limits: without effect here, since limits are not looked at.
-
-        Returns:
-            (n,) mask of motions with a tension that refutes, or that is no number, or with a determinant that has
-            changed its sign.
-        """
+    def refuted(
+        self, segments: PlatformSegment, arcs: int, tau: Float[np.ndarray, "m"], *, limits: bool = True
+    ) -> Bool[np.ndarray, "n"]:
+        """Motions that some instants refute."""
         del limits
         is_refuted = np.zeros(len(segments.rate), bool)
         for chunk in _chunks(tau):

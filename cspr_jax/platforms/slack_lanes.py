@@ -1,5 +1,9 @@
 """The slacks of `slacks.pose_slacks` for many platforms, one lane a case, and the part of them that the sieve needs."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import jax.numpy as jnp
 from jax import Array
 
@@ -23,6 +27,9 @@ from cspr_jax.robots.wrench_lanes import (
     normalised_determinant,
 )
 from cspr_jax.schema.limits import Limit
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # No tension is given below this volume of three of the cables over the product of their lengths: they lie nearly in one
 # plane, and the rounding of the fast balance grows with the third power of the inverse volume. It must refute nothing.
@@ -52,34 +59,18 @@ def _smallest_tension(rate: Array, balance: Balance) -> Array:
     return smallest([x * share for x in balance.numerators])
 
 
-def certain_tension(rate: Array, regular: Array, cables: CableLanes, balance: Balance) -> Array:
-    """The smallest tension, where the fast balance gives one.
-
-    Args:
-        rate: (n,) lambda of (3.50), 1/s^2.
-        regular: (n,) determinant at rest in P0, whose sign must not change.
-
-    Returns:
-        (n,) over its value at rest in P0 if all were equal; -inf where the determinant has changed its sign, infinite
-        where the fast balance has too few digits.
-    """
+def certain_tension(
+    rate: Float[Array, "n"], regular: Float[Array, "n"], cables: CableLanes, balance: Balance
+) -> Float[Array, "n"]:
+    """The smallest tension, where the fast balance gives one."""
     lowest = jnp.where(balance.signed * regular > 0.0, _smallest_tension(rate, balance), -jnp.inf)
     return jnp.where(_is_flat(cables, balance), jnp.inf, lowest)
 
 
 def lowest_tension(
     robot: PlatformRobot, segment: PlatformSegment, arcs: Array, instant: InstantLanes, kind: PlatformMotionKind
-) -> Array:
-    """The smallest tension at one instant of many segments.
-
-    Args:
-        robot: in its reference axes.
-        segment: leaves (n, ...), of the parity of `arcs`.
-        arcs: () or (n,) number of arcs, a float.
-
-    Returns:
-        (n,) of `certain_tension`.
-    """
+) -> Float[Array, "n"]:
+    """The smallest tension at one instant of many segments."""
     here = state(segment, arcs, instant, kind)
     cables = cable_lanes(robot, here.position, here.rotation)
     balance = _balanced(robot, here, cables, squared_duration(segment, arcs))
@@ -89,17 +80,7 @@ def lowest_tension(
 def moving_slacks(
     problem: Problem, segment: PlatformSegment, arcs: Array, instant: InstantLanes, kind: PlatformMotionKind
 ) -> list[Array]:
-    """Smallest slacks of the criteria that depend on the motion, at one instant of many segments.
-
-    Args:
-        problem: robot, limits.
-        segment: leaves (n, ...), of the parity of `arcs`.
-        arcs: () or (n,) number of arcs, a float.
-
-    Returns:
-        (n,) each: the slack of taut cables, then the slacks of limits on the motion; infinite where the fast balance
-        has too few digits.
-    """
+    """Smallest slacks of the criteria that depend on the motion, at one instant of many segments."""
     robot, limits = problem.robot, problem.limits
     here, squared = state(segment, arcs, instant, kind), squared_duration(segment, arcs)
     cables = cable_lanes(robot, here.position, here.rotation)
@@ -125,15 +106,7 @@ def moving_slacks(
 
 
 def still_slacks(problem: Problem, segment: PlatformSegment, here: StateLanes, cables: CableLanes) -> list[Array]:
-    """Smallest slacks of the criteria that depend on the pose alone, at one instant of many segments.
-
-    Args:
-        problem: robot, limits.
-        segment: leaves (n, ...).
-
-    Returns:
-        (n,) each: regular, below the spools, then the slacks of limits on the pose.
-    """
+    """Smallest slacks of the criteria that depend on the pose alone, at one instant of many segments."""
     robot, limits, z0 = problem.robot, problem.limits, problem.robot.gravity / segment.rate
     normal = plane_normal(robot)
     below = dot([normal[i] for i in range(3)], here.position) / z0
@@ -159,11 +132,7 @@ def _least(row: Limit, limits: Limits, each: list[Array], scale) -> Array:
 
 
 def order(limits: Limits) -> list[int]:
-    """Order of the criteria of `slacks.flags` among moving slacks and still ones, one after the other.
-
-    Returns:
-        n_criteria indices.
-    """
+    """Order of the criteria of `slacks.flags` among moving slacks and still ones, one after the other."""
     moving, still = _limit_rows(limits, of_motion=True), _limit_rows(limits, of_motion=False)
     criteria = ["taut", *moving, "regular", "below", *still]
     return [criteria.index(criterion) for criterion in ("taut", "regular", "below", *limits_set(limits))]

@@ -10,6 +10,10 @@ With n the number of cables, f the tensions, m the mass:
     length, speed, acceleration    1 - value / largest
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import jax.numpy as jnp
 from jax import Array
 
@@ -21,27 +25,19 @@ from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.state import State
 from cspr_jax.schema.verdicts import Verdict
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 
 def flags(limits: Limits) -> tuple[Verdict, ...]:
-    """Flags that say which criterion is broken, one a criterion.
-
-    Returns:
-        n_criteria flags.
-    """
+    """Flags that say which criterion is broken, one a criterion."""
     return (Verdict.SLACK_CABLE, Verdict.SINGULAR, Verdict.ABOVE_SPOOLS, *(row.flag for row in limits_set(limits)))
 
 
-def pose_slacks(problem: Problem, state: State, z0: Array, regular: Array) -> Array:
-    """The smallest slack of each criterion at one instant.
-
-    Args:
-        problem: robot, limits.
-        z0: () depth of P0, m.
-        regular: () determinant at rest in P0.
-
-    Returns:
-        (n_criteria,) in the order of `flags`.
-    """
+def pose_slacks(
+    problem: Problem, state: State, z0: Float[Array, ""], regular: Float[Array, ""]
+) -> Float[Array, "n_criteria"]:
+    """The smallest slack of each criterion at one instant."""
     robot, limits = problem.robot, problem.limits
     per_length = wrench_balance.tensions_per_length(robot, state)
     basic = [

@@ -1,6 +1,9 @@
 """Affine bounds of oscillating SLERP over a block of time; formulas are those of `oscillating_slerp`."""
 
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import jax.numpy as jnp
 from jax import Array
@@ -8,6 +11,9 @@ from jax import Array
 from cspr_jax.arithmetic.affine_bounds import AffineBounds, dot, joined, norm_squared, squared
 from cspr_jax.arithmetic.function_bounds import bent, sincospi
 from cspr_jax.platforms.oscillating_slerp import Slerp, angle_ratio, sinc
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
 
 # Rounding of the derivatives that recurrences give, in parts of their size or of 1, is less.
 ROUNDING = 1e-12
@@ -18,18 +24,14 @@ _BENDS = (1.0 / 12.0, 1.0 / 60.0, 1.0 / 840.0, 1.0 / 15120.0)
 Bounds3 = tuple[AffineBounds, AffineBounds, AffineBounds]
 
 
-def beat_bounds(start_beta_hat: Array, end_beta_hat: Array, share: Array, arcs: Array, tau: AffineBounds) -> Bounds3:
-    """Bounds of the time function of the rotation and its first two derivatives in tau.
-
-    Args:
-        start_beta_hat: () beta-hat of the first pose.
-        end_beta_hat: () beta-hat of the last pose.
-        share: () theta_h^2 (n_h - 1) / (pi p)^2.
-        arcs: () number of arcs p, a float.
-
-    Returns:
-        beta, beta', beta'', () each.
-    """
+def beat_bounds(
+    start_beta_hat: Float[Array, ""],
+    end_beta_hat: Float[Array, ""],
+    share: Float[Array, ""],
+    arcs: Num[Array, ""],
+    tau: AffineBounds,
+) -> Bounds3:
+    """Bounds of the time function of the rotation and its first two derivatives in tau."""
     omega, slope = math.pi * arcs, (end_beta_hat - start_beta_hat) * share
     more = tau * slope + (1.0 + start_beta_hat * share)  # 1 + h
     (sine, cosine), (sine3, cosine3) = sincospi(tau * arcs), sincospi(tau * (3.0 * arcs))
@@ -40,15 +42,7 @@ def beat_bounds(start_beta_hat: Array, end_beta_hat: Array, share: Array, arcs: 
 
 
 def orientation_bounds(slerp: Slerp, values: tuple[AffineBounds, ...], beats: Bounds3) -> Bounds3:
-    """Bounds of the orientation and its first two derivatives in tau.
-
-    Args:
-        values: of A, A', A'', () each.
-        beats: of beta, beta', beta'', () each.
-
-    Returns:
-        q, q', q'', (4,) each.
-    """
+    """Bounds of the orientation and its first two derivatives in tau."""
     u, u1, u2 = _half_vector(slerp, values)
     beta, beta1, beta2 = beats
     return _exponential(beta * u, beta1 * u + beta * u1, beta2 * u + 2.0 * (beta1 * u1) + beta * u2)

@@ -10,9 +10,11 @@ and remainders r and q, no slack is below the smallest (k_i - r) / (d_i + q). Li
 and accelerations of cables, `limit_blocks`: docs/theory.md.
 """
 
+from __future__ import annotations
+
 import math
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -33,6 +35,9 @@ from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.wrench_lanes import CABLES, balance, cable_lanes, inertial_wrench
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.limits import Limit
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # A value at a node may be wrong by this part of its bound on real time (tests find a tenth of that), times Lebesgue's
 # constant for the polynomial through such values. Computing the Bernstein coefficients adds a part of the values.
@@ -72,34 +77,15 @@ class _Block(NamedTuple):
 
 
 def of_motion(problem: Problem) -> list[Limit]:
-    """Rows of the limits on the motion that are set.
-
-    Args:
-        problem: robot, limits.
-
-    Returns:
-        the rows.
-    """
+    """Rows of the limits on the motion that are set."""
     return [row for row in limits_set(problem.limits) if row.of_motion]
 
 
 @persistent_jit(static_argnames=("kind", "margins", "least"))
 def tension_blocks(
-    problem: Problem, one: Array, items, *, kind: PlatformMotionKind, margins: bool, least: bool = False
+    problem: Problem, one: Float[Array, ""], items, *, kind: PlatformMotionKind, margins: bool, least: bool = False
 ) -> TensionBounds:
-    """Bounds of slacks on blocks.
-
-    Args:
-        problem: robot, limits, amplitude.
-        one: () the number 1; see `arithmetic.lanes.stored`.
-        items: segments (leaves (n, ...)), arcs (n,), det J(P0) (n,), and where blocks start (n,) and stop (n,), with
-            no knot inside.
-        margins: whether to compute the normalised determinant at the nodes.
-        least: whether to return only the smallest value of each criterion at the nodes.
-
-    Returns:
-        the bounds.
-    """
+    """Bounds of slacks on blocks."""
     taken = _taken(problem, one, items, kind=kind, margins=margins, single_precision=least)
     # Values that only margins need come last, and are not bounded.
     nodes, bound = _bounds(problem, taken)
@@ -129,18 +115,8 @@ class TensionRange(NamedTuple):
 
 
 @partial(jax.jit, static_argnames="kind")
-def tension_ranges(problem: Problem, one: Array, items, *, kind: PlatformMotionKind) -> TensionRange:
-    """Ranges of the tensions of each cable on blocks.
-
-    Args:
-        problem: robot, limits, amplitude.
-        one: () the number 1; see `arithmetic.lanes.stored`.
-        items: segments (leaves (n, ...)), arcs (n,), det J(P0) (n,), and where blocks start (n,) and stop (n,), with
-            no knot inside.
-
-    Returns:
-        the ranges.
-    """
+def tension_ranges(problem: Problem, one: Float[Array, ""], items, *, kind: PlatformMotionKind) -> TensionRange:
+    """Ranges of the tensions of each cable on blocks."""
     taken = _taken(problem, one, items, kind=kind, margins=False)
     low, high = (_coefficients(taken.values) + sign * taken.rests[None] for sign in (-1.0, 1.0))
     regular = low[:, REGULAR, None], high[:, REGULAR, None]

@@ -1,8 +1,10 @@
 """Work list of a proof: blocks of motions are closed, or halved until they are, or until their motion is refuted."""
 
+from __future__ import annotations
+
 import itertools
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -10,6 +12,9 @@ from jax import Array
 
 from cspr_jax.arithmetic.lanes import smallest
 from cspr_jax.motions.blocks import Blocks
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float
 
 TOLERANCE = 1e-6
 # A block is halved so many times at most, and so many blocks of an arc may be open.
@@ -62,14 +67,7 @@ class WorkList:
         self.attained, self._worst = np.zeros((len(arcs), 0)), np.full(len(arcs), -TOLERANCE)
 
     def work_off(self, blocks: Blocks, look: Callable[[Blocks, int], BlockBounds]) -> BlockBounds:
-        """Bound blocks, and the halves of blocks that stay open.
-
-        Args:
-            look: takes blocks and how many times they were halved, and bounds them.
-
-        Returns:
-            the bounds of the blocks as they were given.
-        """
+        """Bound blocks, and the halves of blocks that stay open."""
         first = bounds = look(blocks, 0)
         self.attained = np.full((len(self._arcs), bounds.nodes.shape[1]), np.inf)
         halved = 0
@@ -87,13 +85,8 @@ class WorkList:
         self.bound[self.is_refuted | self.is_stuck] = np.nan
         return first
 
-    def refute(self, row: np.ndarray, tau: np.ndarray) -> None:
-        """Note motions that are refuted by something else than criteria.
-
-        Args:
-            row: (k,) motions.
-            tau: (k,) instants at which they are refuted.
-        """
+    def refute(self, row: Float[np.ndarray, "k"], tau: Float[np.ndarray, "k"]) -> None:
+        """Note motions that are refuted by something else than criteria."""
         self.is_refuted[row] = True
         is_new = np.isnan(self.instant[row])
         self.instant[row[is_new]] = tau[is_new]
@@ -131,30 +124,15 @@ def _lower(values: np.ndarray, row: np.ndarray, others: np.ndarray) -> None:
         values[row[first]] = np.minimum(values[row[first]], np.minimum.reduceat(others, first))
 
 
-def allowance(limits: np.ndarray) -> np.ndarray:
-    """How far below zero slacks may be: limits may be touched, all other criteria must be met strictly.
-
-    Args:
-        limits: (n_criteria,) mask of slacks of limits.
-
-    Returns:
-        (n_criteria,).
-    """
+def allowance(limits: Bool[np.ndarray, "n_criteria"]) -> Float[np.ndarray, "n_criteria"]:
+    """How far below zero slacks may be: limits may be touched, all other criteria must be met strictly."""
     return 2.0 * TOLERANCE * limits
 
 
-def least_nodes(nodes: Sequence[Array], allowed: np.ndarray, places: np.ndarray) -> tuple[Array, Array]:
-    """Reduce the node values of n blocks to the few numbers that a verdict needs.
-
-    Args:
-        nodes: of each criterion, (m, n).
-        allowed: (n_slacks,) how far below zero the first of these criteria, the slacks, may be; see `allowance`.
-        places: (m,) of the nodes, from -1 at the start of a block to 1 at its stop, increasing.
-
-    Returns:
-        (1, n_criteria, n) the smallest value of each criterion; (n,) the first place of the smallest of all slacks, NaN
-        where that is NaN.
-    """
+def least_nodes(
+    nodes: Sequence[Array], allowed: Float[np.ndarray, "n_slacks"], places: Float[np.ndarray, "m"]
+) -> tuple[Float[Array, "1 n_criteria n"], Float[Array, "n"]]:
+    """Reduce the node values of n blocks to the few numbers that a verdict needs."""
     worst = smallest([x + extra for x, extra in zip(nodes, allowed, strict=False)])
     is_there = worst == jnp.min(worst, axis=0)[None]
     first = jnp.min(jnp.where(is_there, places[:, None], jnp.inf), axis=0)

@@ -35,23 +35,12 @@ PUBLISHED = {
 
 
 def sample() -> dict[str, Any]:
-    """Data of the sample.
-
-    Returns:
-        keys of the file.
-    """
+    """Data of the sample."""
     return read_toml(Path(__file__).with_name("batotp_sample.toml"))
 
 
 def least_time(cells: int = CELLS) -> dict[Key, float | None]:
-    """The proved time along the path, beside both printed ones, and the lower bound of all motions' times.
-
-    Args:
-        cells: of the grid.
-
-    Returns:
-        computed cells, by row, column and variant; None for what is not proved.
-    """
+    """The proved time along the path, beside both printed ones, and the lower bound of all motions' times."""
     keys = sample()
     robot, frame = centred(point_mass_robot(keys["base_points"], mass=1.0, gravity=keys["gravity"]))
     problem = Problem(robot, _limits(keys["limits"], robot.n_cables), named("quintic"))

@@ -73,11 +73,7 @@ def _active() -> tuple[PublishedLine, PublishedLine, float]:
 
 
 def table_4_1() -> dict[Key, float | None]:
-    """All solutions of (28) and (29) for T and p.
-
-    Returns:
-        cells; for imaginary solutions the imaginary parts.
-    """
+    """All solutions of (28) and (29) for T and p."""
     (b, m), (low, slope), _ = _active()
     brake = -(low + slope)
     ratios = np.roots([(m - slope) / 6.0, b + brake + slope / 3.0, -brake - slope / 6.0])
@@ -93,11 +89,7 @@ def table_4_1() -> dict[Key, float | None]:
 
 
 def table_4_2() -> dict[Key, float | None]:
-    """The acceleration s'' = slope t + intercept of the least time, range by range.
-
-    Returns:
-        cells, with the exact times and with those of three decimals.
-    """
+    """The acceleration s'' = slope t + intercept of the least time, range by range."""
     least = _least(_case()[0])
     exact = float(least.duration), float(least.duration * least.ratio)
     cells: dict[Key, float | None] = {}
@@ -113,11 +105,7 @@ RANGES = ("0 <= t < 1.120", "1.120 <= t < 2.240", "2.240 <= t < 3.308", "3.308 <
 
 
 def table_4_3() -> dict[Key, float | None]:
-    """The search over p and T: how far the S-model passes the boundaries, and the first node where it does not.
-
-    Returns:
-        cells, with exact boundaries and with those of five decimals.
-    """
+    """The search over p and T: how far the S-model passes the boundaries, and the first node where it does not."""
     upper, lower, largest = _active()
     cells: dict[Key, float | None] = {}
     for reading, decimals in ((EXACT, None), (ROUNDED, DECIMALS)):

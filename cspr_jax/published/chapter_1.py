@@ -42,11 +42,7 @@ def _weights(name: str, direction: list[float]) -> Array:
 
 
 def table_1_1() -> dict[Key, float | None]:
-    """Planar and spatial robots, a target at a distance of four radii on the level of p0, with A1.
-
-    Returns:
-        cells.
-    """
+    """Planar and spatial robots, a target at a distance of four radii on the level of p0, with A1."""
     cases = {
         "Planar": _weights("transition-planar", [1.0, 0.0]),
         "H_0": _weights("transition-prototype", [1.0, 0.0]),  # between two spools
@@ -61,11 +57,7 @@ def table_1_1() -> dict[Key, float | None]:
 
 
 def table_1_2() -> dict[Key, float | None]:
-    """Inclinations, for the target that gains most by them: sigma R = 1, xi = 1 of (1.114).
-
-    Returns:
-        cells; columns name the inclination and hold the number of oscillations, but for "optimal inclination".
-    """
+    """Inclinations, for the target that gains most by them: sigma R = 1, xi = 1 of (1.114)."""
     w = jnp.array([1.0, 1.0, -2.0])
     cells: dict[Key, float | None] = {}
     for name in ("A1", "A2", "A3"):
@@ -86,11 +78,7 @@ def table_1_2() -> dict[Key, float | None]:
 
 
 def table_1_3() -> dict[Key, float | None]:
-    """Amplitude functions, for a far target, in both readings of where it is.
-
-    Returns:
-        cells.
-    """
+    """Amplitude functions, for a far target, in both readings of where it is."""
     cells: dict[Key, float | None] = {}
     for reading, largest in _READINGS.items():
         w = jnp.array([largest, -largest, 0.0])

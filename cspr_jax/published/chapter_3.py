@@ -65,28 +65,14 @@ USUAL = TableSettings()
 
 
 def variant(definition: str, amplitude: str) -> str:
-    """Settings with which a cell was computed.
-
-    Args:
-        amplitude: key of `AMPLITUDES`.
-
-    Returns:
-        the words.
-    """
+    """Settings with which a cell was computed."""
     epsilon = AMPLITUDES[amplitude][1]
     return f"amplitude = {amplitude}{f' {epsilon:g}' if epsilon else ''}; definition = {definition}"
 
 
 @functools.lru_cache(maxsize=len(AMPLITUDES))
 def checker_of(amplitude: str) -> PlatformChecker:
-    """Checker of the tables' motions.
-
-    Args:
-        amplitude: key of `AMPLITUDES`.
-
-    Returns:
-        the checker, of motions of the MSSM from rest.
-    """
+    """Checker of the tables' motions."""
     here = Path(__file__)
     robot = kernel_robot(resolve_robot("laval-mssm", here, here.parent), TrajectoryKeys(), "laval-mssm")
     problem = Problem(aligned(robot)[0], Limits(), named(*AMPLITUDES[amplitude]))
@@ -100,18 +86,7 @@ def attained(
     choice: TableSettings = USUAL,
     tried: np.ndarray | None = None,
 ) -> list[np.ndarray]:
-    """Orientations that horizontal transitions attain; the centroid of the spools is the origin.
-
-    Args:
-        checker: of `checker_of`.
-        sets: for each set its place (3,), m, and its orientations (n, 3): tilt and torsion in the cylindrical frame,
-            rad.
-        choice: largest number of arcs, and number of values of beta-hat.
-        tried: which of these values, as for `platforms.attainable.attained`.
-
-    Returns:
-        (n,) of each set, whether each orientation is attained.
-    """
+    """Orientations that horizontal transitions attain; the centroid of the spools is the origin."""
     sizes = [len(angles) for _, angles in sets]
     places = np.repeat([place for place, _ in sets], sizes, axis=0)
     symmetry = symmetries(checker.problem.robot)
@@ -131,16 +106,7 @@ def attained(
 
 
 def accessible_there(amplitude: str, definition: str, grids: list[tuple[np.ndarray, int]]) -> list[Accessible]:
-    """Accessible orientations of places, in whichever process.
-
-    Args:
-        amplitude: key of `AMPLITUDES`.
-        definition: of `platforms.accessible.DEFINITIONS`.
-        grids: for each set its place (3,), m, and its divisions of pi.
-
-    Returns:
-        the orientations of each.
-    """
+    """Accessible orientations of places, in whichever process."""
     with double_precision():
         return accessible_sets(checker_of(amplitude).problem.robot, grids, definition)
 
@@ -148,17 +114,7 @@ def accessible_there(amplitude: str, definition: str, grids: list[tuple[np.ndarr
 def attained_there(
     amplitude: str, choice: TableSettings, tried: np.ndarray | None, sets: list[tuple[np.ndarray, np.ndarray]]
 ) -> list[np.ndarray]:
-    """Orientations that horizontal transitions attain, in whichever process.
-
-    Args:
-        amplitude: key of `AMPLITUDES`.
-        choice: as for `attained`.
-        tried: likewise.
-        sets: likewise.
-
-    Returns:
-        (n,) of each.
-    """
+    """Orientations that horizontal transitions attain, in whichever process."""
     run = np.cumsum(sizes(sets)) // TOGETHER
     with double_precision():
         groups = [[sets[k] for k in np.flatnonzero(run == number)] for number in np.unique(run)]
@@ -166,26 +122,12 @@ def attained_there(
 
 
 def sizes(sets: list[tuple[np.ndarray, np.ndarray]]) -> list[int]:
-    """Numbers of orientations, by which work on sets is spread.
-
-    Args:
-        sets: as for `attained`.
-
-    Returns:
-        one number for each set.
-    """
+    """Numbers of orientations, by which work on sets is spread."""
     return [len(angles) for _, angles in sets]
 
 
 def table_3_3(choice: TableSettings, workers: int = 1) -> dict[Key, float | None]:
-    """Counts and proportions at four places; errors are differences from twice the step.
-
-    Args:
-        choice: definitions, amplitude functions, step.
-
-    Returns:
-        cells; proportions, volumes (accessible of SO(3), attainable of that) and errors in percent.
-    """
+    """Counts and proportions at four places; errors are differences from twice the step."""
     cells: dict[Key, float | None] = {}
     # The step of the table, and twice that for the errors.
     steps = [DIVISIONS * choice.finer, DIVISIONS * choice.finer // 2]

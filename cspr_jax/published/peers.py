@@ -54,11 +54,7 @@ def _quaternions(angles: np.ndarray) -> np.ndarray:
 
 
 def grids() -> list[PoseGrid]:
-    """The studies.
-
-    Returns:
-        one for each row of the table.
-    """
+    """The studies."""
     level = _product(np.linspace(-4.0, 4.0, 81), np.linspace(-3.0, 3.0, 61), np.array([2.0, 3.0, 4.0]))
     tilted = np.repeat(_quaternions(np.deg2rad([[30.0, -30.0, 5.0]])), len(level), axis=0)
     studies = [
@@ -83,9 +79,6 @@ def peers() -> dict[Key, float | None]:
 
     The first poses, with which programs are compiled, are timed as well; those of linear programs (HiGHS) and of least
     squares (NNLS) are some of the grid, in the same run.
-
-    Returns:
-        computed cells, by row, column and variant.
     """
     cells: dict[Key, float | None] = {}
     for grid in grids():

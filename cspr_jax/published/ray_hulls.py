@@ -36,11 +36,7 @@ Inside = Callable[[np.ndarray], np.ndarray]
 
 
 def hulls() -> dict[Key, float | None]:
-    """Volumes and surfaces of the hulls.
-
-    Returns:
-        computed cells, by row, column and variant.
-    """
+    """Volumes and surfaces of the hulls."""
     by_form, by_all = _conditions()
     cells: dict[Key, float | None] = {}
     for name, inside, divisions in (
@@ -54,15 +50,7 @@ def hulls() -> dict[Key, float | None]:
 
 
 def hull(inside: Inside, divisions: int) -> tuple[float, float]:
-    """Volume and surface of a hull.
-
-    Args:
-        inside: tells which of the positions (n, 3), m, are inside.
-        divisions: of the triangles of the octahedron, each into four.
-
-    Returns:
-        m^3 and m^2.
-    """
+    """Volume and surface of a hull."""
     triangles = _directions(divisions)
     ways, places = np.unique(triangles.reshape(-1, 3).round(12), axis=0, return_inverse=True)
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)

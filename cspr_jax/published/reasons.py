@@ -21,11 +21,7 @@ class Reason(NamedTuple):
     variant: str = ""
 
     def covers(self, cell: Cell) -> bool:
-        """Tell whether it is about a cell.
-
-        Returns:
-            whether it is.
-        """
+        """Tell whether it is about a cell."""
         is_there = (not self.rows or cell.row in self.rows) and (not self.columns or cell.column in self.columns)
         return is_there and self.variant in cell.variant
 
@@ -100,12 +96,5 @@ REASONS: dict[str, tuple[Reason, ...]] = {
 
 
 def reason_of(table: str, cell: Cell) -> str:
-    """Why a cell differs.
-
-    Args:
-        table: its name.
-
-    Returns:
-        one line; empty where that is not known.
-    """
+    """Why a cell differs."""
     return next((reason.text for reason in REASONS.get(table, ()) if reason.covers(cell)), "")

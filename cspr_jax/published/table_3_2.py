@@ -28,11 +28,7 @@ def _variant(amplitude: str, torsion: str) -> str:
 
 
 def table_3_2() -> dict[Key, float | None]:
-    """Arcs and durations with the printed values of beta-hat, for three amplitude functions and two readings of pose 2.
-
-    Returns:
-        cells; rows name the pose at which a segment starts.
-    """
+    """Arcs and durations with the printed beta-hat, for three amplitude functions and two readings of pose 2."""
     data, cells = read_toml(SEQUENCE), dict[Key, float | None]()
     for number, (amplitude, key) in enumerate(_AMPLITUDES.items()):
         segments: dict[int, tuple[float | None, float | None]] = {}

@@ -37,14 +37,6 @@ def smallest_proportions(
     """Smallest part of the orientations of a place that horizontal transitions attain, in each of many annuli.
 
     Other values of beta-hat than the preferred one are tried only at places that could have the smallest one.
-
-    Args:
-        attained: tells which orientations of sets some values of beta-hat attain, as `chapter_3.attained` does.
-        annuli: sets of the places of each, as there.
-        values: of beta-hat that there are.
-
-    Returns:
-        one proportion for each annulus.
     """
     preferred, likely, rest = attainable.rounds(values)
     sets = [one for annulus in annuli for one in annulus]
@@ -69,14 +61,7 @@ def smallest_proportions(
 
 
 def table_3_4(choice: TableSettings, workers: int = 1) -> dict[Key, float | None]:
-    """Smallest proportions in an annulus, at five heights.
-
-    Args:
-        choice: definitions, amplitude functions, step.
-
-    Returns:
-        cells, in percent.
-    """
+    """Smallest proportions in an annulus, at five heights."""
     cells: dict[Key, float | None] = {}
     divisions = DIVISIONS * choice.finer
     with Spread(workers) as spread:

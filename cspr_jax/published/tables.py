@@ -143,17 +143,7 @@ TABLES = {
 
 
 def table_cells(name: str, choice: TableSettings | None = None, workers: int = 1, *, again: bool = True) -> list[Cell]:
-    """Compute a table.
-
-    Args:
-        name: one of `TABLES`.
-        choice: for tables that have one; None: the usual one.
-        workers: number of processes, for tables that have a choice.
-        again: whether it is computed even where an earlier run has kept it.
-
-    Returns:
-        its cells, row by row.
-    """
+    """Compute a table."""
     source, choice = TABLES[name], choice or TableSettings()
 
     def compute() -> list[list]:
@@ -170,11 +160,7 @@ def table_cells(name: str, choice: TableSettings | None = None, workers: int = 1
 
 
 def table_object(name: str, cells: list[Cell]) -> dict[str, Any]:
-    """The object that `cspr table --json` prints.
-
-    Returns:
-        plain values.
-    """
+    """The object that `cspr table --json` prints."""
     return {"schema": SCHEMA, "table": name, "cells": [_plain(cell) for cell in cells]}
 
 
@@ -191,14 +177,7 @@ def _variant(text: str) -> dict[str, str]:
 
 
 def table_for_people(name: str, cells: list[Cell], *, all_readings: bool = False) -> Any:
-    """The table for a terminal, as printed: published and computed in each cell, and why cells differ.
-
-    Args:
-        all_readings: whether readings of the source that its numbers do not fit are shown in full too.
-
-    Returns:
-        a rich renderable.
-    """
+    """The table for a terminal, as printed: published and computed in each cell, and why cells differ."""
     source = TABLES[name]
     return grid(
         source.title,
@@ -212,17 +191,7 @@ def table_for_people(name: str, cells: list[Cell], *, all_readings: bool = False
 
 
 def chosen(name: str, options: dict[str, Any]) -> TableSettings | None:
-    """Settings of a table, from the options of the command line.
-
-    Args:
-        options: values of --definition, --amplitude, --fine, --max-arcs, --values and --workers, None where absent.
-
-    Returns:
-        the choice; None for a table that has none.
-
-    Raises:
-        ConfigError: an option given with such a table, or a value that it does not have.
-    """
+    """Settings of a table, from the options of the command line."""
     if not TABLES[name].with_choice:
         for option, value in options.items():
             if value is not None:

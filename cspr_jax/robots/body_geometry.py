@@ -1,11 +1,18 @@
 """Attachment points, mass centre and inertia of a body on cables, checked. NumPy alone."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from cspr_jax.errors import InputError
 from cspr_jax.robots.patterns import Pattern
 from cspr_jax.robots.point_mass import LARGEST_LENGTH, checked_coordinates
 from cspr_jax.robots.spool_plane import is_on_line
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Points nearer to each other than this part of the largest distance are one point.
 SAME = 1e-9
@@ -15,34 +22,14 @@ INERTIA_TOLERANCE = 1e-9
 BESIDE = 1e-6
 
 
-def is_same(points: np.ndarray, first: int, second: int) -> bool:
-    """Tell whether two points coincide.
-
-    Args:
-        points: (n, 3) m.
-        first: index of one of them.
-
-    Returns:
-        whether their distance is within rounding.
-    """
+def is_same(points: Float[np.ndarray, "n 3"], first: int, second: int) -> bool:
+    """Tell whether two points coincide."""
     span = np.ptp(points, axis=0).max()
     return bool(np.linalg.norm(points[first] - points[second]) <= SAME * span)
 
 
-def checked_platform(platform_points, count: int, pattern: Pattern) -> np.ndarray:
-    """Attachment points of a body.
-
-    Args:
-        platform_points: (n_cables, 3) in platform axes, m.
-        count: number of cables.
-
-    Returns:
-        (n_cables, 3) m.
-
-    Raises:
-        InputError: wrong shape, another number, not finite; on one line, or not on one where the pattern asks for it;
-            out of the plane of a planar platform.
-    """
+def checked_platform(platform_points, count: int, pattern: Pattern) -> Float[np.ndarray, "n_cables 3"]:
+    """Attachment points of a body."""
     points = checked_coordinates("platform_points", platform_points, pattern.dof)
     if len(points) != count:
         raise InputError(
@@ -65,20 +52,10 @@ def checked_platform(platform_points, count: int, pattern: Pattern) -> np.ndarra
     return points
 
 
-def checked_centre(centre_of_mass, platform: np.ndarray, pattern: Pattern) -> np.ndarray:
-    """Mass centre of a body.
-
-    Args:
-        centre_of_mass: (3,) in platform axes, m.
-        platform: (n_cables, 3) attachment points, m.
-
-    Returns:
-        (3,) m.
-
-    Raises:
-        InputError: wrong shape, not finite, out of a planar platform's plane, or beside the line of a rod, about which
-            its weight would turn it.
-    """
+def checked_centre(
+    centre_of_mass, platform: Float[np.ndarray, "n_cables 3"], pattern: Pattern
+) -> Float[np.ndarray, "3"]:
+    """Mass centre of a body."""
     centre = np.asarray(centre_of_mass, float)
     if centre.shape != (3,) or not (np.abs(centre) <= LARGEST_LENGTH).all():
         raise InputError("centre_of_mass", centre_of_mass, "three coordinates, at most 1e6 m")
@@ -93,20 +70,8 @@ def checked_centre(centre_of_mass, platform: np.ndarray, pattern: Pattern) -> np
     return centre
 
 
-def checked_inertia(inertia, pattern: Pattern) -> np.ndarray:
-    """Inertia tensor of a body.
-
-    Args:
-        inertia: (3, 3) about the mass centre, platform axes, kg m^2.
-        pattern: of the body. For a planar platform only the moment about y counts, and a rod may have none about its
-            line.
-
-    Returns:
-        (3, 3) symmetric, kg m^2.
-
-    Raises:
-        InputError: wrong shape, not finite, not symmetric, not positive definite, or of no real body.
-    """
+def checked_inertia(inertia, pattern: Pattern) -> Float[np.ndarray, "3 3"]:
+    """Inertia tensor of a body."""
     tensor = np.asarray(inertia, float)
     if tensor.shape != (3, 3) or not np.isfinite(tensor).all():
         raise InputError("inertia", inertia, "three rows of three finite numbers, kg m^2")

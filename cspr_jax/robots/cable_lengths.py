@@ -9,25 +9,24 @@ distance of B from this axis. Since w = r (1 - t . k) + s (t . e), the second de
         = t . B'' + (|B'|^2 - l'^2 - (p . B')^2 r (1 - t . k) / w) / s
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.robots.pulleys import exits
 from cspr_jax.robots.robot import Robot
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
-def moved_lengths(robot: Robot, targets: Array, velocities: Array, accelerations: Array) -> tuple[Array, Array, Array]:
-    """Lengths of the cables, with what lies on pulleys, and their first two derivatives in time.
 
-    Args:
-        targets: (n_cables, 3) or (1, 3) points at which the cables are attached, m.
-        velocities: (n_cables, 3) or (1, 3) of these points, m/s.
-        accelerations: (n_cables, 3) or (1, 3) of these points, m/s^2.
-
-    Returns:
-        lengths (n_cables,) m, rates (n_cables,) m/s (positive pays out), accelerations (n_cables,) m/s^2; NaN where an
-        attachment point lies within its pulley.
-    """
+def moved_lengths(
+    robot: Robot, targets: Array, velocities: Array, accelerations: Array
+) -> tuple[Float[Array, "n_cables"], Float[Array, "n_cables"], Float[Array, "n_cables"]]:
+    """Lengths of the cables, with what lies on pulleys, and their first two derivatives in time."""
     rays, pulleys = targets - robot.base_points, robot.pulleys
     squares = jnp.sum(velocities**2, axis=1)
     if pulleys is None:

@@ -1,8 +1,10 @@
 """Cables of any robot: diameters and pulleys; tensions, lengths and rates, by the balance of its kind."""
 
+from __future__ import annotations
+
 import dataclasses
 from functools import partial
-from typing import Any, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -23,6 +25,9 @@ from cspr_jax.robots.tension_distribution import Distribution
 from cspr_jax.robots.tension_rule_table import CENTRED
 from cspr_jax.robots.tension_rules import by_rule
 from cspr_jax.robots.wrench_sets import tension_range
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 AnyRobot: TypeAlias = PointMassRobot | PlatformRobot
 RobotKind = TypeVar("RobotKind", bound=AnyRobot)
@@ -58,19 +63,10 @@ def with_cables(robot: RobotKind, *, cable_diameter=None, pulley_radius=None, pu
 
 
 @partial(jax.jit, static_argnames=("rule",))
-def tensions(robot: AnyRobot, state: State, limits: Limits = NO_LIMITS, rule: str = CENTRED) -> Array:
-    """Cable tensions; where cables are redundant, the tensions that a rule chooses.
-
-    Args:
-        robot: z down.
-        state: in the robot's axes.
-        limits: limits of the tensions of redundant cables; 0 and infinity where they are not given.
-        rule: rule that chooses tensions, a name of `robots.tension_rule_table`; known when a function is compiled.
-
-    Returns:
-        (n_cables,) in cable order, N; negative where a cable would have to push. Where no tensions of redundant cables
-        keep the limits, the tensions of least norm.
-    """
+def tensions(
+    robot: AnyRobot, state: State, limits: Limits = NO_LIMITS, rule: str = CENTRED
+) -> Float[Array, "n_cables"]:
+    """Cable tensions; where cables are redundant, the tensions that a rule chooses."""
     if robot.n_cables > robot.dof:
         return shared(robot, state, limits, rule).tensions
     if robot.pulleys is not None or robot.pattern not in MOVED:
@@ -83,27 +79,14 @@ def tensions(robot: AnyRobot, state: State, limits: Limits = NO_LIMITS, rule: st
 
 
 def shared(robot: AnyRobot, state: State, limits: Limits, rule: str) -> Distribution:
-    """Tensions of redundant cables, with their residual.
-
-    Args:
-        robot: z down.
-        state: in the robot's axes.
-        rule: as for `tensions`.
-
-    Returns:
-        the tensions (n_cables,) N, () residual, moments over the size of the platform, () whether they keep the limits.
-    """
+    """Tensions of redundant cables, with their residual."""
     low, high = tension_range(robot, limits)
     unit = wrench_units(robot)
     return by_rule(rule, robot.wrench_matrix(state) / unit[:, None], robot.inertial_wrench(state) / unit, low, high)
 
 
-def wrench_units(robot: AnyRobot) -> Array:
-    """Numbers by which components of wrenches are divided to compare them: 1 of forces, of moments the platform's size.
-
-    Returns:
-        (dof,) 1, or m.
-    """
+def wrench_units(robot: AnyRobot) -> Float[Array, "dof"]:
+    """Divisors that make components of wrenches comparable: 1 of forces, the platform's size of moments."""
     forces = np.ones(len(PATTERNS[robot.pattern].forces))
     if not isinstance(robot, PlatformRobot):
         return jnp.asarray(forces)
@@ -111,16 +94,10 @@ def wrench_units(robot: AnyRobot) -> Array:
     return jnp.concatenate([jnp.asarray(forces), jnp.full(robot.dof - len(forces), size)])
 
 
-def cable_motion(robot: AnyRobot, state: State) -> tuple[Array, Array, Array]:
-    """Lengths of the cables and their first two derivatives in time.
-
-    Args:
-        state: in the robot's axes.
-
-    Returns:
-        lengths (n_cables,) m, with what lies on pulleys; rates (n_cables,) m/s (positive pays out), accelerations
-        (n_cables,) m/s^2.
-    """
+def cable_motion(
+    robot: AnyRobot, state: State
+) -> tuple[Float[Array, "n_cables"], Float[Array, "n_cables"], Float[Array, "n_cables"]]:
+    """Lengths of the cables and their first two derivatives in time."""
     if isinstance(robot, PlatformRobot):
         return wrench_balance.cable_motion(robot, state)
     return force_balance.cable_motion(robot, state.position, state.velocity, state.acceleration)

@@ -111,24 +111,7 @@ def scene(
     body: Body | None = None,
     leave: float | None = None,
 ) -> Scene:
-    """A robot among the bodies that its cables can meet.
-
-    Args:
-        robot: a platform, or a point mass, whose cables never meet each other.
-        diameter: of the cables, one number or (n_cables,), m.
-        obstacles: shapes fixed in space, in the robot's axes.
-        body: shape of the platform in its axes, from the mass centre; see `attachment_hull`. None: contacts of the
-            platform, with cables or obstacles, do not count.
-        leave: length of each cable next to its attachment point for which contacts with the platform do not count, m;
-            None: ten diameters, or a hundredth of the size of the shape if that is more.
-
-    Returns:
-        the scene.
-
-    Raises:
-        InputError: another number of diameters, one that is negative or not finite; `leave` negative or not finite; a
-            shape of a point mass.
-    """
+    """A robot among the bodies that its cables can meet."""
     base = np.asarray(robot.base_points, float)
     diameters = np.asarray(diameter, float)
     if (diameters.ndim and diameters.shape != (len(base),)) or not (np.isfinite(diameters) & (diameters >= 0.0)).all():
@@ -146,11 +129,7 @@ def scene(
 
 
 def attachment_hull(robot: PlatformRobot) -> Hull | None:
-    """The convex hull of the points where cables are attached.
-
-    Returns:
-        the hull, platform axes from the mass centre; None where the points lie in a plane, so that it has no inside.
-    """
+    """The convex hull of the points where cables are attached."""
     points = np.asarray(robot.platform_points, float)
     return None if is_flat(points) else hull(points, name="platform")
 
@@ -164,22 +143,7 @@ def clearances(
     threshold: float = 0.0,
     dtype: Literal["float64", "float32"] = "float64",
 ) -> Clearances:
-    """Clearances of poses.
-
-    Args:
-        scene: the robot and the bodies that its cables can meet.
-        positions: (n, 3) of the mass centre, m.
-        quaternions: (n, 4) unit quaternions, scalar first; None: no rotation.
-        ends: (n, n_cables, 3) points at which the cables leave their spools, if these move, m; None: the base points.
-        threshold: clearance with which verdicts compare, m.
-        dtype: of the numbers; with "float32" open poses are computed again in float64.
-
-    Returns:
-        the clearances, float64; with "float32" accurate to some 1e-6 of the scene's size away from the threshold.
-
-    Raises:
-        InputError: arrays of other shapes.
-    """
+    """Clearances of poses."""
     poses = _checked(scene, positions, quaternions, ends)
     if not len(poses.place):
         return _nothing(0)

@@ -4,8 +4,10 @@ Each gives one complex number a pose, as `clearance_lanes.nearest` does: the cle
 meeting.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
-from typing import NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import jax
 import jax.numpy as jnp
@@ -24,6 +26,9 @@ from cspr_jax.robots.clearance_lanes import (
     segment_hull,
     segments,
 )
+
+if TYPE_CHECKING:
+    from jaxtyping import Complex, Float
 
 __all__ = [
     "Ball",
@@ -133,16 +138,8 @@ def _cables(points: Points, poses: PoseLanes) -> tuple[Sequence[Vector], Sequenc
     return ends, [tuple(poses.position[i] + arms[k][i] - ends[k][i] for i in range(3)) for k in range(count)]
 
 
-def of_cables(points: Points, poses: PoseLanes, pairs: np.ndarray) -> Array:
-    """The nearest two cables.
-
-    Args:
-        poses: lanes (n,).
-        pairs: (n_pairs, 2) cables that can meet.
-
-    Returns:
-        (n,) complex: distance less the mean of both diameters, m, and place among the pairs.
-    """
+def of_cables(points: Points, poses: PoseLanes, pairs: Float[np.ndarray, "n_pairs 2"]) -> Complex[Array, "n"]:
+    """The nearest two cables."""
     return _nearest_pair(points, *_lines(points, poses), pairs)
 
 
@@ -185,15 +182,8 @@ def _nearest_pair(points: Points, starts: list[Array] | None, rays: list[Array],
 
 
 @jax.jit
-def of_obstacle(points: Points, poses: PoseLanes, solid: Solid) -> Array:
-    """The cable that is the nearest to an obstacle.
-
-    Args:
-        poses: lanes (n,).
-
-    Returns:
-        (n,) complex: distance from the surface less half a diameter, m, and the cable.
-    """
+def of_obstacle(points: Points, poses: PoseLanes, solid: Solid) -> Complex[Array, "n"]:
+    """The cable that is the nearest to an obstacle."""
     ends, rays = _cables(points, poses)
     gaps = []
     for k, (end, ray) in enumerate(zip(ends, rays, strict=True)):
@@ -214,17 +204,8 @@ def _in_brick(brick: Brick, start: Vector, ray: Vector) -> tuple[Vector, Vector]
 
 
 @jax.jit
-def of_platform(points: Points, poses: PoseLanes, body: BodyShape, leave: Array) -> Array:
-    """The cable that is the nearest to its own platform.
-
-    Args:
-        poses: lanes (n,).
-        body: shape of the platform in its axes.
-        leave: () length next to the attachment point that is left out, m.
-
-    Returns:
-        (n,) complex: distance from the surface less half a diameter, m, and the cable.
-    """
+def of_platform(points: Points, poses: PoseLanes, body: BodyShape, leave: Float[Array, ""]) -> Complex[Array, "n"]:
+    """The cable that is the nearest to its own platform."""
     rotation, gaps = _rotation(poses), []
     _, rays = _cables(points, poses)
     for k, ray in enumerate(rays):
@@ -245,16 +226,8 @@ def _from_body(body: BodyShape, start: Vector, ray: Vector) -> Array:
 
 
 @jax.jit
-def of_body(poses: PoseLanes, body: BodyShape, solid: Ball | Rod) -> Array:
-    """The platform and a sphere or a cylinder.
-
-    Args:
-        poses: lanes (n,).
-        body: shape of the platform in its axes.
-
-    Returns:
-        (n,) complex: signed distance, m, and 0.
-    """
+def of_body(poses: PoseLanes, body: BodyShape, solid: Ball | Rod) -> Complex[Array, "n"]:
+    """The platform and a sphere or a cylinder."""
     zero, rotation = jnp.zeros_like(poses.position[0]), _rotation(poses)
     rod = Rod(solid.centre, jnp.zeros_like(solid.centre), solid.radius) if isinstance(solid, Ball) else solid
     start = _inward(rotation, _less(_three(rod.start), poses.position))
@@ -263,16 +236,8 @@ def of_body(poses: PoseLanes, body: BodyShape, solid: Ball | Rod) -> Array:
 
 
 @jax.jit
-def of_boxes(poses: PoseLanes, body: Brick, solid: Brick) -> Array:
-    """The platform, a box, and another box: the largest gap between their shadows on a line.
-
-    Args:
-        poses: lanes (n,).
-        body: shape of the platform in its axes.
-
-    Returns:
-        (n,) complex: no larger than the signed distance, with its sign, m, and 0.
-    """
+def of_boxes(poses: PoseLanes, body: Brick, solid: Brick) -> Complex[Array, "n"]:
+    """The platform, a box, and another box: the largest gap between their shadows on a line."""
     zero, rotation = jnp.zeros_like(poses.position[0]), _rotation(poses)
     axes = [_three(row) for row in body.rotation]
     edges = [lanes.turned_back(axes, _inward(rotation, _three(column))) for column in solid.rotation.T]
@@ -282,16 +247,8 @@ def of_boxes(poses: PoseLanes, body: Brick, solid: Brick) -> Array:
 
 
 @jax.jit
-def of_hull_box(poses: PoseLanes, body: Polyhedron, solid: Brick) -> Array:
-    """The platform, a convex polyhedron, and a box: the largest gap between their shadows on a line.
-
-    Args:
-        poses: lanes (n,).
-        body: shape of the platform in its axes.
-
-    Returns:
-        (n,) complex: no larger than the signed distance, with its sign, m, and 0.
-    """
+def of_hull_box(poses: PoseLanes, body: Polyhedron, solid: Brick) -> Complex[Array, "n"]:
+    """The platform, a convex polyhedron, and a box: the largest gap between their shadows on a line."""
     zero, rotation = jnp.zeros_like(poses.position[0]), _rotation(poses)
     edges = [tuple(zero + x for x in _inward(rotation, _three(column))) for column in solid.rotation.T]
     centre = _inward(rotation, _less(_three(solid.centre), poses.position))

@@ -6,8 +6,10 @@ from differences of squares, so that their rounding falls with the angle and the
 angle.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -15,6 +17,9 @@ from jax import Array, lax
 
 from cspr_jax.arithmetic.elementary import lesser
 from cspr_jax.arithmetic.lanes import Vector, cross, dot
+
+if TYPE_CHECKING:
+    from jaxtyping import Complex, Float
 
 Numbers = Sequence[Array]
 
@@ -41,18 +46,8 @@ def _along(start: Vector, ray: Vector, part: Array) -> Vector:
     return tuple(x + part * y for x, y in zip(start, ray, strict=True))
 
 
-def segments(a: Vector, u: Vector, b: Vector, v: Vector) -> Array:
-    """Distance of two segments.
-
-    Args:
-        a: start of the first, m.
-        u: from start to end of the first, m; may be zero.
-        b: start of the second, m.
-        v: from start to end of the second, m; may be zero.
-
-    Returns:
-        (...) m.
-    """
+def segments(a: Vector, u: Vector, b: Vector, v: Vector) -> Float[Array, "..."]:
+    """Distance of two segments."""
     # Find the nearest points of the lines, then clip each to its segment: the last two steps are exact where one point
     # is an end, and for parallel lines wherever the first step starts.
     apart, normal = _less(b, a), cross(u, v)
@@ -64,34 +59,16 @@ def segments(a: Vector, u: Vector, b: Vector, v: Vector) -> Array:
     return jnp.sqrt(dot(between, between))
 
 
-def point_segment(point: Vector, a: Vector, u: Vector) -> Array:
-    """Distance of a point from a segment.
-
-    Args:
-        point: m.
-        a: start of the segment, m.
-        u: from start to end of the segment, m; may be zero.
-
-    Returns:
-        (...) m.
-    """
+def point_segment(point: Vector, a: Vector, u: Vector) -> Float[Array, "..."]:
+    """Distance of a point from a segment."""
     apart = _less(point, a)
     s = _fraction(dot(apart, u) / _greater(dot(u, u), _tiny(apart[0] * u[0])))
     between = tuple(apart[k] - s * u[k] for k in range(3))
     return jnp.sqrt(dot(between, between))
 
 
-def segment_box(a: Vector, u: Vector, half: Numbers) -> Array:
-    """Signed distance of a segment from a box around the origin, in its axes.
-
-    Args:
-        a: start of the segment from the centre of the box, axes of the box, m.
-        u: from start to end of the segment, m; may be zero.
-        half: three halves of the lengths of its edges, m.
-
-    Returns:
-        (...) m: the distance outside; where the segment enters the box, minus the least translation that parts the two.
-    """
+def segment_box(a: Vector, u: Vector, half: Numbers) -> Float[Array, "..."]:
+    """Signed distance of a segment from a box around the origin, in its axes."""
     apart = _parting(a, u, half)
     return jnp.where(apart > 0.0, _outside_box(a, u, half), apart)
 
@@ -157,16 +134,8 @@ def _parting(a: Vector, u: Vector, half: Numbers) -> Array:
     return gap
 
 
-def nearest(values: Sequence[Array]) -> Array:
-    """The smallest of several arrays and its index, as one complex number, since XLA computes two outputs twice.
-
-    Args:
-        values: arrays (...) of real numbers.
-
-    Returns:
-        (...) complex: the smallest value plus i times its index among the values, the first of equal ones; NaN is
-        smallest if it comes first.
-    """
+def nearest(values: Sequence[Array]) -> Complex[Array, "..."]:
+    """The smallest of several arrays and its index, as one complex number, since XLA computes two outputs twice."""
     least, place = values[0], jnp.zeros_like(values[0])
     for k, value in enumerate(values[1:], 1):
         is_less = value < least
@@ -192,17 +161,8 @@ class Polyhedron(NamedTuple):
     sides: Array
 
 
-def segment_hull(a: Vector, u: Vector, hull: Polyhedron) -> Array:
-    """Signed distance of a segment from a convex polyhedron, in its axes.
-
-    Args:
-        a: start of the segment, m.
-        u: from start to end of the segment, m; may be zero.
-
-    Returns:
-        (...) m: the distance outside; where the segment enters, minus the depth, below the nearest face, of the middle
-        of its part inside, which is at least half of the depth of its deepest point.
-    """
+def segment_hull(a: Vector, u: Vector, hull: Polyhedron) -> Float[Array, "..."]:
+    """Signed distance of a segment from a convex polyhedron, in its axes."""
     zero = jnp.zeros_like(a[0] + u[0])
     count = len(hull.offsets)
 
@@ -259,19 +219,8 @@ def _outside_hull(a: Vector, u: Vector, hull: Polyhedron) -> Array:
     return lax.fori_loop(0, len(hull.offsets), to_face, least)
 
 
-def boxes(first: Numbers, centre: Vector, axes: Sequence[Vector], half: Numbers) -> Array:
-    """Largest gap between the shadows of two boxes on a line, in the axes of the first box, which is around the origin.
-
-    Args:
-        first: three halves of the lengths of the edges of the first box, m.
-        centre: centre of the second box, m.
-        axes: three unit vectors along the edges of the second box.
-        half: three halves of the lengths of the edges of the second box, m.
-
-    Returns:
-        (...) m: no larger than the distance, positive exactly where the boxes are apart; else minus the least
-        translation that parts them.
-    """
+def boxes(first: Numbers, centre: Vector, axes: Sequence[Vector], half: Numbers) -> Float[Array, "..."]:
+    """Largest gap between projections of two boxes on a line, in axes of the first, which is around the origin."""
     gap = jnp.full_like(centre[0] + axes[0][0], -jnp.inf)
     for k in range(3):
         reach = first[k] + sum(half[j] * jnp.abs(axes[j][k]) for j in range(3))
@@ -292,20 +241,11 @@ def boxes(first: Numbers, centre: Vector, axes: Sequence[Vector], half: Numbers)
     return gap
 
 
-def hull_box(hull: Polyhedron, centre: Vector, axes: Sequence[Vector], half: Numbers) -> Array:
+def hull_box(hull: Polyhedron, centre: Vector, axes: Sequence[Vector], half: Numbers) -> Float[Array, "..."]:
     """Largest gap between the shadows of a convex polyhedron and a box on a line, in the axes of the polyhedron.
 
     The lines are the normals to the faces of both shapes, and to an edge of each if the polyhedron reaches farthest
     along the line at its edge: the normals to the faces of the sum of both shapes.
-
-    Args:
-        centre: centre of the box, m.
-        axes: three unit vectors along the edges of the box.
-        half: three halves of the lengths of the edges of the box, m.
-
-    Returns:
-        (...) m: no larger than the distance, positive exactly where the shapes are apart; else minus the least
-        translation that parts them.
     """
 
     def gap(line, reached):

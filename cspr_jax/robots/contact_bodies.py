@@ -1,6 +1,8 @@
 """Bodies that can meet while a robot moves, as arrays for compiled functions: cables, obstacles, platform."""
 
-from typing import Any, NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -13,6 +15,9 @@ from cspr_jax.robots.convex_gaps import BOX, BOX_SIGNS, FacePlanes
 from cspr_jax.robots.interference import contacts
 from cspr_jax.robots.platform import RIGID, PlatformRobot
 from cspr_jax.robots.shapes import Box, Cylinder, Hull, is_flat
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Over the size of a scene: depth below which penetrations are not told apart, and thickness of flat boxes.
 DEEPEST, THINNEST = 1e-4, 1e-9
@@ -67,42 +72,23 @@ class Bodies(NamedTuple):
 
 
 def has_sectors(robot: AnyRobot, scene: Scene) -> bool:
-    """Tell whether the criterion of the thesis stands for the shape of a platform.
-
-    Returns:
-        whether a rigid platform has no known shape, and points in a plane.
-    """
+    """Tell whether the criterion of the thesis stands for the shape of a platform."""
     return scene.body is None and robot.pattern == RIGID and is_flat(np.asarray(scene.platform_points))
 
 
 def meetings(robot: AnyRobot, scene: Scene) -> tuple[Meeting, ...]:
-    """Pairs of bodies in the order of their bounds.
-
-    Returns:
-        n_meetings of them.
-    """
+    """Pairs of bodies in the order of their bounds."""
     over = range(robot.n_cables) if has_sectors(robot, scene) else ()
     return scene.meetings + tuple(Meeting("platform", k, -1) for k in over)
 
 
 def default_scene(robot: AnyRobot) -> Scene:
-    """A robot without surroundings, whose cables meet each other.
-
-    Returns:
-        the scene.
-    """
+    """A robot without surroundings, whose cables meet each other."""
     return clearance.scene(robot, diameter=0.0 if robot.cable_diameter is None else np.asarray(robot.cable_diameter))
 
 
 def bodies_of(robot: AnyRobot, scene: Scene) -> Bodies:
-    """Bodies of a scene, as compiled functions take them.
-
-    Args:
-        scene: in the robot's axes.
-
-    Returns:
-        the bodies.
-    """
+    """Bodies of a scene, as compiled functions take them."""
     rods = [k for k, shape in enumerate(scene.obstacles) if not isinstance(shape, Box)]
     boxes = [k for k, shape in enumerate(scene.obstacles) if isinstance(shape, Box)]
     axes = [_axis(scene.obstacles[k]) for k in rods]
@@ -132,25 +118,14 @@ def bodies_of(robot: AnyRobot, scene: Scene) -> Bodies:
     )
 
 
-def shape_corners(robot: AnyRobot, scene: Scene) -> np.ndarray | None:
-    """Corners of the shape of a platform.
-
-    Args:
-        scene: in the robot's axes.
-
-    Returns:
-        (m, 3) from the mass centre, platform axes, m; None: it is not known.
-    """
+def shape_corners(robot: AnyRobot, scene: Scene) -> Float[np.ndarray, "m 3"] | None:
+    """Corners of the shape of a platform."""
     body = bodies_of(robot, scene).body
     return None if body is None else np.asarray(body.corners)
 
 
 def platform_corners(robot: AnyRobot, bodies: Bodies) -> Any:
-    """Points that reach as low as a platform: where cables are attached, and corners of its shape.
-
-    Returns:
-        (m, 3) from the mass centre, platform axes, m; None: it has no extent.
-    """
+    """Points that reach as low as a platform: where cables are attached, and corners of its shape."""
     corners = [bodies.points] if isinstance(robot, PlatformRobot) else []
     corners += [] if bodies.body is None else [bodies.body.corners]
     return jnp.concatenate(corners) if corners else None

@@ -13,6 +13,10 @@ cables (the cable is over the sector) all the time: `passings`. Cables of a plan
 they may cross for a while; they count as `Bodies.deepest` deep then.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import jax
 import jax.numpy as jnp
 from jax import Array
@@ -35,6 +39,9 @@ from cspr_jax.robots.interference_lanes import residual
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.state_bounds import CableBounds, StateBounds
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # Rounding of the corners of shapes, over the size of a scene; cosines up to which directions point away from a sector.
 ROUNDING, POLAR = 1e-14, 1e-12
 
@@ -42,16 +49,7 @@ Range = tuple[Array, Array]
 
 
 def contact_bounds(robot: AnyRobot, bodies: Bodies, state: StateBounds, cables: CableBounds) -> Range:
-    """Bounds of clearances between surfaces, over one block.
-
-    Args:
-        robot: without pulleys.
-        bodies: of its scene.
-        cables: of the same block.
-
-    Returns:
-        (n_meetings,) lower and upper bounds, m, in the order of `contact_bodies.meetings`.
-    """
+    """Bounds of clearances between surfaces, over one block."""
     ends, parts = _ends(state, cables), []
     if len(bodies.pairs):
         parts.append(_of_pairs(robot, bodies, ends))
@@ -72,17 +70,8 @@ def contact_bounds(robot: AnyRobot, bodies: Bodies, state: StateBounds, cables: 
     return low - allowance, high + allowance
 
 
-def passings(robot: AnyRobot, bodies: Bodies, state: StateBounds, cables: CableBounds) -> Array:
-    """Cables that are proved to pass through each other, or over the platform, within one block.
-
-    Args:
-        robot: without pulleys.
-        bodies: of its scene.
-        cables: of the same block.
-
-    Returns:
-        (n_meetings,) in the order of `contact_bodies.meetings`.
-    """
+def passings(robot: AnyRobot, bodies: Bodies, state: StateBounds, cables: CableBounds) -> Float[Array, "n_meetings"]:
+    """Cables that are proved to pass through each other, or over the platform, within one block."""
     ends, first = _ends(state, cables), bodies.pairs[:, 0]
     through = jax.vmap(_pass)(*(ends.each(lambda x, k=k: x[bodies.pairs[:, k]]) for k in range(2)))
     n_others = len(bodies.order) * len(bodies.radii)
@@ -95,15 +84,8 @@ def passings(robot: AnyRobot, bodies: Bodies, state: StateBounds, cables: CableB
     return jnp.concatenate(parts)
 
 
-def corner_depths(corners: Array, state: StateBounds) -> AffineBounds:
-    """Bounds of the depths of points of a platform.
-
-    Args:
-        corners: (n_corners, 3) from the mass centre, platform axes, m.
-
-    Returns:
-        (n_corners,) z, z down, m.
-    """
+def corner_depths(corners: Float[Array, "n_corners 3"], state: StateBounds) -> AffineBounds:
+    """Bounds of the depths of points of a platform."""
     return dot(state.rotation.each(lambda x: x[2][None]), corners) + state.position.each(lambda x: x[2])
 
 

@@ -8,9 +8,11 @@ need not be known with bounds. From above the distance is bounded by that of two
 ones in the middle; of bodies that meet, by how deep a fixed point of one is below all faces of the other.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -19,6 +21,9 @@ from jax import Array
 
 from cspr_jax.arithmetic.affine_bounds import AffineBounds, dot, norm_squared
 from cspr_jax.robots.interference import nearest
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Edges at a smaller angle than about this count as parallel: their common normal is not well known.
 PARALLEL_SQUARE = 1e-8
@@ -67,16 +72,8 @@ class Features(NamedTuple):
     first: Any
     second: Any
 
-    def nearest_on_edges(self, p: Array, q: Array) -> tuple[list[Array], Array, Array]:
-        """Corners of the two edges that are the nearest ones, and the nearest points as fractions of these edges.
-
-        Args:
-            p: (m, 3) corners of the first body, m.
-            q: (k, 3) corners of the second, m.
-
-        Returns:
-            (2,) numbers of corners of each edge; of other features any edges; () and () fractions.
-        """
+    def nearest_on_edges(self, p: Float[Array, "m 3"], q: Float[Array, "k 3"]) -> tuple[list[Array], Array, Array]:
+        """Corners of the two edges that are the nearest ones, and the nearest points as fractions of these edges."""
         edges = [
             body.edges[0] if len(body.edges) == 1 else jnp.asarray(body.edges)[jnp.minimum(k, len(body.edges) - 1)]
             for body, k in zip(self.bodies, (self.first, self.second), strict=True)
@@ -97,16 +94,8 @@ BOX = (
 )
 
 
-def clearance_bounds(first: Solid, second: Solid) -> tuple[Array, Array]:
-    """Bounds of the distance of two bodies.
-
-    Args:
-        first: in the same axes as the second.
-
-    Returns:
-        () lower bound of the signed distance, m, -inf where the bodies are not proved to be apart; () upper bound of
-        the distance, m.
-    """
+def clearance_bounds(first: Solid, second: Solid) -> tuple[Float[Array, ""], Float[Array, ""]]:
+    """Bounds of the distance of two bodies."""
     corners = first.corners.middle, second.corners.middle
     features = nearest_features(*corners, first, second)
     line = turning(partial(parting_direction, features), first.corners, second.corners)
@@ -120,58 +109,27 @@ def clearance_bounds(first: Solid, second: Solid) -> tuple[Array, Array]:
 
 
 def turning(direction: Callable[..., Array], *points: AffineBounds) -> AffineBounds:
-    """A direction that turns at a constant rate, which follows that of a function of points in the middle.
-
-    Args:
-        direction: gives a vector (3,) from arrays of points.
-        points: what the function takes.
-
-    Returns:
-        exact bounds (3,).
-    """
+    """A direction that turns at a constant rate, which follows that of a function of points in the middle."""
     middles, slopes = (tuple(getattr(x, name) for x in points) for name in ("middle", "slope"))
     middle, turn = jax.jvp(direction, middles, slopes)
     return AffineBounds(middle, jnp.where(jnp.sum(turn**2) <= 1.0, turn, 0.0), jnp.zeros_like(middle))
 
 
-def along(line: AffineBounds, vectors: AffineBounds) -> Array:
-    """Least component of vectors along a direction that turns.
-
-    Args:
-        line: of `turning`.
-        vectors: bounds (m, 3), m.
-
-    Returns:
-        () lower bound, m; -inf where none above 0 is known.
-    """
+def along(line: AffineBounds, vectors: AffineBounds) -> Float[Array, ""]:
+    """Least component of vectors along a direction that turns."""
     middle, turn = line.middle, line.slope
     low = jnp.min(dot(line.each(lambda x: x[None]), vectors).low())
     size = jnp.sqrt(jnp.dot(middle, middle) + jnp.dot(turn, turn) + 2.0 * jnp.abs(jnp.dot(middle, turn)))
     return jnp.where(low > 0.0, low * (1.0 - ROUNDING) / size, -jnp.inf)
 
 
-def distance_bound(first: AffineBounds, second: AffineBounds) -> Array:
-    """Largest distance of two points.
-
-    Args:
-        first: bounds (3,), m.
-        second: bounds (3,), m.
-
-    Returns:
-        () m.
-    """
+def distance_bound(first: AffineBounds, second: AffineBounds) -> Float[Array, ""]:
+    """Largest distance of two points."""
     return jnp.sqrt(norm_squared(second - first).high()) * (1.0 + ROUNDING)
 
 
-def depth_bound(body: Solid, planes: FacePlanes) -> Array:
-    """Bound of how deep a body reaches into another one that does not move, by points of its edges.
-
-    Args:
-        body: in the axes of the planes.
-
-    Returns:
-        () upper bound of the signed distance, m; inf where the bodies are not proved to meet.
-    """
+def depth_bound(body: Solid, planes: FacePlanes) -> Float[Array, ""]:
+    """Bound of how deep a body reaches into another one that does not move, by points of its edges."""
     start, end = (body.corners.each(lambda x, k=k: x[body.edges[:, k]]) for k in range(2))
     part = inner_fractions(start.middle, end.middle, planes)[:, None]
     points = start * (1.0 - part) + end * part
@@ -180,16 +138,10 @@ def depth_bound(body: Solid, planes: FacePlanes) -> Array:
     return jnp.where(least < 0.0, least, jnp.inf)
 
 
-def inner_fractions(start: Array, end: Array, planes: FacePlanes) -> Array:
-    """Points of edges in the middle of their parts behind all planes.
-
-    Args:
-        start: (n_edges, 3) m.
-        end: (n_edges, 3) m.
-
-    Returns:
-        (n_edges,) fractions of the edges at which these points lie, or would lie.
-    """
+def inner_fractions(
+    start: Float[Array, "n_edges 3"], end: Float[Array, "n_edges 3"], planes: FacePlanes
+) -> Float[Array, "n_edges"]:
+    """Points of edges in the middle of their parts behind all planes."""
     high, low = (points @ planes.normals.T - planes.offsets[None] for points in (start, end))
     meet = high / jnp.where(high == low, 1.0, high - low)
     first = jnp.max(jnp.where(low < high, meet, 0.0), axis=1)
@@ -223,18 +175,8 @@ def _unit(vectors: Array) -> Array:
     return vectors / jnp.sqrt(jnp.maximum(jnp.sum(vectors**2, axis=-1, keepdims=True), TINY))
 
 
-def nearest_features(p: Array, q: Array, first: Solid, second: Solid) -> Features:
-    """Find the nearest features of two bodies.
-
-    Args:
-        p: (m, 3) corners of the first, m.
-        q: (k, 3) corners of the second, m.
-        first: its edges and faces.
-        second: likewise.
-
-    Returns:
-        the features.
-    """
+def nearest_features(p: Float[Array, "m 3"], q: Float[Array, "k 3"], first: Solid, second: Solid) -> Features:
+    """Find the nearest features of two bodies."""
     if len(first.edges) == len(second.edges) == 1:
         return Features((first, second), 0, 0, 0)
     (a, u), (b, v) = _ends(p, first.edges), _ends(q, second.edges)
@@ -256,17 +198,8 @@ def nearest_features(p: Array, q: Array, first: Solid, second: Solid) -> Feature
     return Features((first, second), kinds[best], *jnp.stack(numbers)[best])
 
 
-def parting_direction(features: Features, p: Array, q: Array) -> Array:
-    """Direction from the first body to the second along the shortest line between them.
-
-    Args:
-        features: their nearest ones.
-        p: (m, 3) corners of the first, m.
-        q: (k, 3) corners of the second, m.
-
-    Returns:
-        (3,) unit vector.
-    """
+def parting_direction(features: Features, p: Float[Array, "m 3"], q: Float[Array, "k 3"]) -> Float[Array, "3"]:
+    """Direction from the first body to the second along the shortest line between them."""
     (first, second), (edges, s, t) = features.bodies, features.nearest_on_edges(p, q)
     (a, u), (b, v) = _ends(p, edges[0]), _ends(q, edges[1])
     gap, normal = b + t * v - a - s * u, jnp.cross(u, v)
@@ -285,17 +218,10 @@ def parting_direction(features: Features, p: Array, q: Array) -> Array:
     return way
 
 
-def nearest_weights(features: Features, p: Array, q: Array) -> tuple[Array, Array]:
-    """Weights of corners, which make the nearest points.
-
-    Args:
-        features: the nearest ones of two bodies.
-        p: (m, 3) corners of the first, m.
-        q: (k, 3) corners of the second, m.
-
-    Returns:
-        (m,) and (k,).
-    """
+def nearest_weights(
+    features: Features, p: Float[Array, "m 3"], q: Float[Array, "k 3"]
+) -> tuple[Float[Array, "m"], Float[Array, "k"]]:
+    """Weights of corners, which make the nearest points."""
     (first, second), (edges, s, t) = features.bodies, features.nearest_on_edges(p, q)
 
     def spread(count: int, corners: Array, shares: list[Array]) -> Array:

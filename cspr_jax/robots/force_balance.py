@@ -1,5 +1,9 @@
 """The force balance of a point mass on three cables, or on two in a plane, at one instant."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import jax.numpy as jnp
 from jax import Array
 
@@ -7,41 +11,22 @@ from cspr_jax.robots.cable_lengths import moved_lengths
 from cspr_jax.robots.point_mass import PointMassRobot, is_planar, relative_acceleration
 from cspr_jax.robots.robot import check_determined
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
-def pseudotensions(robot: PointMassRobot, position: Array, acceleration: Array) -> Array:
-    """Pseudotensions kappa, thesis (2.12) to (2.14), for a planar robot (1.15) and (1.16): Adj(M) (p'' - g).
 
-    Below the spools they have the sign of the tensions, and they need no division. The sign is corrected for spools
-    numbered the other way round, so that it never depends on the order of the cables.
-
-    Args:
-        robot: a point mass on three cables, or on two in a plane.
-        position: (3,) of the mass, z down, m.
-        acceleration: (3,) m/s^2.
-
-    Returns:
-        (n_cables,) in cable order, m^3/s^2 (planar: m^2/s^2); positive pulls, as long as the mass is below the spools.
-
-    Raises:
-        InputError: more cables.
-    """
+def pseudotensions(
+    robot: PointMassRobot, position: Float[Array, "3"], acceleration: Float[Array, "3"]
+) -> Float[Array, "n_cables"]:
+    """Pseudotensions kappa, thesis (2.12) to (2.14), for a planar robot (1.15) and (1.16): Adj(M) (p'' - g)."""
     rows, arms = adjugate(robot)
     return (rows + jnp.cross(position, arms)) @ relative_acceleration(robot, acceleration)
 
 
-def adjugate(robot: PointMassRobot) -> tuple[Array, Array]:
+def adjugate(robot: PointMassRobot) -> tuple[Float[Array, "n_cables 3"], Float[Array, "n_cables 3"]]:
     """Adjugate of the structure matrix M, affine in the position.
 
     Pseudotensions are (rows + position x arms) (p'' - g).
-
-    Args:
-        robot: a point mass on three cables, or on two in a plane.
-
-    Returns:
-        rows: (n_cables, 3) m^2, planar m; arms: (n_cables, 3) m, planar 1; both of the sign of `pseudotensions`.
-
-    Raises:
-        InputError: more cables.
     """
     check_determined(robot)
     a = robot.base_points
@@ -54,21 +39,10 @@ def adjugate(robot: PointMassRobot) -> tuple[Array, Array]:
     return sign * jnp.cross(following, preceding), sign * (following - preceding)
 
 
-def tensions(robot: PointMassRobot, position: Array, acceleration: Array) -> Array:
-    """Cable tensions, thesis (2.2) to (2.7), as kappa / det(M) times mass and length.
-
-    Args:
-        robot: a point mass on three cables, or on two in a plane.
-        position: (3,) of the mass, z down, m.
-        acceleration: (3,) m/s^2.
-
-    Returns:
-        (n_cables,) in cable order, N. Not clipped: a negative entry is the push that a cable cannot give.
-        Infinite or NaN in the spool plane, where M is singular.
-
-    Raises:
-        InputError: more cables.
-    """
+def tensions(
+    robot: PointMassRobot, position: Float[Array, "3"], acceleration: Float[Array, "3"]
+) -> Float[Array, "n_cables"]:
+    """Cable tensions, thesis (2.2) to (2.7), as kappa / det(M) times mass and length."""
     check_determined(robot)
     rays = robot.base_points - position[None]  # (2.6)
     if is_planar(robot):
@@ -82,19 +56,9 @@ def tensions(robot: PointMassRobot, position: Array, acceleration: Array) -> Arr
 
 
 def cable_motion(
-    robot: PointMassRobot, position: Array, velocity: Array, acceleration: Array
-) -> tuple[Array, Array, Array]:
-    """Lengths of the cables, (2.1), and their first two derivatives in time.
-
-    Args:
-        robot: a point mass on any number of cables.
-        position: (3,) m.
-        velocity: (3,) m/s.
-        acceleration: (3,) m/s^2.
-
-    Returns:
-        lengths (n_cables,) m, rates (n_cables,) m/s (positive pays out), accelerations (n_cables,) m/s^2.
-    """
+    robot: PointMassRobot, position: Float[Array, "3"], velocity: Float[Array, "3"], acceleration: Float[Array, "3"]
+) -> tuple[Float[Array, "n_cables"], Float[Array, "n_cables"], Float[Array, "n_cables"]]:
+    """Lengths of the cables, (2.1), and their first two derivatives in time."""
     return moved_lengths(robot, position[None], velocity[None], acceleration[None])
 
 

@@ -1,6 +1,8 @@
 """Cables that meet each other or the platform, thesis section 3.10.2: vectors at one instant, tests between two."""
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -8,6 +10,9 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.robots.platform import PlatformRobot, pairs_apart, rays
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float, Int
 
 # Points nearer than this part of the platform's size are one corner.
 SAME = 1e-9
@@ -36,9 +41,6 @@ def contacts(robot: PlatformRobot) -> Contacts:
     """Contacts possible on a robot: pairs of cables without a common point, and sectors of the platform.
 
     The platform is the convex hull of its points, seen along its normal.
-
-    Returns:
-        the contacts.
     """
     points = np.asarray(robot.platform_points)
     centred = points - points.mean(0)
@@ -63,51 +65,28 @@ def _sector(points: np.ndarray, flat: np.ndarray, corner: int) -> np.ndarray:
     return np.stack([points[end] - points[corner] for end in ends])
 
 
-def gaps(robot: PlatformRobot, pairs: Array, position: Array, rotation: Array) -> Array:
-    """The shortest vectors between cables.
-
-    Args:
-        pairs: (n_pairs, 2) indices of cables.
-        position: (3,) m.
-        rotation: (3, 3).
-
-    Returns:
-        (n_pairs, 3) from the first cable of each pair to the second, m.
-    """
+def gaps(
+    robot: PlatformRobot, pairs: Int[Array, "n_pairs 2"], position: Float[Array, "3"], rotation: Float[Array, "3 3"]
+) -> Float[Array, "n_pairs 3"]:
+    """The shortest vectors between cables."""
     cables, _ = rays(robot, position, rotation)
     i, j = pairs[:, 0], pairs[:, 1]
     return between(robot.base_points[i], cables[i], robot.base_points[j], cables[j])
 
 
-def between(a: Array, u: Array, b: Array, v: Array) -> Array:
-    """The shortest vectors between segments a + s u and b + t v, s and t in [0, 1].
-
-    Args:
-        a: (..., 3) starts of the first segments, m.
-        u: (..., 3) from start to end of the first, m.
-        b: (..., 3) starts of the second segments, m.
-        v: (..., 3) from start to end of the second, m.
-
-    Returns:
-        (..., 3) from the first to the second, m.
-    """
+def between(
+    a: Float[Array, "... 3"], u: Float[Array, "... 3"], b: Float[Array, "... 3"], v: Float[Array, "... 3"]
+) -> Float[Array, "... 3"]:
+    """The shortest vectors between segments a + s u and b + t v, s and t in [0, 1]."""
     s, t = nearest(a, u, b, v)
     return b - a + t[..., None] * v - s[..., None] * u
 
 
 @jax.jit
-def nearest(a: Array, u: Array, b: Array, v: Array) -> tuple[Array, Array]:
-    """Find where segments a + s u and b + t v are nearest to each other.
-
-    Args:
-        a: (..., 3) starts of the first segments, m.
-        u: (..., 3) from start to end of the first, m.
-        b: (..., 3) starts of the second segments, m.
-        v: (..., 3) from start to end of the second, m.
-
-    Returns:
-        s and t, (...) each, in [0, 1].
-    """
+def nearest(
+    a: Float[Array, "... 3"], u: Float[Array, "... 3"], b: Float[Array, "... 3"], v: Float[Array, "... 3"]
+) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
+    """Find where segments a + s u and b + t v are nearest to each other."""
     # Find the nearest points of the lines, then clip them to the segments.
     apart = b - a
     uu, uv, vv = (jnp.sum(x * y, axis=-1) for x, y in ((u, u), (u, v), (v, v)))
@@ -119,45 +98,28 @@ def nearest(a: Array, u: Array, b: Array, v: Array) -> tuple[Array, Array]:
     return jnp.clip((au + t * uv) / jnp.maximum(uu, TINY), 0.0, 1.0), t
 
 
-def cable_directions(robot: PlatformRobot, position: Array, rotation: Array) -> Array:
-    """The cables as unit vectors from the platform to the spools, in the platform's axes.
-
-    Args:
-        position: (3,) m.
-        rotation: (3, 3).
-
-    Returns:
-        (n_cables, 3) platform axes.
-    """
+def cable_directions(
+    robot: PlatformRobot, position: Float[Array, "3"], rotation: Float[Array, "3 3"]
+) -> Float[Array, "n_cables 3"]:
+    """The cables as unit vectors from the platform to the spools, in the platform's axes."""
     cables, _ = rays(robot, position, rotation)
     return -(cables / jnp.linalg.norm(cables, axis=1, keepdims=True)) @ rotation
 
 
-def cables_cross(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Pairs of cables that passed through each other between two instants, (3.94).
-
-    Args:
-        before: (..., n_pairs, 3) of `gaps`.
-        after: (..., n_pairs, 3) likewise.
-
-    Returns:
-        mask (..., n_pairs).
-    """
+def cables_cross(
+    before: Float[np.ndarray, "... n_pairs 3"], after: Float[np.ndarray, "... n_pairs 3"]
+) -> Bool[np.ndarray, "... n_pairs"]:
+    """Pairs of cables that passed through each other between two instants, (3.94)."""
     return np.einsum("...k,...k->...", before, after) <= 0.0
 
 
-def platform_hit(sides: np.ndarray, normal: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Cables that passed over the platform between two instants, as in the thesis, in platform axes.
-
-    Args:
-        sides: (n_cables, 2, 3) of `contacts`.
-        normal: (3,) of `contacts`.
-        before: (..., n_cables, 3) of `cable_directions`.
-        after: (..., n_cables, 3) likewise.
-
-    Returns:
-        mask (..., n_cables).
-    """
+def platform_hit(
+    sides: Float[np.ndarray, "n_cables 2 3"],
+    normal: Float[np.ndarray, "3"],
+    before: Float[np.ndarray, "... n_cables 3"],
+    after: Float[np.ndarray, "... n_cables 3"],
+) -> Bool[np.ndarray, "... n_cables"]:
+    """Cables that passed over the platform between two instants, as in the thesis, in platform axes."""
     high, low = before @ normal, after @ normal
     through = high * low <= 0.0
     # Find the direction within the platform's plane, a combination of both directions with positive weights.

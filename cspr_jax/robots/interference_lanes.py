@@ -1,6 +1,9 @@
 """Cables that meet each other or the platform, one lane a case: the fast form of `interference`."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import jax.numpy as jnp
 from jax import Array
@@ -9,19 +12,14 @@ from cspr_jax.arithmetic.lanes import Matrix, Vector, cross, dot, turned_back
 from cspr_jax.robots.interference import PARALLEL
 from cspr_jax.robots.wrench_lanes import CableLanes
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 TINY = 1e-30  # m^2
 
 
-def gaps(base_points: Array, pairs: Sequence[tuple[int, int]], cables: CableLanes) -> list[Vector]:
-    """The shortest vectors between cables.
-
-    Args:
-        base_points: (n_cables, 3) m.
-        pairs: indices of cables; known when this is compiled.
-
-    Returns:
-        one vector a pair, from its first cable to its second, m.
-    """
+def gaps(base_points: Float[Array, "n_cables 3"], pairs: Sequence[tuple[int, int]], cables: CableLanes) -> list[Vector]:
+    """The shortest vectors between cables."""
     vectors = []
     for i, j in pairs:
         apart = [base_points[j, k] - base_points[i, k] for k in range(3)]
@@ -30,16 +28,7 @@ def gaps(base_points: Array, pairs: Sequence[tuple[int, int]], cables: CableLane
 
 
 def gap(apart: Vector, u: Vector, v: Vector) -> Vector:
-    """The shortest vector between two segments; `interference.between` in lanes.
-
-    Args:
-        apart: from the start of the first to the start of the second, m.
-        u: from start to end of the first, m.
-        v: from start to end of the second, m.
-
-    Returns:
-        from the first to the second, m.
-    """
+    """The shortest vector between two segments; `interference.between` in lanes."""
     uu, uv, vv = dot(u, u), dot(u, v), dot(v, v)
     au, av = dot(apart, u), dot(apart, v)
     denominator = uu * vv - uv * uv
@@ -52,16 +41,7 @@ def gap(apart: Vector, u: Vector, v: Vector) -> Vector:
 
 
 def residual(sides: tuple[Vector, Vector], normal: Vector, seen: Vector) -> Vector:
-    """Residual of the projection of a cable onto the sector of its corner.
-
-    Args:
-        sides: sides of the sector, as in `interference.Contacts`.
-        normal: unit normal of the platform's plane.
-        seen: the cable from the platform, platform axes, m.
-
-    Returns:
-        a vector normal to the projection, as long as the distance of the cable's end from the sector, m.
-    """
+    """Residual of the projection of a cable onto the sector of its corner."""
     height = dot(normal, seen)
     up = tuple(height * n for n in normal)
     flat = tuple(v - w for v, w in zip(seen, up, strict=True))
@@ -81,26 +61,13 @@ def residual(sides: tuple[Vector, Vector], normal: Vector, seen: Vector) -> Vect
 
 
 def cable_directions(cables: CableLanes, rotation: Matrix) -> list[Vector]:
-    """The cables from the platform to the spools, in the platform's axes; not of unit length.
-
-    Args:
-        rotation: rows of the rotation matrix.
-
-    Returns:
-        one vector a cable, platform axes, m.
-    """
+    """The cables from the platform to the spools, in the platform's axes; not of unit length."""
     return [turned_back(rotation, tuple(-x for x in ray)) for ray in cables.rays]
 
 
-def as_arrays(between: Sequence[Vector], directions: Sequence[Vector]) -> tuple[Array, Array]:
-    """Vectors as the arrays that `interference` takes.
-
-    Args:
-        between: vectors of `gaps`, (n,) each.
-        directions: vectors of `cable_directions`.
-
-    Returns:
-        (n, n_pairs, 3) and (n, n_cables, 3).
-    """
+def as_arrays(
+    between: Sequence[Vector], directions: Sequence[Vector]
+) -> tuple[Float[Array, "n n_pairs 3"], Float[Array, "n n_cables 3"]]:
+    """Vectors as the arrays that `interference` takes."""
     arrays = [jnp.stack([jnp.stack(v, -1) for v in vectors], 1) for vectors in (between, directions) if vectors]
     return arrays[0] if between else jnp.zeros((len(arrays[-1]), 0, 3)), arrays[-1]

@@ -16,14 +16,7 @@ RobotKind = TypeVar("RobotKind", bound=PointMassRobot | PlatformRobot)
 
 
 def centred(robot: RobotKind) -> tuple[RobotKind, Frame]:
-    """A robot as the kernels take it: origin at the centroid of its spools, z down, without limits.
-
-    Args:
-        robot: in its own axes.
-
-    Returns:
-        the robot, and the frame that takes points to it and back.
-    """
+    """A robot as the kernels take it: origin at the centroid of its spools, z down, without limits."""
     frame = frame_of(robot.base_points, robot.z_axis)
     changes: dict[str, Any] = {"base_points": leaf(frame.inward(robot.base_points)), "z_axis": "down"}
     if isinstance(robot, PlatformRobot):
@@ -37,18 +30,7 @@ def centred(robot: RobotKind) -> tuple[RobotKind, Frame]:
 
 
 def prepared(robot: RobotKind, *, pulleys: bool = False) -> tuple[RobotKind, Frame]:
-    """A robot as the kernels take it, a platform also in its reference axes.
-
-    Args:
-        robot: in its own axes.
-        pulleys: whether there may be pulleys.
-
-    Returns:
-        the robot, and the frame that takes points to it and back.
-
-    Raises:
-        InputError: a robot that no trajectory moves, as `robots.robot.check_moved` says.
-    """
+    """A robot as the kernels take it, a platform also in its reference axes."""
     check_moved(robot, pulleys=pulleys)
     moved, frame = centred(robot)
     return (aligned(moved)[0] if isinstance(moved, PlatformRobot) else moved), frame  # type: ignore[return-value]

@@ -5,7 +5,9 @@ from their limits as the face allows. With tensions t0 + N^T x, N without a wren
 N_S^T x - sign r = limit_S - t0_S, one small system.
 """
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -14,6 +16,9 @@ from jax import Array
 from cspr_jax.arithmetic.elementary import solved
 from cspr_jax.robots.tension_distribution import all_tensions
 from cspr_jax.robots.wrench_sets import beside_faces, face_distances, one_sided_faces, spanning
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # A tension without a largest value is held below so many times the largest that the wrench needs.
 CAP = 1e3
@@ -33,18 +38,13 @@ class NearestFace(NamedTuple):
     tensions: Array
 
 
-def nearest_face(matrix: Array, wrench: Array, low: Array, high: Array) -> NearestFace:
-    """Find the nearest face.
-
-    Args:
-        matrix: (dof, n_cables) unit columns.
-        wrench: (dof,) N.
-        low: (n_cables,) N.
-        high: (n_cables,) N, inf for none.
-
-    Returns:
-        the face; anything where the cables do not span all components.
-    """
+def nearest_face(
+    matrix: Float[Array, "dof n_cables"],
+    wrench: Float[Array, "dof"],
+    low: Float[Array, "n_cables"],
+    high: Float[Array, "n_cables"],
+) -> NearestFace:
+    """Find the nearest face."""
     dof, count = matrix.shape
     solutions = all_tensions(matrix, wrench)
     cap = CAP * (jnp.max(jnp.abs(solutions.least)) + jnp.max(low))

@@ -33,9 +33,6 @@ def tilt_torsion_grid(divisions: int) -> OrientationGrid:
 
     The volume of SO(3) is sin(theta) d phi d theta d sigma / (8 pi^2): the angles are Euler angles ZXZ, and sigma is
     the sum of the outer two.
-
-    Returns:
-        the grid; neighbours differ by one step in one angle.
     """
     count, step = 2 * divisions, math.pi / divisions
     circle = np.arange(count) * step
@@ -66,9 +63,6 @@ def equal_volume_grid(divisions: int) -> OrientationGrid:
 
     They are products of cells of equal area on the sphere of tilts (in bands of equal cells) with equal steps of
     torsion: in the metric of SO(3) a torsion moves at a right angle to the tilts.
-
-    Returns:
-        the grid; neighbours are up to 1.5 steps apart.
     """
     count, step = 2 * divisions, math.pi / divisions
     cells = [1]  # numbers of cells: one around the vertical, then band by band
@@ -96,13 +90,6 @@ def cone_grid(divisions: int, tilt: float, torsion: float) -> tuple[np.ndarray, 
 
     They are products of rings of tilts with torsions. Each is at the middle of the part of SO(3) that it stands for,
     except orientations on the boundary.
-
-    Args:
-        tilt: largest tilt, in [0, pi], rad.
-        torsion: largest torsion of either sign, in [0, pi], rad.
-
-    Returns:
-        (n, 3) tilt and torsion (phi, theta, sigma), rad; (n,) part of the cone that each orientation stands for.
     """
     step = math.pi / divisions
     rings = math.ceil(tilt / step - 1e-9)
@@ -125,14 +112,7 @@ def cone_grid(divisions: int, tilt: float, torsion: float) -> tuple[np.ndarray, 
 
 
 def planar_grid(divisions: int, largest: float) -> tuple[np.ndarray, np.ndarray]:
-    """Rotations about y, some pi / divisions apart.
-
-    Args:
-        largest: largest angle of either sign, in [0, pi], rad.
-
-    Returns:
-        (n, 3) tilt and torsion (phi, theta, sigma), rad; (n,) part of all rotations that each stands for.
-    """
+    """Rotations about y, some pi / divisions apart."""
     steps = math.ceil(largest * divisions / math.pi - 1e-9)
     theta, widths = np.linspace(-largest, largest, 2 * steps + 1), np.ones(2 * steps + 1)
     if steps:

@@ -9,12 +9,18 @@ gives lambda = 1/2; any lambda follows in the same way).
 NumPy alone, since files are checked without jax.
 """
 
+from __future__ import annotations
+
 import dataclasses
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cspr_jax.errors import InputError
 from cspr_jax.robots.spool_plane import is_on_line, is_vertical
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 COUNT = 6
 # Tolerance, as part of the size (the largest distance of a spool from the centroid of all): for cables of a pair to be
@@ -42,52 +48,22 @@ class ParallelPairs:
     shares: np.ndarray
     exit_points: np.ndarray
 
-    def tensions(self, of_pairs) -> np.ndarray:
-        """Tensions of all cables.
-
-        Args:
-            of_pairs: (..., 3) tensions of the equivalent's cables, N.
-
-        Returns:
-            (..., 6) in the order of the robot's cables, N.
-        """
+    def tensions(self, of_pairs) -> Float[np.ndarray, "... 6"]:
+        """Tensions of all cables."""
         pulls = np.asarray(of_pairs, float)
         each = np.empty((*pulls.shape[:-1], COUNT))
         each[..., self.cables] = pulls[..., None] * self.shares
         return each
 
-    def bound(self, of_cables, *, is_tension: bool, is_least: bool) -> np.ndarray:
-        """Limits of the pairs with which all cables keep their limits.
-
-        Args:
-            of_cables: () or (6,) limits of the cables.
-            is_tension: whether the limits are on tensions, which the cables of a pair share; all other quantities are
-                the same for both cables.
-            is_least: whether they are lower limits.
-
-        Returns:
-            (3,) limits of the equivalent's cables: the tighter of the two in each pair.
-        """
+    def bound(self, of_cables, *, is_tension: bool, is_least: bool) -> Float[np.ndarray, "3"]:
+        """Limits of the pairs with which all cables keep their limits."""
         limits = np.broadcast_to(np.asarray(of_cables, float), (COUNT,))[self.cables]
         limits = limits / self.shares if is_tension else limits
         return limits.max(1) if is_least else limits.min(1)
 
 
 def parallel_pairs(base_points, platform_points) -> ParallelPairs:
-    """The three pairs of a robot.
-
-    Args:
-        base_points: (n_cables, 3) points at which the cables leave their spools, m.
-        platform_points: (n_cables, 3) points at which they are attached, from the mass centre, in axes parallel to
-            those of the spools; m.
-
-    Returns:
-        the pairs.
-
-    Raises:
-        InputError: cables that are no such pairs, a mass centre that is not between the points of a pair, spools of the
-            equivalent on a line or in a vertical plane, or pairs that let the platform turn.
-    """
+    """The three pairs of a robot."""
     base, platform = np.asarray(base_points, float), np.asarray(platform_points, float)
     if len(base) != COUNT:
         raise _fault(f"{len(base)} cables")

@@ -4,8 +4,11 @@ Axes are those of `robots.point_mass`. `robots.patterns` says which forces and m
 components are zero for a planar platform or a rod, and a joint carries them where there is one.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import itertools
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -28,6 +31,9 @@ from cspr_jax.robots.point_mass import (
 )
 from cspr_jax.robots.pulleys import Pulleys
 from cspr_jax.robots.state import State
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 RIGID = "3R3T"
 
@@ -174,12 +180,8 @@ def platform_robot(  # noqa: PLR0913
     return PlatformRobot(*numbers, joints, limits or NO_LIMITS, name, z_axis, pattern, leaf(centre))
 
 
-def across_line(robot: PlatformRobot) -> Array:
-    """Two axes of a rod, normal to the line of its attachment points and to each other.
-
-    Returns:
-        (3, 2) unit vectors in platform axes.
-    """
+def across_line(robot: PlatformRobot) -> Float[Array, "3 2"]:
+    """Two axes of a rod, normal to the line of its attachment points and to each other."""
     offsets = robot.platform_points - robot.platform_points[:1]
     line = offsets[jnp.argmax(jnp.sum(offsets**2, axis=1))]
     line = line / jnp.linalg.norm(line)
@@ -198,36 +200,22 @@ def _spin_moment(robot: PlatformRobot, state: State) -> Array:
     return moment + jnp.cross(state.angular_velocity, inertia @ state.angular_velocity)
 
 
-def rays(robot: PlatformRobot, position: Array, rotation: Array) -> tuple[Array, Array]:
-    """Cables as vectors from spool to platform, (3.1), and their attachment points from the mass centre.
-
-    Args:
-        position: (3,) m.
-        rotation: (3, 3).
-
-    Returns:
-        (n_cables, 3) each, fixed axes, m.
-    """
+def rays(
+    robot: PlatformRobot, position: Float[Array, "3"], rotation: Float[Array, "3 3"]
+) -> tuple[Float[Array, "n_cables 3"], Float[Array, "n_cables 3"]]:
+    """Cables as vectors from spool to platform, (3.1), and their attachment points from the mass centre."""
     arms = robot.platform_points @ rotation.T
     return position[None] + arms - robot.base_points, arms
 
 
-def wrench_per_mass(robot: PlatformRobot, state: State) -> Array:
-    """Right-hand side of (3.11): the wrench that the cables must supply, per mass.
-
-    Returns:
-        (6,) p'' - g, m/s^2, and the rate of the angular momentum (3.8) over the mass, m^2/s^2.
-    """
+def wrench_per_mass(robot: PlatformRobot, state: State) -> Float[Array, "6"]:
+    """Right-hand side of (3.11): the wrench that the cables must supply, per mass."""
     moment = _spin_moment(robot, state) / robot.mass
     return jnp.concatenate([state.acceleration.at[2].add(-robot.gravity), moment])
 
 
 def pairs_apart(robot: PlatformRobot) -> tuple[tuple[int, int], ...]:
-    """Pairs of cables that can meet: those that share neither spool nor platform point.
-
-    Returns:
-        pairs of indices from 0 on.
-    """
+    """Pairs of cables that can meet: those that share neither spool nor platform point."""
     base, platform = np.asarray(robot.base_points), np.asarray(robot.platform_points)
     return tuple(
         (i, j)

@@ -4,9 +4,11 @@ A robot that is loaded or built has the axes of its file. Kernels take it with t
 and with z down, as `robots.kernel_axes.centred` gives it.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import functools
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import jax
 import jax.numpy as jnp
@@ -22,6 +24,9 @@ from cspr_jax.robots.robot import Robot
 from cspr_jax.robots.spool_plane import AT_P0 as AT_P0
 from cspr_jax.robots.spool_plane import SMALLEST_LEVEL_RATIO, is_on_line, is_vertical, spread
 from cspr_jax.robots.state import State
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 STANDARD_GRAVITY = 9.81
 # Degrees of freedom of a point mass in space, in the plane y = 0, and on a vertical guide.
@@ -151,40 +156,16 @@ def _check_planar(points: np.ndarray) -> None:
         raise InputError("base_points", points.tolist(), "two spools on a level line")
 
 
-def checked_points(key: str, points, least: int) -> np.ndarray:
-    """Points of a robot's geometry.
-
-    Args:
-        key: named in errors.
-        points: (n, 3) m.
-        least: smallest number of them.
-
-    Returns:
-        (n, 3) m.
-
-    Raises:
-        InputError: fewer, another shape, not finite, too far away; three or more on one line, or two at one place.
-    """
+def checked_points(key: str, points, least: int) -> Float[np.ndarray, "n 3"]:
+    """Points of a robot's geometry."""
     points = checked_coordinates(key, points, least)
     if least > PLANAR and is_on_line(points):
         raise InputError(key, points.tolist(), "points that are not on one line, or coincident")
     return points
 
 
-def checked_coordinates(key: str, coordinates, least: int) -> np.ndarray:
-    """Points, wherever they lie.
-
-    Args:
-        key: named in errors.
-        coordinates: (n, 3) m.
-        least: smallest number of them.
-
-    Returns:
-        (n, 3) m.
-
-    Raises:
-        InputError: fewer, another shape, not finite, too far away.
-    """
+def checked_coordinates(key: str, coordinates, least: int) -> Float[np.ndarray, "n 3"]:
+    """Points, wherever they lie."""
     if isinstance(coordinates, jax.core.Tracer):
         raise InputError(key, "a traced array", "numbers; to differentiate, dataclasses.replace(robot, ...) takes both")
     points = np.asarray(coordinates, float)
@@ -195,15 +176,8 @@ def checked_coordinates(key: str, coordinates, least: int) -> np.ndarray:
     return points
 
 
-def pulls(robot: Robot, targets: Array) -> Array:
-    """Unit vectors of the cables, from the effector on; with pulleys those of the free cables.
-
-    Args:
-        targets: (n_cables, 3) or (1, 3) points at which the cables are attached, in the axes of the spools, m.
-
-    Returns:
-        (n_cables, 3).
-    """
+def pulls(robot: Robot, targets: Array) -> Float[Array, "n_cables 3"]:
+    """Unit vectors of the cables, from the effector on; with pulleys those of the free cables."""
     if robot.pulleys is not None:
         targets = jnp.broadcast_to(targets, robot.base_points.shape)
         way = exits(robot.base_points, robot.pulleys.axes, robot.pulleys.radius, targets)
@@ -212,85 +186,44 @@ def pulls(robot: Robot, targets: Array) -> Array:
     return rays / jnp.linalg.norm(rays, axis=1, keepdims=True)
 
 
-def relative_acceleration(robot: PointMassRobot, acceleration: Array) -> Array:
-    """Acceleration relative to free fall, p'' - g.
-
-    Args:
-        acceleration: (3,) z down, m/s^2.
-
-    Returns:
-        (3,) m/s^2.
-    """
+def relative_acceleration(robot: PointMassRobot, acceleration: Float[Array, "3"]) -> Float[Array, "3"]:
+    """Acceleration relative to free fall, p'' - g."""
     return acceleration.at[2].add(-robot.gravity)
 
 
 def check_numbers(mass: float, gravity: float) -> None:
-    """Refuse an invalid mass or gravity.
-
-    Args:
-        mass: kg.
-        gravity: m/s^2.
-
-    Raises:
-        InputError: not finite, or not positive.
-    """
+    """Refuse an invalid mass or gravity."""
     for key, value in (("mass", mass), ("gravity", gravity)):
         if not (np.isfinite(value) and value > 0.0):
             raise InputError(key, value, "a finite number > 0")
 
 
 def check_axis(z_axis: str) -> None:
-    """Refuse an unknown direction of z.
-
-    Raises:
-        InputError: neither "down" nor "up".
-    """
+    """Refuse an unknown direction of z."""
     if z_axis not in ("down", "up"):
         raise InputError("z_axis", z_axis, '"down" or "up"')
 
 
 def is_planar(robot: PointMassRobot) -> bool:
-    """Tell whether the robot moves in the plane y = 0.
-
-    Returns:
-        whether it does; known when a function is compiled.
-    """
+    """Tell whether the robot moves in the plane y = 0."""
     return robot.dof == PLANAR
 
 
 def rest_point(z0):
-    """P0, where the effector hangs at rest: below the centroid of the spools.
-
-    Args:
-        z0: (...) depth, m.
-
-    Returns:
-        (..., 3) from the centroid, z down, m; a NumPy array for NumPy numbers.
-    """
+    """P0, where the effector hangs at rest: below the centroid of the spools."""
     xp = jnp if isinstance(z0, jax.Array) else np
     z0 = xp.asarray(z0)
     return xp.stack([xp.zeros_like(z0), xp.zeros_like(z0), z0], axis=-1)
 
 
 @jax.jit
-def spool_radius(robot: Robot) -> Array:
-    """Largest distance of a spool from the centroid of all: the size of a robot.
-
-    Args:
-        robot: centred.
-
-    Returns:
-        () m.
-    """
+def spool_radius(robot: Robot) -> Float[Array, ""]:
+    """Largest distance of a spool from the centroid of all: the size of a robot."""
     return jnp.max(jnp.linalg.norm(robot.base_points, axis=1))
 
 
 def in_one_plane(robot: PointMassRobot) -> bool:
-    """Tell whether the spools lie in one plane, those of a planar robot on one line.
-
-    Returns:
-        whether they do.
-    """
+    """Tell whether the spools lie in one plane, those of a planar robot on one line."""
     if robot.n_cables <= robot.dof:
         return True
     points = np.asarray(robot.base_points)
@@ -299,17 +232,11 @@ def in_one_plane(robot: PointMassRobot) -> bool:
 
 
 @jax.jit
-def plane_normal(robot: Robot) -> Array:
+def plane_normal(robot: Robot) -> Float[Array, "3"]:
     """Normal of the spool plane, scaled so that its vertical component is 1.
 
     For more than three spools it is the plane of least squares. The depth of p below the plane, measured along the
     vertical, is normal . p.
-
-    Args:
-        robot: centred.
-
-    Returns:
-        (3,) the third component is 1; (0, 0, 1) for level spools.
     """
     a = robot.base_points
     if robot.dof == robot.n_cables == PLANAR:  # level

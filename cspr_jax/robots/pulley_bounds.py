@@ -33,15 +33,7 @@ class PulleyBounds(NamedTuple):
 
 
 def pulley_bounds(pulleys: Pulleys, ray: AffineBounds, velocity: AffineBounds) -> PulleyBounds:
-    """Bounds of cables behind pulleys.
-
-    Args:
-        ray: (n_cables, 3) from the entry points to the attachment points, m.
-        velocity: (n_cables, 3) of the attachment points, m/s.
-
-    Returns:
-        the bounds; radii are NaN where an attachment point may lie within its pulley, or on its swivel axis.
-    """
+    """Bounds of cables behind pulleys."""
     axes, radius = jnp.asarray(pulleys.axes), jnp.asarray(pulleys.radius)
     high = dot(ray, axes)
     across = cross(constant(axes), ray)

@@ -7,8 +7,10 @@ n, from C to the point at which the cable leaves, and t = K n along the cable, v
 n = (r v - s K v) / v.v and t = (s v + r K v) / v.v; the only angle needed is that of the wrapped arc, counted from A.
 """
 
+from __future__ import annotations
+
 import dataclasses
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -18,6 +20,9 @@ from jax import Array
 from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.arithmetic.lanes import Vector, combined, dot
 from cspr_jax.errors import InputError
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 LARGEST_RADIUS = 1e6  # m, as coordinates
 
@@ -53,20 +58,7 @@ class Exit(NamedTuple):
 
 
 def pulleys_of(radius, axes, n_cables: int, z_axis: str) -> Pulleys:
-    """Pulleys of a robot, checked.
-
-    Args:
-        radius: () or (n_cables,) m.
-        axes: (3,) or (n_cables, 3) swivel axes, of any length; None: straight up.
-        n_cables: number of cables.
-        z_axis: direction of z, "down" or "up".
-
-    Returns:
-        the pulleys, float64 NumPy leaves.
-
-    Raises:
-        InputError: other shapes, a negative radius, axes without a direction, numbers that are not finite.
-    """
+    """Pulleys of a robot, checked."""
     sizes = np.asarray(radius, float)
     if sizes.shape not in ((), (n_cables,)) or not ((sizes >= 0.0) & (sizes <= LARGEST_RADIUS)).all():
         raise InputError("pulley_radius", radius, f"a number >= 0, in m, or {n_cables}: one a cable")
@@ -82,18 +74,13 @@ def pulleys_of(radius, axes, n_cables: int, z_axis: str) -> Pulleys:
     return Pulleys(leaf(np.broadcast_to(sizes, (n_cables,))), leaf(np.broadcast_to(units, (n_cables, 3))))
 
 
-def exits(entry: Array, axis: Array, radius: Array, target: Array) -> Exit:
-    """Find where cables leave their pulleys.
-
-    Args:
-        entry: (..., 3) entry points, m.
-        axis: (..., 3) unit vectors of the swivel axes.
-        radius: (...) m; 0: no pulley.
-        target: (..., 3) attachment points, m.
-
-    Returns:
-        the exits.
-    """
+def exits(
+    entry: Float[Array, "... 3"],
+    axis: Float[Array, "... 3"],
+    radius: Float[Array, "..."],
+    target: Float[Array, "... 3"],
+) -> Exit:
+    """Find where cables leave their pulleys."""
     ray = target - entry
     # A root at 0, or what lies on the axis of no pulley, would have no derivative, also where it is not chosen.
     is_wheel = jnp.broadcast_to(radius > 0.0, ray.shape[:-1])
@@ -115,18 +102,8 @@ def exits(entry: Array, axis: Array, radius: Array, target: Array) -> Exit:
     )
 
 
-def exit_lanes(entry: Vector, axis: Vector, radius: Array, target: Vector) -> Exit:
-    """Find where cables leave their pulleys, one lane a case: the fast form of `exits`.
-
-    Args:
-        entry: of the entry point, m.
-        axis: unit vector of the swivel axis.
-        radius: (...) m; 0: no pulley.
-        target: attachment point, m.
-
-    Returns:
-        the exits.
-    """
+def exit_lanes(entry: Vector, axis: Vector, radius: Float[Array, "..."], target: Vector) -> Exit:
+    """Find where cables leave their pulleys, one lane a case: the fast form of `exits`."""
     ray = tuple(target[i] - entry[i] for i in range(3))
     high = dot(ray, axis)
     aside = tuple(ray[i] - high * axis[i] for i in range(3))

@@ -7,9 +7,11 @@ the tensions are unequal (NIST RoboCrane at a depth of its spools' radius), whil
 at every depth. The reference orientation is computed, not assumed, and so is the sign of det J.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import math
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -23,6 +25,9 @@ from cspr_jax.errors import InputError
 from cspr_jax.robots import wrench_balance
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.point_mass import rest_point
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Axes that differ less than this from the reference axes count as equal to them.
 ALIGNED = 1e-6
@@ -55,18 +60,12 @@ class Reference(NamedTuple):
     tensions: np.ndarray
 
 
-def aligned(robot: PlatformRobot) -> tuple[PlatformRobot, np.ndarray]:
+def aligned(robot: PlatformRobot) -> tuple[PlatformRobot, Float[np.ndarray, "3 3"]]:
     """A robot whose platform axes are parallel to the fixed ones in the reference orientation.
 
     On more cables than degrees of freedom a platform hangs still in many orientations. Its reference orientation is
     then the one in which its axes are parallel to those of the robot file, and so is that of a platform that does not
     turn about all axes.
-
-    Args:
-        robot: centred, in any platform axes; jax may be tracing its spools, but not its platform points.
-
-    Returns:
-        the robot, and the rotation (3, 3) from its former axes to the new ones.
     """
     if robot.n_cables > robot.dof or robot.pattern != "3R3T":
         return robot, np.eye(3)
@@ -83,18 +82,7 @@ def aligned(robot: PlatformRobot) -> tuple[PlatformRobot, np.ndarray]:
 
 
 def reference_pose(robot: PlatformRobot, z0: float) -> Reference:
-    """The reference orientation of a robot, checked.
-
-    Args:
-        robot: centred, in any platform axes.
-        z0: depth of P0 below the centroid of the spools, m.
-
-    Returns:
-        the robot at rest.
-
-    Raises:
-        InputError: singular there, or not in equilibrium with every cable taut.
-    """
+    """The reference orientation of a robot, checked."""
     turned, rotation = aligned(robot)
     hub = rest_point(np.asarray(z0, float))
     with double_precision():

@@ -78,14 +78,7 @@ MOVED = ("2T", "3T", "3R3T")  # patterns of trajectories and searches; workspace
 
 
 def check_moved(robot: Robot, *, pulleys: bool = False) -> None:
-    """Refuse a robot that no trajectory and no search moves.
-
-    Args:
-        pulleys: whether there may be pulleys.
-
-    Raises:
-        InputError: another pattern than 2T, 3T or 3R3T, or pulleys.
-    """
+    """Refuse a robot that no trajectory and no search moves."""
     if robot.pattern not in MOVED:
         known = " or ".join(f'"{name}"' for name in MOVED)
         raise InputError("pattern", robot.pattern, f"{known} (what is asked for does not exist yet for others)")
@@ -96,14 +89,7 @@ def check_moved(robot: Robot, *, pulleys: bool = False) -> None:
 
 
 def check_determined(robot: Robot, *, pulleys: bool = False) -> None:
-    """Refuse a robot whose motion does not determine its tensions.
-
-    Args:
-        pulleys: whether there may be pulleys.
-
-    Raises:
-        InputError: more cables than degrees of freedom, or what `check_moved` refuses.
-    """
+    """Refuse a robot whose motion does not determine its tensions."""
     check_moved(robot, pulleys=pulleys)
     if robot.n_cables != robot.dof:
         raise InputError(

@@ -11,8 +11,10 @@ Frobenius norm of the upper rows, which for an inverse of n unit vectors e is at
 sqrt 3 with three cables, and only cables at right angles reach this.
 """
 
+from __future__ import annotations
+
 import itertools
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -22,6 +24,9 @@ from cspr_jax.arithmetic.elementary import solved
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.robot import Robot, check_determined
 from cspr_jax.robots.wrench_balance import at_rest, is_regular, normalised_determinant
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 _TRANSLATIONS = 3
 
@@ -38,19 +43,10 @@ class Sensitivities(NamedTuple):
     sigma_r: Array
 
 
-def sensitivities(robot: Robot, position: Array, rotation: Array | None = None) -> Sensitivities:
-    """Sensitivities of a robot with as many cables as degrees of freedom, errors of all lengths independent.
-
-    Args:
-        position: (3,) m.
-        rotation: (3, 3) of a platform; None for a point mass.
-
-    Returns:
-        the sensitivities.
-
-    Raises:
-        InputError: what `check_determined` refuses.
-    """
+def sensitivities(
+    robot: Robot, position: Float[Array, "3"], rotation: Float[Array, "3 3"] | None = None
+) -> Sensitivities:
+    """Sensitivities of a robot with as many cables as degrees of freedom, errors of all lengths independent."""
     check_determined(robot)
     rotation = jnp.eye(_TRANSLATIONS) if rotation is None else rotation
     rates = -robot.wrench_matrix(at_rest(position, rotation)).T
@@ -60,24 +56,10 @@ def sensitivities(robot: Robot, position: Array, rotation: Array | None = None) 
     return _of_inverse(inverse[:_TRANSLATIONS], inverse[_TRANSLATIONS:], determinant)
 
 
-def pair_sensitivities(exit_points: Array, along: Array, size: Array, position: Array) -> Sensitivities:
-    """Sensitivities of a platform on three parallel pairs of cables in closed form, as (A1) and (A2).
-
-    For a pair with shares 1 - lambda and lambda, whose points are d apart, the rows of K give
-    (1 - lambda) rho' + lambda rho'' = e . p' and rho'' - rho' = (d x e) . omega. Independent errors of six lengths move
-    the platform as far as errors of three winches: the weighted means of both fill the same cube, whatever the shares.
-    Differences within pairs, up to twice the error of each length, turn the platform; errors of winches, equal in a
-    pair, do not.
-
-    Args:
-        exit_points: (3, 3) spools of the equivalent, m.
-        along: (3, 3) from the first point of each pair on the platform to the second, d, m.
-        size: () root of the mean square distance of the platform points from the mass centre, m.
-        position: (3,) of the mass centre, m.
-
-    Returns:
-        the sensitivities, as of six independent errors.
-    """
+def pair_sensitivities(
+    exit_points: Float[Array, "3 3"], along: Float[Array, "3 3"], size: Float[Array, ""], position: Float[Array, "3"]
+) -> Sensitivities:
+    """Sensitivities of a platform on three parallel pairs of cables in closed form, as (A1) and (A2)."""
     cables = position[None] - exit_points
     units = cables / jnp.linalg.norm(cables, axis=1, keepdims=True)
     translation, first = solved(units, jnp.eye(_TRANSLATIONS))

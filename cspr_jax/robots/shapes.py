@@ -1,13 +1,18 @@
 """Solid shapes that cables are kept clear of: spheres, cylinders with round ends, boxes, convex hulls. Without jax."""
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Callable
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from cspr_jax.arithmetic.frames import IDENTITY, Frame
 from cspr_jax.errors import InputError
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float
 
 # Squares of larger lengths lose their meaning; the same number as in `robots.point_mass`, which imports jax.
 LARGEST_LENGTH = 1e6
@@ -95,52 +100,17 @@ Body: TypeAlias = Box | Hull
 
 
 def sphere(centre, radius: float, *, name: str = "sphere") -> Sphere:
-    """A ball, its numbers checked.
-
-    Args:
-        centre: (3,) m.
-        radius: m, not negative.
-
-    Returns:
-        the ball.
-
-    Raises:
-        InputError: not three coordinates, or a radius that is negative or not finite.
-    """
+    """A ball, its numbers checked."""
     return Sphere(_point("centre", centre), _radius(radius), name)
 
 
 def cylinder(start, end, radius: float, *, name: str = "cylinder") -> Cylinder:
-    """A cylinder with round ends, its numbers checked.
-
-    Args:
-        start: (3,) start of the axis, m.
-        end: (3,) end of the axis, m; may be the start.
-        radius: m, not negative.
-
-    Returns:
-        the cylinder; it reaches beyond both ends of its axis by its radius.
-
-    Raises:
-        InputError: not three coordinates each, or a radius that is negative or not finite.
-    """
+    """A cylinder with round ends, its numbers checked."""
     return Cylinder(_point("start", start), _point("end", end), _radius(radius), name)
 
 
 def box(centre, size, quaternion=IDENTITY, *, name: str = "box") -> Box:
-    """A box, its numbers checked.
-
-    Args:
-        centre: (3,) m.
-        size: (3,) lengths of its edges, m, not negative.
-        quaternion: (4,) unit quaternion of the orientation, scalar first.
-
-    Returns:
-        the box.
-
-    Raises:
-        InputError: not three coordinates or lengths, one negative, or not a unit quaternion.
-    """
+    """A box, its numbers checked."""
     lengths, components = _point("size", size), np.asarray(quaternion, float)
     if not (lengths >= 0.0).all():
         raise InputError("size", size, "three lengths, none negative")
@@ -151,18 +121,7 @@ def box(centre, size, quaternion=IDENTITY, *, name: str = "box") -> Box:
 
 
 def box_between(lowest, highest, *, name: str = "box") -> Box:
-    """A box along the axes.
-
-    Args:
-        lowest: (3,) corner with the least coordinates, m.
-        highest: (3,) corner with the largest coordinates, m.
-
-    Returns:
-        the box.
-
-    Raises:
-        InputError: not three coordinates each, or the first above the second.
-    """
+    """A box along the axes."""
     low, high = _point("lowest", lowest), _point("highest", highest)
     if not (low <= high).all():
         raise InputError("lowest", lowest, f"nowhere above {high.tolist()}")
@@ -170,17 +129,7 @@ def box_between(lowest, highest, *, name: str = "box") -> Box:
 
 
 def hull(points, *, name: str = "hull") -> Hull:
-    """The convex hull of points.
-
-    Args:
-        points: (n, 3) m.
-
-    Returns:
-        the hull.
-
-    Raises:
-        InputError: fewer than four points, not finite, or all in a plane.
-    """
+    """The convex hull of points."""
     from scipy.spatial import ConvexHull
 
     coordinates = np.asarray(points, float)
@@ -201,30 +150,16 @@ def hull(points, *, name: str = "hull") -> Hull:
     return Hull(normals, offsets, coordinates[corners], np.array(edges), np.array(sides), name)
 
 
-def is_flat(points: np.ndarray) -> bool:
-    """Tell whether points lie in a plane.
-
-    Args:
-        points: (n, 3) m.
-
-    Returns:
-        whether they span no volume beyond rounding.
-    """
+def is_flat(points: Float[np.ndarray, "n 3"]) -> bool:
+    """Tell whether points lie in a plane."""
     if len(points) < 4:
         return True
     spread = np.linalg.svd(points - points.mean(0), compute_uv=False)
     return bool(spread[2] <= FLAT * spread[0])
 
 
-def is_within(shape: Body, points: np.ndarray) -> np.ndarray:
-    """Tell whether points belong to a shape, its surface included.
-
-    Args:
-        points: (n, 3) m.
-
-    Returns:
-        (n,) whether each is outside by at most `WITHIN`.
-    """
+def is_within(shape: Body, points: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
+    """Tell whether points belong to a shape, its surface included."""
     if isinstance(shape, Box):
         out = (np.abs((points - shape.centre) @ shape.rotation) - shape.half).max(1)
     else:
@@ -233,15 +168,7 @@ def is_within(shape: Body, points: np.ndarray) -> np.ndarray:
 
 
 def inward(shape: Obstacle, frame: Frame) -> Obstacle:
-    """An obstacle of a robot file in the kernels' coordinates.
-
-    Args:
-        shape: in the axes of the file.
-        frame: the axes of the file.
-
-    Returns:
-        the obstacle, from the centroid of the spools, z down.
-    """
+    """An obstacle of a robot file in the kernels' coordinates."""
     if isinstance(shape, Cylinder):
         return dataclasses.replace(shape, start=frame.inward(shape.start), end=frame.inward(shape.end))
     if isinstance(shape, Sphere):
@@ -250,27 +177,12 @@ def inward(shape: Obstacle, frame: Frame) -> Obstacle:
 
 
 def turned(shape: Body, frame: Frame) -> Body:
-    """The shape of a platform in the platform axes of the kernels.
-
-    Args:
-        shape: in platform axes as in the robot file.
-        frame: the axes of the file.
-
-    Returns:
-        the shape, with the same origin.
-    """
+    """The shape of a platform in the platform axes of the kernels."""
     return _changed(shape, frame.turned)
 
 
-def rotated(shape: Body, rotation: np.ndarray) -> Body:
-    """The shape of a platform in other platform axes with the same origin.
-
-    Args:
-        rotation: (3, 3) from the former axes to the new ones.
-
-    Returns:
-        the shape.
-    """
+def rotated(shape: Body, rotation: Float[np.ndarray, "3 3"]) -> Body:
+    """The shape of a platform in other platform axes with the same origin."""
     return _changed(shape, lambda vectors: vectors @ rotation.T)
 
 
@@ -294,15 +206,8 @@ def _radius(radius: float) -> float:
     return float(radius)
 
 
-def rotation_matrix(quaternion) -> np.ndarray:
-    """The rotation matrix of a unit quaternion; as `arithmetic.rotations.matrix`, without jax.
-
-    Args:
-        quaternion: (4,) scalar first.
-
-    Returns:
-        (3, 3) from the rotated axes to the fixed ones.
-    """
+def rotation_matrix(quaternion) -> Float[np.ndarray, "3 3"]:
+    """The rotation matrix of a unit quaternion; as `arithmetic.rotations.matrix`, without jax."""
     w, x, y, z = np.asarray(quaternion, float)
     vector = np.array([x, y, z])
     skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -30,10 +30,6 @@ class State(NamedTuple):
 
 
 def backwards(state: State) -> State:
-    """State of the same motion with time reversed.
-
-    Returns:
-        the state with velocity and angular velocity of the other sign.
-    """
+    """State of the same motion with time reversed."""
     turning = None if state.rotation is None else -state.angular_velocity
     return state._replace(velocity=-state.velocity, angular_velocity=turning)

@@ -48,11 +48,7 @@ class StateBounds(NamedTuple):
 
 
 def backwards(state: StateBounds) -> StateBounds:
-    """Bounds of the states of the same motion with time reversed.
-
-    Returns:
-        the bounds; their rates have the other sign, and their lines run the other way.
-    """
+    """Bounds of the states of the same motion with time reversed."""
     rates = ("velocity", "angular_velocity")
     changed = {name: -bounds if name in rates else bounds for name, bounds in state._asdict().items() if bounds}
     return StateBounds(**{name: bounds._replace(slope=-bounds.slope) for name, bounds in changed.items()})
@@ -81,12 +77,7 @@ class CableBounds(NamedTuple):
 def attachments(
     robot: AnyRobot, state: StateBounds
 ) -> tuple[AffineBounds | None, AffineBounds, AffineBounds, AffineBounds]:
-    """Bounds of the attachment points.
-
-    Returns:
-        from the mass centre, m, None for a point mass; positions, m; velocities, m/s; accelerations, m/s^2: (n_cables,
-        3) each, of a point mass (1, 3).
-    """
+    """Bounds of the attachment points."""
     target, velocity, pull = (_rows(bounds) for bounds in state[:3])
     if not isinstance(robot, PlatformRobot):
         return None, target, velocity, pull
@@ -97,12 +88,7 @@ def attachments(
 
 
 def cable_bounds(robot: AnyRobot, state: StateBounds) -> CableBounds:
-    """Bounds of the cables, also behind pulleys.
-
-    Returns:
-        the bounds, leaves (n_cables, ...); radii are NaN where a cable may have no length, or its attachment point may
-        lie within its pulley or on the swivel axis of it.
-    """
+    """Bounds of the cables, also behind pulleys."""
     arm, target, velocity, pull = attachments(robot, state)
     ray = target + -robot.base_points
     square = norm_squared(ray)
@@ -126,14 +112,7 @@ def cable_bounds(robot: AnyRobot, state: StateBounds) -> CableBounds:
 
 
 def balance_bounds(robot: AnyRobot, state: StateBounds, cables: CableBounds) -> tuple[AffineBounds, AffineBounds]:
-    """Bounds of the wrench balance: wrenches of unit tensions, and what the cables must supply.
-
-    Args:
-        cables: of the same block.
-
-    Returns:
-        (dof, n_cables) and (dof,), as `robots.robot.Robot.wrench_matrix` and `inertial_wrench`.
-    """
+    """Bounds of the wrench balance: wrenches of unit tensions, and what the cables must supply."""
     force = (state.acceleration + jnp.asarray([0.0, 0.0, -1.0]) * robot.gravity) * robot.mass
     row = PATTERNS[robot.pattern]
     forces = cables.direction.each(jnp.transpose)
@@ -167,16 +146,7 @@ def _spin_moment(robot: PlatformRobot, state: StateBounds) -> AffineBounds:
 def balanced_part(
     robot: PlatformRobot, rotation: AffineBounds, force: AffineBounds, moment: AffineBounds
 ) -> AffineBounds:
-    """Bounds of the components of wrenches that the cables balance.
-
-    Args:
-        rotation: (3, 3) from platform to fixed axes.
-        force: (3, n) N.
-        moment: (3, n) N m.
-
-    Returns:
-        (dof, n).
-    """
+    """Bounds of the components of wrenches that the cables balance."""
     row = PATTERNS[robot.pattern]
     if row.along_line:
         across = turned(rotation.each(lambda x: x[None]), across_line(robot).T)

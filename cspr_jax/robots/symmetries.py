@@ -1,12 +1,17 @@
 """Rotations about the vertical and mirror planes that leave a platform robot unchanged: tried, not assumed."""
 
+from __future__ import annotations
+
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cspr_jax.arithmetic.rotations import about_vertical
 from cspr_jax.robots.platform import PlatformRobot
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Int
 
 LARGEST_FOLD = 6
 # Points nearer to each other than this part of the robot's size are the same.
@@ -31,14 +36,7 @@ NONE = Symmetries(1, ())
 
 
 def symmetries(robot: PlatformRobot) -> Symmetries:
-    """The symmetries of a robot.
-
-    Args:
-        robot: centred, in its reference axes.
-
-    Returns:
-        the symmetries.
-    """
+    """The symmetries of a robot."""
     fold = next(k for k in range(LARGEST_FOLD, 0, -1) if _maps(robot, about_vertical(2.0 * math.pi / k)))
     # A mirror plane goes through a spool or halves the angle between two.
     base = np.asarray(robot.base_points)[:, :2]
@@ -52,30 +50,17 @@ def symmetries(robot: PlatformRobot) -> Symmetries:
     return Symmetries(fold, tuple(mirrors))
 
 
-def folded(symmetry: Symmetries, azimuths: np.ndarray) -> np.ndarray:
-    """Azimuths that represent all others at which the robot can do the same.
-
-    Args:
-        azimuths: (n,) directions from the vertical through the centroid, rad.
-
-    Returns:
-        (n,) equal for directions that symmetries take into each other.
-    """
+def folded(symmetry: Symmetries, azimuths: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
+    """Azimuths that represent all others at which the robot can do the same."""
     width = 2.0 * math.pi / symmetry.fold
     images = np.mod(np.stack([azimuths, *(2.0 * mirror - azimuths for mirror in symmetry.mirrors)]), width)
     return np.where(width - images < ROUNDING, 0.0, images).min(0)
 
 
-def alike(symmetry: Symmetries, places: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """Orientations that represent others: at a place on a mirror plane, the plane joins orientations in pairs.
-
-    Args:
-        places: (n, m) x and y from the vertical through the centroid, and all else that distinguishes places.
-        angles: (n, 3) tilt and torsion in the cylindrical frame of each place, rad.
-
-    Returns:
-        (n,) index of the first orientation that the robot can take in the same way.
-    """
+def alike(
+    symmetry: Symmetries, places: Float[np.ndarray, "n m"], angles: Float[np.ndarray, "n 3"]
+) -> Int[np.ndarray, "n"]:
+    """Orientations that represent others: at a place on a mirror plane, the plane joins orientations in pairs."""
     azimuths, stands = np.arctan2(places[:, 1], places[:, 0]), np.arange(len(places))
     mirrored = np.flatnonzero((np.abs(np.sin(azimuths[:, None] - np.asarray(symmetry.mirrors))) < ROUNDING).any(1))
     if not len(mirrored):

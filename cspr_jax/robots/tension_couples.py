@@ -1,21 +1,21 @@
 """Tension couples of a point mass on four cables from the corners of a level rectangle: Boralugoda (30) to (33)."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
 from cspr_jax.robots.point_mass import LEVEL, SPATIAL, PointMassRobot, relative_acceleration
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
-def is_rectangle(base_points: np.ndarray) -> bool:
-    """Tell whether spools are the corners of a level rectangle with sides along x and y, in their order around it.
 
-    Args:
-        base_points: (n_cables, 3) m.
-
-    Returns:
-        whether they are, to 1e-9 of the diagonal.
-    """
+def is_rectangle(base_points: Float[np.ndarray, "n_cables 3"]) -> bool:
+    """Tell whether spools are the corners of a level rectangle with sides along x and y, in their order around it."""
     points = np.asarray(base_points, float)
     if points.shape != (4, SPATIAL):
         return False
@@ -29,21 +29,13 @@ def is_rectangle(base_points: np.ndarray) -> bool:
     return bool(is_right and sizes[0, along] > small and sizes[1, 1 - along] > small)
 
 
-def tension_couples(robot: PointMassRobot, position: Array, acceleration: Array) -> Array:
+def tension_couples(
+    robot: PointMassRobot, position: Float[Array, "3"], acceleration: Float[Array, "3"]
+) -> Float[Array, "n_cables"]:
     """Tension couples T12, T23, T34, T41 of a point mass on four cables, Boralugoda (2019), (30) to (33).
 
     A couple is the pull of two cables whose spools are the ends of a side, as seen along that side, where both lie in
     one line. Unlike the tensions, couples follow from the motion alone: each two opposite couples share the force.
-
-    Args:
-        robot: a point mass whose spools are the corners of a level rectangle, see `is_rectangle`; for other robots the
-            result means nothing.
-        position: (3,) z down, m.
-        acceleration: (3,) m/s^2.
-
-    Returns:
-        (n_cables,) couple of each cable and the next one, N; negative where they would have to push, infinite or NaN in
-        the spool plane.
     """
     spools = robot.base_points
     force = robot.mass * relative_acceleration(robot, acceleration)

@@ -10,9 +10,11 @@ and again, as in the improved closed form of Pott (2013); a limit that then hold
 The largest distance from the limits is the distance of the wrench from the nearest face of `wrench_sets`.
 """
 
+from __future__ import annotations
+
 import functools
 import itertools
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -22,6 +24,9 @@ from jax import Array, lax
 from cspr_jax.arithmetic.elementary import solved
 from cspr_jax.errors import InputError
 from cspr_jax.robots.wrench_sets import FLAT, beside_faces, face_distances, one_sided_faces
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float
 
 # A limit counts as kept within the first of these parts of the largest tension; for points that are compared, within
 # the second.
@@ -61,58 +66,32 @@ class AllTensions(NamedTuple):
     kernel: Array
     is_regular: Array
 
-    def tensions(self, point: Array) -> Array:
-        """Tensions of one x.
-
-        Args:
-            point: (m,) N.
-
-        Returns:
-            (n_cables,) N.
-        """
+    def tensions(self, point: Float[Array, "m"]) -> Float[Array, "n_cables"]:
+        """Tensions of one x."""
         return self.least + point @ self.kernel
 
 
 @jax.jit
-def least_norm(matrix: Array, wrench: Array, tension_min: Array, tension_max: Array) -> Distribution:
-    """The least tensions within limits.
-
-    Args:
-        matrix: (dof, n_cables) unit columns: wrenches of unit tensions, moments over a length.
-        wrench: (dof,) wrench that the cables must supply, N.
-        tension_min: (n_cables,) N.
-        tension_max: (n_cables,) N, inf for none.
-
-    Returns:
-        the feasible tensions whose sum of squares is the smallest: (n_cables,), () residual, () whether feasible.
-
-    Raises:
-        InputError: fewer cables than components.
-    """
+def least_norm(
+    matrix: Float[Array, "dof n_cables"],
+    wrench: Float[Array, "dof"],
+    tension_min: Float[Array, "n_cables"],
+    tension_max: Float[Array, "n_cables"],
+) -> Distribution:
+    """The least tensions within limits."""
     solutions = all_tensions(matrix, wrench)
     tensions = solutions.tensions(_shortest(solutions, tension_min, tension_max))
     return checked(matrix, wrench, tension_min, tension_max, solutions, tensions)
 
 
 @jax.jit
-def centred(matrix: Array, wrench: Array, tension_min: Array, tension_max: Array) -> tuple[Distribution, Array]:
-    """The tensions that are farthest from their limits; among these the least.
-
-    Args:
-        matrix: (dof, n_cables) unit columns: wrenches of unit tensions, moments over a length.
-        wrench: (dof,) wrench that the cables must supply, N.
-        tension_min: (n_cables,) N.
-        tension_max: (n_cables,) N, inf for none.
-
-    Returns:
-        the tensions (n_cables,), their residual (), whether they are feasible (); () largest r such that
-        tension_min + r <= t <= tension_max - r, N. Where none are feasible r is negative, -inf where the cables do not
-        span all components. Where r has no limit (cables without largest tensions that pull against each other) it is
-        inf, and the tensions are those of `least_norm`.
-
-    Raises:
-        InputError: fewer cables than components.
-    """
+def centred(
+    matrix: Float[Array, "dof n_cables"],
+    wrench: Float[Array, "dof"],
+    tension_min: Float[Array, "n_cables"],
+    tension_max: Float[Array, "n_cables"],
+) -> tuple[Distribution, Array]:
+    """The tensions that are farthest from their limits; among these the least."""
     solutions = all_tensions(matrix, wrench)
     largest = _largest_distance(matrix, tension_min, tension_max, solutions)
     inwards = jnp.where(jnp.isfinite(largest), largest, 0.0)
@@ -122,68 +101,33 @@ def centred(matrix: Array, wrench: Array, tension_min: Array, tension_max: Array
 
 
 def checked(
-    matrix: Array, wrench: Array, low: Array, high: Array, solutions: AllTensions, tensions: Array
+    matrix: Float[Array, "dof n_cables"],
+    wrench: Float[Array, "dof"],
+    low: Float[Array, "n_cables"],
+    high: Float[Array, "n_cables"],
+    solutions: AllTensions,
+    tensions: Float[Array, "n_cables"],
 ) -> Distribution:
-    """Tensions with their residual and verdict.
-
-    Args:
-        matrix: (dof, n_cables) unit columns.
-        wrench: (dof,) N.
-        low: (n_cables,) N.
-        high: (n_cables,) N, inf for none.
-        solutions: of `all_tensions`.
-        tensions: (n_cables,) tensions that a rule has found, N.
-
-    Returns:
-        the tensions (n_cables,), replaced by those of least norm where they break limits; () residual; () whether the
-        returned tensions keep the limits.
-    """
+    """Tensions with their residual and verdict."""
     tensions = jnp.where(keeps(tensions, low, high), tensions, solutions.least)
     residual = jnp.linalg.norm(matrix @ tensions - wrench) / (1.0 + jnp.linalg.norm(wrench))
     return Distribution(tensions, residual, solutions.is_regular & keeps(tensions, low, high))
 
 
-def keeps(tensions: Array, low: Array, high: Array) -> Array:
-    """Tell whether tensions keep their limits, to 1e-9 of the largest.
-
-    Args:
-        tensions: (n_cables,) N.
-        low: (n_cables,) N.
-        high: (n_cables,) N, inf for none.
-
-    Returns:
-        () of bool.
-    """
+def keeps(
+    tensions: Float[Array, "n_cables"], low: Float[Array, "n_cables"], high: Float[Array, "n_cables"]
+) -> Bool[Array, ""]:
+    """Tell whether tensions keep their limits, to 1e-9 of the largest."""
     return jnp.max(jnp.abs(beyond(tensions, low, high))) <= WITHIN * jnp.max(jnp.abs(tensions))
 
 
-def beyond(tensions: Array, low: Array, high: Array) -> Array:
-    """How far tensions are below their smallest; negative: above their largest.
-
-    Args:
-        tensions: (...) N.
-        low: (...) N.
-        high: (...) N, inf for none.
-
-    Returns:
-        (...) N, 0 within the limits.
-    """
+def beyond(tensions: Float[Array, "..."], low: Float[Array, "..."], high: Float[Array, "..."]) -> Float[Array, "..."]:
+    """How far tensions are below their smallest; negative: above their largest."""
     return jnp.maximum(low - tensions, 0.0) - jnp.maximum(tensions - high, 0.0)
 
 
-def all_tensions(matrix: Array, wrench: Array) -> AllTensions:
-    """All tensions that give a wrench.
-
-    Args:
-        matrix: (dof, n_cables) unit columns.
-        wrench: (dof,) N.
-
-    Returns:
-        the tensions.
-
-    Raises:
-        InputError: fewer cables than components.
-    """
+def all_tensions(matrix: Float[Array, "dof n_cables"], wrench: Float[Array, "dof"]) -> AllTensions:
+    """All tensions that give a wrench."""
     dof, count = matrix.shape
     if count < dof:
         raise InputError("matrix", None, f"must be {dof} or more, one a cable", fault=f"{count} columns")
@@ -332,18 +276,13 @@ def _at_limits(solutions: AllTensions, low: Array, high: Array, sides: Array) ->
     return projected(solutions.kernel, sides != 0.0, jnp.zeros(solutions.kernel.shape[0]), offsets)[0]
 
 
-def projected(kernel: Array, is_held: Array, vector: Array, products: Array) -> tuple[Array, Array]:
-    """The vector nearest to another one that has given products with columns of the kernel.
-
-    Args:
-        kernel: (m, n_cables).
-        is_held: (n_cables,) mask of the columns with given products.
-        vector: (m,) the other vector.
-        products: (n_cables,) the products.
-
-    Returns:
-        (m,) the vector; (n_cables,) multiples of the columns that are subtracted.
-    """
+def projected(
+    kernel: Float[Array, "m n_cables"],
+    is_held: Bool[Array, "n_cables"],
+    vector: Float[Array, "m"],
+    products: Float[Array, "n_cables"],
+) -> tuple[Float[Array, "m"], Float[Array, "n_cables"]]:
+    """The vector nearest to another one that has given products with columns of the kernel."""
     freedom = kernel.shape[0]
     held = jnp.where(is_held[None], kernel, 0.0)
     above = jnp.concatenate([jnp.eye(freedom), held], axis=1)

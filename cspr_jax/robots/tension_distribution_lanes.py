@@ -5,8 +5,10 @@ twice. The shortest feasible x is 0, or lies on the line where one cable is at a
 allow: on each line they leave an interval, whose point nearest to 0 is a foot of the line or a point where lines meet.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import jax
 import jax.numpy as jnp
@@ -18,6 +20,9 @@ from cspr_jax.arithmetic.elementary import lesser
 from cspr_jax.arithmetic.lanes import stored
 from cspr_jax.robots.tension_distribution import ROUNDING, WITHIN, Distribution
 from cspr_jax.robots.wrench_sets import FLAT
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 Lanes = Sequence[Array]
 
@@ -200,20 +205,12 @@ def _of_batch(batch: tuple[np.ndarray, ...]) -> tuple[tuple[Array, ...], Array, 
 
 
 def least_norms(
-    matrices: np.ndarray, wrenches: np.ndarray, low: np.ndarray, high: np.ndarray
+    matrices: Float[np.ndarray, "n dof n_cables"],
+    wrenches: Float[np.ndarray, "n dof"],
+    low: Float[np.ndarray, "n n_cables"],
+    high: Float[np.ndarray, "n n_cables"],
 ) -> tuple[Distribution, np.ndarray]:
-    """The least tensions within limits of many poses.
-
-    Args:
-        matrices: (n, dof, n_cables) float64, unit columns; one or two cables more than components.
-        wrenches: (n, dof) wrenches that the cables must supply, N.
-        low: (n, n_cables) smallest tensions, N.
-        high: (n, n_cables) largest tensions, N, inf for none.
-
-    Returns:
-        NumPy arrays: tensions (n, n_cables) N, residual (n,), whether within limits (n,); (n,) whether cables are so
-        near to not spanning all components that `least_norm` should decide.
-    """
+    """The least tensions within limits of many poses."""
 
     def one(part: slice):
         arrays = tuple(x[part] for x in (matrices, wrenches, low, high))

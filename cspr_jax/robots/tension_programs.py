@@ -1,24 +1,25 @@
 """Verdicts of poses by linear programs and by least squares: slow and general, to compare with; no jax."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # A residual may be off by this part of the right-hand side.
 CLOSE = 1e-6
 
 
-def by_program(matrix: np.ndarray, wrench: np.ndarray, low: np.ndarray | None, high: np.ndarray | None) -> bool:
-    """Tell whether tensions supply a wrench, by a linear program (HiGHS): the largest s with low + s <= t <= high - s.
-
-    Args:
-        matrix: (dof, n_cables) wrench matrix, moments over a length.
-        wrench: (dof,) wrench that the cables must supply, N.
-        low: (n_cables,) smallest tensions, N; None: test wrench closure, s <= t <= 1 - s without a wrench, whatever the
-            rank of the matrix.
-        high: (n_cables,) largest tensions, N, inf for none; None: likewise.
-
-    Returns:
-        whether the largest s is positive.
-    """
+def by_program(
+    matrix: Float[np.ndarray, "dof n_cables"],
+    wrench: Float[np.ndarray, "dof"],
+    low: Float[np.ndarray, "n_cables"] | None,
+    high: Float[np.ndarray, "n_cables"] | None,
+) -> bool:
+    """Tell if tensions supply a wrench, by a linear program (HiGHS): the largest s with low + s <= t <= high - s."""
     from scipy.optimize import linprog  # takes long to import, and is rarely needed
 
     dof, count = matrix.shape
@@ -39,19 +40,13 @@ def by_program(matrix: np.ndarray, wrench: np.ndarray, low: np.ndarray | None, h
     return bool(program.status == 0 and program.x[-1] > 0.0)
 
 
-def by_squares(matrix: np.ndarray, wrench: np.ndarray, low: np.ndarray | None, high: np.ndarray | None) -> bool:
-    """Tell whether tensions supply a wrench, by least squares with none negative (NNLS).
-
-    Args:
-        matrix: (dof, n_cables) wrench matrix, moments over a length.
-        wrench: (dof,) wrench that the cables must supply, N.
-        low: (n_cables,) smallest tensions, N; None: test wrench closure, by tensions of 1 or more without a wrench,
-            whatever the rank of the matrix.
-        high: (n_cables,) largest tensions, N, inf for none; None: likewise.
-
-    Returns:
-        whether the residual is below 1e-6 of the right-hand side.
-    """
+def by_squares(
+    matrix: Float[np.ndarray, "dof n_cables"],
+    wrench: Float[np.ndarray, "dof"],
+    low: Float[np.ndarray, "n_cables"] | None,
+    high: Float[np.ndarray, "n_cables"] | None,
+) -> bool:
+    """Tell whether tensions supply a wrench, by least squares with none negative (NNLS)."""
     from scipy.optimize import nnls
 
     dof, count = matrix.shape

@@ -6,8 +6,10 @@ closed form found tensions for 12 % of the feasible poses (35 % with wider limit
 %), and neither found false ones.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -32,6 +34,9 @@ from cspr_jax.robots.tension_distribution import (
 from cspr_jax.robots.tension_distribution_lanes import FREE, least_norms
 from cspr_jax.robots.tension_rule_table import TENSION_RULES
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 BATCH = 4096
 # The p-norm takes so many steps of Newton's method, while the weight of the limits falls from first to last; compares
 # so many lengths of each step; and goes no farther than this part of the way to the nearest limit.
@@ -46,22 +51,15 @@ EXPONENT, LEAST_EXPONENT, LARGEST_EXPONENT = 4.0, 1.01, 100.0
 
 
 @jax.jit
-def closed_form(matrix: Array, wrench: Array, tension_min: Array, tension_max: Array) -> Distribution:
+def closed_form(
+    matrix: Float[Array, "dof n_cables"],
+    wrench: Float[Array, "dof"],
+    tension_min: Float[Array, "n_cables"],
+    tension_max: Float[Array, "n_cables"],
+) -> Distribution:
     """The tensions that are the nearest to the middles of their ranges: mid + W^+ (w - W mid).
 
     Pott, Bruckmann and Mikelsons (2009). They need not keep the limits where other tensions do.
-
-    Args:
-        matrix: (dof, n_cables) unit columns: wrenches of unit tensions, moments over a length.
-        wrench: (dof,) wrench that the cables must supply, N.
-        tension_min: (n_cables,) N.
-        tension_max: (n_cables,) N, finite.
-
-    Returns:
-        the tensions (n_cables,), () residual, () whether they keep the limits.
-
-    Raises:
-        InputError: fewer cables than components.
     """
     middle = 0.5 * (tension_min + tension_max)
     rest = all_tensions(matrix, wrench - matrix @ middle)
@@ -72,22 +70,15 @@ def closed_form(matrix: Array, wrench: Array, tension_min: Array, tension_max: A
 
 
 @jax.jit
-def improved_closed_form(matrix: Array, wrench: Array, tension_min: Array, tension_max: Array) -> Distribution:
+def improved_closed_form(
+    matrix: Float[Array, "dof n_cables"],
+    wrench: Float[Array, "dof"],
+    tension_min: Float[Array, "n_cables"],
+    tension_max: Float[Array, "n_cables"],
+) -> Distribution:
     """The closed form, in which the cable farthest beyond a limit is held at the limit, again and again.
 
     Pott (2013). A held cable is never let go, so that feasible tensions can be missed, though rarely.
-
-    Args:
-        matrix: (dof, n_cables) unit columns: wrenches of unit tensions, moments over a length.
-        wrench: (dof,) wrench that the cables must supply, N.
-        tension_min: (n_cables,) N.
-        tension_max: (n_cables,) N, finite.
-
-    Returns:
-        the tensions (n_cables,), () residual, () whether they keep the limits.
-
-    Raises:
-        InputError: fewer cables than components.
     """
     solutions = all_tensions(matrix, wrench)
     middle = 0.5 * (tension_min + tension_max)
@@ -119,26 +110,17 @@ def _as_found(answer: Distribution, tensions: Array, low: Array, high: Array) ->
 
 @jax.jit
 def p_norm(
-    matrix: Array, wrench: Array, tension_min: Array, tension_max: Array, reference: Array, exponent: Array
+    matrix: Float[Array, "dof n_cables"],
+    wrench: Float[Array, "dof"],
+    tension_min: Float[Array, "n_cables"],
+    tension_max: Float[Array, "n_cables"],
+    reference: Float[Array, "n_cables"],
+    exponent: Float[Array, ""],
 ) -> Distribution:
     """The tensions within limits whose p-norm about reference tensions is the least; exact to 1e-6 of their range.
 
     By Newton's method along the path of logarithmic barriers, which ends at a weight of 1e-14 of the largest value:
     active limits are then reached to 1e-10, weakly active ones to the root of the weight.
-
-    Args:
-        matrix: (dof, n_cables) unit columns: wrenches of unit tensions, moments over a length.
-        wrench: (dof,) wrench that the cables must supply, N.
-        tension_min: (n_cables,) N.
-        tension_max: (n_cables,) N, inf for none.
-        reference: (n_cables,) N.
-        exponent: () p, from 1.01 to 100.
-
-    Returns:
-        the tensions (n_cables,), () residual, () whether feasible.
-
-    Raises:
-        InputError: fewer cables than components.
     """
     solutions = all_tensions(matrix, wrench)
     size = jnp.max(jnp.abs(solutions.least)) + jnp.max(jnp.abs(tension_min)) + jnp.max(jnp.abs(reference))
@@ -227,33 +209,20 @@ _FUNCTIONS: dict[str, Callable[..., Distribution]] = {
 RULES = {name: Rule(_FUNCTIONS[name], row.is_bounded) for name, row in TENSION_RULES.items()}
 
 
-def by_rule(rule: str, matrix: Array, wrench: Array, tension_min: Array, tension_max: Array) -> Distribution:
-    """Tensions at one instant by a rule, the p-norm with the exponent 4 about `middles`.
-
-    Args:
-        rule: a name of `RULES`; known when a function is compiled.
-        matrix: (dof, n_cables) unit columns: wrenches of unit tensions, moments over a length.
-        wrench: (dof,) wrench that the cables must supply, N.
-        tension_min: (n_cables,) N.
-        tension_max: (n_cables,) N, inf for none; finite where the rule is bounded.
-
-    Returns:
-        the tensions (n_cables,), () residual, () whether they keep the limits.
-    """
+def by_rule(
+    rule: str,
+    matrix: Float[Array, "dof n_cables"],
+    wrench: Float[Array, "dof"],
+    tension_min: Float[Array, "n_cables"],
+    tension_max: Float[Array, "n_cables"],
+) -> Distribution:
+    """Tensions at one instant by a rule, the p-norm with the exponent 4 about `middles`."""
     more = (middles(tension_min, tension_max), jnp.asarray(EXPONENT)) if rule == "p-norm" else ()
     return RULES[rule].function(matrix, wrench, tension_min, tension_max, *more)
 
 
-def middles(tension_min: Array, tension_max: Array) -> Array:
-    """Middles of the ranges of the tensions, the default reference of the p-norm.
-
-    Args:
-        tension_min: (...) N.
-        tension_max: (...) N, inf for none.
-
-    Returns:
-        (...) N; the smallest tension where there is no largest.
-    """
+def middles(tension_min: Float[Array, "..."], tension_max: Float[Array, "..."]) -> Float[Array, "..."]:
+    """Middles of the ranges of the tensions, the default reference of the p-norm."""
     is_bounded = jnp.isfinite(tension_max)
     return jnp.where(is_bounded, 0.5 * (tension_min + jnp.where(is_bounded, tension_max, 0.0)), tension_min)
 
@@ -268,24 +237,7 @@ def distributions(
     reference=None,
     exponent: float = EXPONENT,
 ) -> Distribution:
-    """Tensions of many poses by a rule.
-
-    Args:
-        matrices: (n, dof, n_cables) unit columns: wrenches of unit tensions, moments over a length.
-        wrenches: (n, dof) wrenches that the cables must supply, N.
-        tension_min: (n_cables,) or (n, n_cables) N.
-        tension_max: (n_cables,) or (n, n_cables) N, inf for none.
-        rule: a name of `RULES`.
-        reference: (n_cables,) or (n, n_cables) of the p-norm, N; None: `middles`.
-        exponent: p of the p-norm, from 1.01 to 100.
-
-    Returns:
-        NumPy arrays: tensions (n, n_cables) N, residual (n,), whether within limits (n,).
-
-    Raises:
-        InputError: an unknown rule, arrays of other shapes, fewer cables than components, a rule that needs largest
-            tensions without them, an exponent that is not in range.
-    """
+    """Tensions of many poses by a rule."""
     if rule not in RULES:
         raise InputError("rule", rule, f"one of {', '.join(RULES)}")
     matrix, wrench = np.asarray(matrices, float), np.asarray(wrenches, float)

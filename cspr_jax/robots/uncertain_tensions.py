@@ -15,8 +15,10 @@ On as many cables as components a closer bound follows from there (docs/theory.m
 smallest value, d_k is made of the sum of D_kj phi_j, which is at most y w' for every y with y A' >= D_k.
 """
 
+from __future__ import annotations
+
 import dataclasses
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax.numpy as jnp
 from jax import Array, lax
@@ -28,6 +30,9 @@ from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.robots.state_bounds import CableBounds, StateBounds, balance_bounds, balanced_part
 from cspr_jax.robots.witness_tensions import witness_tensions
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Surplus of a solution, and least change of tensions, as parts of the largest of them.
 SURPLUS = 1e-9
@@ -47,34 +52,21 @@ class UncertainTensions(NamedTuple):
     high: Array
 
 
-def with_mass(robot: AnyRobot, ratio: Array) -> AnyRobot:
-    """A robot whose mass is another one, its inertia in proportion.
-
-    Args:
-        ratio: () of the masses.
-
-    Returns:
-        the robot.
-    """
+def with_mass(robot: AnyRobot, ratio: Float[Array, ""]) -> AnyRobot:
+    """A robot whose mass is another one, its inertia in proportion."""
     if isinstance(robot, PlatformRobot):
         return dataclasses.replace(robot, mass=robot.mass * ratio, inertia=robot.inertia * ratio)
     return dataclasses.replace(robot, mass=robot.mass * ratio)
 
 
 def uncertain_tensions(
-    robot: AnyRobot, state: StateBounds, cables: CableBounds, limits: tuple[Array, Array], sizes: tuple[Array, Array]
+    robot: AnyRobot,
+    state: StateBounds,
+    cables: CableBounds,
+    limits: tuple[Float[Array, "n_cables"], Float[Array, "n_cables"]],
+    sizes: tuple[Float[Array, ""], Float[Array, ""]],
 ) -> UncertainTensions:
-    """Tensions of all robots that differ from one by places of spools and of the mass centre.
-
-    Args:
-        robot: without pulleys.
-        cables: of the same block.
-        limits: (n_cables,) smallest and largest tensions, N, towards whose middle redundant tensions are chosen.
-        sizes: () largest displacements of spools, and of the mass centre, m.
-
-    Returns:
-        the tensions.
-    """
+    """Tensions of all robots that differ from one by places of spools and of the mass centre."""
     unit = 1.0 / wrench_units(robot)
     matrix, wrench = balance_bounds(robot, state, cables)
     matrix, wrench = matrix * unit[:, None], wrench * unit
@@ -141,15 +133,8 @@ def _largest_sum(block: _UnitBlock, weights: Array, centre: Array) -> Array:
     return jnp.where((within + shifted <= more).all(1), total, jnp.nan).reshape(shape)
 
 
-def centre_wrench(robot: AnyRobot, state: StateBounds, centre: Array) -> AffineBounds:
-    """Bounds of what a displaced mass centre adds to the wrench that cables must supply.
-
-    Args:
-        centre: (3,) displacement, fixed axes, m.
-
-    Returns:
-        (dof,) N, N m.
-    """
+def centre_wrench(robot: AnyRobot, state: StateBounds, centre: Float[Array, "3"]) -> AffineBounds:
+    """Bounds of what a displaced mass centre adds to the wrench that cables must supply."""
     if not isinstance(robot, PlatformRobot):
         return constant(jnp.zeros(robot.dof))
     linear = turned(_centre_influence(robot, state), centre)

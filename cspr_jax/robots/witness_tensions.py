@@ -13,7 +13,9 @@ are r from their limits give at most y w >= sum of y A_i times the limit on the 
 bounds r from above.
 """
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -23,6 +25,9 @@ from cspr_jax.arithmetic.affine_bounds import AffineBounds, constant, dot, squar
 from cspr_jax.arithmetic.elementary import solved
 from cspr_jax.robots.nearest_face import NearestFace, nearest_face
 from cspr_jax.robots.wrench_sets import FLAT
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 
 class WitnessTensions(NamedTuple):
@@ -54,18 +59,10 @@ class WitnessTensions(NamedTuple):
         return self.above.max(-1)
 
 
-def witness_tensions(matrix: AffineBounds, wrench: AffineBounds, low: Array, high: Array) -> WitnessTensions:
-    """Tensions that balance a motion throughout a block.
-
-    Args:
-        matrix: (dof, n_cables) wrenches of unit tensions, moments over a length.
-        wrench: (dof,) what the cables must supply, N.
-        low: (n_cables,) smallest tensions, N.
-        high: (n_cables,) largest tensions, N, inf for none.
-
-    Returns:
-        the tensions.
-    """
+def witness_tensions(
+    matrix: AffineBounds, wrench: AffineBounds, low: Float[Array, "n_cables"], high: Float[Array, "n_cables"]
+) -> WitnessTensions:
+    """Tensions that balance a motion throughout a block."""
     dof, count = matrix.middle.shape
     inverse = right_inverse(matrix.middle)
     if count == dof:
@@ -106,15 +103,8 @@ def _central_inverse(matrix: Array, face: NearestFace, other: Array) -> Array:
     return jnp.where(jnp.isfinite(central).all(), central, other)
 
 
-def right_inverse(matrix: Array) -> Array:
-    """Right inverse of a matrix.
-
-    Args:
-        matrix: (m, n), n >= m.
-
-    Returns:
-        (n, m).
-    """
+def right_inverse(matrix: Float[Array, "m n"]) -> Float[Array, "n m"]:
+    """Right inverse of a matrix."""
     m, n = matrix.shape
     inverse = solved(matrix if m == n else matrix @ matrix.T, jnp.eye(m))[0]
     return inverse if m == n else matrix.T @ inverse

@@ -3,16 +3,21 @@
 (3.11) is solved by adjugates, with the cables in two groups of three; the same products give the determinant.
 """
 
+from __future__ import annotations
+
 import itertools
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.arithmetic.lanes import Matrix, Vector, combined, cross, dot, turned, turned_back
 from cspr_jax.robots.platform import PlatformRobot
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 CABLES = 6  # the number for which the adjugates and Laplace's expansion here are written
 
@@ -46,15 +51,7 @@ class Balance(NamedTuple):
 
 
 def cable_lanes(robot: PlatformRobot, position: Vector, rotation: Matrix) -> CableLanes:
-    """Arms and rays of the cables, (3.1).
-
-    Args:
-        position: of the mass centre, m.
-        rotation: rows of the rotation matrix.
-
-    Returns:
-        the cables.
-    """
+    """Arms and rays of the cables, (3.1)."""
     each = {k: turned(rotation, [robot.platform_points[k, j] for j in range(3)]) for k in set(robot.joints)}
     arms = [each[k] for k in robot.joints]
     rays = [tuple(position[i] + arm[i] - robot.base_points[k, i] for i in range(3)) for k, arm in enumerate(arms)]
@@ -64,17 +61,7 @@ def cable_lanes(robot: PlatformRobot, position: Vector, rotation: Matrix) -> Cab
 def inertial_wrench(
     robot: PlatformRobot, acceleration: Vector, rotation: Matrix, omega: Vector, angular_acceleration: Vector
 ) -> tuple[Vector, Vector]:
-    """Right-hand side of (3.11), per mass.
-
-    Args:
-        acceleration: m/s^2.
-        rotation: rows of the rotation matrix.
-        omega: rad/s.
-        angular_acceleration: rad/s^2.
-
-    Returns:
-        force, m/s^2, and moment, m^2/s^2.
-    """
+    """Right-hand side of (3.11), per mass."""
     inertia = robot.inertia / robot.mass
 
     def weighted(vector):
@@ -87,15 +74,7 @@ def inertial_wrench(
 
 
 def balance(cables: CableLanes, force: Vector, moment: Vector) -> Balance:
-    """The tensions that give a wrench, (3.11).
-
-    Args:
-        force: per mass, m/s^2.
-        moment: per mass, m^2/s^2.
-
-    Returns:
-        the tensions per mass and length.
-    """
+    """The tensions that give a wrench, (3.11)."""
     pulls = [tuple(-x for x in ray) for ray in cables.rays]
     moments = [cross(arm, pull) for arm, pull in zip(cables.arms, pulls, strict=True)]
     first, second = range(0, CABLES, 2), range(1, CABLES, 2)
@@ -119,12 +98,8 @@ def balance(cables: CableLanes, force: Vector, moment: Vector) -> Balance:
     return Balance(numerators, d * determinant, -determinant, d)
 
 
-def determinant(cables: CableLanes) -> Array:
-    """Determinant of J, (3.5), as a sum of volumes of three rays times volumes of the moments of the other three.
-
-    Returns:
-        (...) m^9.
-    """
+def determinant(cables: CableLanes) -> Float[Array, "..."]:
+    """Determinant of J, (3.5), as a sum of volumes of three rays times volumes of the moments of the other three."""
     moments = [cross(arm, ray) for arm, ray in zip(cables.arms, cables.rays, strict=True)]
     total = jnp.zeros(())
     for three in itertools.combinations(range(CABLES), 3):
@@ -137,12 +112,8 @@ def determinant(cables: CableLanes) -> Array:
     return total
 
 
-def normalised_determinant(robot: PlatformRobot, cables: CableLanes) -> Array:
-    """Determinant of J with unit cables and the platform's size as unit; see `wrench_balance.normalised_determinant`.
-
-    Returns:
-        (...).
-    """
+def normalised_determinant(robot: PlatformRobot, cables: CableLanes) -> Float[Array, "..."]:
+    """Determinant of J with unit cables, the platform's size as unit; see `wrench_balance.normalised_determinant`."""
     lengths = [jnp.sqrt(dot(ray, ray)) for ray in cables.rays]
     size = jnp.sqrt(jnp.mean(jnp.sum(robot.platform_points**2, axis=1)))
     return determinant(cables) / (size**3 * math.prod(lengths[1:], start=lengths[0]))
@@ -151,17 +122,7 @@ def normalised_determinant(robot: PlatformRobot, cables: CableLanes) -> Array:
 def cable_rates(
     cables: CableLanes, velocity: Vector, acceleration: Vector, omega: Vector, angular_acceleration: Vector
 ) -> list[list[Array]]:
-    """Lengths of the cables and their first two derivatives, (3.2) and (3.3).
-
-    Args:
-        velocity: of the mass centre, per unit of time.
-        acceleration: likewise.
-        omega: angular velocity.
-        angular_acceleration: likewise.
-
-    Returns:
-        lengths, rates, accelerations: six arrays (...) each.
-    """
+    """Lengths of the cables and their first two derivatives, (3.2) and (3.3)."""
     rows = []
     for arm, ray in zip(cables.arms, cables.rays, strict=True):
         swing = cross(omega, arm)

@@ -6,10 +6,13 @@ candidates, each with both signs (hyperplane shifting: Bouchard, Gosselin and Mo
 Krut 2010). A candidate bounds nothing where a cable without a largest tension pulls beyond it.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import functools
 import itertools
 import math
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -20,6 +23,9 @@ from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PLANAR, PointMassRobot, relative_acceleration
 from cspr_jax.robots.robot import Robot
 from cspr_jax.robots.state import State
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Columns are unit vectors: d - 1 columns with a volume below this span no face; a column nearer to a plane lies in it.
 FLAT = 1e-12
@@ -53,42 +59,19 @@ class Faces:
     is_regular: Array
     closure: Array
 
-    def slacks(self, values: Array) -> Array:
-        """Distances from the planes of the faces.
-
-        Args:
-            values: (..., n_components) wrenches, or accelerations.
-
-        Returns:
-            (..., n_faces) positive inside; inf for a face that bounds nothing.
-        """
+    def slacks(self, values: Float[Array, "... n_components"]) -> Float[Array, "... n_faces"]:
+        """Distances from the planes of the faces."""
         return jnp.sum(self.normals * values[..., None, :], axis=-1) - self.offsets
 
-    def margin(self, values: Array) -> Array:
-        """Distance to the nearest face.
-
-        Args:
-            values: (..., n_components) wrenches, or accelerations.
-
-        Returns:
-            (...) inside the set the distance from its boundary, inf where it has none; outside negative, in size at
-            most the distance from the set. Where the cables span no plane (with d = 2, no line), minus the distance
-            from the wrench, or acceleration, of the smallest tensions.
-        """
+    def margin(self, values: Float[Array, "... n_components"]) -> Float[Array, "..."]:
+        """Distance to the nearest face."""
         slacks = self.slacks(values)
         least, spanned = jnp.min(slacks, axis=-1), jnp.isfinite(self.offsets).any(-1)
         flat = jnp.where(spanned, jnp.minimum(least, 0.0), -jnp.linalg.norm(values - self.apex, axis=-1))
         return jnp.where(self.is_regular, least, flat)
 
-    def rounding(self, values: Array) -> Array:
-        """Bound of the rounding error of the smallest slack.
-
-        Args:
-            values: (..., n_components) wrenches, or accelerations.
-
-        Returns:
-            (...) a margin nearer to zero than this may have either sign.
-        """
+    def rounding(self, values: Float[Array, "... n_components"]) -> Float[Array, "..."]:
+        """Bound of the rounding error of the smallest slack."""
         size = jnp.linalg.norm(values, axis=-1)[..., None]
         offsets = jnp.abs(jnp.where(jnp.isfinite(self.offsets), self.offsets, 0.0))
         each = ROUNDING * (size + offsets + jnp.linalg.norm(self.apex, axis=-1)[..., None])
@@ -121,26 +104,12 @@ def _level(rows: int, columns: int, size: int) -> tuple[np.ndarray, ...]:
 
 
 def spanning(count: int, dof: int) -> np.ndarray:
-    """Choices of cables whose directions span a face.
-
-    Args:
-        count: number of cables.
-
-    Returns:
-        (n_faces / 2, d - 1) numbers of cables from 0 on; faces of the other sign follow in the same order.
-    """
+    """Choices of cables whose directions span a face."""
     return _subsets(count, dof - 1)
 
 
-def normals_to(matrix: Array) -> Array:
-    """Normals to all choices of d - 1 columns: their generalised cross products.
-
-    Args:
-        matrix: (dof, n_cables) of dof - 1 columns or more.
-
-    Returns:
-        (n_choices, dof) in the order of `spanning`; the product with another column is the determinant of all columns.
-    """
+def normals_to(matrix: Float[Array, "dof n_cables"]) -> Float[Array, "n_choices dof"]:
+    """Normals to all choices of d - 1 columns: their generalised cross products."""
     dof, count = matrix.shape
     products = matrix.T  # products of one column, by row
     for size in range(2, dof):
@@ -154,26 +123,17 @@ def normals_to(matrix: Array) -> Array:
 
 @functools.cache
 def beside_faces(count: int, dof: int) -> np.ndarray:
-    """Cables that do not span a face.
-
-    Returns:
-        (n_choices, count - dof + 1) in the order of `wrench_sets.spanning`.
-    """
+    """Cables that do not span a face."""
     return np.array([np.setdiff1d(np.arange(count), columns) for columns in spanning(count, dof)])
 
 
-def one_sided_faces(matrix: Array, kernel: Array) -> Array:
+def one_sided_faces(
+    matrix: Float[Array, "dof n_cables"], kernel: Float[Array, "n n_cables"]
+) -> Float[Array, "n_choices n_others"]:
     """Products of a normal to each choice of d - 1 cables with the other cables.
 
     With up to two cables more than needed they are relations among the columns of the kernel, some thirty products in
     place of determinants.
-
-    Args:
-        matrix: (dof, n_cables) unit columns.
-        kernel: (n, n_cables) orthonormal tensions without a wrench, one for each cable beyond dof.
-
-    Returns:
-        (n_choices, n_others), the cables as `beside_faces` has them; 0 for cables in the face.
     """
     dof, count = matrix.shape
     chosen = beside_faces(count, dof)
@@ -196,33 +156,19 @@ def one_sided_faces(matrix: Array, kernel: Array) -> Array:
     return jnp.where(jnp.abs(along) > FLAT, along, 0.0)
 
 
-def face_distances(along: Array, slacks: Array, weights: Array) -> Array:
-    """Distances of tensions from their limits at which a face is reached.
-
-    Args:
-        along: (n, m) products of `one_sided_faces`.
-        slacks: (n,) of the faces, N.
-        weights: (n, m) parts of the distance that the cables keep.
-
-    Returns:
-        (n,) N; inf for a face that is none.
-    """
+def face_distances(
+    along: Float[Array, "n m"], slacks: Float[Array, "n"], weights: Float[Array, "n m"]
+) -> Float[Array, "n"]:
+    """Distances of tensions from their limits at which a face is reached."""
     sizes = jnp.sum(jnp.abs(along) * weights, axis=1)
     return jnp.where(sizes > 0.0, slacks / jnp.where(sizes > 0.0, sizes, 1.0), jnp.inf)
 
 
 @jax.jit
-def wrench_faces(matrix: Array, tension_min: Array, tension_max: Array) -> Faces:
-    """Faces of the set of wrenches that cables can give.
-
-    Args:
-        matrix: (dof, n_cables) unit columns: wrenches of unit tensions, moments over a length.
-        tension_min: (n_cables,) N.
-        tension_max: (n_cables,) N, inf for none.
-
-    Returns:
-        the faces, two for each choice of `spanning`.
-    """
+def wrench_faces(
+    matrix: Float[Array, "dof n_cables"], tension_min: Float[Array, "n_cables"], tension_max: Float[Array, "n_cables"]
+) -> Faces:
+    """Faces of the set of wrenches that cables can give."""
     dof, count = matrix.shape
     # A cable that ends in its own spool has no direction.
     has_directions = jnp.isfinite(matrix).all()
@@ -258,18 +204,13 @@ def _offset(along: Array, low: Array, high: Array) -> Array:
 
 
 @jax.jit
-def acceleration_faces(robot: PointMassRobot, position: Array, tension_min: Array, tension_max: Array) -> Faces:
-    """Faces of the set of accelerations that the cables of a point mass can give at one place.
-
-    Args:
-        robot: a point mass on any number of cables, z down.
-        position: (3,) m.
-        tension_min: (n_cables,) N.
-        tension_max: (n_cables,) N, inf for none.
-
-    Returns:
-        the faces, whose normals are vectors in space; y is zero for a planar robot.
-    """
+def acceleration_faces(
+    robot: PointMassRobot,
+    position: Float[Array, "3"],
+    tension_min: Float[Array, "n_cables"],
+    tension_max: Float[Array, "n_cables"],
+) -> Faces:
+    """Faces of the set of accelerations that the cables of a point mass can give at one place."""
     still = jnp.zeros_like(position)
     matrix = robot.wrench_matrix(State(position, still, still))
     faces = wrench_faces(matrix, tension_min / robot.mass, tension_max / robot.mass)
@@ -283,16 +224,8 @@ def acceleration_faces(robot: PointMassRobot, position: Array, tension_min: Arra
 
 
 @jax.jit
-def tension_range(robot: Robot, limits: Limits) -> tuple[Array, Array]:
-    """Smallest and largest tension of each cable.
-
-    Args:
-        robot: gives the number of cables.
-
-    Returns:
-        (n_cables,) smallest tensions, N, 0 where none is given; (n_cables,) largest tensions, N, inf where none is
-        given.
-    """
+def tension_range(robot: Robot, limits: Limits) -> tuple[Float[Array, "n_cables"], Float[Array, "n_cables"]]:
+    """Smallest and largest tension of each cable."""
     count = robot.n_cables
     low = jnp.zeros(count) if limits.tension_min is None else jnp.asarray(limits.tension_min)
     high = jnp.full(count, jnp.inf) if limits.tension_max is None else jnp.asarray(limits.tension_max)

@@ -61,17 +61,7 @@ _pending: list[_KeptEntries] = []
 
 
 def opened(folder: Path, warn: Callable[[str], None]) -> Path:
-    """The folder of this run, with all entries so far; its new entries are handed over at the end of the process.
-
-    Args:
-        warn: called with a line for people, once, where something there is damaged or nothing can be written.
-
-    Returns:
-        the folder.
-
-    Raises:
-        OSError: it cannot be made, or others may write there.
-    """
+    """The folder of this run, with all entries so far; its new entries are handed over at the end of the process."""
     if largest_size() >= 0 and importlib.util.find_spec("filelock") is None:
         raise OSError(errno.ENOTSUP, f"jax needs filelock for {MAX_SIZE}: pip install filelock")
     whole, run_folder = folder / "whole", folder / f"{_OWN}-{socket.gethostname()}-{os.getpid()}"
@@ -92,14 +82,7 @@ def opened(folder: Path, warn: Callable[[str], None]) -> Path:
 
 
 def check_owner(folder: Path, *, may_be_shared: bool = False) -> None:
-    """Refuse a folder in which others could place code for us to execute.
-
-    Args:
-        may_be_shared: whether all may write there as in /tmp, where nobody can replace a folder of ours.
-
-    Raises:
-        OSError: somebody else owns it or may write there, or it is none.
-    """
+    """Refuse a folder in which others could place code for us to execute."""
     status = folder.lstat() if not may_be_shared else folder.stat()
     if not stat.S_ISDIR(status.st_mode):
         raise OSError(errno.ENOTDIR, "is no folder")
@@ -114,17 +97,7 @@ def check_owner(folder: Path, *, may_be_shared: bool = False) -> None:
 
 
 def plain_bytes(path: Path, most: int = LARGEST_ENTRY) -> bytes:
-    """Content of a plain file; nothing that lies in its place, such as a pipe, holds up the reader.
-
-    Args:
-        most: largest size, bytes.
-
-    Returns:
-        the content.
-
-    Raises:
-        OSError: no plain file, a larger one, or it cannot be read.
-    """
+    """Content of a plain file; nothing that lies in its place, such as a pipe, holds up the reader."""
     flags = (getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
     descriptor = os.open(path, os.O_RDONLY | sum(flags))
     with os.fdopen(descriptor, "rb") as file:
@@ -135,11 +108,7 @@ def plain_bytes(path: Path, most: int = LARGEST_ENTRY) -> bytes:
 
 
 def largest_size() -> int:
-    """Bytes that jax is told to keep at most.
-
-    Returns:
-        the size; -1: no limit.
-    """
+    """Bytes that jax is told to keep at most."""
     loaded = sys.modules.get("jax")
     if loaded is not None:
         return int(loaded.config.jax_compilation_cache_max_size)
@@ -203,14 +172,7 @@ def hand_over() -> None:
 
 
 def set_aside(beginning: str) -> int:
-    """Forget kept entries that cannot be used: what is compiled now takes their place.
-
-    Args:
-        beginning: of their names.
-
-    Returns:
-        how many there were.
-    """
+    """Forget kept entries that cannot be used: what is compiled now takes their place."""
     count = 0
     for run in _pending:
         names = {name for name in run.taken if name.startswith(beginning)} - run.unusable
@@ -303,14 +265,7 @@ def _ending(name: str) -> bytes:
 
 
 def checksum_of(name: str, data: bytes) -> str:
-    """Checksum in the name of a kept entry.
-
-    Args:
-        name: of the entry, without the checksum: equal content under another name has another one.
-
-    Returns:
-        16 hexadecimal digits.
-    """
+    """Checksum in the name of a kept entry."""
     return hashlib.sha256(os.fsencode(name) + b"\0" + data).hexdigest()[:16]
 
 

@@ -11,11 +11,5 @@ QUICK = (
 
 
 def least() -> dict[str, int] | None:
-    """Options of jax.jit for kernels of proofs, a third of that time: a motion takes few blocks.
-
-    They must not be called by other compiled functions.
-
-    Returns:
-        the options; None where XLA's flags in the environment are not those of `QUICK`.
-    """
+    """Options of jax.jit for kernels of proofs, a third of that time: a motion takes few blocks."""
     return {"xla_backend_optimization_level": 0} if QUICK[0] in os.environ.get("XLA_FLAGS", "") else None

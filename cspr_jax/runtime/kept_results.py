@@ -27,17 +27,7 @@ LARGEST_RESULT = 1 << 24  # bytes, not compressed
 
 
 def kept_result(name: str, settings: Any, compute: Callable[[], Any], *, again: bool = False) -> Any:
-    """A result of the same sources, libraries and settings: that of an earlier run, or else one that is kept from now.
-
-    Args:
-        name: of the computation, for the name of its file.
-        settings: all else that decides the result, as JSON writes it.
-        compute: gives the result, as JSON writes it.
-        again: whether it is computed in any case.
-
-    Returns:
-        the result; without a folder of compiled code it is computed, and not kept.
-    """
+    """A result of the same sources, libraries and settings: that of an earlier run, else one that is kept from now."""
     folder = os.environ.get(PROGRAMS)
     if not folder:
         return compute()

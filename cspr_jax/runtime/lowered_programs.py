@@ -35,15 +35,7 @@ class LoweredProgram(NamedTuple):
 
 
 def lowered(function: Callable, leaves: Sequence[Any]) -> LoweredProgram | None:
-    """Trace and lower a function.
-
-    Args:
-        function: takes arrays, and returns a list of arrays; for one processor.
-        leaves: arguments, or others of their shapes.
-
-    Returns:
-        its program; None: it does not say all that the function does.
-    """
+    """Trace and lower a function."""
     # The module has all of the arguments, used or not.
     traced = jax.jit(function, keep_unused=True).trace(*leaves)
     results = traced.jaxpr.out_avals
@@ -58,14 +50,7 @@ def lowered(function: Callable, leaves: Sequence[Any]) -> LoweredProgram | None:
 
 
 def call(program: LoweredProgram, *leaves: Any) -> list:
-    """Results of a program, inside of a function that jax compiles.
-
-    Args:
-        leaves: arrays of the shapes that the program was lowered for.
-
-    Returns:
-        arrays.
-    """
+    """Results of a program, inside of a function that jax compiles."""
     return _primitive().bind(*leaves, program=program)
 
 

@@ -10,17 +10,7 @@ _STEP, _ZSTD = 1 << 20, b"\x28\xb5\x2f\xfd"
 
 
 def inflated(data: bytes, most: int) -> bytes:
-    """Content of what zlib has packed, if it is all there and no larger than it may be.
-
-    Args:
-        most: largest size of the content, bytes.
-
-    Returns:
-        the content.
-
-    Raises:
-        ValueError: it is not all there, is larger, or something else.
-    """
+    """Content of what zlib has packed, if it is all there and no larger than it may be."""
     reader = zlib.decompressobj()
     try:
         content = reader.decompress(data, most)
@@ -32,11 +22,7 @@ def inflated(data: bytes, most: int) -> bytes:
 
 
 def is_whole(data: bytes) -> bool:
-    """Tell whether packed code is all there: a full disk, or the end of the process, may have left half of it.
-
-    Returns:
-        whether it is.
-    """
+    """Tell whether packed code is all there: a full disk, or the end of the process, may have left half of it."""
     if data[:1] == b"x":  # zlib's
         return _is_whole_zlib(data)
     for module in ("compression.zstd", "zstandard"):
@@ -71,11 +57,7 @@ def _is_whole_zstd(zstd, data: bytes) -> bool:
 
 
 def is_too_large(data: bytes) -> bool:
-    """Tell whether packed code holds more than it may: jax would inflate it at one go.
-
-    Returns:
-        whether it does.
-    """
+    """Tell whether packed code holds more than it may: jax would inflate it at one go."""
     if data.startswith(_ZSTD):
         return _size_of_zstd(data) > LARGEST_CODE
     return len(data) > LARGEST_CODE // _DENSEST and not is_whole(data)

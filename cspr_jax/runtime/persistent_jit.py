@@ -59,14 +59,6 @@ def persistent_jit(
     """Compile a function like `jax.jit`, and keep its programs where compiled code is kept.
 
     Inside of other compiled functions, and wherever a program cannot be kept, it is `jax.jit`.
-
-    Args:
-        function: of a module of this package, without positional-only arguments; None: the result is a decorator.
-        static_argnames: as of `jax.jit`.
-        compiler_options: likewise.
-
-    Returns:
-        the compiled function.
     """
     static = (static_argnames,) if isinstance(static_argnames, str) else tuple(static_argnames)
     if function is None:

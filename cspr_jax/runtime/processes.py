@@ -29,27 +29,13 @@ _NO_COMPLAINT = "ignore:resource_tracker:UserWarning"
 
 
 def check_count(count: int | None) -> None:
-    """Refuse an impossible number of workers.
-
-    Args:
-        count: the number; None: the usual one.
-
-    Raises:
-        ConfigError: it is below 1, or too large.
-    """
+    """Refuse an impossible number of workers."""
     if count is not None and not (isinstance(count, int) and 1 <= count <= LARGEST):
         raise ConfigError("--workers", f"{count}: must be an integer from 1 to {LARGEST}")
 
 
 def usual_count(parts: int) -> int:
-    """Number of processes for work that gains by them, where the user gives none.
-
-    Args:
-        parts: into which the work can be divided.
-
-    Returns:
-        one for each core, and no more than parts; 1 on a GPU, which they would have to share.
-    """
+    """Number of processes for work that gains by them, where the user gives none."""
     import jax
 
     return max(1, min(cores(), MOST, parts)) if jax.default_backend() == "cpu" else 1
@@ -87,14 +73,7 @@ class Workers:
             )
 
     def submit(self, function: Callable, *arguments: Any) -> concurrent.futures.Future:
-        """Have a worker call a function.
-
-        Args:
-            arguments: those of the function.
-
-        Returns:
-            its result, when there is one.
-        """
+        """Have a worker call a function."""
         with _signals_blocked(), _environment(self._settings):  # workers inherit both from the start
             return self._pool.submit(function, *arguments)
 
@@ -133,18 +112,7 @@ class Spread:
             self._workers.close()
 
     def __call__(self, function: Callable[[list], list], items: Sequence, sizes: Sequence[float]) -> list:
-        """Results of a function, in order.
-
-        Args:
-            function: returns one result for each of a list of items; it can be pickled.
-            sizes: time that each item takes, in any unit.
-
-        Returns:
-            one result for each item.
-
-        Raises:
-            ResourceError: a worker died.
-        """
+        """Results of a function, in order."""
         if self._workers is None:
             return function(list(items))
         groups = balanced(sizes, GROUPS * self._count)
@@ -161,15 +129,7 @@ class Spread:
 
 
 def balanced(sizes: Sequence[float], count: int) -> list[list[int]]:
-    """Groups of items that take nearly equally long.
-
-    Args:
-        sizes: of each item.
-        count: how many groups at most.
-
-    Returns:
-        numbers of the items of each group, from 0 on; no group is empty, the largest comes first.
-    """
+    """Groups of items that take nearly equally long."""
     groups: list[list[int]] = [[] for _ in range(min(count, len(sizes)))]
     whole = [0.0] * len(groups)
     for k in sorted(range(len(sizes)), key=lambda k: -sizes[k]):

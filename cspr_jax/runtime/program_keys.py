@@ -24,17 +24,7 @@ class Undescribed(Exception):
 
 
 def described(value: Any) -> Any:
-    """Description of a static argument or of the static part of a pytree: equal for equal values in every process.
-
-    Args:
-        value: numbers, words, arrays of NumPy, functions and classes by their names, and what is made of these.
-
-    Returns:
-        what `json` writes.
-
-    Raises:
-        Undescribed: it holds something else, such as a function within a function.
-    """
+    """Description of a static argument or of the static part of a pytree: equal for equal values in every process."""
     if type(value) in _PLAIN:
         return value
     for is_kind, parts in _KINDS:
@@ -78,17 +68,7 @@ def _fields(value: Any) -> dict[str, Any]:
 
 
 def name_of(thing: Any) -> str:
-    """Name by which a process finds a class or a function.
-
-    Args:
-        thing: of one of the packages that a key covers.
-
-    Returns:
-        module:name.
-
-    Raises:
-        Undescribed: nothing, or something else, is found there.
-    """
+    """Name by which a process finds a class or a function."""
     name = f"{getattr(thing, '__module__', None) or 'builtins'}:{getattr(thing, '__qualname__', '')}"
     try:
         is_there = _named(name) is thing
@@ -108,17 +88,7 @@ def _named(name: str) -> Any:
 
 
 def described_tree(tree: Any) -> Any:
-    """Description of the structure of a pytree, with its static parts.
-
-    Args:
-        tree: `jax.tree.structure` of it.
-
-    Returns:
-        what `json` writes.
-
-    Raises:
-        Undescribed: a static part has no description.
-    """
+    """Description of the structure of a pytree, with its static parts."""
     node = tree.node_data()
     if node is None:
         return "leaf"
@@ -127,17 +97,7 @@ def described_tree(tree: Any) -> Any:
 
 
 def tree_of(description: Any) -> Any:
-    """Structure of a pytree from its description.
-
-    Args:
-        description: of `described_tree`.
-
-    Returns:
-        the structure, as `jax.tree.structure` gives it.
-
-    Raises:
-        Undescribed: static parts that this does not make again, or something that is no description.
-    """
+    """Structure of a pytree from its description."""
     if description == "leaf":
         return jax.tree.structure(0)
     kind, static, children = description

@@ -47,11 +47,7 @@ class Pace:
         self.ends = instant + (total - done) / self.rate if self.rate > 0.0 else None
 
     def left(self) -> str:
-        """Time that is left, in words.
-
-        Returns:
-            such as "0:12:34 left"; "" before the first tile.
-        """
+        """Time that is left, in words."""
         if self.ends is None:
             return ""
         return f"{datetime.timedelta(seconds=round(max(self.ends - self._clock(), 0.0)))} left"
@@ -59,11 +55,7 @@ class Pace:
 
 @contextlib.contextmanager
 def progress() -> Iterator[Callable[[int, int], None]]:
-    """Show how far a sweep is: in a bar at a terminal, elsewhere by a line a minute on standard error.
-
-    Yields:
-        a function to be called with the number of cells done and of all cells.
-    """
+    """Show how far a sweep is: in a bar at a terminal, elsewhere by a line a minute on standard error."""
     if not sys.stderr.isatty():
         with _lines() as on_tile:
             yield on_tile
@@ -136,9 +128,6 @@ def waiting() -> Iterator[None]:
     """Show the stage of the work while the block runs: on a terminal all the time, elsewhere by a line a minute.
 
     How much work begins is written at once. Nothing may be printed meanwhile.
-
-    Yields:
-        nothing.
     """
     if not sys.stderr.isatty():
         latest = ["starting"]

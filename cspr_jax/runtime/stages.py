@@ -31,35 +31,20 @@ _board = _Board()
 
 
 def stage(text: str) -> None:
-    """Announce the stage that begins now.
-
-    Args:
-        text: a few words, such as "arcs 5 of 20".
-    """
+    """Announce the stage that begins now."""
     _board.now = text
     _board.tell()
 
 
 def amount(text: str) -> None:
-    """Announce how much work begins now, if that may take minutes.
-
-    Args:
-        text: a line, such as "450 sections with 90,000 cells".
-    """
+    """Announce how much work begins now, if that may take minutes."""
     if _board.amount_listener is not None:
         _board.amount_listener(text)
 
 
 @contextlib.contextmanager
 def within(text: str) -> Iterator[None]:
-    """Announce work of which the stages of a block are parts.
-
-    Args:
-        text: a few words, such as "table 3.2: quintic".
-
-    Yields:
-        nothing.
-    """
+    """Announce work of which the stages of a block are parts."""
     _board.around.append(text)
     stage("")
     try:
@@ -70,11 +55,7 @@ def within(text: str) -> Iterator[None]:
 
 
 def compiling(name: str | None) -> None:
-    """Announce the function that this thread compiles.
-
-    Args:
-        name: of the function; None: it compiles nothing any more.
-    """
+    """Announce the function that this thread compiles."""
     _board.compiling.pop(threading.get_ident(), None)
     if name is not None:
         _board.compiling[threading.get_ident()] = name
@@ -83,15 +64,7 @@ def compiling(name: str | None) -> None:
 
 @contextlib.contextmanager
 def heard(listener: Listener, amounts: Listener | None = None) -> Iterator[None]:
-    """Listen to the stages while the block runs.
-
-    Args:
-        listener: called with a line, from any thread.
-        amounts: called with what `amount` announces.
-
-    Yields:
-        nothing.
-    """
+    """Listen to the stages while the block runs."""
     before = _board.listener, _board.amount_listener
     _board.listener, _board.amount_listener = listener, amounts
     try:

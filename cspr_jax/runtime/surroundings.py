@@ -74,9 +74,6 @@ def check_matplotlibrc() -> None:
 
     Such a file can also ask for the user's locale. Where the system does not have that one, programs use C instead,
     and matplotlib is told so.
-
-    Raises:
-        ConfigError: it cannot be read.
     """
     path = Path("matplotlibrc")
     must = "must be UTF-8 text that can be read, since matplotlib reads it in the working folder"
@@ -97,14 +94,7 @@ def check_matplotlibrc() -> None:
 
 
 def check_threads(count: int = 0) -> None:
-    """Refuse to begin where libraries could not start their threads: they would end the process, or send it a Ctrl-C.
-
-    Args:
-        count: number of threads besides those that every command needs.
-
-    Raises:
-        ResourceError: they cannot be started.
-    """
+    """Refuse to begin where libraries could not start threads: they would end the process, or send it a Ctrl-C."""
     over, started = threading.Event(), list[threading.Thread]()
     size = threading.stack_size(_SMALL_STACK)
     try:
@@ -122,14 +112,7 @@ def check_threads(count: int = 0) -> None:
 
 
 def check_threads_of_jax(processes: int = 0) -> None:
-    """Refuse to begin where jax could not start its threads, or map what it compiles: LLVM would end the process.
-
-    Args:
-        processes: number of processes that share the cores, each with a jax of its own; 0: this process computes.
-
-    Raises:
-        ResourceError: they cannot be started.
-    """
+    """Refuse to begin where jax could not start its threads, or map what it compiles: LLVM would end the process."""
     most = resource.getrlimit(resource.RLIMIT_AS)[0]
     if 0 <= most < LEAST_MEMORY:
         raise ResourceError(_MEMORY)
@@ -138,11 +121,7 @@ def check_threads_of_jax(processes: int = 0) -> None:
 
 
 def shortage(error: Exception) -> str | None:
-    """Name the resource that the machine lacks, if that is why something failed.
-
-    Returns:
-        a line; None for any other failure.
-    """
+    """Name the resource that the machine lacks, if that is why something failed."""
     text = str(error)
     if isinstance(error, MemoryError) or (
         isinstance(error, RuntimeError | ImportError) and any(words in text for words in _NO_MEMORY)

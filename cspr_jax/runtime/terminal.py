@@ -41,37 +41,19 @@ def encodable(stream: IO[str]) -> None:
 
 
 def plainer(text: str, encoding: str | None) -> str:
-    """Text as a stream of an encoding shows it.
-
-    Args:
-        encoding: of the stream; None: one that has all signs.
-
-    Returns:
-        the text, with plainer signs where the encoding lacks some.
-    """
+    """Text as a stream of an encoding shows it."""
     return text.encode(encoding, _PLAINER).decode(encoding) if encoding else text
 
 
 def cell(*lines: object, style: str = "") -> "Text":
-    """A cell, a head, a title or a note of a table of rich, in which nothing is markup.
-
-    Args:
-        lines: anything; each becomes one line.
-
-    Returns:
-        the text.
-    """
+    """A cell, a head, a title or a note of a table of rich, in which nothing is markup."""
     from rich.text import Text  # imported only where tables are printed
 
     return Text("\n".join(map(printable, lines)), style=style)
 
 
 def print_table(renderable: Any, file: TextIO) -> None:
-    """Print a table of rich whose texts are its `Text`; it is changed where the encoding lacks signs.
-
-    Args:
-        renderable: a table, a text, or a group of them.
-    """
+    """Print a table of rich whose texts are its `Text`; it is changed where the encoding lacks signs."""
     from rich.console import Console as Usual
 
     class Console(Usual):

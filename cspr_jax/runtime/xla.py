@@ -60,18 +60,7 @@ def prepare(
     quick: bool = False,
     prefers_cpu: bool = False,
 ) -> None:
-    """Set the variables that jax reads when it is imported; nothing if it has been imported.
-
-    Args:
-        device: "cpu"; "gpu" and None leave the choice to jax, but with `quick` or `prefers_cpu` None is the CPU.
-        warn: called with a line for people where compiled code cannot be kept.
-        quick: whether little is computed, so that compiling in less time is worth more than faster code.
-        prefers_cpu: whether a GPU would take longer: it has to be started, its code takes two to three times as long to
-            compile, and each call waits for it.
-
-    Raises:
-        ConfigError: XLA ends the process that has the user's XLA_FLAGS.
-    """
+    """Set the variables that jax reads when it is imported; nothing if it has been imported."""
     if "jax" in sys.modules:
         return
     if device != "gpu":  # a user who asks for a GPU sees why there is none
@@ -137,14 +126,7 @@ def _keep(folder: Path, warn: Callable[[str], None]) -> Path | None:
 
 
 def check_device(device: str | None) -> None:
-    """Refuse a device that is not there; starts jax where one is asked for, by the user or by JAX_PLATFORMS.
-
-    Args:
-        device: "cpu", "gpu" or None.
-
-    Raises:
-        ConfigError: jax has none, or refuses a setting in the environment.
-    """
+    """Refuse a device that is not there; starts jax where one is asked for, by the user or by JAX_PLATFORMS."""
     try:
         import jax
     except ValueError as error:
@@ -250,15 +232,7 @@ def _flags(folder: Path, settings: str, *, quick: bool = False) -> str:
 
 
 def known_flags(folder: Path, flags: Sequence[str]) -> list[str]:
-    """Flags that this XLA knows, of some: it ends a process whose XLA_FLAGS name another one.
-
-    Args:
-        folder: where answers are kept for later processes.
-        flags: words such as "--xla_backend_optimization_level=1".
-
-    Returns:
-        the flags, in their order.
-    """
+    """Flags that this XLA knows, of some: it ends a process whose XLA_FLAGS name another one."""
     refusal = _refusal(folder, " ".join(flags)) if flags else ""
     if refusal is None:  # there was no answer
         return []

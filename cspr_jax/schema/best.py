@@ -5,8 +5,10 @@ else an undecided one; among several, the one with the fewest arcs, or the best 
 equals, the one with the largest margin.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -14,6 +16,9 @@ from cspr_jax.errors import InputError
 from cspr_jax.schema.meanings import CELL_SIDES
 from cspr_jax.schema.quantities import AXES, BEST, QUANTITIES, best_name
 from cspr_jax.schema.verdicts import FLAGS, Verdict
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # These quantities tell first which of two points is better, if the kind of map does not say; then any other that can.
 FIRST = ("arcs", "oscillations", "release_speed", "margin")
@@ -36,36 +41,16 @@ class Best(NamedTuple):
 
 
 def check_axis(axis: str, known: Sequence[str]) -> None:
-    """Refuse an axis of which no best point can be chosen.
-
-    Args:
-        known: axes that there are.
-
-    Raises:
-        InputError: no such axis, or one along which a motion or a robot has all points.
-    """
+    """Refuse an axis of which no best point can be chosen."""
     allowed = [name for name in known if name not in AXES or best_name(name) in BEST]
     if axis not in allowed:
         raise InputError("--best", axis, f"one of {', '.join(allowed)}" if allowed else "absent: there is no such axis")
 
 
 def best_of(
-    data: Mapping[str, np.ndarray], name: str, points: np.ndarray, place: int, pictured: Sequence[str] = ()
+    data: Mapping[str, np.ndarray], name: str, points: Float[np.ndarray, "n"], place: int, pictured: Sequence[str] = ()
 ) -> Best:
-    """Reduce arrays over one of their axes.
-
-    Args:
-        data: (..., n, ...) by names of the table of quantities; further dimensions may follow.
-        points: (n,) of the axis.
-        place: of the axis among the dimensions.
-        pictured: quantities that the map is about, the first one first.
-
-    Returns:
-        the arrays without that axis.
-
-    Raises:
-        InputError: nothing tells which point is better.
-    """
+    """Reduce arrays over one of their axes."""
     order = ranked(data, pictured)
     verdict = data.get("verdict")
     if not order and verdict is None:
@@ -86,15 +71,7 @@ def best_of(
 
 
 def ranked(names: Mapping[str, np.ndarray], pictured: Sequence[str] = ()) -> list[str]:
-    """Quantities that tell which of two cells is better, the first one first.
-
-    Args:
-        names: of the quantities that there are.
-        pictured: as in `best_of`.
-
-    Returns:
-        the quantities whose row says which numbers are better.
-    """
+    """Quantities that tell which of two cells is better, the first one first."""
     order = dict.fromkeys((*pictured, *FIRST, *QUANTITIES))
     return [name for name in order if name in names and QUANTITIES[name].better]
 

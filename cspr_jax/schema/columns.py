@@ -26,45 +26,17 @@ class Columns:
         return "\n".join(lines)
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """The fields that are arrays.
-
-        Returns:
-            (n, ...) each, by name.
-        """
+        """The fields that are arrays."""
         return {name: values for name, values in vars(self).items() if isinstance(values, np.ndarray)}
 
     def to_xarray(self, dims: Mapping[str, Any] | None = None) -> "xarray.Dataset":
-        """The answers for xarray, with units and long names.
-
-        Args:
-            dims: names and coordinates of the dimensions whose product the n answers are, the last one varying fastest;
-                None: one dimension "target".
-
-        Returns:
-            the fields over these dimensions; those of both ends of a segment over "end", too.
-
-        Raises:
-            InputError: dimensions of another number of points.
-            ConfigError: xarray is not installed.
-        """
+        """The answers for xarray, with units and long names."""
         from cspr_jax.schema import labelled
 
         return labelled.over(self.arrays(), dims)
 
     def best(self, axis: str, dims: Mapping[str, Any]) -> dict[str, np.ndarray]:
-        """The answers at the best point of one of the dimensions whose product they are, as of a map.
-
-        Args:
-            axis: of `dims`, such as "z0".
-            dims: as for `to_xarray`.
-
-        Returns:
-            the fields over the other dimensions by name, and as "best_z0" the point chosen, NaN where none is feasible;
-            `store.result.Result.best` says which one that is.
-
-        Raises:
-            InputError: dimensions of another number of points, or an axis that is none of them.
-        """
+        """The answers at the best point of one of the dimensions whose product they are, as of a map."""
         from cspr_jax.schema import labelled
         from cspr_jax.schema.best import best_of, check_axis
 

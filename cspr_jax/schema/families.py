@@ -60,14 +60,7 @@ class Family:
     precedes_searches: bool = False
 
     def leg(self, pattern: str) -> Any:
-        """Class that joins the poses of a robot.
-
-        Returns:
-            the class.
-
-        Raises:
-            KeyError: the family does not move such robots.
-        """
+        """Class that joins the poses of a robot."""
         module, _, name = self.legs[pattern].partition(":")
         return getattr(importlib.import_module(module), name)
 
@@ -203,24 +196,13 @@ FAMILIES: dict[str, Family] = ExtensibleRows({row.name: row for row in _ROWS}, "
 
 
 def moving(pattern: str) -> list[str]:
-    """Names of the families that move a robot.
-
-    Returns:
-        the names.
-    """
+    """Names of the families that move a robot."""
     return [row.name for row in FAMILIES.values() if pattern in row.legs]
 
 
 @contextlib.contextmanager
 def registered(family: Family) -> Iterator[None]:
-    """Add a family for as long as a block lasts.
-
-    Args:
-        family: its row; the module that it names is imported when it is first used.
-
-    Yields:
-        nothing.
-    """
+    """Add a family for as long as a block lasts."""
     FAMILIES[family.name] = family
     try:
         yield

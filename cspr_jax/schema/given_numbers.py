@@ -22,17 +22,6 @@ def numbers(key: str, value: Any, allowed: str) -> np.ndarray:
 
     Strings, truth values and complex numbers are refused: NumPy would read the first two as numbers, and drop the
     imaginary part of the last.
-
-    Args:
-        key: named in errors.
-        value: number or nested sequence.
-        allowed: allowed numbers, in words, for errors.
-
-    Returns:
-        float64 array.
-
-    Raises:
-        InputError: no real numbers, or rows of several lengths.
     """
     try:
         values = np.asarray(value)
@@ -48,20 +37,7 @@ def numbers(key: str, value: Any, allowed: str) -> np.ndarray:
 
 
 def whole(key: str, value: Any, least: int, largest: int) -> int:
-    """Integer that a caller gave.
-
-    Args:
-        key: named in errors.
-        value: an integer of Python or NumPy, or an array of one.
-        least: smallest that is allowed.
-        largest: largest that is allowed.
-
-    Returns:
-        a Python integer.
-
-    Raises:
-        InputError: no integer, or out of the range.
-    """
+    """Integer that a caller gave."""
     allowed = f"an integer from {least} to {largest}"
     try:
         number = operator.index(value)
@@ -95,18 +71,7 @@ class Numbers:
     nan: bool = False
 
     def array(self, key: str, value: Any) -> np.ndarray:
-        """The numbers.
-
-        Args:
-            key: named in errors.
-            value: number or nested sequence.
-
-        Returns:
-            float64 array.
-
-        Raises:
-            InputError: no real numbers, another shape, or a number out of the range.
-        """
+        """The numbers."""
         values = numbers(key, value, self.allowed)
         if self.shapes is not None and not any(_fits(values.shape, shape) for shape in self.shapes):
             if not values.ndim:

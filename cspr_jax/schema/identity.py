@@ -10,47 +10,22 @@ FORMAT_VERSION = 2
 
 
 def canonical_json(value: Any) -> str:
-    """JSON with sorted keys and no spaces: equal values give equal text.
-
-    Args:
-        value: dictionaries, lists, texts, finite numbers, booleans, None.
-
-    Returns:
-        the text.
-    """
+    """JSON with sorted keys and no spaces: equal values give equal text."""
     return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
 def digest(value: Any) -> str:
-    """Hash of a value.
-
-    Args:
-        value: as for `canonical_json`.
-
-    Returns:
-        64 hexadecimal digits.
-    """
+    """Hash of a value."""
     return hashlib.sha256(canonical_json(value).encode()).hexdigest()
 
 
 def identity(settings: dict[str, Any]) -> str:
-    """Hash of resolved settings and the version of the file format.
-
-    Args:
-        settings: with all defaults filled in.
-
-    Returns:
-        64 hexadecimal digits.
-    """
+    """Hash of resolved settings and the version of the file format."""
     return digest({"format": FORMAT_VERSION, **settings})
 
 
 def differences(here: dict[str, Any], there: dict[str, Any]) -> list[str]:
-    """Differences between two sets of settings, one phrase a key.
-
-    Returns:
-        "key = value here, value there", sorted by key.
-    """
+    """Differences between two sets of settings, one phrase a key."""
     values, before = _flat(here), _flat(there)
     return [
         f"{key} = {shown(values.get(key))} here, {shown(before.get(key))} there"

@@ -20,11 +20,7 @@ CONTROL_POINTS = ("start", "middle", "end")
 
 
 def need_xarray() -> None:
-    """Refuse to begin the computation of a dataset where xarray is missing.
-
-    Raises:
-        ConfigError: it is not installed.
-    """
+    """Refuse to begin the computation of a dataset where xarray is missing."""
     try:
         import xarray  # noqa: F401
     except ImportError as error:
@@ -37,19 +33,7 @@ def dataset(
     attributes: Mapping[str, Any] | None = None,
     settings: Mapping[str, Any] | None = None,
 ) -> "xarray.Dataset":
-    """A dataset whose variables and axes carry the attributes of the table of quantities.
-
-    Args:
-        variables: names of dimensions and values by name.
-        axes: (n,) coordinates by name.
-        settings: of a sweep, on which meanings of numbers may depend; None: unknown.
-
-    Returns:
-        the dataset.
-
-    Raises:
-        ConfigError: xarray is not installed.
-    """
+    """A dataset whose variables and axes carry the attributes of the table of quantities."""
     need_xarray()
     import xarray
 
@@ -61,17 +45,7 @@ def dataset(
 
 
 def motion(arrays: Mapping[str, np.ndarray], attributes: Mapping[str, Any]) -> "xarray.Dataset":
-    """A motion: rows over time, and what there is of its segments.
-
-    Args:
-        arrays: by the names of `schema.quantities.TRAJECTORY`, `SEGMENTS`, `FLIGHT`, `FAILURES` and `PATHS`.
-
-    Returns:
-        the dataset, over "t" with "axis", "component", "cable" or "couple", and over "segment".
-
-    Raises:
-        ConfigError: xarray is not installed.
-    """
+    """A motion: rows over time, and what there is of its segments."""
     cables = range(1, arrays["tension"].shape[1] + 1)
     axes: dict[str, Any] = {"t": arrays["t"], **PARTS, "cable": np.array(cables)}
     used = {ACROSS.get(name) for name in arrays} | {part for name in arrays for part in OTHER_DIMS.get(name, ())}
@@ -92,20 +66,7 @@ def motion(arrays: Mapping[str, np.ndarray], attributes: Mapping[str, Any]) -> "
 
 
 def over(arrays: Mapping[str, np.ndarray], dims: Mapping[str, Any] | None) -> "xarray.Dataset":
-    """Answers over the product of some dimensions.
-
-    Args:
-        arrays: (n,), (n, 2) for both ends of a segment, or (n, 3, 3) for its control points, by name; what is no
-            number is left out.
-        dims: coordinates by name, the last one varying fastest; None: one dimension "target".
-
-    Returns:
-        the dataset.
-
-    Raises:
-        InputError: dimensions of another number of points.
-        ConfigError: xarray is not installed.
-    """
+    """Answers over the product of some dimensions."""
     count = len(next(iter(arrays.values())))
     axes, shape = axes_of({"target": range(count)} if dims is None else dims, count)
     numbers = {name: values for name, values in arrays.items() if values.dtype != object}
@@ -127,18 +88,7 @@ def over(arrays: Mapping[str, np.ndarray], dims: Mapping[str, Any] | None) -> "x
 
 
 def axes_of(dims: Mapping[str, Any], count: int) -> tuple[dict[str, np.ndarray], tuple[int, ...]]:
-    """Return the dimensions whose product the answers cover.
-
-    Args:
-        dims: coordinates by name, the last one varying fastest.
-        count: number of answers.
-
-    Returns:
-        (n,) coordinates by name; the shape of the product.
-
-    Raises:
-        InputError: dimensions of another number of points.
-    """
+    """Return the dimensions whose product the answers cover."""
     axes = {name: np.asarray(points) for name, points in dims.items()}
     shape = tuple(points.size for points in axes.values())
     if any(points.ndim != 1 for points in axes.values()) or math.prod(shape) != count:

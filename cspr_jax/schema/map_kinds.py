@@ -101,11 +101,7 @@ class MapKind:
         return (self, *self.variants)
 
     def of(self, family: str) -> "MapKind":
-        """The row of a trajectory family.
-
-        Returns:
-            the row; this one for families that none of them takes.
-        """
+        """The row of a trajectory family."""
         return next((form for form in self.forms if family in form.families), self)
 
     @property
@@ -114,19 +110,11 @@ class MapKind:
         return (*self.needs, *self.takes, *self.one_of)
 
     def keys_of(self, quantity: str) -> tuple[str, ...]:
-        """Keys without which a quantity is no number.
-
-        Returns:
-            the keys, of which one must be given; empty where none is needed.
-        """
+        """Keys without which a quantity is no number."""
         return next((keys for names, keys in self.only_with if quantity in names), ())
 
     def load(self) -> Any:
-        """The class that computes it, imported now.
-
-        Returns:
-            a class, called as `maps.grid_map.GridMap` is.
-        """
+        """The class that computes it, imported now."""
         module, _, name = self.implementation.partition(":")
         return getattr(importlib.import_module(module), name)
 
@@ -424,29 +412,13 @@ MAP_KINDS: ExtensibleRows[MapKind] = ExtensibleRows(
 
 
 def quantity_of(kind: object, name: str) -> Quantity:
-    """The row of a quantity, as a kind of map says it.
-
-    Args:
-        kind: name of the kind; of anything else the row is that of the table.
-        name: of the quantity or axis.
-
-    Returns:
-        the row.
-    """
+    """The row of a quantity, as a kind of map says it."""
     forms = MAP_KINDS[kind].forms if isinstance(kind, str) and kind in MAP_KINDS else ()
     return next((row for form in forms for row in form.rows if row.name == name), EVERY[name])
 
 
 def register(kind: MapKind, *quantities: Quantity) -> None:
-    """Add a kind of map from outside of the package; a second time changes nothing.
-
-    Args:
-        quantities: rows that are not in the table yet.
-
-    Raises:
-        InputError: another kind, quantity or axis has such a name, or the row names quantities that it does not give,
-            or that nobody knows.
-    """
+    """Add a kind of map from outside of the package; a second time changes nothing."""
     if MAP_KINDS.get(kind.name, kind) != kind:
         raise InputError("map", kind.name, "a name that no other kind of map has")
     for name in kind.quantities:
@@ -466,14 +438,7 @@ def register(kind: MapKind, *quantities: Quantity) -> None:
 
 @contextlib.contextmanager
 def registered(kind: MapKind, *quantities: Quantity) -> Iterator[None]:
-    """Add a kind of map for as long as a block lasts; see `register`.
-
-    Args:
-        quantities: rows that are not in the table yet.
-
-    Yields:
-        nothing.
-    """
+    """Add a kind of map for as long as a block lasts; see `register`."""
     register(kind, *quantities)
     try:
         yield
@@ -484,12 +449,5 @@ def registered(kind: MapKind, *quantities: Quantity) -> Iterator[None]:
 
 
 def kinds_with(key: str) -> list[str]:
-    """Kinds that take a key which only some have.
-
-    Args:
-        key: dotted.
-
-    Returns:
-        their names.
-    """
+    """Kinds that take a key which only some have."""
     return [kind.name for kind in MAP_KINDS.values() if any(key in form.keys for form in kind.forms)]

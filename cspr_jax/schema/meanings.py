@@ -11,14 +11,7 @@ from cspr_jax.schema.quantities import Quantity
 
 
 def line_bounds(settings: Mapping[str, Any]) -> tuple[str, ...]:
-    """Bounds of the acceleration along a straight line, as `lines.durations.names_of` names them from 1 on.
-
-    Args:
-        settings: of a sweep, with its point mass as "robot", or a platform that translates on three pairs of cables.
-
-    Returns:
-        the words of 0, 1, 2, ...
-    """
+    """Bounds of the acceleration along a straight line, as `lines.durations.names_of` names them from 1 on."""
     robot, limits = settings["robot"], settings.get("limits") or {}
     count = 3 if robot.get("translation_only") else len(robot["base_points"])
     chosen = itertools.combinations(range(1, count + 1), 1 if robot.get("planar") else 2)
@@ -29,14 +22,7 @@ def line_bounds(settings: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def slack_cables(settings: Mapping[str, Any]) -> tuple[str, ...]:
-    """Cables that get slack first on an ellipse.
-
-    Args:
-        settings: of a sweep, as for `line_bounds`.
-
-    Returns:
-        the words of 0, 1, 2, ...
-    """
+    """Cables that get slack first on an ellipse."""
     robot = settings["robot"]
     count = 3 if robot.get("translation_only") else len(robot["base_points"])
     dof = 2 if robot.get("planar") or robot.get("pattern") == "2T" else 3
@@ -52,14 +38,7 @@ CELL_SIDES = ("not decided", "inside", "outside")
 
 
 def cell_sides(_: Mapping[str, Any]) -> tuple[str, ...]:
-    """Sides of a workspace on which a whole cell is proved to lie.
-
-    Args:
-        _: settings of a sweep; the words are the same for all.
-
-    Returns:
-        the words of 0, 1 and 2.
-    """
+    """Sides of a workspace on which a whole cell is proved to lie."""
     return CELL_SIDES
 
 
@@ -70,14 +49,7 @@ OPEN_CONDITIONS = (
 
 
 def open_conditions(_: Mapping[str, Any]) -> tuple[str, ...]:
-    """Reasons why a cell is open: the boundary, or a condition that is not proved.
-
-    Args:
-        _: settings of a sweep; the words are the same for all.
-
-    Returns:
-        the words of 0, 1, 2, ...
-    """
+    """Reasons why a cell is open: the boundary, or a condition that is not proved."""
     return OPEN_CONDITIONS
 
 
@@ -85,14 +57,7 @@ NEAREST_BODIES = ("none", "two cables", "cable and obstacle", "cable and platfor
 
 
 def nearest_bodies(_: Mapping[str, Any]) -> tuple[str, ...]:
-    """Two bodies whose distance is the least of all, in the order of `robots.clearance.Kind` from 1 on.
-
-    Args:
-        _: settings of a sweep; the words are the same for all.
-
-    Returns:
-        the words of 0 to 4.
-    """
+    """Two bodies whose distance is the least of all, in the order of `robots.clearance.Kind` from 1 on."""
     return NEAREST_BODIES
 
 
@@ -109,14 +74,7 @@ MEANINGS: dict[str, Callable[[Mapping[str, Any]], tuple[str, ...]]] = {
 
 
 def meanings_of(quantity: Quantity, settings: Mapping[str, Any] | None) -> tuple[str, ...]:
-    """Meanings of a quantity's numbers.
-
-    Args:
-        settings: of a sweep, as its result has them; None: unknown.
-
-    Returns:
-        the words of 0, 1, 2, ...; none where its numbers are numbers, the settings are unknown, or the words too many.
-    """
+    """Meanings of a quantity's numbers."""
     if not quantity.meanings or not settings:
         return ()
     words = MEANINGS[quantity.meanings](settings)
@@ -124,14 +82,7 @@ def meanings_of(quantity: Quantity, settings: Mapping[str, Any] | None) -> tuple
 
 
 def value_attributes(quantity: Quantity, settings: Mapping[str, Any] | None) -> dict[str, Any]:
-    """The CF attributes that explain a quantity's numbers.
-
-    Args:
-        settings: as for `meanings_of`.
-
-    Returns:
-        flag_values and flag_meanings, one word each; empty where `meanings_of` knows none.
-    """
+    """The CF attributes that explain a quantity's numbers."""
     words = meanings_of(quantity, settings)
     if not words:
         return {}

@@ -29,11 +29,7 @@ class ExtensibleRows(dict[str, Row]):
         raise KeyError(name)
 
     def complete(self) -> None:
-        """Add the rows of installed packages, if they are not there yet.
-
-        Raises:
-            ConfigError: one of them cannot be used; those of the others are added.
-        """
+        """Add the rows of installed packages, if they are not there yet."""
         if self._is_complete:
             return
         errors = []

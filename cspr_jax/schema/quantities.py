@@ -111,11 +111,7 @@ _NO_CHOICES = ("tau", "cable")
 
 
 def best_name(axis: str) -> str:
-    """The quantity that says which point of an axis is the best one.
-
-    Returns:
-        its name.
-    """
+    """The quantity that says which point of an axis is the best one."""
     return f"best_{axis}"
 
 
@@ -983,26 +979,14 @@ _OWN = frozenset(QUANTITIES)
 
 
 def columns_of(name: str, count: int) -> list[str]:
-    """Columns of a quantity of a motion in a CSV file.
-
-    Args:
-        name: of the quantity, a row of `TRAJECTORY`.
-        count: of its numbers at an instant.
-
-    Returns:
-        their heads.
-    """
+    """Columns of a quantity of a motion in a CSV file."""
     if name not in ACROSS:
         return [name]
     return [f"{name}_{part}" for part in PARTS.get(ACROSS[name], [str(k + 1) for k in range(count)])]
 
 
 def register(quantity: Quantity) -> None:
-    """Add a quantity that maps can give, from outside of the package; a second time changes nothing.
-
-    Raises:
-        InputError: another quantity, or a coordinate, has that name.
-    """
+    """Add a quantity that maps can give, from outside of the package; a second time changes nothing."""
     known = EVERY.get(quantity.name, quantity)
     if known != quantity:
         raise InputError("quantity", quantity.name, "a name that no other quantity or axis has")
@@ -1010,19 +994,11 @@ def register(quantity: Quantity) -> None:
 
 
 def from_outside() -> list[Quantity]:
-    """Quantities from outside of the package, which another process does not know.
-
-    Returns:
-        their rows.
-    """
+    """Quantities from outside of the package, which another process does not know."""
     return [quantity for name, quantity in QUANTITIES.items() if name not in _OWN]
 
 
 def flag_attributes() -> dict[str, object]:
-    """The CF attributes that explain `verdict`.
-
-    Returns:
-        flag_masks and flag_meanings.
-    """
+    """The CF attributes that explain `verdict`."""
     masks = np.array([flag.value for flag in SENTENCES], FLAGS)
     return {"flag_masks": masks, "flag_meanings": " ".join(flag.text for flag in SENTENCES)}

@@ -30,11 +30,7 @@ ORDINARY_COST = CellCost()
 
 
 def tile_shape(shape: tuple[int, ...], most: int = LARGEST_TILE) -> tuple[int, ...]:
-    """Shape of the tiles of a grid: whole trailing axes as long as they fit, and equal parts of the next one.
-
-    Returns:
-        a shape with at most so many cells.
-    """
+    """Shape of the tiles of a grid: whole trailing axes as long as they fit, and equal parts of the next one."""
     tile, room = [], most
     for length in reversed(shape):
         parts = -(-length // max(room, 1))
@@ -67,20 +63,12 @@ class Tiling:
         return (self.place(index) for index in range(len(self)))
 
     def place(self, index: int) -> tuple[slice, ...]:
-        """Place of a tile.
-
-        Returns:
-            one slice for each axis.
-        """
+        """Place of a tile."""
         corner = [int(i) * t for i, t in zip(np.unravel_index(index, self.counts), self.tile, strict=True)]
         return tuple(slice(a, min(a + t, n)) for a, t, n in zip(corner, self.tile, self.shape, strict=True))
 
     def extent(self, index: int) -> tuple[int, ...]:
-        """Shape of one tile.
-
-        Returns:
-            its lengths.
-        """
+        """Shape of one tile."""
         return tuple(part.stop - part.start for part in self.place(index))
 
 
@@ -112,10 +100,6 @@ class Grid:
         return Tiling(self.shape, self.tile)
 
     def cells(self, place: tuple[slice, ...]) -> dict[str, np.ndarray]:
-        """Coordinates of the cells of a tile.
-
-        Returns:
-            (n,) for each axis, the last axis fastest.
-        """
+        """Coordinates of the cells of a tile."""
         points = [axis[part] for axis, part in zip(self.axes.values(), place, strict=True)]
         return {name: mesh.ravel() for name, mesh in zip(self.axes, np.meshgrid(*points, indexing="ij"), strict=True)}

@@ -1,9 +1,14 @@
 """Verdicts: bit flags, each with a sentence, and what criteria bound. No jax here: files and tables use them too."""
 
+from __future__ import annotations
+
 import enum
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Arrays of flags have this type, in memory and in files.
 FLAGS = np.uint32
@@ -106,15 +111,7 @@ CRITERIA = {
 
 
 def criterion_words(flag: Verdict, cable: int | None = None, feed: str = "") -> str:
-    """Name the quantity that a criterion bounds.
-
-    Args:
-        cable: from 0 on; None: of no single cable.
-        feed: as G-code has it, or "".
-
-    Returns:
-        such as "largest speed of cable 2", or "feed F6000".
-    """
+    """Name the quantity that a criterion bounds."""
     row = CRITERIA.get(flag)
     words = row.words if row is not None else flag.text.replace("_", " ")
     if cable is not None:
@@ -122,14 +119,7 @@ def criterion_words(flag: Verdict, cable: int | None = None, feed: str = "") -> 
     return f"{words} {feed}".rstrip()
 
 
-def conjunction(flags: np.ndarray) -> np.ndarray:
-    """Verdict of several conditions that must all be met: a broken one decides, whatever the others leave open.
-
-    Args:
-        flags: (...) flags of all conditions together.
-
-    Returns:
-        (...) the flags, without those that leave a verdict open where any other is set.
-    """
+def conjunction(flags: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
+    """Verdict of several conditions that must all be met: a broken one decides, whatever the others leave open."""
     refuted = flags & ~flags.dtype.type(OPEN.value)
     return np.where(refuted != 0, refuted, flags)

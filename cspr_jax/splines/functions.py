@@ -1,7 +1,10 @@
 """Motions that are functions of time, differentiated by jax."""
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -14,6 +17,9 @@ from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.curves.spline import turning_of
 from cspr_jax.errors import InputError
 from cspr_jax.robots.state import State
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 
 @jax.tree_util.register_dataclass
@@ -62,22 +68,9 @@ class FunctionMotion:
 
 
 def function_motion(
-    function: Callable, duration: float, *, frame: Frame, reference: np.ndarray, is_platform: bool
+    function: Callable, duration: float, *, frame: Frame, reference: Float[np.ndarray, "4"], is_platform: bool
 ) -> FunctionMotion:
-    """Motion that a function gives in the axes of a robot file, in those of the kernels.
-
-    Args:
-        function: gives positions (3,) m, of a platform also (7,) with quaternions behind them, at instants () s.
-        duration: s.
-        reference: (4,) of `curves.files.reference_of`.
-        is_platform: whether the robot has orientations.
-
-    Returns:
-        the motion, from the centroid of the spools, z down.
-
-    Raises:
-        InputError: values of another shape, or a function that jax cannot differentiate.
-    """
+    """Motion that a function gives in the axes of a robot file, in those of the kernels."""
     try:
         size = jax.eval_shape(lambda t: jnp.asarray(function(t)), jnp.asarray(0.0)).shape
     except TypeError as error:

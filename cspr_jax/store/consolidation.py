@@ -67,17 +67,7 @@ def consolidate(
     *,
     between: Callable[[], None] = lambda: None,
 ) -> None:
-    """Write the result, read it back, and give it its name.
-
-    Args:
-        grid: its axes and tiles.
-        shards: one for each tile, in order, verified.
-        attributes: of the file; must hold "environment" and "settings".
-        between: called before each tile; may raise.
-
-    Raises:
-        StoreError: the disk refuses, or does not give back what was written.
-    """
+    """Write the result, read it back, and give it its name."""
     digests, environments, near_zero, undecided = [], set(), 0, []
     with new_file(disk, path) as descriptor:
         with open_hdf5(disk, descriptor, attributes) as file:
@@ -120,18 +110,7 @@ def _digests(file: h5py.File, grid: Grid, store: list[str], between: Callable[[]
 
 
 def content_of(path: Path, begun: Callable[[Iterable[ReadableDataset]], None] = lambda _: None) -> Content:
-    """Content of a result, all of it read and compared with its checksums, but for its seal.
-
-    Args:
-        path: the file. HDF5 may fail or hang on it: `store.isolated` reads it in another process.
-        begun: called with all datasets before they are read, which takes long.
-
-    Returns:
-        its content.
-
-    Raises:
-        DamagedError: it is not what was written, or was not written by this program.
-    """
+    """Content of a result, all of it read and compared with its checksums, but for its seal."""
     try:
         with h5py.File(path, "r") as file:
             settings = plain_json(_text(file, "settings"))

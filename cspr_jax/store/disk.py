@@ -13,43 +13,19 @@ class Disk:
     """The calls that change a disk."""
 
     def create(self, path: Path, mode: int = USUAL) -> int:
-        """Make a file, and open it for writing and reading.
-
-        Args:
-            path: its name, which nothing may have: a link there could lead to a file of somebody else.
-            mode: its permissions.
-
-        Returns:
-            a file descriptor.
-        """
+        """Make a file, and open it for writing and reading."""
         return os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, mode)
 
     def write(self, file: int, data: bytes, offset: int) -> int:
-        """Write some of the data, perhaps not all.
-
-        Args:
-            file: descriptor.
-
-        Returns:
-            how many bytes were written.
-        """
+        """Write some of the data, perhaps not all."""
         return os.pwrite(file, data, offset)
 
     def truncate(self, file: int, size: int) -> None:
-        """Set the size of a file.
-
-        Args:
-            file: descriptor.
-            size: bytes.
-        """
+        """Set the size of a file."""
         os.ftruncate(file, size)
 
     def sync(self, file: int) -> None:
-        """Flush a file to the disk.
-
-        Args:
-            file: descriptor.
-        """
+        """Flush a file to the disk."""
         os.fsync(file)
 
     def replace(self, part: Path, path: Path) -> None:
@@ -82,18 +58,7 @@ class Disk:
 
 
 def open_plain(path: Path, how: int) -> int:
-    """Open a file for writing that has no other name, or make it.
-
-    Args:
-        how: flags of `os.open`, besides those that every file has here.
-
-    Returns:
-        a descriptor.
-
-    Raises:
-        OSError: the disk refuses, or what is there is a link, a file with a second name, or no file: what is
-            written to it would go elsewhere.
-    """
+    """Open a file for writing that has no other name, or make it."""
     check_plain(path)  # opening a device can do something to it; looked at again against a change between
     file = os.open(path, how | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY, USUAL)
     try:
@@ -105,11 +70,7 @@ def open_plain(path: Path, how: int) -> int:
 
 
 def check_plain(path: Path) -> None:
-    """Refuse what `open_plain` refuses, without opening it; a name that is free will do.
-
-    Raises:
-        OSError: it is a link, a file with a second name, or no file.
-    """
+    """Refuse what `open_plain` refuses, without opening it; a name that is free will do."""
     if os.path.lexists(path):
         _check_plain(os.lstat(path))
 
@@ -122,14 +83,7 @@ def _check_plain(status: os.stat_result) -> None:
 
 
 def write_all(disk: Disk, file: int, data: bytes, offset: int = 0) -> None:
-    """Write all of the data, in as many calls as it takes.
-
-    Args:
-        file: descriptor.
-
-    Raises:
-        OSError: the disk refuses.
-    """
+    """Write all of the data, in as many calls as it takes."""
     done = 0
     while done < len(data):
         done += disk.write(file, data[done:], offset + done)

@@ -184,14 +184,7 @@ class Record(Document):
 
 
 def plain_json(text: str | bytes) -> Any:
-    """JSON of finite numbers that is not nested deeply.
-
-    Returns:
-        its value.
-
-    Raises:
-        DamagedError: it is not such JSON.
-    """
+    """JSON of finite numbers that is not nested deeply."""
     try:
         value = json.loads(text, parse_constant=_not_finite, parse_float=_finite)
     except RecursionError as error:
@@ -208,18 +201,7 @@ def plain_json(text: str | bytes) -> Any:
 
 
 def document(kind: type[Known], value: Any, what: str) -> Known:
-    """Document that JSON holds, checked against its schema.
-
-    Args:
-        value: from `plain_json`.
-        what: its name in errors.
-
-    Returns:
-        the document.
-
-    Raises:
-        DamagedError: it is none.
-    """
+    """Document that JSON holds, checked against its schema."""
     try:
         return kind.model_validate(value)
     except ValidationError as error:

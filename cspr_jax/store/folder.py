@@ -44,41 +44,21 @@ class RunFolder:
         self._held: os.stat_result | None = None
 
     def shard(self, index: int) -> Path:
-        """Path of the shard of a tile.
-
-        Returns:
-            its path.
-        """
+        """Path of the shard of a tile."""
         return self.shards / f"{index:05d}.h5"
 
     def shard_names(self) -> dict[Path, int]:
-        """Names of shards that are present; other names in their folder are ignored.
-
-        Returns:
-            the index that each name says, sorted.
-        """
+        """Names of shards that are present; other names in their folder are ignored."""
         matches = {path: _SHARD.fullmatch(path.name) for path in sorted(self.shards.glob("*"))}
         return {path: int(match[1]) for path, match in matches.items() if match}
 
     def make(self) -> None:
-        """Make the directory; its parents too.
-
-        Raises:
-            StoreError: the disk or a folder refuses.
-        """
+        """Make the directory; its parents too."""
         make_folders(self.disk, self.path)
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
-        """Hold the lock of the directory; it is free as soon as its holder dies.
-
-        Yields:
-            nothing.
-
-        Raises:
-            RefusedError: another process holds it.
-            StoreError: the disk or the folder refuses.
-        """
+        """Hold the lock of the directory; it is free as soon as its holder dies."""
         path = self.lock
         try:
             check_plain(self.log)
@@ -110,11 +90,7 @@ class RunFolder:
             os.close(file)
 
     def is_held(self) -> bool | None:
-        """Tell whether a process holds the lock at the moment; nothing is written.
-
-        Returns:
-            None where it cannot be told.
-        """
+        """Tell whether a process holds the lock at the moment; nothing is written."""
         try:
             file = os.open(self.lock, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_NOCTTY)
         except FileNotFoundError:
@@ -132,12 +108,7 @@ class RunFolder:
         return False
 
     def check_held(self) -> None:
-        """Refuse to write on where the lock is no longer this process's, or a folder of the run leads elsewhere.
-
-        Raises:
-            RefusedError: the lock was removed or replaced, so that another process may write here; or a folder is
-                a link.
-        """
+        """Refuse to write on where the lock is no longer this process's, or a folder of the run leads elsewhere."""
         for folder in (self.shards, self.quarantine):
             if folder.is_symlink():
                 raise RefusedError(printable(f"{folder}: is a link: must be a folder of the run: choose another -o"))
@@ -155,21 +126,13 @@ class RunFolder:
             )
 
     def leftovers(self) -> list[Path]:
-        """Files that processes have begun to write and not finished.
-
-        Returns:
-            the files; anything else, such as a link, is left alone.
-        """
+        """Files that processes have begun to write and not finished."""
         pattern = re.compile(rf"\.(?:run\.json|{re.escape(self.result.name)}|\d{{5,}}\.h5){PART}")
         parts = [part for folder in (self.path, self.shards) for part in sorted(folder.glob(".*.part"))]
         return [part for part in parts if pattern.fullmatch(part.name) and _is_file(part)]
 
     def remove_leftovers(self) -> None:
-        """Remove what dead processes left unfinished; only under the lock.
-
-        Raises:
-            StoreError: the disk or the folder refuses.
-        """
+        """Remove what dead processes left unfinished; only under the lock."""
         self.check_held()
         for part in self.leftovers():
             try:
@@ -178,17 +141,7 @@ class RunFolder:
                 raise refusal(part, error) from error
 
     def set_aside(self, path: Path) -> Path:
-        """Move something damaged into quarantine/; nothing there is ever deleted by the program.
-
-        Args:
-            path: a file, folder or link of the run.
-
-        Returns:
-            where it is now.
-
-        Raises:
-            StoreError: the disk or the folder refuses.
-        """
+        """Move something damaged into quarantine/; nothing there is ever deleted by the program."""
         self.check_held()
         make_folders(self.disk, self.quarantine)
         number = 0
@@ -203,14 +156,7 @@ class RunFolder:
         return target
 
     def note(self, event: str, **fields: Any) -> None:
-        """Add a line to log.jsonl, which no decision ever reads.
-
-        Args:
-            **fields: details.
-
-        Raises:
-            StoreError: the disk or the folder refuses.
-        """
+        """Add a line to log.jsonl, which no decision ever reads."""
         time_stamp = time.strftime("%Y-%m-%dT%H:%M:%S%z", time.localtime())
         seconds = round(time.time(), 3)
         line = json.dumps({"time": time_stamp, "event": event, "pid": os.getpid(), "seconds": seconds, **fields})

@@ -63,11 +63,7 @@ class ReadableDataset(NamedTuple):
     stored: int
 
     def values(self) -> np.ndarray:
-        """All values of the dataset.
-
-        Returns:
-            the numbers, C-contiguous.
-        """
+        """All values of the dataset."""
         array = np.empty(self.shape, self.dtype)
         if array.size:
             self.data.read(h5s.ALL, h5s.ALL, array)
@@ -75,31 +71,12 @@ class ReadableDataset(NamedTuple):
 
 
 def datasets(file: h5py.File, names: Iterable[str], *, is_joined: bool = False) -> dict[str, ReadableDataset]:
-    """Open the named datasets that a file holds; nothing else of the file is looked at.
-
-    Args:
-        is_joined: whether another program has written it, whose attributes do not matter.
-
-    Returns:
-        the datasets by name.
-
-    Raises:
-        DamagedError: one is a link, lies in another file, or is not plain numbers of a fitting size.
-    """
+    """Open the named datasets that a file holds; nothing else of the file is looked at."""
     return {name: _dataset(file, name, is_joined) for name in names if file.id.links.exists(name.encode())}
 
 
 def refuse_dense(datasets: Iterable[ReadableDataset], size: int, *, densest: int = DENSEST) -> None:
-    """Refuse datasets that hold much more than their file can, or much less than it has.
-
-    Args:
-        datasets: all that would be read.
-        size: of the file, bytes.
-        densest: bytes of data that one byte of the file may stand for.
-
-    Raises:
-        DamagedError: the datasets do not fit the file.
-    """
+    """Refuse datasets that hold much more than their file can, or much less than it has."""
     readable = list(datasets)
     total, most = sum(one.size for one in readable), _PLENTY + densest * size
     if total > most:
@@ -112,16 +89,7 @@ def refuse_dense(datasets: Iterable[ReadableDataset], size: int, *, densest: int
 
 
 def refuse_others(file: h5py.File, objects: int, attributes: int) -> None:
-    """Refuse a file with other objects or attributes than the requested ones.
-
-    Args:
-        file: open.
-        objects: how many its root must hold.
-        attributes: how many its root must have.
-
-    Raises:
-        DamagedError: there are more, or fewer.
-    """
+    """Refuse a file with other objects or attributes than the requested ones."""
     there = h5g.open(file.id, b"/").get_num_objs(), h5a.get_num_attrs(file.id)
     if there != (objects, attributes):
         raise DamagedError(
@@ -130,17 +98,7 @@ def refuse_others(file: h5py.File, objects: int, attributes: int) -> None:
 
 
 def text(item: h5py.HLObject, name: str, *, largest: int = LARGEST_TEXT) -> str | None:
-    """An attribute that is one text, of variable length or, in files of earlier versions, of a fixed one.
-
-    Args:
-        largest: bytes.
-
-    Returns:
-        the text; None if there is no such attribute.
-
-    Raises:
-        DamagedError: it is anything else.
-    """
+    """An attribute that is one text, of variable length or, in files of earlier versions, of a fixed one."""
     if not h5a.exists(item.id, name.encode()):
         return None
     attribute = h5a.open(item.id, name.encode())
@@ -164,17 +122,7 @@ def text(item: h5py.HLObject, name: str, *, largest: int = LARGEST_TEXT) -> str 
 
 
 def numbers(item: h5py.HLObject, name: str, dtype: str, shape: tuple[int | None, ...] = ()) -> np.ndarray | None:
-    """An attribute that is a number, or a few.
-
-    Args:
-        shape: what it must be; None stands for any number up to `MOST_ROWS`.
-
-    Returns:
-        the numbers; None if there is no such attribute.
-
-    Raises:
-        DamagedError: it is anything else.
-    """
+    """An attribute that is a number, or a few."""
     if not h5a.exists(item.id, name.encode()):
         return None
     attribute = h5a.open(item.id, name.encode())

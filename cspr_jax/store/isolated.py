@@ -89,18 +89,7 @@ class Reader:
         self._end()
 
     def result(self, path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray], dict[str, list[str]] | None]:
-        """Attributes, axes and quantities of a file, as far as this program writes them.
-
-        Args:
-            path: the file, or a link to one; without a seal it must be a map that was written anew as netCDF.
-
-        Returns:
-            its attributes, its arrays by name, and of a file without a seal the dimensions of each array.
-
-        Raises:
-            DamagedError: it is no file, is damaged, or holds what no file of this program does.
-            StoreError: the system refuses to read anything at the moment.
-        """
+        """Attributes, axes and quantities of a file, as far as this program writes them."""
         with (
             self._opened(path, follow=True, is_unsealed_too=True) as opened,
             self._answered(opened, {"what": "result", "is_sealed": opened.is_sealed}) as (answer, pipe),
@@ -112,34 +101,12 @@ class Reader:
             return answer["attributes"], arrays, answer["dimensions"]
 
     def content(self, path: Path, *, follow: bool = False) -> Content | None:
-        """Content of a result, from `store.consolidation.content_of`.
-
-        Args:
-            follow: whether it may be a link to one.
-
-        Returns:
-            its content; None for a motion.
-
-        Raises:
-            DamagedError: it is no file, or damaged.
-            StoreError: the system refuses to read anything at the moment.
-        """
+        """Content of a result, from `store.consolidation.content_of`."""
         with self._opened(path, follow=follow) as opened, self._answered(opened, {"what": "content"}) as (answer, pipe):
             return None if "motion" in answer else Content(**self._header(pipe, patience=None)["content"])
 
     def shard(self, path: Path, layout: Layout, index: int, shape: tuple[int, ...]) -> Shard:
-        """A shard, checked in every respect.
-
-        Args:
-            index: of the tile that it must hold.
-
-        Returns:
-            its content.
-
-        Raises:
-            DamagedError: it is anything else.
-            StoreError: the system refuses to read anything at the moment.
-        """
+        """A shard, checked in every respect."""
         words = {"what": "shard", "layout": dataclasses.asdict(layout), "index": index, "shape": shape}
         with self._opened(path, most=LARGEST_SHARD) as opened:
             if opened.seal in self.known:
@@ -152,15 +119,7 @@ class Reader:
             return Shard(**answer["shard"], values=values)
 
     def header(self, path: Path) -> Header:
-        """Header of a shard, of whatever run.
-
-        Returns:
-            the header.
-
-        Raises:
-            DamagedError: it is no shard, or a damaged one.
-            StoreError: the system refuses to read anything at the moment.
-        """
+        """Header of a shard, of whatever run."""
         with (
             self._opened(path, most=LARGEST_SHARD) as opened,
             self._answered(opened, {"what": "header"}) as (answer, _),

@@ -18,18 +18,7 @@ def joined_map(
     arrays: Mapping[str, np.ndarray],
     dimensions: Mapping[str, list[str]],
 ) -> tuple[dict[str, Any], dict[str, Any], dict[str, np.ndarray]]:
-    """Attributes, settings and arrays of a joined map, as of a map that was computed as a whole.
-
-    Args:
-        arrays: axes and quantities by name, in any order of dimensions and points.
-        dimensions: names of the dimensions of each array.
-
-    Returns:
-        attributes, settings and arrays; the points of each axis increase, and quantities have their own types.
-
-    Raises:
-        DamagedError: the dimensions are not those of the settings, points are there twice, or cells have no values.
-    """
+    """Attributes, settings and arrays of a joined map, as of a map that was computed as a whole."""
     order = settings["dimensions"]
     for name, names in dimensions.items():
         if sorted(names) != (sorted(order) if name in QUANTITIES else [name]):

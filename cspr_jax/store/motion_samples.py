@@ -14,18 +14,7 @@ XML = ".xml"
 
 
 def read_motion(path: Path, trajectory: str | None = None) -> MotionTable | MotionPieces:
-    """A motion as a whole.
-
-    Args:
-        path: of a table of text, of trajectories of CASPR (.xml), or of an HDF5 motion of this program.
-        trajectory: name of one of several that a file of CASPR holds; None: it has one.
-
-    Returns:
-        samples, or polynomial pieces.
-
-    Raises:
-        ConfigError: a mistake in the file, or an HDF5 file that is damaged or not of this program.
-    """
+    """A motion as a whole."""
     path, ending = Path(path), Path(path).suffix.lower()
     if ending == XML:
         return caspr.read(path, trajectory)
@@ -37,17 +26,7 @@ def read_motion(path: Path, trajectory: str | None = None) -> MotionTable | Moti
 
 
 def motion_windows(path: Path, rows: int = text.WINDOW) -> Iterator[text.MotionWindow]:
-    """A table of samples, window by window, so that its length is not limited; see `config.motions.text.windows`.
-
-    Args:
-        rows: of a window; of an HDF5 motion, all are one window.
-
-    Yields:
-        the windows.
-
-    Raises:
-        ConfigError: as `read_motion`, and for trajectories of CASPR, which are polynomial pieces.
-    """
+    """A table of samples, window by window, so that its length is not limited; see `config.motions.text.windows`."""
     path, ending = Path(path), Path(path).suffix.lower()
     if ending == XML:
         raise ConfigError(path, "must be a table of samples here")

@@ -23,15 +23,7 @@ WORK_ROWS, EXPLAINED = 4096, 0.5
 
 
 def read_table(path: Path) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """Columns of a table of a motion.
-
-    Returns:
-        attributes, and arrays by the names of `schema.quantities.TRAJECTORY`: (n,), or (n, k) of vectors.
-
-    Raises:
-        DamagedError: it is not what `cspr plan` writes.
-        StoreError: it cannot be read at the moment.
-    """
+    """Columns of a table of a motion."""
     if not 0 <= file_size(path) <= LARGEST_TABLE:
         raise DamagedError(f"it is not a file, or has more than {LARGEST_TABLE} bytes")
     try:

@@ -26,14 +26,7 @@ UNREADABLE = (OSError, KeyError, ValueError, RuntimeError, IndexError, TypeError
 
 @contextlib.contextmanager
 def new_hdf5(path: Path, attributes: dict[str, Any]) -> Iterator[h5py.File]:
-    """An HDF5 file that appears under its name only when it is whole.
-
-    Yields:
-        the open file.
-
-    Raises:
-        StoreError: the disk or the folder refuses.
-    """
+    """An HDF5 file that appears under its name only when it is whole."""
     disk = Disk()
     with new_file(disk, path) as descriptor, open_hdf5(disk, descriptor, attributes) as file:
         yield file
@@ -41,14 +34,7 @@ def new_hdf5(path: Path, attributes: dict[str, Any]) -> Iterator[h5py.File]:
 
 @contextlib.contextmanager
 def open_hdf5(disk: Disk, descriptor: int, attributes: dict[str, Any]) -> Iterator[h5py.File]:
-    """HDF5 file that is written into an open, empty file; it is sealed when HDF5 has closed it.
-
-    Yields:
-        the open file.
-
-    Raises:
-        OSError: the disk refuses.
-    """
+    """HDF5 file that is written into an open, empty file; it is sealed when HDF5 has closed it."""
     through = DiskFile(disk, descriptor)
     try:
         with h5py.File(through, "w", libver=LAYOUT) as file:
@@ -70,14 +56,7 @@ def make_datasets(
     tile: tuple[int, ...],
     settings: Mapping[str, Any] | None = None,
 ) -> None:
-    """The empty datasets of a result over a grid, with their axes.
-
-    Args:
-        file: an empty HDF5 file.
-        axes: coordinates, in the order of the dimensions.
-        dtype: of quantities of kind "float".
-        settings: of the sweep, on which meanings of numbers may depend; None: unknown.
-    """
+    """The empty datasets of a result over a grid, with their axes."""
     for name, points in axes.items():
         scale = file.create_dataset(name, data=points, track_times=False)
         describe(scale, AXES[name])
@@ -94,25 +73,14 @@ def make_datasets(
 
 
 def new_dataset(file: h5py.File, name: str, shape: tuple[int, ...], dtype: str, chunk: tuple[int, ...]) -> h5py.Dataset:
-    """An empty dataset, compressed and with checksums.
-
-    Returns:
-        the dataset.
-    """
+    """An empty dataset, compressed and with checksums."""
     return file.create_dataset(
         name, shape, dtype, chunks=chunk, compression="gzip", shuffle=True, fletcher32=True, track_times=False
     )
 
 
 def dtype_of(name: str, dtype: str) -> str:
-    """Type of a stored quantity.
-
-    Args:
-        dtype: of those of kind "float".
-
-    Returns:
-        NumPy's name.
-    """
+    """Type of a stored quantity."""
     kind = QUANTITIES[name].kind
     return dtype if kind == "float" else kind
 
@@ -131,48 +99,26 @@ def set_attributes(item: h5py.HLObject, values: dict[str, Any]) -> None:
 
 
 def plain(value: Any) -> Any:
-    """The value of an attribute as Python has it.
-
-    Args:
-        value: as h5py reads it.
-
-    Returns:
-        text, numbers, lists of them; NumPy arrays stay what they are.
-    """
+    """The value of an attribute as Python has it."""
     if isinstance(value, bytes):
         return value.decode()
     return value.item() if isinstance(value, np.generic) else value
 
 
 def bytes_needed(shape: tuple[int, ...], store: list[str], dtype: str) -> int:
-    """Room that a run needs at most, its shards and its result together.
-
-    Args:
-        dtype: of quantities of kind "float".
-
-    Returns:
-        bytes.
-    """
+    """Room that a run needs at most, its shards and its result together."""
     one = sum(np.dtype(dtype_of(name, dtype)).itemsize for name in store)
     # Twice the data, and a tenth for chunks that do not compress and for what describes them.
     return int(2.1 * np.prod([float(n) for n in shape]) * one) + (1 << 20)
 
 
 def reason(error: BaseException) -> str:
-    """The first line of a library's error.
-
-    Returns:
-        the line, or the error's name where it says nothing.
-    """
+    """The first line of a library's error."""
     return str(error).splitlines()[0] if str(error) else type(error).__name__
 
 
 def file_size(path: Path) -> int:
-    """Size of a regular file.
-
-    Returns:
-        bytes; -1 if it is not a regular file, a link included.
-    """
+    """Size of a regular file."""
     try:
         status = os.lstat(path)
     except OSError:

@@ -20,23 +20,12 @@ PART = r"\.(?:[0-9a-f]{12}|\d+)\.part"
 
 
 def part_of(path: Path) -> Path:
-    """Name under which a file is written until it is whole; nobody can know it beforehand.
-
-    Returns:
-        the name, in the same folder.
-    """
+    """Name under which a file is written until it is whole; nobody can know it beforehand."""
     return path.with_name(f".{path.name}.{secrets.token_hex(6)}.part")
 
 
 def check_place(path: Path | None) -> None:
-    """Refuse a file that cannot be written where it is to be, before the work of which it is the end.
-
-    Args:
-        path: of the file; None: none is to be written.
-
-    Raises:
-        StoreError: its folder does not exist or takes no files, its name is too long, or it is a folder itself.
-    """
+    """Refuse a file that cannot be written where it is to be, before the work of which it is the end."""
     if path is None:
         return
     is_long = len(os.fsencode(part_of(path).name)) > LONGEST_NAME
@@ -54,17 +43,7 @@ def check_place(path: Path | None) -> None:
 
 @contextlib.contextmanager
 def new_file(disk: Disk, path: Path, *, mode: int = USUAL) -> Iterator[int]:
-    """A file that gets its name when the block ends well, and leaves nothing when it does not.
-
-    Args:
-        mode: its permissions.
-
-    Yields:
-        a descriptor, for writing and reading.
-
-    Raises:
-        StoreError: the disk or the folder refuses.
-    """
+    """A file that gets its name when the block ends well, and leaves nothing when it does not."""
     part = part_of(path)
     try:
         file = disk.create(part, mode)  # where it fails, what has that name is not ours to remove
@@ -85,24 +64,13 @@ def new_file(disk: Disk, path: Path, *, mode: int = USUAL) -> Iterator[int]:
 
 
 def publish(disk: Disk, path: Path, data: bytes, *, mode: int = USUAL) -> None:
-    """Write a small file whole or not at all.
-
-    Args:
-        mode: its permissions.
-
-    Raises:
-        StoreError: the disk or the folder refuses.
-    """
+    """Write a small file whole or not at all."""
     with new_file(disk, path, mode=mode) as file:
         write_all(disk, file, data)
 
 
 def make_folders(disk: Disk, path: Path) -> None:
-    """Make a folder and those above it, each named on the disk before the next.
-
-    Raises:
-        StoreError: the disk or a folder refuses.
-    """
+    """Make a folder and those above it, each named on the disk before the next."""
     missing = []
     folder = path
     while not folder.is_dir():
@@ -122,11 +90,7 @@ def make_folders(disk: Disk, path: Path) -> None:
 
 
 def refusal(path: Path, error: OSError) -> StoreError:
-    """Error for a file that cannot be written.
-
-    Returns:
-        the error to raise.
-    """
+    """Error for a file that cannot be written."""
     return StoreError(
         printable(f"{path}: cannot be written: {error.strerror or error}; make room or choose another -o")
     )

@@ -13,26 +13,14 @@ LARGEST_RECORD = 64 << 20
 
 
 def write_record(disk: Disk, path: Path, record: Record) -> None:
-    """Write run.json.
-
-    Raises:
-        StoreError: the disk or the folder refuses.
-    """
+    """Write run.json."""
     content = record.model_dump()
     text = json.dumps({**content, "checksum": digest(content)}, indent=1, allow_nan=False)
     publish(disk, path, (text + "\n").encode(), mode=READ_ONLY)
 
 
 def read_record(path: Path) -> Record:
-    """Read run.json.
-
-    Returns:
-        its content.
-
-    Raises:
-        DamagedError: it is not what was written, or was not written by this program.
-        StoreError: the system refuses to read anything at the moment.
-    """
+    """Read run.json."""
     content = plain_json(read_regular(path, LARGEST_RECORD))
     if not isinstance(content, dict) or content.keys() != Record.model_fields.keys() | {"checksum"}:
         raise DamagedError("it is not a record of cspr")

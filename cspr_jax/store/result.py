@@ -71,24 +71,7 @@ class Result:
         return "map" in self.attributes
 
     def best(self, *axes: str) -> "Result":
-        """The map with the best point of each of some axes chosen for every cell: the answer to "at any z0?".
-
-        A cell is feasible if it is so at some point, else undecided if it is so at some point. Among feasible points
-        the one with the fewest arcs is chosen (or with the best of what the map is about: the least duration, the
-        largest margin, ...), among equals the one with the largest margin, then the first. All quantities of a cell are
-        those of the chosen point; where none is feasible, those of the best candidate. Where a point is undecided, the
-        verdict keeps the flag that fewer arcs may be possible.
-
-        Args:
-            axes: names, such as "z0".
-
-        Returns:
-            a result without these axes, and with "best_z0" among the quantities: the point chosen, NaN where none is
-            feasible.
-
-        Raises:
-            InputError: a motion, no such axis, one that is no choice (tau, cable), or no quantity tells what is better.
-        """
+        """The map with the best point of each of some axes chosen for every cell: the answer to "at any z0?"."""
         if not self.is_map:
             raise InputError("--best", " ".join(axes), "absent for a motion")
         whole = self
@@ -112,23 +95,12 @@ class Result:
         return dataclasses.replace(self, axes=others, data=data, units=units, labels=labels, choices=choices)
 
     def place(self, index: tuple[int, ...]) -> dict[str, float]:
-        """Coordinates of a cell of a map.
-
-        Returns:
-            by axis, those chosen by `best` included.
-        """
+        """Coordinates of a cell of a map."""
         place = {axis: float(points[i]) for (axis, points), i in zip(self.axes.items(), index, strict=True)}
         return place | {axis: float(choice.points[choice.places[index]]) for axis, choice in self.choices.items()}
 
     def to_xarray(self) -> "xarray.Dataset":
-        """The result for xarray: named dimensions, units and long names, and the attributes of the file.
-
-        Returns:
-            of a map, quantities over its axes; of a motion, rows over "t" and segments over "segment".
-
-        Raises:
-            ConfigError: xarray is not installed.
-        """
+        """The result for xarray: named dimensions, units and long names, and the attributes of the file."""
         if self.is_map:
             variables = {name: (tuple(self.axes), data) for name, data in self.data.items()}
             best = {"best_over": " ".join(self.choices)} if self.choices else {}
@@ -143,12 +115,6 @@ def open_result(path: Path) -> Result:
 
     An HDF5 file may come from anybody: another process reads it, within limits of memory and time, and its content is
     checked like a sweep file.
-
-    Returns:
-        the result.
-
-    Raises:
-        StoreError: the file is missing, not HDF5, damaged, or not written by this program.
     """
     try:
         is_table = Path(path).suffix.lower() == ".csv"
@@ -172,17 +138,7 @@ def open_result(path: Path) -> Result:
 
 
 def motion_result(attributes: dict[str, Any], arrays: dict[str, np.ndarray]) -> Result:
-    """A motion that was computed, as it would be read from a motion file.
-
-    Args:
-        arrays: by the names of `schema.quantities.EVERY`.
-
-    Returns:
-        the motion.
-
-    Raises:
-        StoreError: numbers that no motion file has.
-    """
+    """A motion that was computed, as it would be read from a motion file."""
     try:
         axes, data = _motion(attributes, dict(sorted(arrays.items())), keeps_robot=True)
     except DamagedError as error:

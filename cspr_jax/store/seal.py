@@ -29,11 +29,7 @@ class DamagedError(Exception):
 
 
 def unreadable(path: Path, error: OSError) -> DamagedError | StoreError:
-    """Error for a file that cannot be read.
-
-    Returns:
-        the error to raise: damage, or a refusal that may pass.
-    """
+    """Error for a file that cannot be read."""
     reason = error.strerror or str(error)
     if error.errno in _NO_FILE:
         return DamagedError(f"it cannot be read: {reason}")
@@ -41,52 +37,22 @@ def unreadable(path: Path, error: OSError) -> DamagedError | StoreError:
 
 
 def sealed(data: bytes) -> bytes:
-    """Data with their seal.
-
-    Returns:
-        the data and the line.
-    """
+    """Data with their seal."""
     return data + _line(hashlib.sha256(data).hexdigest())
 
 
 def seal_of(data: bytes) -> bytes:
-    """The seal at the end of data.
-
-    Args:
-        data: as `sealed` gives them.
-
-    Returns:
-        the line, which is equal for equal data alone.
-    """
+    """The seal at the end of data."""
     return data[-LENGTH:]
 
 
 def seal_file(disk: Disk, file: int, size: int) -> None:
-    """Seal a file that is open.
-
-    Args:
-        file: descriptor.
-        size: of its content, bytes.
-
-    Raises:
-        OSError: the disk refuses.
-    """
+    """Seal a file that is open."""
     write_all(disk, file, _line(_hash(file, size)), size)
 
 
 def open_regular(path: Path, *, follow: bool = True) -> int:
-    """Open a file for reading, and only a file: a pipe would keep its reader waiting.
-
-    Args:
-        follow: whether it may be a link to one, as a user may name it; nothing in a run directory is a link.
-
-    Returns:
-        a descriptor.
-
-    Raises:
-        DamagedError: it is no regular file, or cannot be read.
-        StoreError: the system refuses to read anything at the moment.
-    """
+    """Open a file for reading, and only a file: a pipe would keep its reader waiting."""
     try:
         # Opening a device can do something to it, so it is looked at before, and again against a change between.
         if not stat.S_ISREG(os.stat(path, follow_symlinks=follow).st_mode):
@@ -104,19 +70,7 @@ def open_regular(path: Path, *, follow: bool = True) -> int:
 
 
 def read_regular(path: Path, most: int, *, last: bool = False) -> bytes:
-    """Content of a file of a run directory, which is no link.
-
-    Args:
-        most: bytes that it may have.
-        last: whether only so many of its last bytes are read, of however many.
-
-    Returns:
-        the bytes.
-
-    Raises:
-        DamagedError: it is no regular file, or a larger one.
-        StoreError: the system or the disk refuses.
-    """
+    """Content of a file of a run directory, which is no link."""
     file = open_regular(path, follow=False)
     try:
         size = os.fstat(file).st_size
@@ -130,19 +84,7 @@ def read_regular(path: Path, most: int, *, last: bool = False) -> bytes:
 
 
 def has_mark(path: Path, file: int) -> bool:
-    """Tell whether an open file ends with a seal; files of others need not be read whole.
-
-    Args:
-        path: named in errors.
-        file: descriptor.
-
-    Returns:
-        whether it does.
-
-    Raises:
-        DamagedError: it cannot be read.
-        StoreError: the system refuses to read anything at the moment.
-    """
+    """Tell whether an open file ends with a seal; files of others need not be read whole."""
     try:
         line = os.pread(file, LENGTH, max(os.fstat(file).st_size - LENGTH, 0))
     except OSError as error:
@@ -151,19 +93,7 @@ def has_mark(path: Path, file: int) -> bool:
 
 
 def check_open(path: Path, file: int) -> bytes:
-    """Compare an open file with its seal.
-
-    Args:
-        path: named in errors.
-        file: descriptor.
-
-    Returns:
-        the seal, which is equal for equal files alone.
-
-    Raises:
-        DamagedError: it cannot be read, has no seal, or one that does not fit.
-        StoreError: the system refuses to read anything at the moment.
-    """
+    """Compare an open file with its seal."""
     try:
         size = os.fstat(file).st_size - LENGTH
         line = os.pread(file, LENGTH, max(size, 0))

@@ -63,14 +63,7 @@ class Shard:
 
 
 def digest_of(values: dict[str, np.ndarray]) -> str:
-    """SHA-256 over name, type, shape and bytes of arrays, sorted by name.
-
-    Args:
-        values: the arrays.
-
-    Returns:
-        64 hexadecimal digits.
-    """
+    """SHA-256 over name, type, shape and bytes of arrays, sorted by name."""
     total = hashlib.sha256()
     for name in sorted(values):
         array = np.ascontiguousarray(values[name])
@@ -80,11 +73,7 @@ def digest_of(values: dict[str, np.ndarray]) -> str:
 
 
 def encode(layout: Layout, shard: Shard) -> bytes:
-    """A shard as bytes; equal shards give equal bytes.
-
-    Returns:
-        the file's content.
-    """
+    """A shard as bytes; equal shards give equal bytes."""
     memory = io.BytesIO()
     with h5py.File(memory, "w", libver=LAYOUT) as file:
         file.attrs["header"] = canonical_json(_header(layout, shard))
@@ -107,20 +96,7 @@ def decode(
     shape: tuple[int, ...],
     begun: Callable[[Iterable[ReadableDataset]], None] = lambda _: None,
 ) -> Shard:
-    """A shard, checked in every respect but its seal.
-
-    Args:
-        place: the file, or its content. HDF5 may fail or hang on one that this process has not written itself:
-            `store.isolated` reads it elsewhere.
-        index: of the tile that it must hold.
-        begun: called with all datasets before they are read.
-
-    Returns:
-        its content.
-
-    Raises:
-        DamagedError: it is anything else.
-    """
+    """A shard, checked in every respect but its seal."""
     kinds = {name: dtype_of(name, layout.dtype) for name in layout.store}
     try:
         with h5py.File(place, "r") as file:
@@ -151,17 +127,7 @@ def decode(
 
 
 def header_of(file: h5py.File) -> Header:
-    """Header of a shard.
-
-    Args:
-        file: open.
-
-    Returns:
-        the header.
-
-    Raises:
-        DamagedError: it is no header of a shard.
-    """
+    """Header of a shard."""
     text = file.attrs.get("header")
     if not isinstance(text, str):
         raise DamagedError("it has no header")

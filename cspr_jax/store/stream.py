@@ -32,35 +32,16 @@ class DiskFile(io.RawIOBase):
             raise self._failure
 
     def seek(self, offset: int, whence: int = os.SEEK_SET, /) -> int:
-        """Go to an offset.
-
-        Args:
-            offset: bytes.
-            whence: from the start, from here, or from the end.
-
-        Returns:
-            the offset from the start.
-        """
+        """Go to an offset."""
         self._at = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: self._size}[whence]
         return self._at
 
     def tell(self) -> int:
-        """Position at which reading and writing goes on.
-
-        Returns:
-            the offset.
-        """
+        """Position at which reading and writing goes on."""
         return self._at
 
     def readinto(self, buffer, /) -> int:
-        """Read what has been written, or keep the reason why not.
-
-        Args:
-            buffer: filled from its start.
-
-        Returns:
-            how many bytes.
-        """
+        """Read what has been written, or keep the reason why not."""
         view = memoryview(buffer).cast("B")
         try:
             data = os.pread(self._file, len(view), self._at)
@@ -71,14 +52,7 @@ class DiskFile(io.RawIOBase):
         return len(data)
 
     def write(self, data, /) -> int:
-        """Write all of the data, or keep the reason why not.
-
-        Args:
-            data: bytes.
-
-        Returns:
-            how many there are.
-        """
+        """Write all of the data, or keep the reason why not."""
         view = memoryview(data).cast("B")
         if self._failure is None:
             try:
@@ -90,14 +64,7 @@ class DiskFile(io.RawIOBase):
         return len(view)
 
     def truncate(self, size: int | None = None, /) -> int:
-        """Set the size, or keep the reason why not.
-
-        Args:
-            size: bytes; None: the offset.
-
-        Returns:
-            the size.
-        """
+        """Set the size, or keep the reason why not."""
         self._size = self._at if size is None else size
         if self._failure is None:
             try:
@@ -107,25 +74,13 @@ class DiskFile(io.RawIOBase):
         return self._size
 
     def readable(self) -> bool:
-        """It can be read.
-
-        Returns:
-            true.
-        """
+        """It can be read."""
         return True
 
     def writable(self) -> bool:
-        """It can be written.
-
-        Returns:
-            true.
-        """
+        """It can be written."""
         return True
 
     def seekable(self) -> bool:
-        """It has offsets.
-
-        Returns:
-            true.
-        """
+        """It has offsets."""
         return True

@@ -31,14 +31,7 @@ _FEW = 3
 
 
 def check_map(kind: MapKind, keys: SweepFile, path: Path) -> None:
-    """Refuse a sweep whose keys do not fit its map.
-
-    Args:
-        path: named in errors.
-
-    Raises:
-        ConfigError: which key, and what it must be.
-    """
+    """Refuse a sweep whose keys do not fit its map."""
     targets = tuple(name for name in _TARGETS[:-1] if getattr(keys.axes, name) is not None)
     if targets not in (("x", "y"), ("radius", "azimuth")):
         raise ConfigError(path, f"axes: {', '.join(targets) or 'no targets'}: must be x and y, or radius and azimuth")
@@ -67,15 +60,7 @@ def check_map(kind: MapKind, keys: SweepFile, path: Path) -> None:
 
 
 def check_points(axes: dict[str, np.ndarray], path: Path) -> None:
-    """Refuse coordinates out of their range.
-
-    Args:
-        axes: coordinates by name.
-        path: named in errors.
-
-    Raises:
-        ConfigError: which axis, and what it must be.
-    """
+    """Refuse coordinates out of their range."""
     for name, inside, allowed in (
         ("z0", lambda p: p > 0.0, "a number > 0"),
         ("radius", lambda p: p >= 0.0, "a number >= 0"),
@@ -93,27 +78,12 @@ def check_points(axes: dict[str, np.ndarray], path: Path) -> None:
 
 
 def is_given(keys: SweepFile, name: str) -> bool:
-    """Tell whether a sweep has a key.
-
-    Args:
-        name: dotted.
-
-    Returns:
-        whether it is there.
-    """
+    """Tell whether a sweep has a key."""
     return _missing(keys, name) is None
 
 
 def is_asked(keys: SweepFile, robot: RobotFile, name: str) -> bool:
-    """Tell whether a sweep, or its robot, asks for what a key stands for.
-
-    Args:
-        robot: its robot, whose limits hold where the sweep gives none.
-        name: dotted; a condition of a workspace as "workspace.conditions.static".
-
-    Returns:
-        whether it does.
-    """
+    """Tell whether a sweep, or its robot, asks for what a key stands for."""
     table, _, last = name.rpartition(".")
     if table == "workspace.conditions":
         return last in (keys.workspace or WorkspaceTable()).conditions
@@ -123,11 +93,7 @@ def is_asked(keys: SweepFile, robot: RobotFile, name: str) -> bool:
 
 
 def check_store(kind: MapKind, keys: SweepFile, robot: RobotFile, path: Path) -> None:
-    """Refuse to store quantities that the map does not give, or that the sweep does not ask for.
-
-    Raises:
-        ConfigError: such a quantity.
-    """
+    """Refuse to store quantities that the map does not give, or that the sweep does not ask for."""
     for name in keys.run.store or ():
         if name not in kind.quantities:
             raise ConfigError(path, f"run.store: {name}: must be one of {', '.join(kind.quantities)} in this map")

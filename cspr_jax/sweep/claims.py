@@ -17,11 +17,7 @@ from cspr_jax.sweep.definition import Sweep
 
 
 def refuse_other_sweep(sweep: Sweep, folder: RunFolder, reader: Reader) -> None:
-    """Refuse a directory that belongs to another sweep.
-
-    Raises:
-        RefusedError: with a line for each key that differs.
-    """
+    """Refuse a directory that belongs to another sweep."""
     record = _record(folder.record)
     if record is not None:
         if record.identity != sweep.identity:
@@ -40,9 +36,6 @@ def refuse_strangers(folder: RunFolder, reader: Reader) -> None:
     """Refuse a directory where somebody else keeps files under the names of a run.
 
     A run makes its lock before anything else, so that where it is, a file that is not whole is a damaged one.
-
-    Raises:
-        RefusedError: names the file.
     """
     if folder.lock.exists() or _record(folder.record) is not None or _owners(folder, reader):
         return
@@ -52,24 +45,13 @@ def refuse_strangers(folder: RunFolder, reader: Reader) -> None:
 
 
 def differing(sweep: Sweep, folder: RunFolder, settings: dict[str, Any]) -> list[str]:
-    """Differences between a sweep and the one that a directory belongs to.
-
-    Returns:
-        a line for each key.
-    """
+    """Differences between a sweep and the one that a directory belongs to."""
     lines = differences(sweep.settings, settings) or ["the format of the run differs"]
     return [printable(f"{folder.path}: {line}: must be equal, or another -o") for line in lines]
 
 
 def refuse_other_environment(folder: RunFolder, environment: dict[str, Any], accept: bool, reader: Reader) -> None:
-    """Refuse to go on with another program, library or machine than began.
-
-    Args:
-        accept: whether results of another environment may be mixed in.
-
-    Raises:
-        RefusedError: with a line for each key that differs.
-    """
+    """Refuse to go on with another program, library or machine than began."""
     record = _record(folder.record)
     if accept or (record is not None and record.environment == environment):
         return
@@ -83,11 +65,7 @@ def refuse_other_environment(folder: RunFolder, environment: dict[str, Any], acc
 
 
 def refuse_worker(expected: dict[str, Any], actual: dict[str, Any]) -> None:
-    """Refuse a tile of a worker whose environment differs from that of the run.
-
-    Raises:
-        RefusedError: with a line for each key that differs.
-    """
+    """Refuse a tile of a worker whose environment differs from that of the run."""
     if actual == expected:
         return
     advice = "--accept-environment-change takes it"
@@ -96,11 +74,7 @@ def refuse_worker(expected: dict[str, Any], actual: dict[str, Any]) -> None:
 
 
 def damage(path: Path) -> str | None:
-    """Damage of a run.json, in words.
-
-    Returns:
-        a phrase, or None where it is whole or absent.
-    """
+    """Damage of a run.json, in words."""
     if not (path.exists() or path.is_symlink()):
         return None
     try:
@@ -111,14 +85,7 @@ def damage(path: Path) -> str | None:
 
 
 def own_record(sweep: Sweep, folder: RunFolder, environment: dict[str, Any], command: tuple[str, ...]) -> Record:
-    """Record of a directory that belongs to the sweep, written if it is missing.
-
-    Returns:
-        the record.
-
-    Raises:
-        StoreError: the disk or the folder refuses.
-    """
+    """Record of a directory that belongs to the sweep, written if it is missing."""
     present = _record(folder.record)
     if present is not None:
         return present
@@ -137,14 +104,7 @@ def _record(path: Path) -> Record | None:
 
 
 def content_at(path: Path, reader: Reader) -> Content | str:
-    """Content of a result in a run directory.
-
-    Returns:
-        its content, or a line about its fault.
-
-    Raises:
-        StoreError: the system refuses to read anything at the moment.
-    """
+    """Content of a result in a run directory."""
     try:
         return reader.content(path) or "it is a motion"
     except DamagedError as error:

@@ -85,14 +85,7 @@ class Sweep:
 
 
 def read_sweep(path: Path) -> Sweep:
-    """A sweep file, checked without computing anything.
-
-    Returns:
-        the sweep.
-
-    Raises:
-        ConfigError: a mistake in it.
-    """
+    """A sweep file, checked without computing anything."""
     if len(os.fsencode(path.stem)) > LONGEST_NAME:
         raise ConfigError(path, f"a name of {len(os.fsencode(path.stem))} bytes: must be at most {LONGEST_NAME}")
     text = read_text(path)
@@ -100,18 +93,7 @@ def read_sweep(path: Path) -> Sweep:
 
 
 def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
-    """A sweep file's parsed content, checked without computing anything.
-
-    Args:
-        path: of the file, named in errors; paths in it are relative to its folder.
-        text: of the file, which a run keeps.
-
-    Returns:
-        the sweep.
-
-    Raises:
-        ConfigError: a mistake in it.
-    """
+    """A sweep file's parsed content, checked without computing anything."""
     refuse_other_kinds(data, "sweep", path)
     keys = checked(SweepFile, data, path)
     robot = resolve_robot(keys.robot, path, path.parent)
@@ -139,19 +121,7 @@ def sweep_of(data: dict[str, Any], path: Path, *, text: str) -> Sweep:
 
 
 def sweep_of_settings(settings: dict[str, Any], file: Path, text: str = "") -> Sweep:
-    """The sweep that a run has recorded, whatever has become of its file.
-
-    Args:
-        settings: resolved, as a record or a result holds them.
-        file: named in errors; gives the name of the result.
-        text: of the sweep file, which a run keeps.
-
-    Returns:
-        the sweep.
-
-    Raises:
-        ConfigError: this version cannot read them.
-    """
+    """The sweep that a run has recorded, whatever has become of its file."""
     keys = checked(SweepFile, {key: value for key, value in settings.items() if key != "dimensions"}, file)
     robot, kind = (
         checked(RobotFile, settings["robot"], file, at="robot"),
@@ -215,15 +185,7 @@ def _check_size(counts: dict[str, int], tile: tuple[int, ...], usual: tuple[int,
 
 
 def check_room(sweep: Sweep, directory: Path, done: float) -> None:
-    """Refuse a sweep whose files would not fit on the disk.
-
-    Args:
-        directory: of the run; it need not be there yet.
-        done: share of the tiles that are finished.
-
-    Raises:
-        ConfigError: too little room.
-    """
+    """Refuse a sweep whose files would not fit on the disk."""
     folder = next(place for place in (directory, *Path(os.path.abspath(directory)).parents) if place.is_dir())
     needed = bytes_needed(sweep.grid.shape, sweep.store, sweep.keys.run.dtype) * (1.0 - 0.5 * done)
     free = shutil.disk_usage(folder).free
@@ -243,20 +205,12 @@ def _cells_of(counts: dict[str, int]) -> str:
 
 
 def run_directory(sweep: Sweep) -> Path:
-    """Directory of a sweep's result without -o.
-
-    Returns:
-        results/<sweep>-<first 12 digits of its identity>.
-    """
+    """Directory of a sweep's result without -o."""
     return Path("results") / f"{sweep.file.stem}-{sweep.identity[:12]}"
 
 
 def attributes(sweep: Sweep) -> dict[str, Any]:
-    """Attributes of a result file, from its sweep.
-
-    Returns:
-        attributes of the whole file.
-    """
+    """Attributes of a result file, from its sweep."""
     robot, words = sweep.robot, [sweep.kind.title, f"robot {sweep.robot.name}"]
     if "workspace" in sweep.kind.takes:
         words += (sweep.keys.workspace or WorkspaceTable()).conditions

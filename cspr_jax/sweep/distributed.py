@@ -99,15 +99,7 @@ class Scheduler:
             time.sleep(POLL_SECONDS)
 
     def environment(self) -> dict[str, Any]:
-        """Environment that all workers share.
-
-        Returns:
-            the environment of a worker.
-
-        Raises:
-            RefusedError: workers that differ, or another version of the program than here.
-            ResourceError: no worker there, or one that has no cspr_jax.
-        """
+        """Environment that all workers share."""
         try:
             environments = list(self._client.run(environment).values())
         except Exception as error:  # dask raises it for whatever a worker cannot import
@@ -130,17 +122,7 @@ class Scheduler:
         return environments[0]
 
     def tiles(self, indices: Iterable[int], stop: Stop) -> Iterator[Computed]:
-        """Compute tiles in any order.
-
-        Args:
-            stop: when it is set, tiles in progress are finished and no other one is begun.
-
-        Yields:
-            the tiles.
-
-        Raises:
-            ResourceError: a tile whose workers keep dying.
-        """
+        """Compute tiles in any order."""
         from distributed import KilledWorker, wait
 
         waiting, running, has_warned = collections.deque(indices), set[Any](), False

@@ -98,15 +98,7 @@ class Run:
         self._tiling = sweep.grid.tiling
 
     def finished(self) -> Path | None:
-        """The result, if it is complete and undamaged; nothing is computed and jax is not needed.
-
-        Returns:
-            its path, or None.
-
-        Raises:
-            RefusedError: the directory, or the result in it, belongs to another sweep.
-            StoreError: the disk refuses to remove shards.
-        """
+        """The result, if it is complete and undamaged; nothing is computed and jax is not needed."""
         with self._reader:
             claims.refuse_other_sweep(self._sweep, self._folder, self._reader)
             if not self._folder.result.exists():
@@ -124,17 +116,7 @@ class Run:
         return self._folder.result
 
     def go(self, executor: Executor) -> Outcome:
-        """Compute what is missing and publish the result.
-
-        Returns:
-            what was done.
-
-        Raises:
-            ConfigError: too little room on the disk.
-            RefusedError: another process writes here, or the environment has changed.
-            StoreError: the disk or the folder refuses.
-            StoppedError: asked to stop; what was finished is kept.
-        """
+        """Compute what is missing and publish the result."""
         with self._reader:
             return self._go(executor)
 

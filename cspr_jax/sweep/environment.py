@@ -17,11 +17,7 @@ LIBRARIES = ("jax", "jaxlib", "numpy", "h5py")
 
 @functools.cache
 def environment() -> dict[str, Any]:
-    """Everything that a worker's bits can depend on; equal environments give equal bits.
-
-    Returns:
-        plain values by name.
-    """
+    """Everything that a worker's bits can depend on; equal environments give equal bits."""
     import h5py
     import jax
 
@@ -45,11 +41,7 @@ def environment() -> dict[str, Any]:
 
 
 def package_hash() -> str:
-    """SHA-256 over the package's own files: it works without git and sees uncommitted changes.
-
-    Returns:
-        64 hexadecimal digits.
-    """
+    """SHA-256 over the package's own files: it works without git and sees uncommitted changes."""
     total = hashlib.sha256()
     for path in sorted(PACKAGE.rglob("*")):
         # Examples are in a wheel alone, and nothing is computed with them.

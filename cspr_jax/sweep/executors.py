@@ -30,22 +30,11 @@ class ThisProcess:
         self._tile_map = tile_map
 
     def environment(self) -> dict[str, Any]:
-        """Environment of the computation.
-
-        Returns:
-            the environment of this process.
-        """
+        """Environment of the computation."""
         return environment()
 
     def tiles(self, indices: Iterable[int], stop: Stop) -> Iterator[Computed]:
-        """Compute tiles in order.
-
-        Args:
-            stop: when it is set, tiles in progress are finished and no other one is begun.
-
-        Yields:
-            the tiles.
-        """
+        """Compute tiles in order."""
         for index in indices:
             if stop:
                 return
@@ -65,11 +54,7 @@ def _take(pickled: bytes) -> None:
 
 
 def usual_workers(sweep: Sweep) -> int:
-    """Number of processes for a sweep where nobody says how many.
-
-    Returns:
-        the number.
-    """
+    """Number of processes for a sweep where nobody says how many."""
     return usual_count(len(sweep.grid.tiling) // TILES_EACH) if sweep.kind.by_processes else 1
 
 
@@ -85,25 +70,11 @@ class Processes:
         self._pickled, self._count = pickle.dumps(sweep), count
 
     def environment(self) -> dict[str, Any]:
-        """Environment of the computation: workers are the same program on the same machine.
-
-        Returns:
-            the environment of this process.
-        """
+        """Environment of the computation: workers are the same program on the same machine."""
         return environment()
 
     def tiles(self, indices: Iterable[int], stop: Stop) -> Iterator[Computed]:
-        """Compute tiles in any order; one whose worker died is computed again.
-
-        Args:
-            stop: when it is set, tiles in progress are finished and no other one is begun.
-
-        Yields:
-            the tiles.
-
-        Raises:
-            ResourceError: workers that keep dying.
-        """
+        """Compute tiles in any order; one whose worker died is computed again."""
         waiting, deaths = dict.fromkeys(indices), 0
         while waiting and not stop:
             try:

@@ -30,16 +30,7 @@ LOG_TAIL = 1 << 16
 
 
 def status(directory: Path) -> dict[str, Any]:
-    """Progress of a run, from the names in its directory.
-
-    Returns:
-        plain values: "identity", "tiles", "shards", "quarantined", "unfinished", "result", "last" (of log.jsonl),
-        "cells", "cells_done", "cells_per_second" and "seconds_left" (None where unknown), "state" ("finished",
-        "running", "stopped", "killed" or "unknown") and "state_text", the same in words.
-
-    Raises:
-        StoreError: no run directory.
-    """
+    """Progress of a run, from the names in its directory."""
     record = _record(directory)
     folder = _folder(directory, record)
     tiling = _settings(record).tiling
@@ -70,17 +61,7 @@ def status(directory: Path) -> dict[str, Any]:
 
 
 def verify(path: Path) -> dict[str, Any]:
-    """Read again everything of a run, or one result or motion file.
-
-    Args:
-        path: a run directory, or a file.
-
-    Returns:
-        plain values: counts, and "faults", a list of lines.
-
-    Raises:
-        StoreError: neither a run directory nor a file.
-    """
+    """Read again everything of a run, or one result or motion file."""
     if path.is_file():
         # A link that a user names is followed.
         return _verify_file(path, {"schema": 1, "path": str(path), "faults": []})
@@ -118,14 +99,7 @@ def _is_read(report: dict[str, Any], path: Path, read: Callable[[], object]) -> 
 
 
 def result_in(directory: Path) -> Path:
-    """The result of a run directory.
-
-    Returns:
-        its path.
-
-    Raises:
-        StoreError: no run directory, or its run has not finished.
-    """
+    """The result of a run directory."""
     path = _folder(directory, _record(directory)).result
     if file_size(path) < 0:
         raise StoreError(printable(f"{directory}: holds no finished result: run the sweep to its end"))

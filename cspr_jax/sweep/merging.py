@@ -59,14 +59,7 @@ class Part:
 
 
 def read_part(path: Path) -> Part:
-    """A part from a run directory, or from a result.
-
-    Returns:
-        the part.
-
-    Raises:
-        StoreError: it is neither, or damaged.
-    """
+    """A part from a run directory, or from a result."""
     return _run_part(path) if path.is_dir() else _result_part(path, path)
 
 
@@ -163,22 +156,11 @@ class Merged:
         self._owner[cells] = np.where(new, number, owner)
 
     def environment(self) -> dict[str, Any]:
-        """Environment of the joined map.
-
-        Returns:
-            the environment of the first part.
-        """
+        """Environment of the joined map."""
         return self._parts[0].environment
 
     def tiles(self, indices: Iterable[int], stop: Stop) -> Iterator[Computed]:
-        """The tiles, in order.
-
-        Args:
-            stop: when it is set, no other tile is begun.
-
-        Yields:
-            the tiles.
-        """
+        """The tiles, in order."""
         for index in indices:
             if stop:
                 return

@@ -70,14 +70,7 @@ class Stop:
 
 @contextlib.contextmanager
 def stop_signals(tell: Callable[[str], None] = lambda line: None) -> Iterator[Stop]:
-    """Turn SIGINT and SIGTERM into a flag while the block runs; in the main thread only.
-
-    Args:
-        tell: called with a line for people when somebody has asked, from another thread.
-
-    Yields:
-        the flag.
-    """
+    """Turn SIGINT and SIGTERM into a flag while the block runs; in the main thread only."""
     stop, over = Stop(), threading.Event()
     stop.tell = tell
     if threading.current_thread() is not threading.main_thread():
@@ -133,12 +126,6 @@ def prompt_end(last: Callable[[], None] | None = None) -> Iterator[Prompt]:
     """Say at once that Ctrl-C or SIGTERM was noticed, and end the process where KeyboardInterrupt does not do so soon.
 
     Files get their names only when they are whole, so nothing half-written is left.
-
-    Args:
-        last: called before the process ends with the block, where a signal came; None: the process goes on.
-
-    Yields:
-        the answer.
     """
     prompt, pressed, over = Prompt(), threading.Event(), threading.Event()
     if threading.current_thread() is not threading.main_thread():

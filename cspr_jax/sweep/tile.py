@@ -34,18 +34,7 @@ class TileMap:
             self._cells.refuse_hopeless(sweep.grid)
 
     def __call__(self, index: int) -> Computed:
-        """Compute a tile.
-
-        Args:
-            index: of the tile, in the order of `Grid.places`.
-
-        Returns:
-            the tile.
-
-        Raises:
-            SelfCheckError: numbers that contradict each other.
-            ResourceError: the tile does not fit into memory.
-        """
+        """Compute a tile."""
         tiling = self._sweep.grid.tiling
         try:
             with double_precision():
@@ -87,13 +76,5 @@ def _tile_map(pickled: bytes) -> TileMap:
 
 
 def compute_tile(pickled: bytes, index: int) -> Computed:
-    """Compute a tile in a process that may not know the sweep yet.
-
-    Returns:
-        the tile.
-
-    Raises:
-        SelfCheckError: numbers that contradict each other.
-        ResourceError: the tile does not fit into memory.
-    """
+    """Compute a tile in a process that may not know the sweep yet."""
     return _tile_map(pickled)(index)

@@ -34,11 +34,7 @@ ARCS = 30
 
 
 def cell_seconds(kind: MapKind, keys: SweepFile) -> float:
-    """Estimate the time that a cell takes on one core.
-
-    Returns:
-        seconds.
-    """
+    """Estimate the time that a cell takes on one core."""
     names = [row.name for row in LIMITS if is_given(keys, f"limits.{row.name}")]
     limits = kind.cost.limits * sum(LIMIT_SECONDS.get(name, max(LIMIT_SECONDS.values())) for name in names)
     if is_given(keys, "limits.uncertainty"):
@@ -52,11 +48,7 @@ def cell_seconds(kind: MapKind, keys: SweepFile) -> float:
 
 
 def tile_cells(kind: MapKind, keys: SweepFile, cells: int) -> int:
-    """Choose the largest number of cells of a tile.
-
-    Returns:
-        at least 1.
-    """
+    """Choose the largest number of cells of a tile."""
     seconds = cell_seconds(kind, keys)
     most = min(kind.cells, math.ceil(TILE_SECONDS / seconds))
     return min(most, max(math.ceil(cells / FEWEST_TILES), math.ceil(SHORTEST_SECONDS / seconds)))

@@ -3,7 +3,10 @@
 A sieve bounds the margin of every number of arcs from above; `swings.decide` decides about the survivors.
 """
 
+from __future__ import annotations
+
 from functools import partial
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -21,6 +24,9 @@ from cspr_jax.swings import hypocycloid, sieve
 from cspr_jax.swings.decide import decided, end_slacks
 from cspr_jax.swings.hypocycloid import Segment
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # Largest number of segments that each thread holds at a time.
 PART = 16 * sieve.BATCH
 
@@ -35,29 +41,18 @@ def _segments(problem: Problem, points) -> tuple[Segment, Segment, jax.Array]:
 
 
 def segments_between(
-    problem: Problem, starts: np.ndarray, ends: np.ndarray, z0: np.ndarray
+    problem: Problem, starts: Float[np.ndarray, "n 3"], ends: Float[np.ndarray, "n 3"], z0: Float[np.ndarray, "n"]
 ) -> tuple[dict[int, Segment], np.ndarray]:
-    """Segments of many pairs of points.
-
-    Args:
-        problem: gives the robot and the amplitude function.
-        starts: (n, 3) from the centroid of the spools, z down, m.
-        ends: (n, 3) likewise.
-        z0: (n,) m.
-
-    Returns:
-        the segments for even (key 0) and odd (key 1) numbers of arcs, leaves (n, ...), and the
-        left-hand side of (2.55), (n,).
-    """
+    """Segments of many pairs of points."""
     even, odd, infinity = in_batches(partial(_segments, problem), (starts, ends, z0), size=sieve.BATCH)
     return {0: even, 1: odd}, infinity
 
 
 def minimum_arcs(
     problem: Problem,
-    starts: np.ndarray,
-    ends: np.ndarray,
-    z0: np.ndarray,
+    starts: Float[np.ndarray, "n 3"],
+    ends: Float[np.ndarray, "n 3"],
+    z0: Float[np.ndarray, "n"],
     *,
     max_arcs: int = 30,
     arcs=None,
@@ -66,20 +61,6 @@ def minimum_arcs(
     """Smallest number of arcs of each segment from a start to an end.
 
     Needs 64-bit jax (`jax.config.update("jax_enable_x64", True)`): verdicts are float64's.
-
-    Args:
-        starts: (n, 3) from the centroid of the spools, z down, m.
-        ends: (n, 3) likewise.
-        z0: (n,) depth of p0 below the centroid of the spools, m; positive.
-        max_arcs: largest number of arcs tried.
-        arcs: (n,) a fixed number of arcs for each segment, 0 where free; None: all free.
-        dtype: precision of the sieve, "float64" or "float32"; the verdicts are the same.
-
-    Returns:
-        the answers.
-
-    Raises:
-        InputError: an amplitude function that breaks (2.49); max_arcs below 1; z0 not positive; jax without 64 bits.
     """
     check_numbers(problem.robot, z0, max_arcs)
 
@@ -94,30 +75,15 @@ def minimum_arcs(
 
 def arcs_and_segments(
     problem: Problem,
-    starts: np.ndarray,
-    ends: np.ndarray,
-    z0: np.ndarray,
+    starts: Float[np.ndarray, "n 3"],
+    ends: Float[np.ndarray, "n 3"],
+    z0: Float[np.ndarray, "n"],
     *,
     max_arcs: int = 30,
     arcs=None,
     dtype="float64",
 ) -> tuple[Answers, Segment]:
-    """Smallest number of arcs of each segment, with the segments: `minimum_arcs` in one part.
-
-    Args:
-        starts: (n, 3) from the centroid of the spools, z down, m.
-        ends: (n, 3) likewise.
-        z0: (n,) depth of p0 below the centroid of the spools, m; positive.
-        max_arcs: largest number of arcs tried.
-        arcs: as for `swings.decide.only`.
-        dtype: precision of the sieve, "float64" or "float32"; the verdicts are the same.
-
-    Returns:
-        the answers, and the segments that they belong to, leaves (n, ...).
-
-    Raises:
-        InputError: as `minimum_arcs` does.
-    """
+    """Smallest number of arcs of each segment, with the segments: `minimum_arcs` in one part."""
     check_numbers(problem.robot, z0, max_arcs)
     broken = boundary_errors(problem.amplitude)
     if broken:
@@ -136,17 +102,8 @@ def arcs_and_segments(
     return decided(problem, parities, upper, at_ends, infinity, arcs=arcs)
 
 
-def check_numbers(robot: PointMassRobot, z0: np.ndarray, max_arcs: int) -> None:
-    """Refuse arguments that no search can use.
-
-    Args:
-        robot: must be centred.
-        z0: (n,) m.
-        max_arcs: largest number of arcs tried.
-
-    Raises:
-        InputError: max_arcs below 1; z0 not positive; jax without 64 bits; a robot that is not centred.
-    """
+def check_numbers(robot: PointMassRobot, z0: Float[np.ndarray, "n"], max_arcs: int) -> None:
+    """Refuse arguments that no search can use."""
     if not jax.config.read("jax_enable_x64"):
         raise InputError("jax_enable_x64", False, "true: verdicts need float64")
     if max_arcs < 1:

@@ -1,7 +1,10 @@
 """Blocks of a segment for a first look: cuts between the knots of the amplitude function."""
 
+from __future__ import annotations
+
 import itertools
 import math
+from typing import TYPE_CHECKING
 
 import jax.numpy as jnp
 import numpy as np
@@ -9,24 +12,19 @@ from jax import Array, lax
 
 from cspr_jax.motions.amplitudes import Amplitude
 
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
+
 # Intervals between the samples of one block.
 INTERVALS = 16
 # Rows and columns of the table are multiples of this, so that most calls have one shape.
 STEP = 32
 
 
-def blocks(amplitude: Amplitude, max_arcs: int, *, density: int = 1, least: int = 1) -> tuple[np.ndarray, np.ndarray]:
-    """Edges of about density (p + 4) blocks for each number of arcs p, none across a knot.
-
-    Args:
-        max_arcs: largest number of arcs.
-        density: 1 for a first look.
-        least: smallest number of blocks.
-
-    Returns:
-        edges (n_rows, n_edges), n_rows > max_arcs, with row p for p arcs, padded with ones; and the
-        number of blocks of each row (n_rows,).
-    """
+def blocks(
+    amplitude: Amplitude, max_arcs: int, *, density: int = 1, least: int = 1
+) -> tuple[Num[np.ndarray, "n_rows n_edges"], Float[np.ndarray, "n_rows"]]:
+    """Edges of about density (p + 4) blocks for each number of arcs p, none across a knot."""
     pieces = list(itertools.pairwise([0.0, *np.asarray(amplitude.knots).tolist(), 1.0]))
     n_rows = _rounded(max_arcs + 1)
     rows = []
@@ -45,21 +43,16 @@ def _rounded(count: int) -> int:
     return -(-count // STEP) * STEP
 
 
-def over_blocks(edges: Array, counts: Array, arcs: Array, first, step, *, together: int = 1):
-    """Fold a function over the blocks of each segment.
-
-    Args:
-        edges: (n_rows, n_edges) as `blocks` gives them.
-        counts: (n_rows,).
-        arcs: (n,) number of arcs of each segment.
-        first: state to start from.
-        step: (state, start, stop) -> state, with start and stop (together, n). A segment with fewer blocks sees its
-            last block again.
-        together: how many blocks of each segment a step takes.
-
-    Returns:
-        the last state.
-    """
+def over_blocks(
+    edges: Float[Array, "n_rows n_edges"],
+    counts: Float[Array, "n_rows"],
+    arcs: Num[Array, "n"],
+    first,
+    step,
+    *,
+    together: int = 1,
+):
+    """Fold a function over the blocks of each segment."""
     index = arcs.astype(jnp.int32)
     count, flat, row = counts[index], edges.reshape(-1), edges.shape[1] * index
 

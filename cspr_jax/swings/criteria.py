@@ -1,6 +1,9 @@
 """All criteria of a segment together, in one order: taut cables, below the spools, then the limits that are given."""
 
+from __future__ import annotations
+
 import itertools
+from typing import TYPE_CHECKING
 
 import jax
 from jax import Array
@@ -15,47 +18,33 @@ from cspr_jax.swings.hypocycloid import Segment
 from cspr_jax.swings.limit_slacks import count, limit_curvatures, limit_slacks
 from cspr_jax.swings.slacks import each_taut_bounds, instant, row_bounds, stretch
 
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
+
 # Criteria that are no limits: taut cables, and the depth below the spools.
 BASIC = 2
 
 
 def flags(limits: Limits) -> tuple[Verdict, ...]:
-    """The flag that says that a criterion is broken, for each criterion.
-
-    Returns:
-        n_criteria flags.
-    """
+    """The flag that says that a criterion is broken, for each criterion."""
     return (Verdict.SLACK_CABLE, Verdict.ABOVE_SPOOLS, *(row.flag for row in limits_set(limits)))
 
 
 def counts(robot: PointMassRobot, limits: Limits) -> tuple[int, ...]:
-    """Numbers of smooth functions of which each criterion is the smallest.
-
-    Args:
-        robot: a point mass on cables.
-
-    Returns:
-        n_criteria numbers.
-    """
+    """Numbers of smooth functions of which each criterion is the smallest."""
     return (robot.n_cables, 1, *(count(row, robot.n_cables) for row in limits_set(limits)))
 
 
 @jax.jit
 def smooth_slacks(
-    robot: PointMassRobot, limits: Limits, amplitude: Amplitude, segment: Segment, arcs: Array, tau: Array
-) -> tuple[Array, ...]:
-    """Every slack of every criterion, at one instant: smooth functions of tau.
-
-    Args:
-        robot: a point mass on three cables.
-        limits: what else must be met.
-        segment: of the parity of `arcs`.
-        arcs: () number of arcs, a float.
-        tau: () normalised time.
-
-    Returns:
-        numbers (), as many as `counts` adds up to, criterion by criterion.
-    """
+    robot: PointMassRobot,
+    limits: Limits,
+    amplitude: Amplitude,
+    segment: Segment,
+    arcs: Num[Array, ""],
+    tau: Float[Array, ""],
+) -> tuple[Float[Array, ""], ...]:
+    """Every slack of every criterion, at one instant: smooth functions of tau."""
     state = instant(segment, amplitude, arcs, tau)
     terms = [*state.kappa, state.eta]
     for slack in limit_slacks(robot, limits, segment, arcs, tau, state):
@@ -64,20 +53,14 @@ def smooth_slacks(
 
 
 def slacks(
-    robot: PointMassRobot, limits: Limits, amplitude: Amplitude, segment: Segment, arcs: Array, tau: Array
-) -> tuple[Array, ...]:
-    """The smallest slack of each criterion, at one instant.
-
-    Args:
-        robot: a point mass on three cables.
-        limits: what else must be met.
-        segment: of the parity of `arcs`.
-        arcs: () number of arcs, a float.
-        tau: () normalised time.
-
-    Returns:
-        n_criteria numbers ().
-    """
+    robot: PointMassRobot,
+    limits: Limits,
+    amplitude: Amplitude,
+    segment: Segment,
+    arcs: Num[Array, ""],
+    tau: Float[Array, ""],
+) -> tuple[Float[Array, ""], ...]:
+    """The smallest slack of each criterion, at one instant."""
     values = iter(smooth_slacks(robot, limits, amplitude, segment, arcs, tau))
     return tuple(smallest(list(itertools.islice(values, n))) for n in counts(robot, limits))
 
@@ -87,23 +70,11 @@ def curvatures(
     limits: Limits,
     amplitude: Amplitude,
     segment: Segment,
-    arcs: Array,
-    start: Array,
-    stop: Array,
-) -> tuple[Array, ...]:
-    """Bound of the second derivative of each criterion's slacks over an interval.
-
-    Args:
-        robot: a point mass on three cables.
-        limits: what else must be met.
-        segment: of the parity of `arcs`.
-        arcs: () number of arcs, a float.
-        start: () tau.
-        stop: () tau, larger; no knot between.
-
-    Returns:
-        n_criteria numbers ().
-    """
+    arcs: Num[Array, ""],
+    start: Float[Array, ""],
+    stop: Float[Array, ""],
+) -> tuple[Float[Array, ""], ...]:
+    """Bound of the second derivative of each criterion's slacks over an interval."""
     over = stretch(segment, amplitude, arcs, start, stop)
     kappa = each_taut_bounds(segment, arcs, over)
     eta = row_bounds(segment, arcs, over, segment.tilt)

@@ -6,9 +6,11 @@ refuse the candidates whose cables stay taut, and one of these candidates is rep
 with the largest margin. `platforms.answers` does the same for platforms.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -32,6 +34,9 @@ from cspr_jax.swings.parities import pick, rows_of
 from cspr_jax.swings.proof import SMALLEST_MARGIN, first_look, prove
 from cspr_jax.swings.refusals import refusals, unavoidable
 from cspr_jax.swings.sieve import upper_bounds
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
 
 # Segments computed at a time where little is computed for each.
 BATCH = 4096
@@ -61,29 +66,15 @@ class Known(NamedTuple):
 def decided(
     problem: Problem,
     parities: dict[int, Segment],
-    upper: np.ndarray,
-    at_ends: np.ndarray,
-    infinity: np.ndarray,
+    upper: Num[np.ndarray, "n max_arcs"],
+    at_ends: Float[np.ndarray, "n n_criteria"],
+    infinity: Float[np.ndarray, "n"],
     *,
     arcs: np.ndarray | None = None,
     known: Known | None = None,
     measure: Callable[[Problem, Segment, np.ndarray], np.ndarray] = margins,
 ) -> tuple[Answers, Segment]:
-    """Answers from upper bounds.
-
-    Args:
-        parities: the segments for even (key 0) and odd (key 1) numbers of arcs, leaves (n, ...).
-        upper: (n, max_arcs) upper bounds of the slack of the cables and of the depth, column p - 1 for p arcs; -inf
-            where it is out of the question.
-        at_ends: (n, n_criteria) of `end_slacks`.
-        infinity: (n,) left-hand side of (2.55).
-        arcs: as for `only`.
-        known: numbers of arcs that are proved already; None: none.
-        measure: finds the margins, as `margins` does.
-
-    Returns:
-        the answers; the segments that durations and margins belong to, leaves (n, ...).
-    """
+    """Answers from upper bounds."""
     known = known or Known(np.zeros(len(upper), int), np.full(len(upper), -np.inf))
     with_limits = only(np.minimum(upper, at_ends.min(1)[:, None] + SMALLEST_MARGIN), arcs)
     basic = only(np.minimum(upper, at_ends[:, :BASIC].min(1)[:, None] + SMALLEST_MARGIN), arcs)
@@ -116,17 +107,10 @@ def decided(
 
 
 @persistent_jit
-def end_slacks(problem: Problem, arcs: float, segments: Segment) -> jax.Array:
+def end_slacks(problem: Problem, arcs: float, segments: Segment) -> Float[jax.Array, "n n_criteria"]:
     """Smallest slack of each criterion at the two ends.
 
     There the velocity is zero and the acceleration a pendulum's, whatever the number of arcs.
-
-    Args:
-        arcs: any number of arcs of the segments' parity.
-        segments: leaves (n, ...).
-
-    Returns:
-        (n, n_criteria) in the order of `criteria.flags`.
     """
 
     def one(segment):
@@ -138,16 +122,8 @@ def end_slacks(problem: Problem, arcs: float, segments: Segment) -> jax.Array:
     return jax.vmap(one)(segments)
 
 
-def only(upper: np.ndarray, arcs) -> np.ndarray:
-    """Upper bounds, without those that prescribed numbers of arcs rule out.
-
-    Args:
-        upper: (n, max_arcs).
-        arcs: (n,) a fixed number of arcs for each segment, -m where it is free from m on, 0 where free; None: all free.
-
-    Returns:
-        (n, max_arcs), -inf at numbers of arcs that are ruled out.
-    """
+def only(upper: Float[np.ndarray, "n max_arcs"], arcs) -> Num[np.ndarray, "n max_arcs"]:
+    """Upper bounds, without those that prescribed numbers of arcs rule out."""
     if arcs is None:
         return upper
     fixed, number = np.asarray(arcs)[:, None], np.arange(1, upper.shape[1] + 1)

@@ -1,9 +1,16 @@
 """Guides for z0, the depth of P0 below the centroid of the spools."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from cspr_jax.robots.point_mass import plane_normal
 from cspr_jax.robots.robot import Robot
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 
 def _depths(robot: Robot, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -11,44 +18,22 @@ def _depths(robot: Robot, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray, 
     return targets, targets @ normal, normal
 
 
-def mean_depth(robot: Robot, targets: np.ndarray) -> float:
-    """Mean depth of the targets, the choice of thesis section 2.9.
-
-    Args:
-        robot: centred.
-        targets: (n, 3) from the centroid of the spools, z down, m.
-
-    Returns:
-        z0, m.
-    """
+def mean_depth(robot: Robot, targets: Float[np.ndarray, "n 3"]) -> float:
+    """Mean depth of the targets, the choice of thesis section 2.9."""
     return float(_depths(robot, targets)[0][:, 2].mean())
 
 
-def least_depth(robot: Robot, targets: np.ndarray) -> float:
-    """Bound (2.59): below it some target cannot be reached with many arcs, though perhaps with few.
-
-    Args:
-        robot: any robot; depths are measured below the plane of its spools, along the vertical.
-        targets: (n, 3) from the centroid of the spools, z down, m.
-
-    Returns:
-        z0, m.
-    """
+def least_depth(robot: Robot, targets: Float[np.ndarray, "n 3"]) -> float:
+    """Bound (2.59): below it some target cannot be reached with many arcs, though perhaps with few."""
     return float(_depths(robot, targets)[1].max() / 2.0)
 
 
-def conservative_depth(robot: Robot, targets: np.ndarray) -> float:
+def conservative_depth(robot: Robot, targets: Float[np.ndarray, "n 3"]) -> float:
     """Bound (2.58): above it every segment between the targets is feasible with enough arcs.
 
     It keeps every target inside the sphere about P0 that touches the spool plane,
     |p - p0| < z0 / |n| with n the plane's normal of unit vertical component. For a plane that is
     not level the condition is quadratic in z0, and can fail for large z0 too, or for all.
-
-    Args:
-        targets: (n, 3) from the centroid of the spools, z down, m; below the spools.
-
-    Returns:
-        z0, m; NaN if there is none.
     """
     below, depth, normal = _depths(robot, targets)
     height, square = below[:, 2], (below**2).sum(1)

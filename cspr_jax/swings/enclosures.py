@@ -1,7 +1,9 @@
 """Enclosures of a point mass in motion, for bounds over robots that differ a little."""
 
+from __future__ import annotations
+
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -18,6 +20,9 @@ from cspr_jax.swings.blocks import INTERVALS
 from cspr_jax.swings.hypocycloid import Segment, duration, motion
 from cspr_jax.swings.limit_slacks import pace_bounds
 from cspr_jax.swings.slacks import instant, row_bounds, stretch, taut_bounds
+
+if TYPE_CHECKING:
+    from jaxtyping import Num
 
 # Parts of an arc that are looked at first, and blocks computed at a time.
 PARTS, BATCH = 4, 1024
@@ -76,17 +81,8 @@ def _durations(items) -> Array:
     return jax.vmap(duration)(*items)
 
 
-def enclosure(problem: Problem, segments: Segment, arcs: np.ndarray, blocks: Blocks) -> Enclosure:
-    """Enclosure of blocks of motions.
-
-    Args:
-        problem: robot, limits and amplitude; the robot has as many cables as degrees of freedom.
-        segments: leaves (n, ...), of the parity of `arcs`.
-        arcs: (n,) number of arcs, 1 or more.
-
-    Returns:
-        the enclosure.
-    """
+def enclosure(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"], blocks: Blocks) -> Enclosure:
+    """Enclosure of blocks of motions."""
     items = (*jax.tree.map(lambda x: np.asarray(x)[blocks.row], (segments, arcs.astype(float))), *blocks[1:])
     known: Any = in_batches(partial(_enclosed, problem), items, size=BATCH)
     count, n_cables = known.rays.shape[:2]
@@ -117,19 +113,9 @@ def enclosure(problem: Problem, segments: Segment, arcs: np.ndarray, blocks: Blo
 
 
 def tolerated_by_point_masses(
-    problem: Problem, segments: Segment, arcs: np.ndarray, *, whole: bool = True
+    problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"], *, whole: bool = True
 ) -> Tolerated:
-    """Multiples of the uncertainty that motions of a point mass tolerate.
-
-    Args:
-        problem: robot, limits with an uncertainty, amplitude.
-        segments: leaves (n, ...), of the parity of `arcs`; feasible as they are planned.
-        arcs: (n,) number of arcs, 1 or more.
-        whole: as in `tolerances.tolerated`.
-
-    Returns:
-        the multiples.
-    """
+    """Multiples of the uncertainty that motions of a point mass tolerate."""
     blocks = parts_of_arcs(arcs, np.asarray(problem.amplitude.knots), PARTS)
     rates: Any = np.asarray(segments.rate)
     requirements = requirements_of(problem, rates / problem.robot.base_points.shape[0])

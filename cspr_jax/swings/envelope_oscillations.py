@@ -9,9 +9,12 @@ Omega. Its largest root, the largest over tau and over the cables, is what N mus
 is sufficient for taut cables, not necessary. n is a real number here: a motion takes the next integer.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from functools import partial
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -21,6 +24,9 @@ from jax import Array, lax
 from cspr_jax.arithmetic.elementary import vertex
 from cspr_jax.arithmetic.minima import GOLDEN, Bracket, golden_step, inner_points
 from cspr_jax.motions.amplitudes import SMALLEST_EPSILON, Amplitude, derivatives, named
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Samples of each piece of the amplitude function; between them the maximum is refined.
 SAMPLES = 64
@@ -34,17 +40,10 @@ EPSILONS, SMALLEST_WIDTH = 50, 1e-9
 LARGEST_INCLINATION = 1.0 - 1e-9
 
 
-def squared_oscillations_at(amplitude: Amplitude, weight: Array, inclination: Array, tau: Array) -> Array:
-    """N_k(v, tau) of (1.44): square of the oscillations that keep a cable taut at an instant, whatever the phase.
-
-    Args:
-        weight: () w_k.
-        inclination: () v, |v| < 1.
-        tau: ().
-
-    Returns:
-        () N; that of Omega = 0 where every Omega will do; infinite where none will, |v A| >= 1.
-    """
+def squared_oscillations_at(
+    amplitude: Amplitude, weight: Float[Array, ""], inclination: Float[Array, ""], tau: Float[Array, ""]
+) -> Float[Array, ""]:
+    """N_k(v, tau) of (1.44): square of the oscillations that keep a cable taut at an instant, whatever the phase."""
     end = derivatives(amplitude, jnp.ones_like(tau), order=2)[2]
     return _squared(_root(inclination + weight, inclination, end, derivatives(amplitude, tau, order=2)), end)
 
@@ -150,17 +149,10 @@ def _peak(function: Callable[[Array], Array], low: Array, high: Array) -> Array:
     return lax.fori_loop(0, PARABOLAS, narrow, (jnp.full_like(middle, -jnp.inf), middle, width))[0]
 
 
-def least_oscillations(amplitude: Amplitude, weights: Array, inclination: Array) -> Array:
-    """Oscillations that the envelopes ask for, a real number: (1.48), (1.94).
-
-    Args:
-        amplitude: A, which meets (1.27) and (1.28).
-        weights: (n_cables,) w_k.
-        inclination: () v, |v| < 1.
-
-    Returns:
-        () n; infinite where |v A| reaches 1: no n will do.
-    """
+def least_oscillations(
+    amplitude: Amplitude, weights: Float[Array, "n_cables"], inclination: Float[Array, ""]
+) -> Float[Array, ""]:
+    """Oscillations that the envelopes ask for, a real number: (1.48), (1.94)."""
     return jnp.sqrt(jnp.maximum(_least(amplitude, _samples(amplitude), _extreme(weights), inclination), 0.0))
 
 
@@ -170,30 +162,16 @@ def _extreme(weights: Array) -> Array:
     return jnp.stack([jnp.max(weights), jnp.min(weights)])
 
 
-def horizontal_oscillations(amplitude: Amplitude, weights: Array) -> Array:
-    """Oscillations that the envelopes ask for on a horizontal transition, a real number: (1.53).
-
-    Args:
-        amplitude: A, which meets (1.27) and (1.28).
-        weights: (n_cables,) w_k; only the largest size counts.
-
-    Returns:
-        () n.
-    """
+def horizontal_oscillations(amplitude: Amplitude, weights: Float[Array, "n_cables"]) -> Float[Array, ""]:
+    """Oscillations that the envelopes ask for on a horizontal transition, a real number: (1.53)."""
     largest = jnp.max(jnp.abs(weights), keepdims=True)
     return jnp.sqrt(jnp.maximum(_least(amplitude, _samples(amplitude), largest, jnp.zeros_like(largest[0])), 0.0))
 
 
-def best_inclination(amplitude: Amplitude, weights: Array) -> tuple[Array, Array]:
-    """The inclination that needs the fewest oscillations, by golden section.
-
-    Args:
-        amplitude: A, which meets (1.27) and (1.28).
-        weights: (n_cables,) w_k.
-
-    Returns:
-        v and n, () each; |v| stays below 1 over the largest |A|, beyond which no n will do.
-    """
+def best_inclination(
+    amplitude: Amplitude, weights: Float[Array, "n_cables"]
+) -> tuple[Float[Array, ""], Float[Array, ""]]:
+    """The inclination that needs the fewest oscillations, by golden section."""
     return _best(amplitude, _samples(amplitude), _extreme(weights))
 
 
@@ -204,15 +182,8 @@ def _best(amplitude: Amplitude, samples: Array, weights: Array) -> tuple[Array, 
     return v, jnp.sqrt(jnp.maximum(_least(amplitude, samples, weights, v), 0.0))
 
 
-def best_epsilon(weights: Array) -> tuple[float, float]:
-    """The epsilon of A_eff, (1.110), that needs the fewest oscillations on a horizontal transition.
-
-    Args:
-        weights: (n_cables,) w_k.
-
-    Returns:
-        epsilon and n.
-    """
+def best_epsilon(weights: Float[Array, "n_cables"]) -> tuple[float, float]:
+    """The epsilon of A_eff, (1.110), that needs the fewest oscillations on a horizontal transition."""
 
     def needed(epsilon: float) -> float:
         return float(horizontal_oscillations(named("effective", epsilon), weights))
@@ -227,13 +198,6 @@ def best_epsilon(weights: Array) -> tuple[float, float]:
     return 0.5 * (low + high), needed(0.5 * (low + high))
 
 
-def many_oscillations(amplitude: Amplitude, weights: Array) -> Array:
-    """Limit of `least_oscillations` on a horizontal transition as the weights grow, (1.55).
-
-    Args:
-        weights: (n_cables,) w_k.
-
-    Returns:
-        () n.
-    """
+def many_oscillations(amplitude: Amplitude, weights: Float[Array, "n_cables"]) -> Float[Array, ""]:
+    """Limit of `least_oscillations` on a horizontal transition as the weights grow, (1.55)."""
     return jnp.max(jnp.abs(weights)) / math.pi * amplitude.largest[1]

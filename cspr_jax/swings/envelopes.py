@@ -5,9 +5,11 @@ C and S hold no fast oscillation, so that a few samples with a bound of the seco
 a whole transition, where the pseudotensions themselves need many samples an arc.
 """
 
+from __future__ import annotations
+
 import itertools
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -15,23 +17,22 @@ from jax import Array, lax
 
 from cspr_jax.motions.amplitudes import Amplitude, derivatives, local_bounds
 
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
+
 # Intervals of each piece of the amplitude function.
 INTERVALS = 64
 UNROLL = 4
 
 
-def lower_envelope(amplitude: Amplitude, weight: Array, inclination: Array, n: Array, tau: Array) -> Array:
-    """Lower envelope of the normalised pseudotension of one cable at one instant, (1.39); (1.50) for v = 0.
-
-    Args:
-        weight: () w_k.
-        inclination: () v.
-        n: () number of oscillations, a real number.
-        tau: ().
-
-    Returns:
-        () the smallest pseudotension of any phase; NaN where n is too small to have a duration.
-    """
+def lower_envelope(
+    amplitude: Amplitude,
+    weight: Float[Array, ""],
+    inclination: Float[Array, ""],
+    n: Num[Array, ""],
+    tau: Float[Array, ""],
+) -> Float[Array, ""]:
+    """Lower envelope of the normalised pseudotension of one cable at one instant, (1.39); (1.50) for v = 0."""
     end = derivatives(amplitude, jnp.ones_like(tau), order=2)[2]
     omega = (2.0 * math.pi * n) ** 2 - end
     values = derivatives(amplitude, tau, order=2)
@@ -64,18 +65,10 @@ def _stretches(amplitude: Amplitude) -> _Stretch:
     return _Stretch(derivatives(amplitude, stop, order=2), bounds, stop - start)
 
 
-def proved_envelope(amplitude: Amplitude, weights: Array, inclination: Array, n: Array) -> Array:
-    """Lower bound of all pseudotensions, and of the depth below the spools over z0, on a whole transition.
-
-    Args:
-        amplitude: A, which meets (1.27) and (1.28).
-        weights: (n_cables,) w_k.
-        inclination: () v.
-        n: () number of oscillations, large enough to have a duration.
-
-    Returns:
-        () the bound, but for rounding; the smallest envelope less what may hide between the samples.
-    """
+def proved_envelope(
+    amplitude: Amplitude, weights: Float[Array, "n_cables"], inclination: Float[Array, ""], n: Num[Array, ""]
+) -> Float[Array, ""]:
+    """Lower bound of all pseudotensions, and of the depth below the spools over z0, on a whole transition."""
     end = derivatives(amplitude, jnp.ones_like(n), order=2)[2]
     omega = (2.0 * math.pi * n) ** 2 - end
     # The squares are convex in the load: no load between these, the depth's 0 among them, has a lower envelope.

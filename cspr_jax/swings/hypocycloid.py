@@ -15,10 +15,12 @@ p0 and the arcs still need a plane (psi = 0 with p odd, psi = pi with p even), t
 least inclined to the spool plane. psi = 0 with p = 1 has no duration: see `duration`.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import math
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -37,6 +39,9 @@ from cspr_jax.robots.state import State
 from cspr_jax.robots.state_bounds import StateBounds
 from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float, Num
 
 # Blocks of which bounds are computed at a time.
 BATCH = 64
@@ -77,21 +82,13 @@ class Segment:
     twist: Array
 
 
-def couplings(robot: PointMassRobot, hub: Array, axes: Array) -> tuple[Array, Array, Array]:
+def couplings(
+    robot: PointMassRobot, hub: Float[Array, "3"], axes: Float[Array, "3 n"]
+) -> tuple[Float[Array, "n"], Float[Array, "n_cables n"], Float[Array, "n_cables"]]:
     """Coefficients that couple a motion p = p0 + axes c, in a plane or on a line through p0, to the pseudotensions.
 
     With d = c + c'' / lambda and lambda = gravity / z0, from (2.12) to (2.14) divided by their value
     at rest in p0: cable k has the normalised pseudotension 1 + tilt . c + pull_k . d + twist_k (c x d).
-
-    Args:
-        robot: centred; a point mass on three cables, any triangle; or on two, then the motion is a line in their plane;
-            on more cables the motion does not determine tensions.
-        hub: (3,) p0 from the centroid of the spools, m.
-        axes: (3, n) the directions of the motion, as columns; n is 1 or 2.
-
-    Returns:
-        tilt (n,), 1/m; pull (n_cables, n), 1/m, one row for each cable; twist (n_cables,), 1/m^2, zero for a line; NaN
-        on more cables.
     """
     if robot.n_cables > robot.dof:
         nothing = jnp.full((robot.n_cables, axes.shape[1]), jnp.nan)
@@ -111,19 +108,15 @@ def couplings(robot: PointMassRobot, hub: Array, axes: Array) -> tuple[Array, Ar
 
 
 @jax.jit
-def segment(robot: PointMassRobot, start: Array, end: Array, z0: Array, *, odd: Array) -> Segment:
-    """The segment from one point to another.
-
-    Args:
-        robot: a point mass on three cables or more, centred.
-        start: (3,) p1, from the centroid of the spools, z down, m.
-        end: (3,) p2, m.
-        z0: () depth of p0 below the centroid of the spools, m.
-        odd: () whether the number of arcs is odd.
-
-    Returns:
-        the segment for arcs of that parity.
-    """
+def segment(
+    robot: PointMassRobot,
+    start: Float[Array, "3"],
+    end: Float[Array, "3"],
+    z0: Float[Array, ""],
+    *,
+    odd: Bool[Array, ""],
+) -> Segment:
+    """The segment from one point to another."""
     hub, size = point_mass.rest_point(z0), point_mass.spool_radius(robot)
     plane, r1, r2, precession = swing_plane(start - hub, end - hub, size, point_mass.plane_normal(robot), odd)
     tilt, pull, twist = couplings(robot, hub, plane)
@@ -145,37 +138,23 @@ class Oscillation(NamedTuple):
     period: Array
 
 
-def oscillation(segment: Segment, arcs: Array) -> Oscillation:
-    """The fast part of a segment.
-
-    Args:
-        segment: of the parity of `arcs`.
-        arcs: () number of arcs p, a float.
-
-    Returns:
-        its numbers.
-    """
+def oscillation(segment: Segment, arcs: Num[Array, ""]) -> Oscillation:
+    """The fast part of a segment."""
     ratio = segment.precession / arcs
     # 1 - ratio comes first: it vanishes for p = 1 and psi -> 0.
     steady = (math.pi * arcs) ** 2 * (1.0 - ratio) * (1.0 + ratio)
     return Oscillation(ratio, steady, steady - segment.end_curvature)
 
 
-def duration(segment: Segment, arcs: Array) -> Array:
-    """Duration T of a segment, (2.47); of a transition (1.29).
-
-    Args:
-        segment: of the parity of `arcs`.
-        arcs: () number of arcs.
-
-    Returns:
-        () seconds; 0 for p = 1 between points on one ray from p0, which is no trajectory.
-    """
+def duration(segment: Segment, arcs: Num[Array, ""]) -> Float[Array, ""]:
+    """Duration T of a segment, (2.47); of a transition (1.29)."""
     return jnp.sqrt(oscillation(segment, arcs).period / segment.rate)
 
 
 @jax.jit
-def swing(segment: Segment, amplitude_values: tuple[Array, ...], arcs: Array, tau: Array) -> tuple[Array, Array]:
+def swing(
+    segment: Segment, amplitude_values: tuple[Float[Array, ""], ...], arcs: Num[Array, ""], tau: Float[Array, ""]
+) -> tuple[Float[Array, "2"], Float[Array, "2"]]:
     """Closed form of the motion in the plane of the trajectory, at one instant.
 
     In the frame e_r, e_t that precesses with the ellipse, with C, S the cosine and sine of the
@@ -186,15 +165,6 @@ def swing(segment: Segment, amplitude_values: tuple[Array, ...], arcs: Array, ta
 
     rho = (r'' - A''(1) r) / (T^2 lambda) and g = (T^2 lambda + A''(1)) / (T^2 lambda), which is 1 in
     chapter 2; c'' here is the second derivative in time.
-
-    Args:
-        segment: of the parity of `arcs`.
-        amplitude_values: A, A', A'' at `tau`, each ().
-        arcs: () number of arcs, a float.
-        tau: () normalised time.
-
-    Returns:
-        c: (2,) and d: (2,) along q_h1 and q_h2, m.
     """
     span = segment.end_radius - segment.start_radius
     r = segment.start_radius + span * amplitude_values[0]  # (2.48)
@@ -210,17 +180,10 @@ def swing(segment: Segment, amplitude_values: tuple[Array, ...], arcs: Array, ta
     return c, d
 
 
-def motion(segment: Segment, amplitude: Amplitude, arcs: Array, tau: Array) -> tuple[Array, Array, Array]:
-    """Position, velocity and acceleration at one instant, as printed in (2.31) to (2.48).
-
-    Args:
-        segment: of the parity of `arcs`.
-        arcs: () number of arcs, a float.
-        tau: () normalised time in [0, 1].
-
-    Returns:
-        position (3,) m, velocity (3,) m/s, acceleration (3,) m/s^2.
-    """
+def motion(
+    segment: Segment, amplitude: Amplitude, arcs: Num[Array, ""], tau: Float[Array, ""]
+) -> tuple[Float[Array, "3"], Float[Array, "3"], Float[Array, "3"]]:
+    """Position, velocity and acceleration at one instant, as printed in (2.31) to (2.48)."""
     theta = segment.sense * math.pi * (arcs - segment.precession)  # (2.34)
     n = 2.0 * math.pi * arcs / jnp.abs(theta)  # (2.35)
     slow, fast = theta * tau, (n - 1.0) * theta * tau
@@ -289,14 +252,7 @@ def _bounds(segment: Segment, arcs: Array, blocks: TimeBounds) -> StateBounds:
 
 @jax.jit
 def several_bounds(cases: tuple[Segment, Array, TimeBounds]) -> StateBounds:
-    """Bounds of the states of several motions, over one block of each.
-
-    Args:
-        cases: segments and numbers of arcs, and bounds of the amplitude function; leaves (k, ...).
-
-    Returns:
-        the bounds, leaves (k, ...).
-    """
+    """Bounds of the states of several motions, over one block of each."""
     return jax.vmap(_block_bounds)(*cases)
 
 
@@ -304,31 +260,17 @@ def _block_bounds(segment: Segment, arcs: Array, block: TimeBounds) -> StateBoun
     return StateBounds(*swing_bounds(segment, arcs, duration(segment, arcs), block))
 
 
-def feasibility_at_infinity(segment: Segment, amplitude: Amplitude) -> Array:
-    """Left-hand side of (2.55): positive means that enough arcs make the segment feasible.
-
-    Args:
-        amplitude: A; one that overshoots counts with its largest radius.
-
-    Returns:
-        () at most 1.
-    """
+def feasibility_at_infinity(segment: Segment, amplitude: Amplitude) -> Float[Array, ""]:
+    """Left-hand side of (2.55): positive means that enough arcs make the segment feasible."""
     span = segment.end_radius - segment.start_radius
     ends = segment.start_radius + span * jnp.stack([amplitude.lowest, amplitude.highest]).astype(span.dtype)
     return 1.0 - jnp.max(jnp.abs(ends)) * jnp.linalg.norm(segment.tilt)
 
 
-def limit_of_many_arcs(segment: Segment, amplitude: Amplitude, tau: Array) -> Array:
+def limit_of_many_arcs(segment: Segment, amplitude: Amplitude, tau: Float[Array, ""]) -> Float[Array, ""]:
     """Smallest normalised pseudotension as the number of arcs of this parity grows, at one instant.
 
     1 - r(tau) |tilt . e_r(tau)|: exact, where (2.55) bounds the direction of the swing by the worst.
-
-    Args:
-        segment: of the parity in question.
-        tau: () normalised time.
-
-    Returns:
-        () its minimum over tau is the limit of the margin.
     """
     r = segment.start_radius + (segment.end_radius - segment.start_radius) * derivatives(amplitude, tau, order=0)[0]
     lateral, axial = sincospi(segment.sense * segment.precession * tau)

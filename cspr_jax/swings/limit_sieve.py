@@ -4,7 +4,10 @@ It looks at candidates only as the search comes to them, as many at a time as a 
 limit by more than rounding is a refutation; nothing is accepted here.
 """
 
+from __future__ import annotations
+
 from functools import partial
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -20,6 +23,9 @@ from cspr_jax.swings.criteria import BASIC, slacks
 from cspr_jax.swings.hypocycloid import Segment
 from cspr_jax.swings.parities import pick
 from cspr_jax.swings.proof import BATCH, tolerance
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
 
 SAMPLES = 32
 # Tolerances by which a sample must lie below zero: twice as far as where `swings.proof` refutes a limit.
@@ -45,15 +51,8 @@ class LimitSieve:
         self._unseen = alive.copy() if n_limits else np.zeros_like(alive)
         self.alive, self.broken = alive.copy(), np.zeros((*alive.shape, BASIC + n_limits), bool)
 
-    def look(self, rows: np.ndarray) -> np.ndarray:
-        """Look at candidates until none that comes first is refuted.
-
-        Args:
-            rows: (m,) segments.
-
-        Returns:
-            (k,) those of the segments that have a candidate left.
-        """
+    def look(self, rows: Float[np.ndarray, "m"]) -> Float[np.ndarray, "k"]:
+        """Look at candidates until none that comes first is refuted."""
         while True:
             rows = rows[self.alive[rows].any(1)]
             open_rows = rows[self._unseen[rows, np.argmax(self.alive[rows], axis=1)]]
@@ -68,30 +67,18 @@ class LimitSieve:
         self.alive[rows, arcs - 1] &= ~broken.any(1)
 
 
-def broken_at_samples(problem: Problem, segments: Segment, arcs: np.ndarray) -> np.ndarray:
-    """Limits that some sample breaks by more than rounding; a quick refutation.
-
-    Args:
-        segments: leaves (n, ...), of the parity of `arcs`; float64.
-        arcs: (n,) number of arcs, 1 or more.
-
-    Returns:
-        (n, n_criteria); False of what is no limit.
-    """
+def broken_at_samples(
+    problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]
+) -> Float[np.ndarray, "n n_criteria"]:
+    """Limits that some sample breaks by more than rounding; a quick refutation."""
     lowest, near = in_batches(partial(_lowest, problem), (segments, np.asarray(arcs, float)), size=BATCH)
     return np.concatenate([np.zeros((len(lowest), BASIC), bool), lowest < -FAR * near[:, None]], axis=1)
 
 
-def upcoming(candidates: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Next candidates of segments: one each, or as many as fit into a batch, which takes as long whatever it holds.
-
-    Args:
-        candidates: (n, max_arcs) which are left, column p - 1 for p arcs.
-        rows: (m,) segments, at least one, each with a candidate.
-
-    Returns:
-        the segments and numbers of arcs of the candidates, (k,) each; numbers of a segment increase.
-    """
+def upcoming(
+    candidates: Num[np.ndarray, "n max_arcs"], rows: Float[np.ndarray, "m"]
+) -> tuple[Num[np.ndarray, "k"], Num[np.ndarray, "k"]]:
+    """Next candidates of segments: one each, or as many as fit into a batch, which takes as long whatever it holds."""
     left = candidates[rows]
     owner, column = np.nonzero(left & (np.cumsum(left, axis=1) <= max(BATCH // len(rows), 1)))
     return rows[owner], column + 1

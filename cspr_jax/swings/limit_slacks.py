@@ -13,9 +13,11 @@ the weight, and rates with respect to tau; w_k = (p - a_k) . p'. F of cable k is
 Each is dimensionless and free of a division that could blow up.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -30,6 +32,9 @@ from cspr_jax.robots.point_mass import PointMassRobot, plane_normal
 from cspr_jax.schema.limits import Limit
 from cspr_jax.swings.hypocycloid import Segment, duration, oscillation
 from cspr_jax.swings.slacks import Instant, Stretch, row_bounds
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
 
 
 class _AtInstant(NamedTuple):
@@ -127,30 +132,15 @@ CLOSED = {
 
 
 def count(row: Limit, n_cables: int) -> int:
-    """Number of smooth functions of which the slack of a limit is the smallest.
-
-    Returns:
-        one for a height; one for each cable, or two for either sign.
-    """
+    """Number of smooth functions of which the slack of a limit is the smallest."""
     return CLOSED[row.name].sides * (n_cables if row.per_cable else 1)
 
 
 @jax.jit
 def limit_slacks(
-    robot: PointMassRobot, limits: Limits, segment: Segment, arcs: Array, tau: Array, state: Instant
+    robot: PointMassRobot, limits: Limits, segment: Segment, arcs: Num[Array, ""], tau: Float[Array, ""], state: Instant
 ) -> tuple[list[Array], ...]:
-    """The slacks of each limit, at one instant: smooth functions, one or two for each cable.
-
-    Args:
-        robot: a point mass on three cables.
-        segment: of the parity of `arcs`.
-        arcs: () number of arcs, a float.
-        tau: () normalised time.
-        state: the state at `tau`.
-
-    Returns:
-        a list of () for each limit of `limits_set`, as long as `count` says.
-    """
+    """The slacks of each limit, at one instant: smooth functions, one or two for each cable."""
     if not limits_set(limits):
         return ()
     position, velocity, acceleration = _path(segment, arcs, tau, state)
@@ -197,19 +187,14 @@ def _in_space(segment: Segment, vector: Sequence[Array] | Array, origin: Sequenc
 
 
 def limit_curvatures(
-    robot: PointMassRobot, limits: Limits, segment: Segment, arcs: Array, over: Stretch, kappa: Sequence[Bounds]
-) -> tuple[Array, ...]:
-    """Bound of the second derivative of each limit's slack over an interval.
-
-    Args:
-        robot: a point mass on three cables.
-        segment: of the parity of `arcs`.
-        arcs: () number of arcs, a float.
-        kappa: bounds of the variable part of each cable's pseudotension over the interval, () each.
-
-    Returns:
-        one () for each limit of `limits_set`, the largest over the cables.
-    """
+    robot: PointMassRobot,
+    limits: Limits,
+    segment: Segment,
+    arcs: Num[Array, ""],
+    over: Stretch,
+    kappa: Sequence[Bounds],
+) -> tuple[Float[Array, ""], ...]:
+    """Bound of the second derivative of each limit's slack over an interval."""
     if not limits_set(limits):
         return ()
     z0, time, weight = segment.hub[2], duration(segment, arcs), robot.mass * robot.gravity
@@ -232,17 +217,8 @@ def limit_curvatures(
     return tuple(row_curvature(row) for row in limits_set(limits))
 
 
-def pace_bounds(segment: Segment, arcs: Array, over: Stretch) -> tuple[Bounds, Bounds]:
-    """Bounds of how the mass moves over an interval, derivatives in normalised time.
-
-    Args:
-        segment: of the parity of `arcs`.
-        arcs: () number of arcs, a float.
-
-    Returns:
-        the bounds, () each: of the position from P0 and of its first two derivatives, m; of the second derivative and
-        of its first two derivatives.
-    """
+def pace_bounds(segment: Segment, arcs: Num[Array, ""], over: Stretch) -> tuple[Bounds, Bounds]:
+    """Bounds of how the mass moves over an interval, derivatives in normalised time."""
     ratio, steady, period = oscillation(segment, arcs)
     omega, gain = math.pi * arcs, steady / period
     precession = math.pi * segment.precession
@@ -277,14 +253,6 @@ def least_lengths(robot: PointMassRobot, segment: Segment, over: Stretch, pace: 
 
     No cable is shorter than the distance from the spool plane. Where the mass goes far within the interval, its
     greatest distance from P0 and its least depth say more than its length and depth in the middle.
-
-    Args:
-        robot: a point mass on three cables.
-        pace: bounds of the position from P0, () each, as `pace_bounds` gives them.
-        eta: bounds of the depth over z0, less 1, () each.
-
-    Returns:
-        the bounds, (...) each as those of `pace`, in cable order, m; not negative.
     """
     tilt = segment.tilt[0] * over.place[0] + segment.tilt[1] * over.place[1]
     lowest = jnp.maximum(tilt - over.radius * eta.slope, -eta.value)

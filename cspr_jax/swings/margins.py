@@ -4,9 +4,11 @@ Every block is sampled; where its smallest sample lies, a parabola estimates the
 three estimates of a group of functions over all blocks are then refined by parabolas, each narrower.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -22,6 +24,9 @@ from cspr_jax.swings.blocks import INTERVALS, blocks, over_blocks
 from cspr_jax.swings.criteria import BASIC, counts, smooth_slacks
 from cspr_jax.swings.hypocycloid import Segment
 from cspr_jax.swings.proof import OF_PLANS, SMALL, length
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
 
 CANDIDATES = 3
 # An estimate says in its last 16 bits where it lies, 1/4096 of the distance of samples; none is larger than this.
@@ -69,20 +74,16 @@ def _insert(best: tuple[Array, Array], estimate: Array, place: Array) -> tuple[A
     return jnp.stack(estimates), jnp.stack(places)
 
 
-def refined_minimum(function: Callable[[Array], Array], tau: Array, step: Array, one: Array | None = None) -> Array:
+def refined_minimum(
+    function: Callable[[Array], Array],
+    tau: Float[Array, ""],
+    step: Float[Array, ""],
+    one: Float[Array, ""] | None = None,
+) -> Float[Array, ""]:
     """Smallest value of a continuous function near an estimated minimum, by ever narrower parabolas.
 
     A parabola is believed only where its middle is the lowest of its three points; else the points move to the lowest.
     So a minimum that is steep on one side, or a kink beside it, is found too.
-
-    Args:
-        function: of one instant, () to ().
-        tau: () the estimate.
-        step: () distance of the samples that it came from.
-        one: () the number 1; see `arithmetic.lanes.stored`.
-
-    Returns:
-        () a value that the function attains.
     """
 
     def narrow(i, state):
@@ -166,18 +167,10 @@ def _minima(functions: Functions, problem: Problem, edges: Array, counts: Array,
     return jax.vmap(refine, in_axes=(0, 0, 2, 2, 0))(segments, arcs, number, where, steps)
 
 
-def smallest_values(functions: Functions, problem: Problem, segments: Segment, arcs: np.ndarray, table) -> np.ndarray:
-    """Smallest values along each segment of functions of one instant.
-
-    Args:
-        functions: of one instant, in groups.
-        segments: leaves (n, ...), of the parity of `arcs`.
-        arcs: (n,) number of arcs, 1 or more.
-        table: blocks to sample, from `blocks.blocks`.
-
-    Returns:
-        (n, n_groups).
-    """
+def smallest_values(
+    functions: Functions, problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"], table
+) -> Float[np.ndarray, "n n_groups"]:
+    """Smallest values along each segment of functions of one instant."""
     arcs = np.asarray(arcs, float)
     order = np.argsort(arcs, kind="stable")
     arguments = jax.tree.map(lambda x: x[order], (segments, arcs))
@@ -186,19 +179,12 @@ def smallest_values(functions: Functions, problem: Problem, segments: Segment, a
     return minima[np.argsort(order, kind="stable")]
 
 
-def margins(problem: Problem, segments: Segment, arcs: np.ndarray) -> np.ndarray:
+def margins(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]) -> Float[np.ndarray, "n n_criteria"]:
     """Smallest slack of each criterion along each segment.
 
     The smallest sample of every block is refined, so the value does not depend on where the samples lie. For many
     segments with limits, where all slacks are positive, the smaller one of the cables' and the depth's stands in the
     first two columns, and the smallest one of the limits in the others: refining two numbers takes less time.
-
-    Args:
-        segments: leaves (n, ...), of the parity of `arcs`.
-        arcs: (n,) number of arcs, 1 or more.
-
-    Returns:
-        (n, n_criteria) in the order of `criteria.flags`; NaN where the motion is not finite.
     """
     sizes = counts(problem.robot, problem.limits)
     if len(sizes) == BASIC or len(arcs) <= SMALL:
@@ -214,16 +200,8 @@ def margins(problem: Problem, segments: Segment, arcs: np.ndarray) -> np.ndarray
     return smallest
 
 
-def each_margin(problem: Problem, segments: Segment, arcs: np.ndarray) -> np.ndarray:
-    """Smallest slack of each criterion along each segment, each refined by itself, as `margins` may not do.
-
-    Args:
-        segments: leaves (n, ...), of the parity of `arcs`.
-        arcs: (n,) number of arcs, 1 or more.
-
-    Returns:
-        (n, n_criteria); NaN where the motion is not finite.
-    """
+def each_margin(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]) -> Float[np.ndarray, "n n_criteria"]:
+    """Smallest slack of each criterion along each segment, each refined by itself, as `margins` may not do."""
     # The smallest over the cables has kinks, each cable's own slack has none.
     table = blocks(problem.amplitude, int(np.max(arcs)))
     functions = Functions(smooth_slacks, counts(problem.robot, problem.limits))

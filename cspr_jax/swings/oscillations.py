@@ -4,9 +4,11 @@ The envelopes (1.39) are sufficient, not necessary: a motion may be taut with on
 smallest integer that they allow stands beside the smallest that is proved from the pseudotensions themselves.
 """
 
+from __future__ import annotations
+
 import dataclasses
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax
 import jax.numpy as jnp
@@ -28,6 +30,9 @@ from cspr_jax.swings.hypocycloid import Segment
 from cspr_jax.swings.margins import margins
 from cspr_jax.swings.proof import tolerance
 from cspr_jax.swings.transition_margins import transition_margins
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Instants of the sieve; odd, so that they do not fall on the zeros of an oscillation.
 SAMPLES = 61
@@ -72,17 +77,8 @@ def _transitions(problem: Problem, arguments) -> Segment:
     return jax.vmap(partial(transition.transition, problem.robot, problem.amplitude))(*arguments)
 
 
-def transitions_to(problem: Problem, targets: np.ndarray, z0: np.ndarray) -> Segment:
-    """Transitions from rest to many targets.
-
-    Args:
-        problem: gives the robot and the amplitude function.
-        targets: (n, 3) from the centroid of the spools, z down, m.
-        z0: (n,) m.
-
-    Returns:
-        the segments, leaves (n, ...).
-    """
+def transitions_to(problem: Problem, targets: Float[np.ndarray, "n 3"], z0: Float[np.ndarray, "n"]) -> Segment:
+    """Transitions from rest to many targets."""
     return in_batches(partial(_transitions, problem), (targets, z0), size=BATCH)
 
 
@@ -91,17 +87,10 @@ def _best_inclinations(amplitude: Amplitude, weights: jax.Array) -> jax.Array:
     return jax.vmap(lambda w: counts.best_inclination(amplitude, w)[0])(weights)
 
 
-def best_inclinations(problem: Problem, targets: np.ndarray, *, max_arcs: int = 30) -> np.ndarray:
-    """The inclination of each target that asks for the fewest oscillations.
-
-    Args:
-        problem: gives the robot and the amplitude function; on more cables than degrees of freedom its limits, too.
-        targets: (n, 3) from the centroid of the spools, z down, m.
-        max_arcs: twice the largest number of oscillations tried, which counts on more cables alone.
-
-    Returns:
-        (n,) v.
-    """
+def best_inclinations(
+    problem: Problem, targets: Float[np.ndarray, "n 3"], *, max_arcs: int = 30
+) -> Float[np.ndarray, "n"]:
+    """The inclination of each target that asks for the fewest oscillations."""
     if problem.robot.n_cables > problem.robot.dof:
         from cspr_jax.swings.redundant_inclinations import redundant_inclinations  # as in `swings.arcs`
 
@@ -172,26 +161,11 @@ def _known(
 
 
 def minimum_oscillations(
-    problem: Problem, segments: Segment, z0: np.ndarray, *, max_arcs: int = 30, arcs=None, steady=None
+    problem: Problem, segments: Segment, z0: Float[np.ndarray, "n"], *, max_arcs: int = 30, arcs=None, steady=None
 ) -> OscillationAnswers:
     """Smallest number of oscillations of transitions.
 
     Needs 64-bit jax (`jax.config.update("jax_enable_x64", True)`): verdicts are float64's.
-
-    Args:
-        problem: robot, limits and amplitude, which meets (1.27) and (1.28).
-        segments: as `transitions_to` gives them, leaves (n, ...).
-        z0: (n,) depth of p0 below the centroid of the spools, m; positive.
-        max_arcs: twice the largest number of oscillations tried, at least 2.
-        arcs: even, as for `swings.decide.only`.
-        steady: (n,) whether the segment is no transition but the swing of constant size that one ends in; None:
-            nowhere.
-
-    Returns:
-        the answers.
-
-    Raises:
-        InputError: max_arcs below 1; z0 not positive; jax without 64 bits.
     """
     check_numbers(problem.robot, z0, max_arcs)
     stage(f"numbers of oscillations, 1 to {max_arcs // 2}")

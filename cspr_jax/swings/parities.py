@@ -1,22 +1,20 @@
 """Segments of either parity of their numbers of arcs."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import jax
 import numpy as np
 
 from cspr_jax.swings.hypocycloid import Segment
 
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
 
-def pick(parities: dict[int, Segment], rows: np.ndarray, arcs: np.ndarray) -> Segment:
-    """Pick segments, each of the parity of its number of arcs.
 
-    Args:
-        parities: as `segments_between` gives them.
-        rows: (m,) which segments.
-        arcs: (m,) number of arcs of each.
-
-    Returns:
-        leaves (m, ...).
-    """
+def pick(parities: dict[int, Segment], rows: Float[np.ndarray, "m"], arcs: Num[np.ndarray, "m"]) -> Segment:
+    """Pick segments, each of the parity of its number of arcs."""
     if parities[0] is parities[1]:
         return jax.tree.map(lambda leaf: np.asarray(leaf)[rows], parities[0])
     is_odd = arcs % 2 == 1
@@ -27,16 +25,8 @@ def pick(parities: dict[int, Segment], rows: np.ndarray, arcs: np.ndarray) -> Se
     return jax.tree.map(choose, parities[0], parities[1])
 
 
-def rows_of(parities: dict[int, Segment], rows: np.ndarray) -> dict[int, Segment]:
-    """Pick segments, of both parities.
-
-    Args:
-        parities: as `segments_between` gives them.
-        rows: (m,) which segments.
-
-    Returns:
-        leaves (m, ...).
-    """
+def rows_of(parities: dict[int, Segment], rows: Float[np.ndarray, "m"]) -> dict[int, Segment]:
+    """Pick segments, of both parities."""
     return {
         parity: jax.tree.map(lambda leaf: np.asarray(leaf)[rows], segments) for parity, segments in parities.items()
     }

@@ -13,8 +13,11 @@ The tolerance covers rounding (see `tolerance`). A limit that is touched exactly
 on the floor, counts as met: limits are allowed twice the tolerance.
 """
 
+from __future__ import annotations
+
 import dataclasses
 from functools import partial
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -31,6 +34,9 @@ from cspr_jax.swings.blocks import INTERVALS, blocks, over_blocks
 from cspr_jax.swings.criteria import BASIC, curvatures, slacks
 from cspr_jax.swings.hypocycloid import Segment
 from cspr_jax.swings.slacks import largest_term
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float, Num
 
 SMALLEST_MARGIN = 1e-9
 BATCH = 1024
@@ -63,38 +69,16 @@ class Proof:
     bound: np.ndarray
 
 
-def tolerance(amplitude: Amplitude, segment: Segment, arcs: Array) -> Array:
-    """Distance from zero within which a slack is undecided.
-
-    1e-9, plus 512 units of rounding of the largest term that a pseudotension can hold: the float64
-    error of a slack is measured below a tenth of that (tests).
-
-    Args:
-        segment: of the parity of `arcs`.
-        arcs: () number of arcs.
-
-    Returns:
-        () the tolerance.
-    """
+def tolerance(amplitude: Amplitude, segment: Segment, arcs: Num[Array, ""]) -> Float[Array, ""]:
+    """Distance from zero within which a slack is undecided."""
     terms = largest_term(amplitude, segment, arcs)
     return SMALLEST_MARGIN + 512.0 * jnp.finfo(terms.dtype).eps * terms
 
 
 def block_bounds(
-    problem: Problem, segments: Segment, arcs: Array, start: Array, stop: Array
-) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
-    """Smallest sampled slack, and proved lower bound, of each criterion over one block of each segment.
-
-    Args:
-        problem: robot, limits and amplitude.
-        segments: leaves (n, ...).
-        arcs: (n,).
-        start: (n,) tau where each block starts.
-        stop: (n,) tau where it stops; no knot inside.
-
-    Returns:
-        sampled and proved, n_criteria arrays (n,) each.
-    """
+    problem: Problem, segments: Segment, arcs: Float[Array, "n"], start: Float[Array, "n"], stop: Float[Array, "n"]
+) -> tuple[tuple[Float[Array, "n"], ...], tuple[Float[Array, "n"], ...]]:
+    """Smallest sampled slack, and proved lower bound, of each criterion over one block of each segment."""
     weight = (jnp.arange(INTERVALS + 1, dtype=arcs.dtype) / INTERVALS)[:, None]
     tau = start[None] * (1.0 - weight) + stop[None] * weight
     values = jax.vmap(jax.vmap(partial(slacks, *problem)), in_axes=(None, None, 0))(segments, arcs, tau)
@@ -128,22 +112,12 @@ def _closer_look(problem: Problem, arguments) -> tuple[Array, Array]:
 def prove(
     problem: Problem,
     segments: Segment,
-    arcs: np.ndarray,
+    arcs: Num[np.ndarray, "n"],
     *,
-    ignored: np.ndarray | None = None,
+    ignored: Float[np.ndarray, "n n_criteria"] | None = None,
     look: tuple[np.ndarray, ...] | None = None,
 ) -> Proof:
-    """Decide segments, each with a given number of arcs.
-
-    Args:
-        segments: leaves (n, ...), of the parity of `arcs`; float64.
-        arcs: (n,) number of arcs, 1 or more.
-        ignored: (n, n_criteria) criteria that do not count; None: all do.
-        look: result of `first_look` for these segments; None: it is taken here.
-
-    Returns:
-        the proofs.
-    """
+    """Decide segments, each with a given number of arcs."""
     arcs = np.asarray(arcs, float)
     table = blocks(problem.amplitude, int(arcs.max()))
     sampled, bound, near = first_look(problem, segments, arcs) if look is None else look
@@ -161,42 +135,21 @@ def prove(
 
 
 def length(problem: Problem, count: int, few: int = 0) -> int:
-    """Length of the batches for some segments, or blocks of them.
-
-    Args:
-        few: number up to which batches are small.
-
-    Returns:
-        that of small batches, too, where limits, whose slacks take long, leave much of a batch to fill.
-    """
+    """Length of the batches for some segments, or blocks of them."""
     return SMALL if count <= few or (2 * count <= BATCH and limits_set(problem.limits)) else BATCH
 
 
-def is_met_at_samples(problem: Problem, segments: Segment, arcs: np.ndarray) -> np.ndarray:
-    """Criteria that no sample of a first look breaks.
-
-    Args:
-        segments: leaves (n, ...), of the parity of `arcs`; float64.
-        arcs: (n,) number of arcs, 1 or more.
-
-    Returns:
-        (n, n_criteria): False is a proof that the criterion is broken, True is none that it is met.
-    """
+def is_met_at_samples(
+    problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]
+) -> Bool[np.ndarray, "n n_criteria"]:
+    """Criteria that no sample of a first look breaks."""
     arcs = np.asarray(arcs, float)
     sampled, _, near = first_look(problem, segments, arcs)
     return sampled + _allowance(sampled.shape[1], near) >= -near[:, None]
 
 
-def first_look(problem: Problem, segments: Segment, arcs: np.ndarray) -> tuple[np.ndarray, ...]:
-    """A first look at segments: smallest samples and proved bounds of all criteria.
-
-    Args:
-        segments: leaves (n, ...), of the parity of `arcs`; float64.
-        arcs: (n,) number of arcs, 1 or more; floats.
-
-    Returns:
-        the samples and the bounds, (n, n_criteria) each, and the tolerances (n,).
-    """
+def first_look(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]) -> tuple[np.ndarray, ...]:
+    """A first look at segments: smallest samples and proved bounds of all criteria."""
     table = blocks(problem.amplitude, int(arcs.max()))
     order = np.argsort(arcs, kind="stable")
     back = np.argsort(order, kind="stable")

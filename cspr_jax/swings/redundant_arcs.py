@@ -6,8 +6,10 @@ other terms fade with the number of arcs. What is tried in increasing order is r
 its whole time (`motions.proved`). Margins are distances of all tensions from their limits, over the weight per cable.
 """
 
+from __future__ import annotations
+
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -27,6 +29,9 @@ from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.swings.hypocycloid import Hypocycloid, Segment
 from cspr_jax.swings.parities import pick
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 BATCH = 512
 # Samples an arc: of a first look, and of one before a proof.
@@ -65,24 +70,13 @@ def _instants(problem: Problem, items) -> jax.Array:
 def redundant_arcs(
     problem: Problem,
     parities: dict[int, Segment],
-    infinity: np.ndarray,
+    infinity: Float[np.ndarray, "n"],
     *,
     max_arcs: int,
     arcs: np.ndarray | None = None,
     step: int = 1,
 ) -> tuple[Answers, Segment]:
-    """Smallest number of arcs of each segment.
-
-    Args:
-        parities: the segments for even (key 0) and odd (key 1) numbers of arcs, leaves (n, ...).
-        infinity: (n,) left-hand side of (2.55).
-        max_arcs: largest number of arcs tried.
-        arcs: as for `swings.decide.only`.
-        step: 2 where numbers of arcs must be even.
-
-    Returns:
-        the answers; the segments that durations and margins belong to, leaves (n, ...).
-    """
+    """Smallest number of arcs of each segment."""
     count = len(infinity)
     only = np.zeros(count, int) if arcs is None else np.asarray(arcs)
     nothing = np.full(count, np.nan)
@@ -142,19 +136,15 @@ def _motion(problem: Problem, segments: Segment, i: int, number: int) -> Hypocyc
 
 
 def least_slacks(
-    problem: Problem, segments: Segment, rows: np.ndarray, number: int, samples: int, *, is_narrowed: bool = False
-) -> np.ndarray:
-    """Smallest sampled slacks of segments with one number of arcs.
-
-    Args:
-        segments: leaves (n, ...).
-        rows: (m,) numbers of the segments that are looked at.
-        samples: instants an arc.
-        is_narrowed: whether minima between samples are looked for.
-
-    Returns:
-        (m, n_slacks) the margin of the tensions over the weight a cable, the depth over z0, limits; -inf for none.
-    """
+    problem: Problem,
+    segments: Segment,
+    rows: Float[np.ndarray, "m"],
+    number: int,
+    samples: int,
+    *,
+    is_narrowed: bool = False,
+) -> Float[np.ndarray, "m n_slacks"]:
+    """Smallest sampled slacks of segments with one number of arcs."""
     kernel, chosen = partial(_instants, problem), jax.tree.map(lambda x: np.asarray(x)[rows], segments)
 
     def at(tau: np.ndarray) -> np.ndarray:

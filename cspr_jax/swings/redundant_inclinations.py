@@ -6,8 +6,11 @@ refute with all of them takes the inclination with the largest slack, which a fi
 proves the motion: a smaller number may exist between the inclinations that were tried.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from functools import partial
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -21,24 +24,18 @@ from cspr_jax.swings.hypocycloid import Segment
 from cspr_jax.swings.redundant_arcs import FEW, MANY, least_slacks
 from cspr_jax.swings.transition import depth_for
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # Inclinations of a first look, of each finer one, and how many of these follow.
 TRIED, FINER, ROUNDS = 41, 9, 3
 Transitions = Callable[[Problem, np.ndarray, np.ndarray], Segment]
 
 
 def redundant_inclinations(
-    problem: Problem, targets: np.ndarray, transitions: Transitions, *, max_arcs: int
-) -> np.ndarray:
-    """The inclination of each target that needs the fewest oscillations; of these the one with the largest slack.
-
-    Args:
-        targets: (n, 3) from the centroid of the spools, z down, m.
-        transitions: gives segments from rest to (m, 3) targets with (m,) depths of P0.
-        max_arcs: twice the largest number of oscillations tried.
-
-    Returns:
-        (n,) v; where no number will do, the one with the largest slack that was seen; 0 for targets above the spools.
-    """
+    problem: Problem, targets: Float[np.ndarray, "n 3"], transitions: Transitions, *, max_arcs: int
+) -> Float[np.ndarray, "n"]:
+    """The inclination of each target that needs the fewest oscillations; of these the one with the largest slack."""
     largest = LARGEST_INCLINATION / max(float(np.asarray(problem.amplitude.largest)[0]), 1.0)
     best, most = np.zeros(len(targets)), np.full(len(targets), -np.inf)
     is_open = targets @ np.asarray(plane_normal(problem.robot)) > 0.0

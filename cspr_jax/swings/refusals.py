@@ -1,5 +1,9 @@
 """Limits that refuse every number of arcs of a point mass; see `motions.fewest_limits`."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import jax
 import numpy as np
 
@@ -13,18 +17,17 @@ from cspr_jax.swings.limit_sieve import broken_at_samples, upcoming
 from cspr_jax.swings.parities import pick
 from cspr_jax.swings.proof import SMALL, SMALLEST_MARGIN, first_look, is_met_at_samples, prove
 
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
 
-def refusals(problem: Problem, parities: dict[int, Segment], upper: np.ndarray, known: np.ndarray) -> Refused:
-    """Limits that refuse segments whose cables some number of arcs keeps taut.
 
-    Args:
-        parities: the segments for even (key 0) and odd (key 1) numbers of arcs, leaves (n, ...); none is feasible.
-        upper: (n, max_arcs) upper bounds of the slack of the cables and of the depth; -inf where out of the question.
-        known: (n, max_arcs, n_criteria) limits that each candidate is known to break, by more than rounding.
-
-    Returns:
-        the refusals.
-    """
+def refusals(
+    problem: Problem,
+    parities: dict[int, Segment],
+    upper: Float[np.ndarray, "n max_arcs"],
+    known: Float[np.ndarray, "n max_arcs n_criteria"],
+) -> Refused:
+    """Limits that refuse segments whose cables some number of arcs keeps taut."""
     fewest, alive = FewestLimits(len(upper), flags(problem.limits)), upper >= -SMALLEST_MARGIN
     while True:
         rows = np.flatnonzero(~fewest.is_best & alive.any(1))
@@ -76,17 +79,13 @@ def _limits_of(
     return is_proved, broken
 
 
-def unavoidable(problem: Problem, parities: dict[int, Segment], upper: np.ndarray, suspects: np.ndarray) -> np.ndarray:
-    """Criteria that every number of arcs breaks.
-
-    Args:
-        parities: the segments for even (key 0) and odd (key 1) numbers of arcs, leaves (n, ...).
-        upper: (n, max_arcs) -inf at numbers of arcs that are out of the question.
-        suspects: (n, n_criteria) limits to be tested, each broken by some number of arcs.
-
-    Returns:
-        (n, n_criteria) which of them every number of arcs breaks: proved.
-    """
+def unavoidable(
+    problem: Problem,
+    parities: dict[int, Segment],
+    upper: Num[np.ndarray, "n max_arcs"],
+    suspects: Num[np.ndarray, "n n_criteria"],
+) -> Num[np.ndarray, "n n_criteria"]:
+    """Criteria that every number of arcs breaks."""
     suspects, left = suspects.copy(), upper > -np.inf
     while True:
         rows = np.flatnonzero(suspects.any(1) & left.any(1))

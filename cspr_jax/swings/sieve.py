@@ -9,8 +9,11 @@ own numbers stay in registers and no array of segments by samples is made but th
 The sieve rejects candidates; it accepts none. `swings.proof` decides about the rest.
 """
 
+from __future__ import annotations
+
 import math
 from functools import partial
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -24,6 +27,9 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.swings.hypocycloid import Segment, oscillation
 from cspr_jax.swings.slacks import largest_term
 
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
+
 SAMPLES = 32
 BATCH = 2048
 # Samples in one pass over the batch; measured.
@@ -34,34 +40,20 @@ SMALLEST_PERIOD = 1e-9
 ROUNDING = 256.0
 
 
-def sample_table(amplitude: Amplitude, arcs: np.ndarray, tau: np.ndarray, dtype) -> Array:
-    """Table of the factors of a check that do not depend on the points: of the phase pi p tau and of A.
-
-    Args:
-        arcs: (n_arcs,) numbers of arcs.
-        tau: (n_samples,).
-        dtype: of the table.
-
-    Returns:
-        (n_arcs, 6, n_samples): cosine, sine, A, A'', A'' times cosine, A' times sine.
-    """
+def sample_table(
+    amplitude: Amplitude, arcs: Num[np.ndarray, "n_arcs"], tau: Float[np.ndarray, "n_samples"], dtype
+) -> Float[Array, "n_arcs 6 n_samples"]:
+    """Table of the factors of a check that do not depend on the points: of the phase pi p tau and of A."""
     phase = math.pi * arcs[:, None] * tau
     cosine, sine = jnp.asarray(np.cos(phase)), jnp.asarray(np.sin(phase))
     size, slope, bend = (jnp.broadcast_to(v, phase.shape) for v in derivatives(amplitude, jnp.asarray(tau), order=2))
     return jnp.stack([cosine, sine, size, bend, bend * cosine, slope * sine], axis=1).astype(dtype)
 
 
-def smallest_sampled(amplitude: Amplitude, segments: Segment, arcs: np.ndarray, tau: np.ndarray) -> Array:
-    """Smallest normalised pseudotension, or depth ratio, over samples, for several numbers of arcs of one parity.
-
-    Args:
-        segments: leaves (n, ...), of the parity of `arcs`.
-        arcs: (n_arcs,) all odd or all even.
-        tau: (n_samples,), a multiple of 4.
-
-    Returns:
-        (n_arcs, n): an upper bound of the margin; -inf where there is no trajectory.
-    """
+def smallest_sampled(
+    amplitude: Amplitude, segments: Segment, arcs: Float[np.ndarray, "n_arcs"], tau: Float[np.ndarray, "n_samples"]
+) -> Float[Array, "n_arcs n"]:
+    """Smallest normalised pseudotension, or depth ratio, over samples, for several numbers of arcs of one parity."""
     dtype = segments.rate.dtype
     start, span = segments.start_radius, segments.end_radius - segments.start_radius
     laterals, axials = sincospi(jnp.asarray(tau, dtype)[:, None] * segments.precession[None, :])
@@ -106,18 +98,10 @@ def smallest_sampled(amplitude: Amplitude, segments: Segment, arcs: np.ndarray, 
 
 
 @persistent_jit(static_argnames=("max_arcs", "samples"))
-def upper_bounds(amplitude: Amplitude, even: Segment, odd: Segment, *, max_arcs: int, samples: int = SAMPLES) -> Array:
-    """Upper bounds of the margin of segments, for every number of arcs; rounding is allowed for.
-
-    Args:
-        even: the segments for even numbers of arcs, leaves (n, ...).
-        odd: the segments for odd numbers of arcs, leaves (n, ...).
-        max_arcs: largest number of arcs.
-        samples: how many; a multiple of 4.
-
-    Returns:
-        (n, max_arcs): column p - 1 for p arcs.
-    """
+def upper_bounds(
+    amplitude: Amplitude, even: Segment, odd: Segment, *, max_arcs: int, samples: int = SAMPLES
+) -> Num[Array, "n max_arcs"]:
+    """Upper bounds of the margin of segments, for every number of arcs; rounding is allowed for."""
     tau = (np.arange(samples) + 0.5) / samples
     numbers = np.arange(1, max_arcs + 1)
     dtype = even.rate.dtype

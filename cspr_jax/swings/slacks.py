@@ -10,8 +10,10 @@ depth below the spools over z0, both along the vertical:
 derivative over an interval, from the closed form: it is what makes a verdict hold between samples.
 """
 
+from __future__ import annotations
+
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -21,6 +23,9 @@ from cspr_jax.arithmetic.bounds import Bounds, hypotenuse
 from cspr_jax.arithmetic.elementary import sincospi
 from cspr_jax.motions.amplitudes import Amplitude, derivatives, local_bounds
 from cspr_jax.swings.hypocycloid import Segment, oscillation, swing
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
 
 
 class Instant(NamedTuple):
@@ -41,17 +46,8 @@ class Instant(NamedTuple):
     amplitude_values: tuple[Array, ...]
 
 
-def instant(segment: Segment, amplitude: Amplitude, arcs: Array, tau: Array) -> Instant:
-    """State of a segment at one instant, by the closed form.
-
-    Args:
-        segment: of the parity of `arcs`.
-        arcs: () number of arcs, a float.
-        tau: () normalised time.
-
-    Returns:
-        the state.
-    """
+def instant(segment: Segment, amplitude: Amplitude, arcs: Num[Array, ""], tau: Float[Array, ""]) -> Instant:
+    """State of a segment at one instant, by the closed form."""
     values = derivatives(amplitude, tau, order=2)
     c, d = swing(segment, values, arcs, tau)
     cross = c[0] * d[1] - c[1] * d[0]
@@ -61,30 +57,15 @@ def instant(segment: Segment, amplitude: Amplitude, arcs: Array, tau: Array) -> 
     return Instant(kappa, eta, c, d, values)
 
 
-def normalised_pseudotensions(segment: Segment, amplitude: Amplitude, arcs: Array, tau: Array) -> Array:
-    """Pseudotensions over their value at rest in p0, by the closed form, at one instant.
-
-    Args:
-        segment: of the parity of `arcs`.
-        arcs: () number of arcs, a float.
-        tau: () normalised time.
-
-    Returns:
-        (n_cables,) in cable order; all 1 at rest in p0.
-    """
+def normalised_pseudotensions(
+    segment: Segment, amplitude: Amplitude, arcs: Num[Array, ""], tau: Float[Array, ""]
+) -> Float[Array, "n_cables"]:
+    """Pseudotensions over their value at rest in p0, by the closed form, at one instant."""
     return jnp.stack(instant(segment, amplitude, arcs, tau).kappa)
 
 
-def largest_term(amplitude: Amplitude, segment: Segment, arcs: Array) -> Array:
-    """Bound of the sum of the sizes of all terms of a normalised pseudotension: the scale of its rounding error.
-
-    Args:
-        segment: of the parity of `arcs`.
-        arcs: () number of arcs, a float.
-
-    Returns:
-        () at least 1.
-    """
+def largest_term(amplitude: Amplitude, segment: Segment, arcs: Num[Array, ""]) -> Float[Array, ""]:
+    """Bound of the sum of the sizes of all terms of a normalised pseudotension: the scale of its rounding error."""
     ratio, steady, period = oscillation(segment, arcs)
     span = jnp.abs(segment.end_radius - segment.start_radius)
     largest = amplitude.largest.astype(span.dtype)
@@ -116,18 +97,10 @@ class Stretch(NamedTuple):
     place: Array
 
 
-def stretch(segment: Segment, amplitude: Amplitude, arcs: Array, start: Array, stop: Array) -> Stretch:
-    """The interval [start, stop] with bounds of the radius r(tau) of (2.48) over it.
-
-    Args:
-        segment: gives r1 and r2.
-        arcs: () number of arcs, a float.
-        start: () tau.
-        stop: () tau, larger; no knot between.
-
-    Returns:
-        the interval.
-    """
+def stretch(
+    segment: Segment, amplitude: Amplitude, arcs: Num[Array, ""], start: Float[Array, ""], stop: Float[Array, ""]
+) -> Stretch:
+    """The interval [start, stop] with bounds of the radius r(tau) of (2.48) over it."""
     middle, radius = 0.5 * (start + stop), 0.5 * (stop - start)
     span = segment.end_radius - segment.start_radius
     a = local_bounds(amplitude, middle, radius)
@@ -154,22 +127,17 @@ def _components(segment: Segment, vector: Array, over: Stretch) -> tuple[Bounds,
 
 @jax.jit
 def row_bounds(
-    segment: Segment, arcs: Array, over: Stretch, tilt: Array, pull: Array | None = None, twist: Array | None = None
+    segment: Segment,
+    arcs: Num[Array, ""],
+    over: Stretch,
+    tilt: Float[Array, "2"],
+    pull: Float[Array, "2"] | None = None,
+    twist: Float[Array, ""] | None = None,
 ) -> Bounds:
     """Bounds of tilt . c + pull . d + twist (c x d) over an interval.
 
     In the precessing frame it is X cos Phi + Y sin Phi + E (cos 2 Phi - 1) + F sin 2 Phi with
     Phi = pi p tau, where X, Y, E and F are slow: their bounds, and those of Phi, give the rest.
-
-    Args:
-        segment: of the parity of `arcs`.
-        arcs: () number of arcs, a float.
-        tilt: (2,).
-        pull: (2,), or None for no such term.
-        twist: (), or None.
-
-    Returns:
-        the bounds.
     """
     ratio, steady, period = oscillation(segment, arcs)
     omega, gain = math.pi * arcs, steady / period
@@ -200,28 +168,12 @@ def _oscillating(cosine: Bounds, sine: Bounds, omega: Array) -> Bounds:
     )
 
 
-def each_taut_bounds(segment: Segment, arcs: Array, over: Stretch) -> list[Bounds]:
-    """Bounds of the variable part of each kappa_k over an interval (of kappa_k - 1; the derivatives are kappa_k's).
-
-    Args:
-        segment: of the parity of `arcs`.
-        arcs: () number of arcs, a float.
-
-    Returns:
-        bounds, () each, in cable order.
-    """
+def each_taut_bounds(segment: Segment, arcs: Num[Array, ""], over: Stretch) -> list[Bounds]:
+    """Bounds of the variable part of each kappa_k over an interval (of kappa_k - 1; the derivatives are kappa_k's)."""
     cables = range(segment.pull.shape[0])
     return [row_bounds(segment, arcs, over, segment.tilt, segment.pull[k], segment.twist[k]) for k in cables]
 
 
-def taut_bounds(segment: Segment, arcs: Array, over: Stretch) -> Bounds:
-    """The bounds of `each_taut_bounds` in arrays.
-
-    Args:
-        segment: of the parity of `arcs`.
-        arcs: () number of arcs, a float.
-
-    Returns:
-        bounds with leaves (n_cables,), in cable order.
-    """
+def taut_bounds(segment: Segment, arcs: Num[Array, ""], over: Stretch) -> Bounds:
+    """The bounds of `each_taut_bounds` in arrays."""
     return jax.tree.map(lambda *bounds: jnp.stack(bounds), *each_taut_bounds(segment, arcs, over))

@@ -9,7 +9,10 @@ need not vanish here. Backwards in time it is the way back to rest, (1.56) to (1
 size it is a swing that stays between the target and its opposite point.
 """
 
+from __future__ import annotations
+
 import dataclasses
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -20,20 +23,13 @@ from cspr_jax.robots.point_mass import PointMassRobot, plane_normal, rest_point
 from cspr_jax.swings import hypocycloid
 from cspr_jax.swings.hypocycloid import Segment
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 
 @jax.jit
-def transition(robot: PointMassRobot, amplitude: Amplitude, target: Array, z0: Array) -> Segment:
-    """The transition from rest in p0 to a target.
-
-    Args:
-        robot: a point mass on three cables, any triangle; or on two in a plane.
-        amplitude: A, which meets (1.27) and (1.28).
-        target: (3,) from the centroid of the spools, z down, m.
-        z0: () depth of p0 below the centroid of the spools, m.
-
-    Returns:
-        the segment, for even numbers of arcs.
-    """
+def transition(robot: PointMassRobot, amplitude: Amplitude, target: Float[Array, "3"], z0: Float[Array, ""]) -> Segment:
+    """The transition from rest in p0 to a target."""
     segment = hypocycloid.segment(robot, rest_point(z0), target, z0, odd=jnp.asarray(False))
     bend = derivatives(amplitude, jnp.ones_like(z0), order=2)[2]
     return dataclasses.replace(segment, end_curvature=bend)
@@ -41,54 +37,25 @@ def transition(robot: PointMassRobot, amplitude: Amplitude, target: Array, z0: A
 
 @jax.jit
 def steady(segment: Segment) -> Segment:
-    """The swing of constant size that a transition ends in.
-
-    Returns:
-        the segment between the target and itself, for even numbers of arcs.
-    """
+    """The swing of constant size that a transition ends in."""
     return dataclasses.replace(
         segment, start_radius=segment.end_radius, end_curvature=jnp.zeros_like(jnp.asarray(segment.end_curvature))
     )
 
 
-def inclination(segment: Segment) -> Array:
-    """Depth of the target below the spools, less that of p0, over z0: v of (1.31).
-
-    Args:
-        segment: a transition; leaves (...).
-
-    Returns:
-        (...) v.
-    """
+def inclination(segment: Segment) -> Float[Array, "..."]:
+    """Depth of the target below the spools, less that of p0, over z0: v of (1.31)."""
     return segment.end_radius * segment.tilt[..., 0]
 
 
 @jax.jit
-def weights(segment: Segment) -> Array:
-    """The weighted trajectory parameters w_k: (1.37) and (1.93) for their robots.
-
-    They follow from the robot's own spools: v + w_k is what the acceleration along u takes from cable k.
-
-    Args:
-        segment: a transition; leaves (...).
-
-    Returns:
-        (..., n_cables).
-    """
+def weights(segment: Segment) -> Float[Array, "... n_cables"]:
+    """The weighted trajectory parameters w_k: (1.37) and (1.93) for their robots."""
     load = -segment.end_radius[..., None] * segment.pull[..., 0]
     return load - inclination(segment)[..., None]
 
 
 @jax.jit
-def depth_for(robot: PointMassRobot, target: Array, inclination: Array) -> Array:
-    """The depth z0 of p0 that gives a target an inclination, from (1.31).
-
-    Args:
-        robot: a point mass on three cables, any triangle; or on two in a plane; centred.
-        target: (3,) from the centroid of the spools, z down, m.
-        inclination: () v, above -1.
-
-    Returns:
-        () z0, m; positive where the target is below the spools.
-    """
+def depth_for(robot: PointMassRobot, target: Float[Array, "3"], inclination: Float[Array, ""]) -> Float[Array, ""]:
+    """The depth z0 of p0 that gives a target an inclination, from (1.31)."""
     return plane_normal(robot) @ target / (1.0 + inclination)

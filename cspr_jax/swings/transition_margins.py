@@ -1,6 +1,9 @@
 """Margins of transitions: the smallest pseudotension from two functions, not one for each cable and the depth."""
 
+from __future__ import annotations
+
 import math
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -15,6 +18,9 @@ from cspr_jax.swings import transition
 from cspr_jax.swings.blocks import blocks
 from cspr_jax.swings.hypocycloid import Segment, oscillation
 from cspr_jax.swings.margins import Functions, margins, smallest_values
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 
 def _extreme_pseudotensions(robot, limits, amplitude: Amplitude, segment: Segment, arcs: Array, tau: Array):
@@ -34,17 +40,12 @@ def _extreme_pseudotensions(robot, limits, amplitude: Amplitude, segment: Segmen
     return level - jnp.maximum(jnp.max(loads), 0.0) * pull, level - jnp.minimum(jnp.min(loads), 0.0) * pull
 
 
-def transition_margins(problem: Problem, segments: Segment, arcs: np.ndarray) -> np.ndarray:
+def transition_margins(
+    problem: Problem, segments: Segment, arcs: Float[np.ndarray, "n"]
+) -> Float[np.ndarray, "n n_criteria"]:
     """Smallest slack of each criterion along each transition, as `margins` gives them.
 
     Where both are positive, the slack of the cables stands in both of the first two columns.
-
-    Args:
-        segments: transitions from rest, leaves (n, ...).
-        arcs: (n,) even.
-
-    Returns:
-        (n, n_criteria); NaN where the motion is not finite.
     """
     if limits_set(problem.limits):
         return margins(problem, segments, arcs)

@@ -1,6 +1,9 @@
 """Feasible accelerations at many places: arrays in, answers out."""
 
+from __future__ import annotations
+
 from functools import partial
+from typing import TYPE_CHECKING
 
 import jax
 import numpy as np
@@ -11,6 +14,9 @@ from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.robots.wrench_sets import Faces
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # Number of places computed at a time; fewer for robots on many cables, whose faces are many.
 BATCH = 4096
 _ROOM = 1 << 22
@@ -20,17 +26,8 @@ def _size(robot: PointMassRobot, power: int) -> int:
     return max(min(BATCH, _ROOM // robot.n_cables**power), 1)
 
 
-def reach_of(robot: PointMassRobot, limits: Limits, positions: np.ndarray) -> AccelerationReach:
-    """Sizes of the sets of feasible accelerations at many places.
-
-    Args:
-        robot: a point mass, centred, z down.
-        limits: only limits of tensions count.
-        positions: (n, 3) m.
-
-    Returns:
-        the numbers, (n,) each.
-    """
+def reach_of(robot: PointMassRobot, limits: Limits, positions: Float[np.ndarray, "n 3"]) -> AccelerationReach:
+    """Sizes of the sets of feasible accelerations at many places."""
     return in_batches(partial(reaches, robot, limits), positions, size=_size(robot, 6))
 
 
@@ -39,17 +36,8 @@ def _faces(robot: PointMassRobot, limits: Limits, positions) -> Faces:
     return jax.vmap(partial(faces_at, robot, limits))(positions)
 
 
-def faces_of(robot: PointMassRobot, limits: Limits, positions: np.ndarray) -> Faces:
-    """Faces of the sets of feasible accelerations at many places.
-
-    Args:
-        robot: a point mass, centred, z down.
-        limits: only limits of tensions count.
-        positions: (n, 3) m.
-
-    Returns:
-        the faces, leaves (n, ...).
-    """
+def faces_of(robot: PointMassRobot, limits: Limits, positions: Float[np.ndarray, "n 3"]) -> Faces:
+    """Faces of the sets of feasible accelerations at many places."""
     return in_batches(partial(_faces, robot, limits), positions, size=_size(robot, 3))
 
 
@@ -62,16 +50,7 @@ def _judged(robot: PointMassRobot, arguments):
 
 
 def judged(
-    robot: PointMassRobot, faces: Faces, positions: np.ndarray, accelerations: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Margins and verdicts of accelerations, one at each place.
-
-    Args:
-        robot: a point mass, centred, z down.
-        positions: (n, 3) m.
-        accelerations: (n, 3) m/s^2.
-
-    Returns:
-        (n,) m/s^2, and (n,) flags of `Verdict`.
-    """
+    robot: PointMassRobot, faces: Faces, positions: Float[np.ndarray, "n 3"], accelerations: Float[np.ndarray, "n 3"]
+) -> tuple[Float[np.ndarray, "n"], Float[np.ndarray, "n"]]:
+    """Margins and verdicts of accelerations, one at each place."""
     return in_batches(partial(_judged, robot), (faces, positions, accelerations), size=_size(robot, 3))

@@ -55,17 +55,7 @@ def mass_searches(
     has_weight: bool,
     acceleration: float,
 ) -> list[MassSearch]:
-    """Searches of a condition for the masses that decide.
-
-    Args:
-        robot: centred, z down.
-        ask: gives the requirement on a robot.
-        has_weight: whether the wrenches include the weight.
-        acceleration: radius of the ball of accelerations, m/s^2.
-
-    Returns:
-        one search a mass.
-    """
+    """Searches of a condition for the masses that decide."""
     is_closure = ask(robot).condition == CLOSURE
     pull = float(robot.gravity) * has_weight + acceleration
     factor = 1.0 if is_closure or pull == 0.0 else float(uncertainty.mass_factor)

@@ -1,6 +1,9 @@
 """Proofs of cells at one orientation, without halving: that they lie wholly inside a workspace, or wholly outside."""
 
+from __future__ import annotations
+
 import dataclasses
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +22,9 @@ from cspr_jax.workspaces.questions import CLOSURE
 from cspr_jax.workspaces.search import WorkspaceSearch
 from cspr_jax.workspaces.shifts import leaving_points, shifts
 from cspr_jax.workspaces.worst_cocircuits import worst_cocircuits
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float
 
 # Cells that are proved at a time, so that their arrays fit a cache; poses whose cocircuits are compared at a time.
 PART, BATCH = 256, 1024
@@ -53,46 +59,23 @@ class CellProofs:
             self._boxed = WorkspaceSearch(robot, dataclasses.replace(search.requirement, wrenches=loads))
         self._subsets = spanning(robot.n_cables, robot.dof)
 
-    def matrices(self, positions: np.ndarray) -> np.ndarray:
-        """Wrench matrices.
-
-        Args:
-            positions: (n, 3) m.
-
-        Returns:
-            (n, dof, n_cables), moments over a length.
-        """
+    def matrices(self, positions: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n dof n_cables"]:
+        """Wrench matrices."""
         return self._matrices(positions, self._exits(positions))
 
     def _matrices(self, positions: np.ndarray, exits: np.ndarray) -> np.ndarray:
         return np.einsum("nik,kmi->nmi", unit_vectors(exits - positions[:, None]), self._forces)
 
-    def inside(self, positions: np.ndarray, half: np.ndarray) -> np.ndarray:
-        """Tell whether cells lie wholly inside.
-
-        Args:
-            positions: (n, 3) centres, m.
-            half: (n, 3) half sizes, m.
-
-        Returns:
-            (n,) whether this is proved.
-        """
+    def inside(self, positions: Float[np.ndarray, "n 3"], half: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
+        """Tell whether cells lie wholly inside."""
         if not (self._spools or half.any()):
             return self._search(positions, np.tile(self._quaternion, (len(positions), 1))).verdict == 0
         return self.least_margins(positions, half) > 0.0
 
-    def least_margins(self, positions: np.ndarray, half: np.ndarray) -> np.ndarray:
-        """Lower bounds of margins over cells.
-
-        Args:
-            positions: (n, 3) centres, m.
-            half: (n, 3) half sizes, m.
-
-        Returns:
-            (n,) distance that tensions keep from their limits at every position, N, or -inf; for wrench closure a
-            number that is positive where closure is proved in the whole cell. In place of ellipsoids of wrenches the
-            boxes about them count.
-        """
+    def least_margins(
+        self, positions: Float[np.ndarray, "n 3"], half: Float[np.ndarray, "n 3"]
+    ) -> Float[np.ndarray, "n"]:
+        """Lower bounds of margins over cells."""
         exits, moves = self._exits(positions), self._moves(positions, half) + self._spools
         units, count = self._matrices(positions, exits), len(self._arms)
         low, high, loads = self._requirement.low, self._requirement.high, self._enclosing
@@ -112,16 +95,8 @@ class CellProofs:
 
         return np.concatenate(in_parts(part, len(positions), PART))
 
-    def outside(self, positions: np.ndarray, half: np.ndarray) -> np.ndarray:
-        """Tell whether cells lie wholly outside.
-
-        Args:
-            positions: (n, 3) centres, m.
-            half: (n, 3) half sizes, m.
-
-        Returns:
-            (n,) whether this is proved.
-        """
+    def outside(self, positions: Float[np.ndarray, "n 3"], half: Float[np.ndarray, "n 3"]) -> Bool[np.ndarray, "n"]:
+        """Tell whether cells lie wholly outside."""
         low, high = self._requirement.low, self._requirement.high
         finite = np.where(self._unbounded, 0.0, high)
         condition = "closure" if self._is_closure else "tensions"
@@ -194,17 +169,10 @@ def _tensions(units: np.ndarray, wrench: np.ndarray, low: np.ndarray, high: np.n
     return np.asarray(distributions(units, np.broadcast_to(wrench, (len(units), len(wrench))), *limits).tensions)
 
 
-def cable_wrenches(robot: AnyRobot, quaternion: np.ndarray, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Wrenches of forces at the attachment points.
-
-    Args:
-        quaternion: (4,) unit quaternion, scalar first.
-        unit: (dof,) divisors of the components.
-
-    Returns:
-        (n_cables, 3) arms of the attachment points, fixed axes, m; (3, dof, n_cables) wrenches of unit forces there
-        along the axes.
-    """
+def cable_wrenches(
+    robot: AnyRobot, quaternion: Float[np.ndarray, "4"], unit: Float[np.ndarray, "dof"]
+) -> tuple[Float[np.ndarray, "n_cables 3"], Float[np.ndarray, "3 dof n_cables"]]:
+    """Wrenches of forces at the attachment points."""
     row, count = PATTERNS[robot.pattern], robot.n_cables
     axes = np.eye(3)
     forces = np.repeat(axes[list(row.forces)].T[..., None], count, axis=2)

@@ -15,10 +15,15 @@ more than is known, and robots within an uncertainty have their spools elsewhere
 Arrays are (cells, ...); coefficients of first order in x have one axis of length 3, those of second order two.
 """
 
+from __future__ import annotations
+
 import math
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float
 
 # Rounding may have added this share of the sizes to a sum of up to some hundred products of float64 (2.2e-16 each),
 # with room for rays, arms and rotations that are rounded themselves.
@@ -60,34 +65,19 @@ class Cells(NamedTuple):
         """Lower bound of the lengths over the cells, (n, n_cables), m; not positive where nothing is known."""
         return (self.lengths - self.radius[:, None]) * (1.0 - ROUNDING) - self.rounding - self.moves
 
-    def take(self, chosen: np.ndarray) -> "Cells":
-        """Some of the cells.
-
-        Args:
-            chosen: (k,) indices, or a mask (n,).
-
-        Returns:
-            the cells.
-        """
+    def take(self, chosen: Bool[np.ndarray, "k"]) -> "Cells":
+        """Some of the cells."""
         return Cells(*(values[chosen] for values in self))
 
 
 def cells_about(
-    centres: np.ndarray, half: np.ndarray, exits: np.ndarray, wrenches: np.ndarray, moves: np.ndarray
+    centres: Float[np.ndarray, "n 3"],
+    half: Float[np.ndarray, "n 3"],
+    exits: Float[np.ndarray, "n n_cables 3"],
+    wrenches: Float[np.ndarray, "3 m n_cables"],
+    moves: Float[np.ndarray, "n n_cables"],
 ) -> Cells:
-    """Cells about centres.
-
-    Args:
-        centres: (n, 3) m.
-        half: (n, 3) half sizes, m.
-        exits: (n, n_cables, 3) e_i at the centres, m.
-        wrenches: (3, m, n_cables) wrenches of unit forces along the axes at the attachment points, moments over a
-            length.
-        moves: (n, n_cables) how far from there e_i may be within the cells, m.
-
-    Returns:
-        the cells.
-    """
+    """Cells about centres."""
     rays = exits - centres[:, None]
     lengths = np.linalg.norm(rays, axis=2)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -99,70 +89,33 @@ def cells_about(
     return Cells(matrices, changes, rays, steps, lengths, np.linalg.norm(half, axis=1), rounding, moves, each)
 
 
-def reach(linear: np.ndarray) -> np.ndarray:
-    """Largest value of a linear function over the cells.
-
-    Args:
-        linear: (..., 3) coefficients of x.
-
-    Returns:
-        (...).
-    """
+def reach(linear: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "..."]:
+    """Largest value of a linear function over the cells."""
     return np.abs(linear).sum(-1)
 
 
 def least_quadratic(quadratic: Any) -> Any:
-    """Lower bound of a quadratic form over the cells, each product of two components on its own.
-
-    Args:
-        quadratic: (..., 3, 3) coefficients, not symmetric; of NumPy or of jax.
-
-    Returns:
-        (...) at most 0.
-    """
+    """Lower bound of a quadratic form over the cells, each product of two components on its own."""
     squares = quadratic.diagonal(axis1=-2, axis2=-1).clip(max=0.0).sum(-1)
     both = quadratic + quadratic.swapaxes(-1, -2)
     return squares - abs(both[..., (0, 0, 1), (1, 2, 2)]).sum(-1)
 
 
-def norm_reach(vectors: np.ndarray) -> np.ndarray:
-    """Bound of the norm of a linear function over the cells: Euclidean of vectors, Frobenius' of matrices.
-
-    |sum_k x_k v_k|^2 is at most the sum of all |v_k . v_l|.
-
-    Args:
-        vectors: (n, 3, ...) coefficients of x.
-
-    Returns:
-        (n,).
-    """
+def norm_reach(vectors: Float[np.ndarray, "n 3 ..."]) -> Float[np.ndarray, "n"]:
+    """Bound of the norm of a linear function over the cells: Euclidean of vectors, Frobenius' of matrices."""
     rows = vectors.reshape(*vectors.shape[:2], math.prod(vectors.shape[2:]))
     return np.sqrt(np.abs(rows @ rows.transpose(0, 2, 1)).sum((1, 2)))
 
 
-def pair_norm(vectors: np.ndarray) -> np.ndarray:
-    """Bound of the Euclidean norm of a quadratic function over the cells.
-
-    Args:
-        vectors: (n, 3, 3, m) coefficients, not symmetric.
-
-    Returns:
-        (n,).
-    """
+def pair_norm(vectors: Float[np.ndarray, "n 3 3 m"]) -> Float[np.ndarray, "n"]:
+    """Bound of the Euclidean norm of a quadratic function over the cells."""
     both = vectors + vectors.transpose(0, 2, 1, 3)
     norms = np.linalg.norm(both, axis=3)
     return 0.5 * norms.sum((1, 2))
 
 
-def inverse_factor(squares: np.ndarray) -> np.ndarray:
-    """Inverse of the lower Cholesky factor of symmetric matrices, without an error where one is not positive definite.
-
-    Args:
-        squares: (n, m, m).
-
-    Returns:
-        (n, m, m) lower triangular; not finite where the matrix is not positive definite.
-    """
+def inverse_factor(squares: Float[np.ndarray, "n m m"]) -> Float[np.ndarray, "n m m"]:
+    """Inverse of the lower Cholesky factor of symmetric matrices; no error where one is not positive definite."""
     size = squares.shape[1]
     left = np.ascontiguousarray(squares.transpose(1, 2, 0))
     inverse = np.zeros_like(left)

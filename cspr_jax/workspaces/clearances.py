@@ -1,7 +1,9 @@
 """Clearance of robots at rest among obstacles, for maps of workspaces. Arrays in, answers out."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
-from typing import get_args
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
@@ -13,6 +15,9 @@ from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.workspaces import geometry
 
+if TYPE_CHECKING:
+    from jaxtyping import Float, Int
+
 BATCH = 4096
 # Step of differences, over the size of the robot.
 STEP = 1e-7
@@ -23,22 +28,11 @@ KINDS = dict(zip(get_args(Kind), range(1, 5), strict=True))
 def at_rest(
     robot: AnyRobot,
     around: Scene,
-    positions: np.ndarray,
-    quaternions: np.ndarray,
-    exits: np.ndarray | None = None,
+    positions: Float[np.ndarray, "n 3"],
+    quaternions: Float[np.ndarray, "n 4"],
+    exits: Float[np.ndarray, "n n_cables 3"] | None = None,
 ) -> Clearances:
-    """Clearances of poses.
-
-    Args:
-        robot: centred, z down.
-        around: of `build.surroundings`.
-        positions: (n, 3) of the mass centre, or of the joint, m.
-        quaternions: (n, 4) unit quaternions, scalar first.
-        exits: (n, n_cables, 3) points at which cables leave, m; None: those of the robot.
-
-    Returns:
-        the clearances.
-    """
+    """Clearances of poses."""
     body_quaternions, pulleys = quaternions if PATTERNS[robot.pattern].is_body else None, robot.pulleys
     if exits is None and pulleys is not None:
         exits = in_batches(lambda x: geometry.exit_points(robot, pulleys, *x), (positions, quaternions), size=BATCH)
@@ -50,22 +44,10 @@ def nearer_exits(
     around: Scene,
     positions: np.ndarray,
     quaternions: np.ndarray,
-    exits: np.ndarray,
+    exits: Float[np.ndarray, "n n_cables 3"],
     distance: float,
 ) -> Iterator[np.ndarray]:
-    """Exits displaced so that, to first order, bodies come as near to each other as they can.
-
-    Args:
-        robot: as for `at_rest`.
-        around: likewise.
-        positions: likewise, m.
-        quaternions: likewise.
-        exits: (n, n_cables, 3) m.
-        distance: of each from its place, m.
-
-    Yields:
-        (n, n_cables, 3) m: for two cables, for obstacles, and for cables and the platform.
-    """
+    """Exits displaced so that, to first order, bodies come as near to each other as they can."""
     step = STEP * float(np.ptp(exits, axis=(0, 1)).max())
 
     def at(exits: np.ndarray) -> np.ndarray:
@@ -81,15 +63,8 @@ def nearer_exits(
     yield from exits - distance * unit_vectors(gradients)
 
 
-def flags(distances: Clearances) -> np.ndarray:
-    """Flags of the reasons why poses are not free of interference.
-
-    Args:
-        distances: of `at_rest`.
-
-    Returns:
-        (n,) flags of `Verdict`.
-    """
+def flags(distances: Clearances) -> Float[np.ndarray, "n"]:
+    """Flags of the reasons why poses are not free of interference."""
     verdict = np.zeros(len(distances.clearance), FLAGS)
     for values, flag in (
         (distances.cables, Verdict.CABLE_CABLE),
@@ -101,15 +76,7 @@ def flags(distances: Clearances) -> np.ndarray:
     return np.where(distances.is_open, Verdict.UNDECIDED, verdict).astype(FLAGS)
 
 
-def nearest_bodies(around: Scene, distances: Clearances) -> np.ndarray:
-    """Kind of the nearest bodies at each pose.
-
-    Args:
-        around: of `build.surroundings`.
-        distances: of `at_rest`.
-
-    Returns:
-        (n,) numbers of `schema.meanings.NEAREST_BODIES`.
-    """
+def nearest_bodies(around: Scene, distances: Clearances) -> Int[np.ndarray, "n"]:
+    """Kind of the nearest bodies at each pose."""
     numbers = np.array([*(KINDS[meeting.kind] for meeting in around.meetings), 0], np.int16)
     return numbers[distances.nearest]

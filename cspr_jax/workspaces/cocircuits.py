@@ -10,9 +10,11 @@ at most eight cables, the relations among the rows of the null space. One lane a
 one shape.
 """
 
+from __future__ import annotations
+
 import itertools
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -20,6 +22,9 @@ from jax import Array
 
 from cspr_jax.arithmetic.lanes import cross, dot, largest
 from cspr_jax.robots.wrench_sets import spanning
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 CABLES = 6  # of a base block, in two groups of three
 # Further cables beside a base block.
@@ -43,18 +48,8 @@ class CableSubsets(NamedTuple):
     counts: np.ndarray | None
 
 
-def choices_of(matrices: np.ndarray) -> CableSubsets:
-    """Choices of dof - 1 cables that give a cocircuit at some pose; four cables at one point never do.
-
-    Args:
-        matrices: (n, dof, n_cables) finite wrench matrices of poses, of unit columns.
-
-    Returns:
-        the choices.
-
-    Raises:
-        ValueError: a matrix is not finite: since NaN compares as false, it would strike out cocircuits that exist.
-    """
+def choices_of(matrices: Float[np.ndarray, "n dof n_cables"]) -> CableSubsets:
+    """Choices of dof - 1 cables that give a cocircuit at some pose; four cables at one point never do."""
     _check_finite(matrices)
     dof, count = matrices.shape[1:]
     chosen = spanning(count, dof)
@@ -78,14 +73,7 @@ def _check_finite(matrices: np.ndarray) -> None:
 
 
 def normal(columns: Sequence[Column]) -> Column:
-    """Normal to dof - 1 columns: their generalised cross product.
-
-    Args:
-        columns: dof - 1 columns of dof components, at least one.
-
-    Returns:
-        dof components; the product with another column is the determinant of all columns together.
-    """
+    """Normal to dof - 1 columns: their generalised cross product."""
     dof = len(columns) + 1
     if dof == 2:
         return (-columns[0][1], columns[0][0])
@@ -126,16 +114,8 @@ def _signed_sum(terms: Sequence[Array], signs: Sequence[int]) -> Array:
     return total
 
 
-def product(a: Sequence[Array], b: Sequence[Array]) -> Array:
-    """Scalar product of vectors of any length.
-
-    Args:
-        a: at least one array (...).
-        b: as many.
-
-    Returns:
-        (...).
-    """
+def product(a: Sequence[Array], b: Sequence[Array]) -> Float[Array, "..."]:
+    """Scalar product of vectors of any length."""
     total = a[0] * b[0]
     for x, y in zip(a[1:], b[1:], strict=True):
         total = total + x * y
@@ -143,14 +123,7 @@ def product(a: Sequence[Array], b: Sequence[Array]) -> Array:
 
 
 def relation(rows: Sequence[Sequence[Array]]) -> Sequence[Array]:
-    """Relation among rows of the null space, one row more than it has columns: a cocircuit of their cables.
-
-    Args:
-        rows: one row of no column, two of one column, or three of two columns.
-
-    Returns:
-        as many components as rows.
-    """
+    """Relation among rows of the null space, one row more than it has columns: a cocircuit of their cables."""
     if len(rows) == 2:
         return (rows[1][0], -rows[0][0])
     i, j, k = rows
@@ -176,15 +149,7 @@ class Block(NamedTuple):
 
 
 def block(columns: Sequence[Column], wrenches: Sequence[Column]) -> Block:
-    """Tensions of six cables by adjugates, the cables in two groups of three; no division.
-
-    Args:
-        columns: six columns of three forces and three moments; the forces of the first three should span space.
-        wrenches: six components each.
-
-    Returns:
-        the tensions.
-    """
+    """Tensions of six cables by adjugates, the cables in two groups of three; no division."""
     a, c = [column[:3] for column in columns[:3]], [column[3:] for column in columns[:3]]
     adjugate = (cross(a[1], a[2]), cross(a[2], a[0]), cross(a[0], a[1]))
     volume = dot(a[0], adjugate[0])
@@ -209,18 +174,8 @@ def block(columns: Sequence[Column], wrenches: Sequence[Column]) -> Block:
     return Block(tensions, volume * determinant, most * most)
 
 
-def base_order(matrices: np.ndarray) -> tuple[int, ...]:
-    """Order of the cables in space such that the first six, and the first three forces, are far from singular.
-
-    Args:
-        matrices: (n, 6, n_cables) of poses, finite, moments over a length.
-
-    Returns:
-        the cables.
-
-    Raises:
-        ValueError: a matrix is not finite.
-    """
+def base_order(matrices: Float[np.ndarray, "n 6 n_cables"]) -> tuple[int, ...]:
+    """Order of the cables in space such that the first six, and the first three forces, are far from singular."""
     _check_finite(matrices)
     count = matrices.shape[2]
 

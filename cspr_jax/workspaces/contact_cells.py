@@ -9,9 +9,11 @@ quadratic in x and the bounds lose terms of second order alone. From above the d
 the bodies, which is largest at a corner of the cell.
 """
 
+from __future__ import annotations
+
 import itertools
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -35,6 +37,9 @@ from cspr_jax.robots.convex_gaps import (
 )
 from cspr_jax.runtime import compile_options
 from cspr_jax.workspaces.cells import least_quadratic
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 BATCH = 512
 # Over the largest coordinate: far above the rounding of bounds, far below what anybody measures.
@@ -81,25 +86,13 @@ class _CellLanes(NamedTuple):
 def clearance_bounds(
     robot: AnyRobot,
     scene: Scene,
-    quaternion: np.ndarray,
-    positions: np.ndarray,
-    half: np.ndarray,
-    exits: np.ndarray,
-    shifts: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds of the least clearance in cells.
-
-    Args:
-        scene: of the robot.
-        quaternion: (4,) unit quaternion of all cells, scalar first.
-        positions: (n, 3) of the mass centre, or of the joint, at the centres, m.
-        half: (n, 3) half sizes, m.
-        exits: (n, n_cables, 3) points at which the cables leave at the centres, m.
-        shifts: (n, n_cables) how far those are from there within the cells, m.
-
-    Returns:
-        (n,) m, the least clearance is nowhere smaller, -inf where nothing is known; (n,) m, it is nowhere larger.
-    """
+    quaternion: Float[np.ndarray, "4"],
+    positions: Float[np.ndarray, "n 3"],
+    half: Float[np.ndarray, "n 3"],
+    exits: Float[np.ndarray, "n n_cables 3"],
+    shifts: Float[np.ndarray, "n n_cables"],
+) -> tuple[Float[np.ndarray, "n"], Float[np.ndarray, "n"]]:
+    """Bounds of the least clearance in cells."""
     bodies, rotation = bodies_of(robot, scene), np.asarray(matrix(jnp.asarray(quaternion)))
     body = None if bodies.body is None else _rotated(bodies.body, rotation)
     rotated = bodies._replace(points=bodies.points @ rotation.T, body=body)

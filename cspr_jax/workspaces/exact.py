@@ -1,12 +1,17 @@
 """Margins of poses one by one, by singular values: for any robot, and where the wrench matrix loses rank; no jax."""
 
+from __future__ import annotations
+
 import itertools
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cspr_jax.workspaces.cocircuits import CableSubsets
 from cspr_jax.workspaces.required import RequiredWrenches
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Singular values count as zero below the first of these parts of the largest one, or below the second number, since
 # columns are unit vectors.
@@ -17,16 +22,10 @@ ZERO = 1e-10
 OUTSIDE = 1e-9
 
 
-def cocircuits(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Cocircuits of a wrench matrix, and a basis of its span.
-
-    Args:
-        matrix: (dof, n_cables).
-
-    Returns:
-        (k, n_cables) cocircuits y of unit length, one sign of each; (k, dof) the normals c with c^T W = y, in the span;
-        (dof, rank) an orthonormal basis of the span.
-    """
+def cocircuits(
+    matrix: Float[np.ndarray, "dof n_cables"],
+) -> tuple[Float[np.ndarray, "k n_cables"], Float[np.ndarray, "k dof"], Float[np.ndarray, "dof rank"]]:
+    """Cocircuits of a wrench matrix, and a basis of its span."""
     left, sizes, right = np.linalg.svd(matrix, full_matrices=False)
     rank = int((sizes > max(RANK * sizes[0], NOTHING)).sum())
     rows = right[:rank]
@@ -59,17 +58,10 @@ class Planes(NamedTuple):
     basis: np.ndarray
 
 
-def margin_planes(matrix: np.ndarray, low: np.ndarray, high: np.ndarray) -> Planes:
-    """Planes that bound the margin by their distances, in newtons of tension: one a cocircuit and sign.
-
-    Args:
-        matrix: (dof, n_cables).
-        low: (n_cables,) smallest tensions, N.
-        high: (n_cables,) largest tensions, N; inf where there is none.
-
-    Returns:
-        the planes.
-    """
+def margin_planes(
+    matrix: Float[np.ndarray, "dof n_cables"], low: Float[np.ndarray, "n_cables"], high: Float[np.ndarray, "n_cables"]
+) -> Planes:
+    """Planes that bound the margin by their distances, in newtons of tension: one a cocircuit and sign."""
     components, normals, basis = cocircuits(matrix)
     rows, normals = np.concatenate([components, -components]), np.concatenate([normals, -normals])
     finite = np.where(np.isfinite(high), high, 0.0)
@@ -81,25 +73,13 @@ def margin_planes(matrix: np.ndarray, low: np.ndarray, high: np.ndarray) -> Plan
 
 
 def wrench_margin(
-    matrix: np.ndarray,
+    matrix: Float[np.ndarray, "dof n_cables"],
     wrenches: RequiredWrenches,
-    low: np.ndarray,
-    high: np.ndarray,
-    measure: np.ndarray | None = None,
+    low: Float[np.ndarray, "n_cables"],
+    high: Float[np.ndarray, "n_cables"],
+    measure: Float[np.ndarray, "dof"] | None = None,
 ) -> float:
-    """Margin of wrenches: the largest s such that tensions between low + s and high - s give each of them; or capacity.
-
-    Args:
-        matrix: (dof, n_cables).
-        wrenches: wrenches that the cables must supply.
-        low: (n_cables,) smallest tensions, N.
-        high: (n_cables,) largest tensions, N; inf where there is none: the margin counts only finite limits.
-        measure: (dof,) factors of the components of normals for the capacity margin, which is the distance of the
-            wrenches from the faces of the set that can be supplied; None: the margin of the tensions.
-
-    Returns:
-        N; inf where nothing bounds it, -inf where a wrench is outside of the span of the cables.
-    """
+    """Margin of wrenches: the largest s such that tensions between low + s and high - s give each; or capacity."""
     planes = margin_planes(matrix, low, high)
     if any(is_outside(loads, planes.basis) for loads in wrenches.spanning):
         return -np.inf
@@ -109,30 +89,14 @@ def wrench_margin(
     return float(min(slacks.min(initial=np.inf), planes.half_range))
 
 
-def is_outside(wrenches: np.ndarray, basis: np.ndarray) -> bool:
-    """Tell whether some wrench is outside of the span of the cables.
-
-    Args:
-        wrenches: (n, dof).
-        basis: (dof, rank) orthonormal.
-
-    Returns:
-        whether it is.
-    """
+def is_outside(wrenches: Float[np.ndarray, "n dof"], basis: Float[np.ndarray, "dof rank"]) -> bool:
+    """Tell whether some wrench is outside of the span of the cables."""
     outside = np.linalg.norm(wrenches - wrenches @ basis @ basis.T, axis=1)
     return bool((outside > OUTSIDE * np.linalg.norm(wrenches, axis=1)).any())
 
 
-def closure_margin(matrix: np.ndarray, choices: CableSubsets) -> float:
-    """Margin of wrench closure; see `workspaces.margins.closure_margin`.
-
-    Args:
-        matrix: (dof, n_cables).
-        choices: of the robot, which say which components of its cocircuits are always zero.
-
-    Returns:
-        the margin, in [-1, 1]; -1 where the cables do not span all components.
-    """
+def closure_margin(matrix: Float[np.ndarray, "dof n_cables"], choices: CableSubsets) -> float:
+    """Margin of wrench closure; see `workspaces.margins.closure_margin`."""
     components, _, basis = cocircuits(matrix)
     if basis.shape[1] < len(matrix):
         return -1.0

@@ -5,7 +5,10 @@ compiled separately: in one call XLA would compute each length three times, and 
 has stored are three times as slow as loops over its arguments.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -21,22 +24,14 @@ from cspr_jax.robots.platform import PlatformRobot, across_line
 from cspr_jax.robots.pulleys import Pulleys, exit_lanes, exits
 from cspr_jax.robots.state import State
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 
 def wrench_columns(
-    robot: AnyRobot, position: Vector, quaternion: Vector | None, length: Array
+    robot: AnyRobot, position: Vector, quaternion: Vector | None, length: Float[Array, ""]
 ) -> tuple[list[Array], Array]:
-    """Columns of the wrench matrix, and how much larger their errors are than rounding.
-
-    Args:
-        robot: z down.
-        position: of the mass centre, or of the joint, three arrays (n,), m.
-        quaternion: unit quaternion, scalar first, four arrays (n,); None: no rotation.
-        length: () length by which moments are divided, m.
-
-    Returns:
-        dof arrays (n_cables, n), a component each; (n,) at least 1: coordinates over the length of the shortest cable,
-        since a difference of coordinates keeps their rounding.
-    """
+    """Columns of the wrench matrix, and how much larger their errors are than rounding."""
     arms = None if quaternion is None else turned_arms(robot, quaternion)
     units, loss = unit_vectors(robot, position, arms)
     if isinstance(robot, PlatformRobot):
@@ -46,14 +41,7 @@ def wrench_columns(
 
 @jax.jit
 def turned_arms(robot: AnyRobot, quaternion: Vector) -> Vector | None:
-    """Arms from the mass centre, or from the joint, to the attachment points.
-
-    Args:
-        quaternion: unit quaternion, scalar first, four arrays (n,).
-
-    Returns:
-        three arrays (n_cables, n), fixed axes, m; None of a point mass.
-    """
+    """Arms from the mass centre, or from the joint, to the attachment points."""
     if not isinstance(robot, PlatformRobot):
         return None
     shape = robot.n_cables, len(quaternion[0])
@@ -70,16 +58,7 @@ def _down(points: Array, shape: tuple[int, int]) -> Vector:
 
 
 def unit_vectors(robot: AnyRobot, position: Vector, arms: Vector | None) -> tuple[Vector, Array]:
-    """Unit vectors of the cables, from the effector on; with pulleys those of the free cables.
-
-    Args:
-        robot: z down.
-        position: of the mass centre, or of the joint, three arrays (n,), m.
-        arms: of `turned_arms`; None: a platform is not rotated.
-
-    Returns:
-        three arrays (n_cables, n); (n,) coordinates over the length of the shortest cable, or 1 if that is more.
-    """
+    """Unit vectors of the cables, from the effector on; with pulleys those of the free cables."""
     return _units(robot, position, arms, _inverse_lengths(robot, position, arms))
 
 
@@ -130,73 +109,40 @@ def _columns(
     return [*(units[i] for i in row.forces), *(component / length for component in about)]
 
 
-def scales(robot: AnyRobot) -> np.ndarray:
-    """Mask of the components of a wrench that are moments.
-
-    Returns:
-        (dof,).
-    """
+def scales(robot: AnyRobot) -> Float[np.ndarray, "dof"]:
+    """Mask of the components of a wrench that are moments."""
     row = PATTERNS[robot.pattern]
     return np.arange(robot.dof) >= len(row.forces)
 
 
-def at_rest(position: Array, quaternion: Array) -> State:
-    """State of an effector at rest.
-
-    Args:
-        position: (3,) m.
-        quaternion: (4,) unit quaternion, scalar first.
-
-    Returns:
-        the state.
-    """
+def at_rest(position: Float[Array, "3"], quaternion: Float[Array, "4"]) -> State:
+    """State of an effector at rest."""
     still = jnp.zeros_like(position)
     return State(position, still, still, matrix(quaternion), still, still, quaternion)
 
 
 @jax.jit
-def wrench_matrices(robot: AnyRobot, positions: Array, quaternions: Array) -> Array:
-    """Wrench matrices of poses.
-
-    Args:
-        robot: z down.
-        positions: (n, 3) m.
-        quaternions: (n, 4).
-
-    Returns:
-        (n, dof, n_cables).
-    """
+def wrench_matrices(
+    robot: AnyRobot, positions: Float[Array, "n 3"], quaternions: Float[Array, "n 4"]
+) -> Float[Array, "n dof n_cables"]:
+    """Wrench matrices of poses."""
     return jax.vmap(lambda p, q: robot.wrench_matrix(at_rest(p, q)))(positions, quaternions)
 
 
 @jax.jit
-def exit_points(robot: AnyRobot, pulleys: Pulleys, positions: Array, quaternions: Array) -> Array:
-    """Points at which cables leave their pulleys.
-
-    Args:
-        robot: z down.
-        positions: (n, 3) m.
-        quaternions: (n, 4).
-
-    Returns:
-        (n, n_cables, 3) m.
-    """
+def exit_points(
+    robot: AnyRobot, pulleys: Pulleys, positions: Float[Array, "n 3"], quaternions: Float[Array, "n 4"]
+) -> Float[Array, "n n_cables 3"]:
+    """Points at which cables leave their pulleys."""
     targets = attachments(robot, positions, quaternions)
     return jax.vmap(lambda x: jnp.asarray(exits(robot.base_points, pulleys.axes, pulleys.radius, x).point))(targets)
 
 
 @jax.jit
-def cable_lengths(robot: AnyRobot, positions: Array, quaternions: Array) -> Array:
-    """Lengths of the cables, from the points where they enter their pulleys, or from the base points.
-
-    Args:
-        robot: z down.
-        positions: (n, 3) m.
-        quaternions: (n, 4).
-
-    Returns:
-        (n, n_cables) m.
-    """
+def cable_lengths(
+    robot: AnyRobot, positions: Float[Array, "n 3"], quaternions: Float[Array, "n 4"]
+) -> Float[Array, "n n_cables"]:
+    """Lengths of the cables, from the points where they enter their pulleys, or from the base points."""
     targets, pulleys = attachments(robot, positions, quaternions), robot.pulleys
     if pulleys is None:
         return jnp.linalg.norm(robot.base_points[None] - targets, axis=2)
@@ -205,17 +151,10 @@ def cable_lengths(robot: AnyRobot, positions: Array, quaternions: Array) -> Arra
 
 
 @jax.jit
-def attachments(robot: AnyRobot, positions: Array, quaternions: Array) -> Array:
-    """Points at which the cables are attached.
-
-    Args:
-        robot: z down.
-        positions: (n, 3) m.
-        quaternions: (n, 4).
-
-    Returns:
-        (n, n_cables, 3) m.
-    """
+def attachments(
+    robot: AnyRobot, positions: Float[Array, "n 3"], quaternions: Float[Array, "n 4"]
+) -> Float[Array, "n n_cables 3"]:
+    """Points at which the cables are attached."""
     arms = jnp.zeros((len(positions), *robot.base_points.shape), positions.dtype)
     if isinstance(robot, PlatformRobot):
         points = robot.platform_points
@@ -224,31 +163,15 @@ def attachments(robot: AnyRobot, positions: Array, quaternions: Array) -> Array:
 
 
 @jax.jit
-def weights(robot: AnyRobot, positions: Array, quaternions: Array) -> Array:
-    """Wrenches that hold a robot still.
-
-    Args:
-        robot: z down.
-        positions: (n, 3) m.
-        quaternions: (n, 4).
-
-    Returns:
-        (n, dof) N and N m.
-    """
+def weights(robot: AnyRobot, positions: Float[Array, "n 3"], quaternions: Float[Array, "n 4"]) -> Float[Array, "n dof"]:
+    """Wrenches that hold a robot still."""
     return jax.vmap(lambda p, q: robot.inertial_wrench(at_rest(p, q)))(positions, quaternions)
 
 
-def mass_centres(robot: AnyRobot, origins: np.ndarray, quaternions: np.ndarray | None) -> np.ndarray:
-    """Positions of the mass centre, or of the joint of a robot that has one, as the kernels take them.
-
-    Args:
-        robot: centred, z down.
-        origins: (n, 3) of the platform frame, m.
-        quaternions: (n, 4) unit quaternions, scalar first, or (1, 4) one for all; None: no rotation.
-
-    Returns:
-        (n, 3) m.
-    """
+def mass_centres(
+    robot: AnyRobot, origins: Float[np.ndarray, "n 3"], quaternions: np.ndarray | None
+) -> Float[np.ndarray, "n 3"]:
+    """Positions of the mass centre, or of the joint of a robot that has one, as the kernels take them."""
     row = PATTERNS[robot.pattern]
     if not isinstance(robot, PlatformRobot) or row.is_jointed or robot.centre_of_mass is None:
         return origins

@@ -18,11 +18,16 @@ first order; all else that they do is bounded by norms. The bounds allow for rou
 quite I and Z0 f0 not quite w. Where |T| < 1 the rank of Z(x) is full, too, since C^-1 Z(x) D U^T = I - T.
 """
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cspr_jax.workspaces.cells import ROUNDING, Cells, inverse_factor, least_quadratic, norm_reach, pair_norm, reach
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 
 class _Way(NamedTuple):
@@ -40,20 +45,13 @@ class _Way(NamedTuple):
 
 
 def least_margins(
-    cells: Cells, tensions: np.ndarray, wrench: np.ndarray, low: np.ndarray, high: np.ndarray
-) -> np.ndarray:
-    """Lower bounds of the tension margin over cells.
-
-    Args:
-        tensions: (n, n_cables) tensions at the centres that give the wrench, between the limits, N.
-        wrench: (m,) wrench that the cables must supply, moments over a length, N.
-        low: (n_cables,) smallest tensions, at least 0, N.
-        high: (n_cables,) largest tensions, inf for none, N.
-
-    Returns:
-        (n,) N: at every position of the cell, tensions keep at least so far from their limits; -inf where nothing is
-        proved. Where it is positive, the wrench matrix has full rank in the whole cell.
-    """
+    cells: Cells,
+    tensions: Float[np.ndarray, "n n_cables"],
+    wrench: Float[np.ndarray, "m"],
+    low: Float[np.ndarray, "n_cables"],
+    high: Float[np.ndarray, "n_cables"],
+) -> Float[np.ndarray, "n"]:
+    """Lower bounds of the tension margin over cells."""
     least, most = tension_bounds(cells, tensions, wrench, low, high)
     with np.errstate(invalid="ignore"):
         below = np.where(np.isfinite(high), high - most, np.inf)
@@ -62,19 +60,13 @@ def least_margins(
 
 
 def tension_bounds(
-    cells: Cells, tensions: np.ndarray, wrench: np.ndarray, low: np.ndarray, high: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds of tensions that give a wrench everywhere in cells.
-
-    Args:
-        tensions: (n, n_cables) as for `least_margins`, N.
-        wrench: (m,) likewise, N.
-        low: (n_cables,) likewise, N.
-        high: (n_cables,) likewise, N.
-
-    Returns:
-        (n, n_cables) smallest tensions of a cell and (n, n_cables) largest, N; -inf and inf where nothing is proved.
-    """
+    cells: Cells,
+    tensions: Float[np.ndarray, "n n_cables"],
+    wrench: Float[np.ndarray, "m"],
+    low: Float[np.ndarray, "n_cables"],
+    high: Float[np.ndarray, "n_cables"],
+) -> tuple[Float[np.ndarray, "n n_cables"], Float[np.ndarray, "n n_cables"]]:
+    """Bounds of tensions that give a wrench everywhere in cells."""
     with np.errstate(all="ignore"):
         densities = tensions / cells.lengths
         weights = np.minimum(tensions - low, high - tensions) / cells.lengths

@@ -4,9 +4,11 @@ The body of a loop is compiled once, whatever the number of cables. Its result i
 the margin and the upper one: with two results XLA would compute everything twice.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -17,6 +19,9 @@ from cspr_jax.arithmetic.lanes import largest
 from cspr_jax.workspaces import margins
 from cspr_jax.workspaces.cocircuits import CABLES, MOST_OTHERS, CableSubsets, Column, block, normal, product, relation
 from cspr_jax.workspaces.margins import BLOCK_ROUNDING, ROUNDING, CocircuitLimits, Wrenches, length, one_norm
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Up to so many cocircuits the loop is unrolled.
 UNROLLED = 10
@@ -39,27 +44,15 @@ class TensionLimits(NamedTuple):
 @partial(jax.jit, static_argnames=("measure", "is_bounded"))
 def by_normals(
     components: Sequence[Array],
-    loss: Array,
+    loss: Float[Array, "n"],
     wrenches: Wrenches,
     tension_limits: TensionLimits,
     choices: CableSubsets,
     *,
     measure: str,
     is_bounded: bool,
-) -> Array:
-    """Margins of poses of any robot, by the normals to dof - 1 cables.
-
-    Args:
-        components: of the wrench matrix, of `geometry.wrench_columns`.
-        loss: (n,) errors of the components over rounding, likewise.
-        wrenches: wrenches that the cables must supply.
-        choices: of `cocircuits.choices_of`.
-        measure: "tensions", "capacity" or "closure"; known when this is compiled, as `is_bounded` is.
-        is_bounded: whether all largest tensions are finite.
-
-    Returns:
-        (...) lower bound + i upper bound.
-    """
+) -> Float[Array, "..."]:
+    """Margins of poses of any robot, by the normals to dof - 1 cables."""
     dof, template = len(components), components[0][0]
     lanes = wrenches._replace(
         points=[[jnp.broadcast_to(x, template.shape) for x in point] for point in wrenches.points]
@@ -145,18 +138,10 @@ class NullSpace(NamedTuple):
     largest: Array
 
 
-def null_space(components: Sequence[Array], loss: Array, wrench: Column, *, order: tuple[int, ...]) -> NullSpace:
-    """Tensions without a wrench, and tensions that supply one, of robots on six to eight cables in space.
-
-    Args:
-        components: of the wrench matrix, of `geometry.wrench_columns`.
-        loss: (n,) errors of the components over rounding, likewise.
-        wrench: six components, () or (n,), moments over a length, N.
-        order: of the cables, those of the base block first.
-
-    Returns:
-        the tensions.
-    """
+def null_space(
+    components: Sequence[Array], loss: Float[Array, "n"], wrench: Column, *, order: tuple[int, ...]
+) -> NullSpace:
+    """Tensions without a wrench, and tensions that supply one, of robots on six to eight cables in space."""
     return _joined(_by_block(components, wrench, order=order), wrench, loss)
 
 
@@ -196,19 +181,8 @@ def _joined(tensions: tuple[list[list[Array]], Array], wrench: Column, loss: Arr
 @partial(jax.jit, static_argnames=("measure", "is_bounded"))
 def by_null_space(
     space: NullSpace, tension_limits: TensionLimits, choices: CableSubsets, *, measure: str, is_bounded: bool
-) -> Array:
-    """Margins of poses by the relations among rows of the null space.
-
-    Args:
-        space: of `null_space`.
-        tension_limits: of the cables in the order of the block.
-        choices: its table has only the cables of each cocircuit, in the order of the block.
-        measure: "tensions" or "closure"; known when this is compiled, as `is_bounded` is.
-        is_bounded: whether all largest tensions are finite.
-
-    Returns:
-        (...) lower bound + i upper bound.
-    """
+) -> Float[Array, "..."]:
+    """Margins of poses by the relations among rows of the null space."""
     template = space.loss
     finite = jnp.where(jnp.isinf(tension_limits.high), 0.0, jnp.abs(tension_limits.high)) + jnp.abs(tension_limits.low)
     reach = jnp.sum(finite) + space.largest

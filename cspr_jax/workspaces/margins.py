@@ -3,14 +3,19 @@
 Where the bounds lie apart, `workspaces.exact` answers the pose by singular values.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.arithmetic.lanes import largest
 from cspr_jax.workspaces.cocircuits import Column, product
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Allowances for errors, in units of rounding: of a product of unit columns, and of the numbers of a block of six
 # cables. They are estimates, not proofs; wherever tests look, margins by singular values lie between the bounds.
@@ -56,40 +61,19 @@ class CocircuitLimits(NamedTuple):
 Bounds = tuple[Array, Array]
 
 
-def one_norm(entries: Sequence[Array]) -> Array:
-    """Sum of the sizes of components.
-
-    Args:
-        entries: arrays (...).
-
-    Returns:
-        (...).
-    """
+def one_norm(entries: Sequence[Array]) -> Float[Array, "..."]:
+    """Sum of the sizes of components."""
     parts = [jnp.abs(entry) for entry in entries]
     return sum(parts[1:], parts[0])
 
 
-def length(vector: Sequence[Array]) -> Array:
-    """Length of a vector.
-
-    Args:
-        vector: its components (...).
-
-    Returns:
-        (...).
-    """
+def length(vector: Sequence[Array]) -> Float[Array, "..."]:
+    """Length of a vector."""
     return jnp.sqrt(product(vector, vector))
 
 
 def supports(normal: Column, wrenches: Wrenches) -> tuple[Array, Array]:
-    """Largest products of a normal, and of its negative, with the wrenches of a set.
-
-    Args:
-        normal: dof components.
-
-    Returns:
-        both (...), in units of the normal times N.
-    """
+    """Largest products of a normal, and of its negative, with the wrenches of a set."""
     products = [product(normal, point) for point in wrenches.points]
     most, least = largest(products), largest([-value for value in products])
     spreads = list[Array]()
@@ -102,15 +86,7 @@ def supports(normal: Column, wrenches: Wrenches) -> tuple[Array, Array]:
 
 
 def bounded_margin(pull: CocircuitLimits, most: Array, least: Array) -> Bounds:
-    """Bounds of the margin of one cocircuit whose cables all have a largest tension.
-
-    Args:
-        most: the largest product of the cocircuit with a required wrench.
-        least: the largest product of its negative.
-
-    Returns:
-        lower and upper bound, N.
-    """
+    """Bounds of the margin of one cocircuit whose cables all have a largest tension."""
     limits = list(zip(pull.entries, pull.low, pull.high, strict=True))
     ranges = [(0.5 * (high - low)) * jnp.abs(y) for y, low, high in limits]
     middles = [(0.5 * (high + low)) * y for y, low, high in limits]
@@ -131,13 +107,6 @@ def free_margin(pull: CocircuitLimits, most: Array, least: Array) -> Bounds:
     """Bounds of the margin of one cocircuit; any of its cables may have no largest tension.
 
     A component that may be zero but for rounding frees the upper bound, but not the lower one.
-
-    Args:
-        most: the largest product of the cocircuit with a required wrench.
-        least: the largest product of its negative.
-
-    Returns:
-        lower and upper bound, N; inf where a cable without a largest tension frees the cocircuit.
     """
     lower, upper = list[Array](), list[Array]()
     for sign, demand in ((1.0, most), (-1.0, least)):
@@ -152,12 +121,7 @@ def free_margin(pull: CocircuitLimits, most: Array, least: Array) -> Bounds:
 
 
 def closure_margin(pull: CocircuitLimits) -> Bounds:
-    """Bounds of the margin of wrench closure of one cocircuit.
-
-    Returns:
-        lower and upper bound, in [-1, 1]: of the largest component of the weaker sign over the largest of all; where
-        all components have one sign, minus the least of them over the largest.
-    """
+    """Bounds of the margin of wrench closure of one cocircuit."""
     fewest = jnp.minimum(largest(pull.entries), largest([-entry for entry in pull.entries]))
     inverse = 1.0 / largest([jnp.abs(entry) for entry in pull.entries])
     error = 2.0 * largest(pull.noises) * inverse

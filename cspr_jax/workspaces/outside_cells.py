@@ -20,11 +20,16 @@ of 1 / L have norm 2 / L^3. The bounds allow for rounding of Q, so that Q^T Q is
 move, K = 0, will do where all cables keep away from being normal to it; then the products are affine.
 """
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cspr_jax.workspaces.cells import ROUNDING, Cells, inverse_factor, least_quadratic, norm_reach, reach
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float
 
 
 class Products(NamedTuple):
@@ -53,20 +58,14 @@ class Products(NamedTuple):
 
 
 def are_beyond(
-    cells: Cells, normals: np.ndarray, held: np.ndarray | None, wrenches: np.ndarray, low: np.ndarray, high: np.ndarray
-) -> np.ndarray:
-    """Tell whether a wrench is beyond what tensions can give at every position of cells.
-
-    Args:
-        normals: (n, m) c at the centres.
-        held: (n, m - 1) the cables S; None: there are none, and c does not move.
-        wrenches: (n, m) wrenches that the cables must supply, moments over a length, N.
-        low: (n_cables,) smallest tensions, N.
-        high: (n_cables,) largest tensions, inf for none, N.
-
-    Returns:
-        (n,) whether this is proved.
-    """
+    cells: Cells,
+    normals: Float[np.ndarray, "n m"],
+    held: Float[np.ndarray, "n m-1"] | None,
+    wrenches: Float[np.ndarray, "n m"],
+    low: Float[np.ndarray, "n_cables"],
+    high: Float[np.ndarray, "n_cables"],
+) -> Bool[np.ndarray, "n"]:
+    """Tell whether a wrench is beyond what tensions can give at every position of cells."""
     with np.errstate(all="ignore"):
         products, others = products_of(cells, normals, held, wrenches), _others(cells, held)
         least, most = (side[:, :-1] for side in products.ends)
@@ -83,16 +82,10 @@ def are_beyond(
         return is_kept & (cells.shortest > 0.0).all(1) & (slack > ROUNDING * size)
 
 
-def are_one_sided(cells: Cells, normals: np.ndarray, held: np.ndarray | None) -> np.ndarray:
-    """Tell whether cables fail to resist every wrench at every position of cells.
-
-    Args:
-        normals: (n, m) c at the centres, with which no other cable has a negative product.
-        held: (n, m - 1) as for `are_beyond`.
-
-    Returns:
-        (n,) whether this is proved.
-    """
+def are_one_sided(
+    cells: Cells, normals: Float[np.ndarray, "n m"], held: Float[np.ndarray, "n m-1"] | None
+) -> Bool[np.ndarray, "n"]:
+    """Tell whether cables fail to resist every wrench at every position of cells."""
     with np.errstate(all="ignore"):
         products = products_of(cells, normals, held, np.zeros_like(normals))
         least = products.ends[0][:, :-1]
@@ -107,17 +100,13 @@ def _others(cells: Cells, held: np.ndarray | None) -> np.ndarray:
     return others
 
 
-def products_of(cells: Cells, normals: np.ndarray, held: np.ndarray | None, wrenches: np.ndarray) -> Products:
-    """Products of a normal that moves with the cables S.
-
-    Args:
-        normals: (n, m) as for `are_beyond`.
-        held: (n, m - 1) likewise.
-        wrenches: (n, m) likewise, N.
-
-    Returns:
-        the products, with c of unit length at the centres.
-    """
+def products_of(
+    cells: Cells,
+    normals: Float[np.ndarray, "n m"],
+    held: Float[np.ndarray, "n m-1"] | None,
+    wrenches: Float[np.ndarray, "n m"],
+) -> Products:
+    """Products of a normal that moves with the cables S."""
     normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
     units = np.concatenate([cells.matrices / cells.lengths[:, None], wrenches[..., None]], axis=2)
     changes = cells.changes / cells.lengths[:, None, None]
@@ -168,16 +157,8 @@ def _norms(vectors: np.ndarray) -> np.ndarray:
     return np.sqrt(np.abs(columns @ columns.transpose(0, 1, 3, 2)).sum((2, 3)))
 
 
-def least_slacks(cells: Cells, products: Products, limits: np.ndarray) -> np.ndarray:
-    """Lower bounds over cells of the component of a wrench along c, less what some tensions give.
-
-    Args:
-        products: of `products_of`.
-        limits: (n, n_cables) the tensions, 0 of the cables S, N.
-
-    Returns:
-        (n,) N.
-    """
+def least_slacks(cells: Cells, products: Products, limits: Float[np.ndarray, "n n_cables"]) -> Float[np.ndarray, "n"]:
+    """Lower bounds over cells of the component of a wrench along c, less what some tensions give."""
     steps = cells.steps / cells.lengths[..., None]  # of L0 / L
     value, linear, quadratic = products.value[:, :-1], products.linear[:, :-1], products.quadratic[:, :-1]
     second = -np.minimum(least_quadratic(quadratic), least_quadratic(-quadratic))

@@ -43,11 +43,7 @@ class Requirement:
 
 
 def check_cables(robot: AnyRobot) -> None:
-    """Refuse robots with too many cables: the number of choices of cables grows with a power of it.
-
-    Raises:
-        InputError: too many cables.
-    """
+    """Refuse robots with too many cables: the number of choices of cables grows with a power of it."""
     if math.comb(robot.n_cables, robot.dof - 1) > MOST_CHOICES:
         most = max(n for n in range(robot.n_cables) if math.comb(n, robot.dof - 1) <= MOST_CHOICES)
         allowed = f"at most {most} for workspaces of {robot.dof} degrees of freedom"
@@ -61,18 +57,7 @@ def requirement(
     wrenches: RequiredWrenches | None = None,
     capacity_length: float | None = None,
 ) -> Requirement:
-    """Requirement of a condition.
-
-    Args:
-        robot: centred, z down.
-        condition: one of `CONDITIONS`.
-        limits: of the tensions; only "wrench-feasible" takes these, wrenches and a capacity length into account.
-        wrenches: of `required_wrenches`; None: the wrench that holds the robot still.
-        capacity_length: as in `Requirement`.
-
-    Returns:
-        the requirement.
-    """
+    """Requirement of a condition."""
     if condition != FEASIBLE:
         limits, wrenches, capacity_length = Limits(), None, None
     low, high = tension_range(robot, limits)
@@ -95,22 +80,7 @@ def required_wrenches(
     ellipsoid: Any = None,
     acceleration: Any = None,
 ) -> RequiredWrenches:
-    """Wrenches that cables must supply, as the kernels take them: all sums of one wrench of each given set.
-
-    Args:
-        robot: centred, z down.
-        points: (k, dof) in the axes of the file, N and N m; None: the wrench that holds the robot still.
-        box: (dof,) half widths of a box, N and N m; None: there is none.
-        ellipsoid: (dof,) semi-axes of an ellipsoid, N and N m; None: there is none.
-        acceleration: radius of a ball of accelerations of the mass centre, m/s^2; None: there is none.
-
-    Returns:
-        the wrenches.
-
-    Raises:
-        InputError: another shape, not finite, a negative half width, semi-axis or radius; moments of a rod; an
-            acceleration of a robot on a joint.
-    """
+    """Wrenches that cables must supply, as the kernels take them: all sums of one wrench of each given set."""
     row, ellipsoids = PATTERNS[robot.pattern], list[np.ndarray]()
     required = _weight(robot)
     if points is not None:

@@ -1,9 +1,15 @@
 """Wrenches that cables must supply; no jax."""
 
+from __future__ import annotations
+
 import dataclasses
 import itertools
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 NO_POINTS = "the weight of a body on a joint is known at a pose: see about()"
 
@@ -23,28 +29,14 @@ class RequiredWrenches:
     box: np.ndarray | None = None
     ellipsoids: tuple[np.ndarray, ...] = ()
 
-    def over(self, unit: np.ndarray) -> "RequiredWrenches":
-        """The same wrenches in other units.
-
-        Args:
-            unit: (dof,) divisors of the components.
-
-        Returns:
-            the wrenches.
-        """
+    def over(self, unit: Float[np.ndarray, "dof"]) -> "RequiredWrenches":
+        """The same wrenches in other units."""
         box = None if self.box is None else self.box / unit
         points = None if self.points is None else self.points / unit
         return RequiredWrenches(points, box, tuple(axes / unit for axes in self.ellipsoids))
 
-    def about(self, wrench: np.ndarray) -> "RequiredWrenches":
-        """The same box and ellipsoids about one wrench, which takes the place of the finite set.
-
-        Args:
-            wrench: (dof,) in the units of the set.
-
-        Returns:
-            the wrenches.
-        """
+    def about(self, wrench: Float[np.ndarray, "dof"]) -> "RequiredWrenches":
+        """The same box and ellipsoids about one wrench, which takes the place of the finite set."""
         return dataclasses.replace(self, points=wrench[None])
 
     @property
@@ -64,18 +56,8 @@ class RequiredWrenches:
         box = sum(self.ellipsoids) if self.box is None else self.box + sum(self.ellipsoids)
         return dataclasses.replace(self, box=np.asarray(box), ellipsoids=())
 
-    def supports(self, normals: np.ndarray) -> np.ndarray:
-        """Largest products of normals with the wrenches.
-
-        Args:
-            normals: (n, dof).
-
-        Returns:
-            (n,).
-
-        Raises:
-            TypeError: there is no finite set.
-        """
+    def supports(self, normals: Float[np.ndarray, "n dof"]) -> Float[np.ndarray, "n"]:
+        """Largest products of normals with the wrenches."""
         if self.points is None:
             raise TypeError(NO_POINTS)
         products = (self.points @ normals.T).max(0)

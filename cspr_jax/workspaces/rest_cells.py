@@ -1,6 +1,9 @@
 """Whole cells of maps of workspaces against all conditions of a workspace. Arrays in, answers out."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,6 +22,9 @@ from cspr_jax.workspaces.search import WorkspaceSearch
 from cspr_jax.workspaces.shifts import Shifts, leaving_points, shifts, unit_changes
 from cspr_jax.workspaces.speeds import CableSpeeds
 from cspr_jax.workspaces.whole_cells import ROUND, proved_sides, sides_of
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Int
 
 # How often open cells are halved along each axis.
 DEPTH = 2
@@ -55,18 +61,10 @@ class RestCells:
         inside = outside if enclosing is attained else CellProofs(enclosing, self._quaternion, self._spools)
         return inside, outside, attained
 
-    def __call__(self, origins: np.ndarray, half: np.ndarray, *, depth: int = DEPTH) -> tuple[np.ndarray, np.ndarray]:
-        """Tell which cells are proved to lie wholly on one side of the workspace.
-
-        Args:
-            origins: (n, 3) of the platform at the centres of the cells, kernels' coordinates, m.
-            half: (n, 3) half sizes of the cells, m.
-            depth: how often open cells are halved along each axis.
-
-        Returns:
-            (n,) 0: neither side is proved; 1: inside; 2: outside, as in `schema.meanings.CELL_SIDES`; (n,) what leaves
-            the cell open, numbers of `schema.meanings.OPEN_CONDITIONS`.
-        """
+    def __call__(
+        self, origins: Float[np.ndarray, "n 3"], half: Float[np.ndarray, "n 3"], *, depth: int = DEPTH
+    ) -> tuple[Float[np.ndarray, "n"], Int[np.ndarray, "n"]]:
+        """Tell which cells are proved to lie wholly on one side of the workspace."""
         sides, reasons = np.zeros(len(origins), np.int16), np.zeros(len(origins), np.int16)
         numbers = np.array([OPEN_CONDITIONS.index(name) for name in self._names])
         with double_precision():
@@ -93,17 +91,8 @@ class RestCells:
         is_open = (verdict & ~FLAGS(OPEN.value)) == 0
         return np.where(verdict == 0, 1, np.where(is_open, 0, -1))
 
-    def verdicts(self, positions: np.ndarray, verdict: np.ndarray) -> np.ndarray:
-        """Verdicts about all robots.
-
-        Args:
-            positions: (n, 3) of the platform, kernels' coordinates, m.
-            verdict: (n,) of the robot as it is described.
-
-        Returns:
-            (n,) the same, but `Verdict.UNCERTAINTY` where it is 0, and not of all robots; where neither is proved,
-            `Verdict.UNDECIDED`.
-        """
+    def verdicts(self, positions: Float[np.ndarray, "n 3"], verdict: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
+        """Verdicts about all robots."""
         if self._all_robots is None:
             return verdict
         verdict, chosen = verdict.copy(), np.flatnonzero(verdict == 0)

@@ -1,8 +1,10 @@
 """Poses at rest against all conditions of a workspace, and sets of orientations at places. Arrays in, answers out."""
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -19,6 +21,9 @@ from cspr_jax.workspaces.geometry import mass_centres
 from cspr_jax.workspaces.questions import CLOSURE
 from cspr_jax.workspaces.search import WorkspaceSearch
 from cspr_jax.workspaces.speeds import CableSpeeds
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 CLEARANCES = {"clearance_cables": "cables", "clearance_obstacles": "obstacles", "clearance_platform": "platform"}
 MARGINS = (
@@ -56,30 +61,16 @@ class RestPoses:
     capacity: WorkspaceSearch | None = None
     of_mass_centre: bool = False
 
-    def origins(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
-        """Origins of the platform frame.
-
-        Args:
-            positions: (n, 3) as `__call__` takes them, m.
-            quaternions: (n, 4) unit quaternions, scalar first.
-
-        Returns:
-            (n, 3) m.
-        """
+    def origins(
+        self, positions: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"]
+    ) -> Float[np.ndarray, "n 3"]:
+        """Origins of the platform frame."""
         if not self.of_mass_centre:
             return positions
         return positions - mass_centres(self.robot, np.zeros_like(positions), quaternions)
 
-    def __call__(self, positions: np.ndarray, quaternions: np.ndarray) -> PoseColumns:
-        """Tell whether poses meet all conditions.
-
-        Args:
-            positions: (n, 3) of the platform, kernels' coordinates, m.
-            quaternions: (n, 4) unit quaternions, scalar first.
-
-        Returns:
-            (n,) verdict, each of `MARGINS`, NaN where its condition does not count, and `NEAREST`.
-        """
+    def __call__(self, positions: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"]) -> PoseColumns:
+        """Tell whether poses meet all conditions."""
         origins = self.origins(positions, quaternions)
         places, count = mass_centres(self.robot, origins, quaternions), len(origins)
         columns: PoseColumns = {name: np.full(count, np.nan) for name in MARGINS}
@@ -118,16 +109,10 @@ class RestPoses:
         lowest_row = np.stack([2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)], axis=1)
         return places[:, 2:] + lowest_row @ points.T
 
-    def limited(self, origins: np.ndarray, quaternions: np.ndarray) -> Iterator[tuple[str, Verdict, np.ndarray]]:
-        """Slacks of the limits.
-
-        Args:
-            origins: (n, 3) of the platform frame, m.
-            quaternions: (n, 4) unit quaternions, scalar first.
-
-        Returns:
-            for each limit its quantity, its flag and its slacks (n, k).
-        """
+    def limited(
+        self, origins: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"]
+    ) -> Iterator[tuple[str, Verdict, np.ndarray]]:
+        """Slacks of the limits."""
         places = mass_centres(self.robot, origins, quaternions)
         if self.limits.floor is not None:
             yield "floor_margin", Verdict.BELOW_FLOOR, float(self.limits.floor) - self._depths(places, quaternions)
@@ -140,25 +125,12 @@ class RestPoses:
 
 def over_orientations(
     ask: Callable[[np.ndarray, np.ndarray], PoseColumns],
-    origins: np.ndarray,
-    orientations: np.ndarray,
-    volume: np.ndarray,
+    origins: Float[np.ndarray, "n 3"],
+    orientations: Float[np.ndarray, "k 4"],
+    volume: Float[np.ndarray, "k"],
     kind: OrientationSet,
 ) -> PoseColumns:
-    """Tell whether places belong to the workspace of a set of orientations.
-
-    Args:
-        ask: gives the columns of poses, as `RestPoses` does.
-        origins: (n, 3) m.
-        orientations: (k, 4) unit quaternions, scalar first.
-        volume: (k,) part of the set that each orientation stands for.
-        kind: "inclusion": at least one orientation must be inside; "total": all must.
-
-    Returns:
-        (n,) verdict: where it is not 0, the most frequent flags of orientations that are not inside; margins of the
-        best orientation, or of the worst, and the nearest bodies there; orientation_fraction, the part of the set
-        inside.
-    """
+    """Tell whether places belong to the workspace of a set of orientations."""
     parts, count = list[PoseColumns](), len(orientations)
     step = max(1, AT_ONCE // count)
     for start in range(0, len(origins), step):

@@ -4,9 +4,11 @@ A pose is answered by the fastest method first, then by surer ones until its ans
 of six to eight cables in space, the normals to dof - 1 cables, singular values.
 """
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import numpy as np
@@ -25,6 +27,9 @@ from cspr_jax.workspaces import cocircuits, exact, geometry, kernels
 from cspr_jax.workspaces.margins import Wrenches
 from cspr_jax.workspaces.questions import CLOSURE, Requirement
 from cspr_jax.workspaces.required import RequiredWrenches
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # A pose is on the boundary if its margin is nearer to zero than this part of the largest limit of the tensions, or of
 # the wrench.
@@ -120,19 +125,12 @@ class WorkspaceSearch:
             self._order = cocircuits.base_order(matrices)
 
     def __call__(
-        self, positions: np.ndarray, quaternions: np.ndarray | None, wrenches: np.ndarray | None = None
+        self,
+        positions: Float[np.ndarray, "n 3"],
+        quaternions: Float[np.ndarray, "n 4"] | None,
+        wrenches: Float[np.ndarray, "n dof"] | None = None,
     ) -> WorkspaceAnswers:
-        """Tell whether poses belong to the workspace.
-
-        Args:
-            positions: (n, 3) of the mass centre, or of the joint, m.
-            quaternions: (n, 4) unit quaternions, scalar first; None: no rotation.
-            wrenches: (n, dof) wrench of each pose that takes the place of the finite set of the requirement, N and
-                N m; None: the finite set.
-
-        Returns:
-            the answers.
-        """
+        """Tell whether poses belong to the workspace."""
         if len(positions) == 0:
             return WorkspaceAnswers(np.zeros(0, FLAGS), np.zeros(0), np.zeros(0, bool))
         quaternions = np.tile(IDENTITY, (len(positions), 1)) if quaternions is None else quaternions
@@ -211,25 +209,12 @@ class WorkspaceSearch:
         yield self._stage(np.float64, False), is_known
 
     def batch(self, dtype: type) -> int:
-        """Length of a batch on a CPU where poses are many.
-
-        Returns:
-            a power of two.
-        """
+        """Length of a batch on a CPU where poses are many."""
         rows = self.robot.dof * self.robot.n_cables
         return 1 << int(np.log2(BYTES / (rows * np.dtype(dtype).itemsize)))
 
     def kernel(self, dtype: type, *, by_null_space: bool = False) -> Callable[..., Array]:
-        """Compiled margins of a batch of poses.
-
-        Args:
-            by_null_space: whether to use the null space, which suits only some robots and requirements.
-
-        Returns:
-            a function of lanes: three arrays (n,) of positions, m; four of quaternions, None for a point mass; dof
-            arrays of wrenches over `unit` in place of those of the requirement, or None. It gives (n,) lower bound + i
-            upper bound of the margin.
-        """
+        """Compiled margins of a batch of poses."""
 
         def cast(tree):
             return jax.tree.map(lambda x: np.asarray(x, dtype), tree)
@@ -276,16 +261,8 @@ class WorkspaceSearch:
         ordered = None if counts is None else np.take_along_axis(counts, sorting, 1)
         return cocircuits.CableSubsets(np.take_along_axis(places, sorting, 1), ordered)
 
-    def required(self, position: np.ndarray, quaternion: np.ndarray) -> RequiredWrenches:
-        """Wrenches that the cables must supply at a pose.
-
-        Args:
-            position: (3,) of the mass centre, or of the joint, m.
-            quaternion: (4,) unit quaternion, scalar first.
-
-        Returns:
-            the wrenches over `unit`, N.
-        """
+    def required(self, position: Float[np.ndarray, "3"], quaternion: Float[np.ndarray, "4"]) -> RequiredWrenches:
+        """Wrenches that the cables must supply at a pose."""
         load = self._weights(position[None], quaternion[None])
         return self._wrenches if load is None else self._wrenches.about(load[0])
 

@@ -1,6 +1,9 @@
 """Sensitivities of a robot at many places: arrays in, answers out."""
 
+from __future__ import annotations
+
 from functools import partial
+from typing import TYPE_CHECKING
 
 import jax
 import numpy as np
@@ -16,6 +19,9 @@ from cspr_jax.robots.point_mass import PointMassRobot
 from cspr_jax.robots.reference_pose import aligned
 from cspr_jax.robots.robot import check_determined
 from cspr_jax.robots.sensitivities import Sensitivities, pair_sensitivities, sensitivities
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 BATCH = 8192  # places at a time
 
@@ -57,16 +63,10 @@ class SensitivitySearch:
             self._pairs = _pairs(robot)
             self.robot = robot if self._pairs is not None else aligned(robot)[0]
 
-    def __call__(self, positions: np.ndarray, quaternions: np.ndarray | None = None) -> Sensitivities:
-        """Sensitivities at places.
-
-        Args:
-            positions: (n, 3) in the kernels' coordinates, m.
-            quaternions: (n, 4) rotations of a platform from its orientation; None: there are none.
-
-        Returns:
-            (n,) each.
-        """
+    def __call__(
+        self, positions: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"] | None = None
+    ) -> Sensitivities:
+        """Sensitivities at places."""
         robot, pairs = self.robot, self._pairs
         if isinstance(robot, PointMassRobot):
             return in_batches(partial(_of_point_mass, robot), positions, size=BATCH)

@@ -7,14 +7,19 @@ it, where w is the distance of A from the swivel axis (`robots.pulleys`). Wherev
 width 4 r and height 2 r.
 """
 
+from __future__ import annotations
+
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.workspaces import geometry
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 BATCH = 4096
 # Diagonal of the band within which exits lie, over the radius of the pulley.
@@ -37,18 +42,13 @@ class Shifts(NamedTuple):
     free: np.ndarray
 
 
-def shifts(robot: AnyRobot, positions: np.ndarray, quaternions: np.ndarray, reach: np.ndarray) -> Shifts:
-    """Bounds of movements while robots move within their cells.
-
-    Args:
-        robot: centred, z down.
-        positions: (n, 3) of the mass centre, or of the joint, at the centres of the cells, m.
-        quaternions: (n, 4) unit quaternions, scalar first.
-        reach: (n,) how far the robot moves from there, m.
-
-    Returns:
-        the bounds.
-    """
+def shifts(
+    robot: AnyRobot,
+    positions: Float[np.ndarray, "n 3"],
+    quaternions: Float[np.ndarray, "n 4"],
+    reach: Float[np.ndarray, "n"],
+) -> Shifts:
+    """Bounds of movements while robots move within their cells."""
     targets = in_batches(lambda x: geometry.attachments(robot, *x), (positions, quaternions), size=BATCH)
     rays, most = targets - np.asarray(robot.base_points), reach[:, None]
     if robot.pulleys is None:
@@ -67,16 +67,10 @@ def shifts(robot: AnyRobot, positions: np.ndarray, quaternions: np.ndarray, reac
     return Shifts(reach, exits.max(1), unit_changes(most, np.minimum(free, wide)), free)
 
 
-def leaving_points(robot: AnyRobot, positions: np.ndarray, quaternion: np.ndarray) -> np.ndarray:
-    """Points at which cables leave: their base points, or points of their pulleys.
-
-    Args:
-        positions: (n, 3) of the mass centre, or of the joint, m.
-        quaternion: (4,) unit quaternion of all positions, scalar first.
-
-    Returns:
-        (n, n_cables, 3) m.
-    """
+def leaving_points(
+    robot: AnyRobot, positions: Float[np.ndarray, "n 3"], quaternion: Float[np.ndarray, "4"]
+) -> Float[np.ndarray, "n n_cables 3"]:
+    """Points at which cables leave: their base points, or points of their pulleys."""
     pulleys = robot.pulleys
     if pulleys is None:
         return np.broadcast_to(np.asarray(robot.base_points), (len(positions), robot.n_cables, 3))
@@ -84,14 +78,6 @@ def leaving_points(robot: AnyRobot, positions: np.ndarray, quaternion: np.ndarra
     return in_batches(lambda x: geometry.exit_points(robot, pulleys, *x), poses, size=BATCH)
 
 
-def unit_changes(reach: np.ndarray, length: np.ndarray) -> np.ndarray:
-    """Bound of the changes of unit vectors.
-
-    Args:
-        reach: (n, k) how far an end moves, m.
-        length: (n, k) the least that is left of the vectors, m.
-
-    Returns:
-        (n, k) 2 at most.
-    """
+def unit_changes(reach: Float[np.ndarray, "n k"], length: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
+    """Bound of the changes of unit vectors."""
     return np.where(length > 0.0, np.minimum(reach / np.where(length > 0.0, length, 1.0), 2.0), 2.0)

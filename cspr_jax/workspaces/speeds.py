@@ -6,7 +6,10 @@ A cable of unit vector u, attached at the arm a from the origin of the platform 
 along which the effector can move and about which it can turn: the rows of the wrench matrix.
 """
 
+from __future__ import annotations
+
 import dataclasses
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +21,9 @@ from cspr_jax.robots.platform import PlatformRobot
 from cspr_jax.workspaces import geometry
 from cspr_jax.workspaces.cell_proofs import cable_wrenches
 from cspr_jax.workspaces.shifts import Shifts
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 BATCH = 4096
 
@@ -38,33 +44,20 @@ class CableSpeeds:
     angular_speed: float
     most: np.ndarray
 
-    def margins(self, origins: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
-        """Slack up to the largest speeds of the cables.
-
-        Args:
-            origins: (n, 3) of the platform frame, kernels' coordinates, m.
-            quaternions: (n, 4) unit quaternions, scalar first.
-
-        Returns:
-            (n, n_cables) m/s, negative where some velocity needs a faster cable.
-        """
+    def margins(
+        self, origins: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"]
+    ) -> Float[np.ndarray, "n n_cables"]:
+        """Slack up to the largest speeds of the cables."""
         poses = origins, quaternions
         columns = in_batches(lambda x: geometry.wrench_matrices(self.robot, *x), poses, size=BATCH)
         forces = len(PATTERNS[self.robot.pattern].forces)
         along, about = (np.linalg.norm(part, axis=1) for part in (columns[:, :forces], columns[:, forces:]))
         return self.most - (along * self.speed + about * self.angular_speed)
 
-    def displaced(self, origins: np.ndarray, quaternion: np.ndarray, distance: float) -> tuple[np.ndarray, np.ndarray]:
-        """Margins of robots without pulleys whose spools are displaced so that, to first order, cables are fastest.
-
-        Args:
-            origins: (n, 3) of the platform frame, kernels' coordinates, m.
-            quaternion: (4,) unit quaternion, scalar first.
-            distance: of spools from their places, m.
-
-        Returns:
-            (n, n_cables) m/s; (n, n_cables) lengths of the cables, m.
-        """
+    def displaced(
+        self, origins: Float[np.ndarray, "n 3"], quaternion: Float[np.ndarray, "4"], distance: float
+    ) -> tuple[Float[np.ndarray, "n n_cables"], Float[np.ndarray, "n n_cables"]]:
+        """Margins of robots without pulleys whose spools are displaced so that, to first order, cables are fastest."""
         robot = self.robot
         arms, wrenches = cable_wrenches(robot, quaternion, np.ones(robot.dof))
         forces = len(PATTERNS[robot.pattern].forces)
@@ -85,12 +78,8 @@ class CableSpeeds:
         rays = rays + distance * unit_vectors(gradients - (gradients * units).sum(2, keepdims=True) * units)
         return self.most - each(rays)[1], np.linalg.norm(rays, axis=2)
 
-    def changes(self, moved: Shifts) -> np.ndarray:
-        """Largest change of `margins` within cells.
-
-        Returns:
-            (n, n_cables) m/s.
-        """
+    def changes(self, moved: Shifts) -> Float[np.ndarray, "n n_cables"]:
+        """Largest change of `margins` within cells."""
         # |u'| is constant for a robot that moves in all directions in which its cables lie.
         speed = self.speed if PATTERNS[self.robot.pattern].forces == (2,) else 0.0
         if not isinstance(self.robot, PlatformRobot):
@@ -100,17 +89,7 @@ class CableSpeeds:
 
 
 def cable_speeds(robot: AnyRobot, most: np.ndarray, *, speed: float, angular_speed: float) -> CableSpeeds:
-    """Velocities that an effector must be able to have.
-
-    Args:
-        robot: centred, z down.
-        most: () or (n_cables,) largest speeds of the cables, m/s.
-        speed: of the origin of the platform frame, or of the point mass, m/s.
-        angular_speed: rad/s.
-
-    Returns:
-        the velocities, as a condition on poses.
-    """
+    """Velocities that an effector must be able to have."""
     if isinstance(robot, PlatformRobot) and not PATTERNS[robot.pattern].is_jointed and robot.centre_of_mass is not None:
         points = np.asarray(robot.platform_points) + np.asarray(robot.centre_of_mass)
         robot = dataclasses.replace(robot, platform_points=leaf(points))

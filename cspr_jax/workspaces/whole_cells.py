@@ -1,12 +1,17 @@
 """Cells of maps of workspaces: boxes of positions that lie wholly inside a workspace, or wholly outside of it."""
 
+from __future__ import annotations
+
 import itertools
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.workspaces.search import WorkspaceAnswers
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Cells that are proved at a time.
 ROUND = 65536
@@ -56,20 +61,14 @@ class CellSides(NamedTuple):
 
 
 def proved_sides(
-    conditions: CellConditions, positions: np.ndarray, half: np.ndarray, sides: np.ndarray, held: np.ndarray, depth: int
+    conditions: CellConditions,
+    positions: Float[np.ndarray, "n 3"],
+    half: Float[np.ndarray, "n 3"],
+    sides: Float[np.ndarray, "n"],
+    held: Float[np.ndarray, "n n_conditions"],
+    depth: int,
 ) -> CellSides:
-    """Tell which cells lie wholly on the side of their centres, open ones halved as often as `depth` allows.
-
-    Args:
-        positions: (n, 3) centres, m.
-        half: (n, 3) half sizes, m.
-        sides: (n,) of the centres; 0 proves nothing.
-        held: (n, n_conditions) conditions that hold in the whole cell.
-        depth: how often open cells are halved along each axis.
-
-    Returns:
-        the results.
-    """
+    """Tell which cells lie wholly on the side of their centres, open ones halved as often as `depth` allows."""
     held, is_broken = conditions.proved(positions, half, sides, held)
     result = CellSides(np.where(sides > 0, held.all(1), is_broken & (sides < 0)), held, np.zeros(len(sides), bool))
     left = np.flatnonzero(~result.proved & (sides != 0))
@@ -94,10 +93,6 @@ def proved_sides(
     return result
 
 
-def sides_of(answers: WorkspaceAnswers) -> np.ndarray:
-    """Sides of poses.
-
-    Returns:
-        (n,) 1 strictly inside, -1 strictly outside, else 0.
-    """
+def sides_of(answers: WorkspaceAnswers) -> Float[np.ndarray, "n"]:
+    """Sides of poses."""
     return np.where(answers.verdict == 0, 1, np.where(answers.verdict == Verdict.WRENCH_INFEASIBLE, -1, 0))

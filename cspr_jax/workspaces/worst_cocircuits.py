@@ -1,8 +1,10 @@
 """The cocircuit that decides at a pose: the normal to some cables along which the others do the least."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -10,6 +12,9 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.robots.wrench_sets import normals_to, spanning
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Components of a cocircuit below this part of the largest one do not make it void.
 ZERO = 1e-9
@@ -37,11 +42,11 @@ class WorstCocircuits(NamedTuple):
 
 @partial(jax.jit, static_argnames=("condition", "unbounded"))
 def worst_cocircuits(
-    matrices: Array,
-    wrenches: Array,
-    spreads: Array,
-    low: Array,
-    high: Array,
+    matrices: Float[Array, "n dof n_cables"],
+    wrenches: Float[Array, "k dof"],
+    spreads: Float[Array, "l dof"],
+    low: Float[Array, "n_cables"],
+    high: Float[Array, "n_cables"],
     *,
     condition: str,
     unbounded: Sequence[bool],
@@ -50,19 +55,6 @@ def worst_cocircuits(
 
     This weight puts cocircuits of nearly dependent columns last, whose normals turn fast from place to place. Where a
     single cocircuit is violated, it is that one; where none is, it is the one whose plane is the nearest.
-
-    Args:
-        matrices: (n, dof, n_cables) unit columns, moments over a length.
-        wrenches: (k, dof) wrenches that the cables must supply, N.
-        spreads: (l, dof) semi-axes of ellipsoids of wrenches about each of them, N.
-        low: (n_cables,) smallest tensions, N.
-        high: (n_cables,) largest tensions, N; any number for cables without one.
-        condition: "closure": take the cocircuit whose other components are the most of one sign, positive; any other:
-            take the one along which the wrenches are the farthest beyond what tensions can give.
-        unbounded: mask of the cables without a largest tension.
-
-    Returns:
-        the cocircuits.
     """
     dof, count = matrices.shape[1:]
     chosen = spanning(count, dof)

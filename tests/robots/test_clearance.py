@@ -470,7 +470,7 @@ def test_a_planted_sign_is_found(monkeypatch, name, old, new):
     source = inspect.getsource(getattr(clearance_lanes, name))
     assert source.count(old) == 1
     room = dict(vars(clearance_lanes))
-    exec(source.replace(old, new), room)
+    exec("from __future__ import annotations\n" + source.replace(old, new), room)
     monkeypatch.setattr(clearance_lanes, name, room[name])
     a, u, half = random_boxes(4_000, 9)
     boxes = lanes(clearance_lanes.segment_box)(a, u, half)

@@ -4,8 +4,11 @@ Points are in the frame of their link. A link's mass centre lies at com_location
 attachment_reference is "com" count from there. Off-diagonals of an inertia tensor are its entries, not minus them.
 """
 
+from __future__ import annotations
+
 import dataclasses
 from pathlib import Path
+from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -17,6 +20,9 @@ from cspr_jax.config.reading import other_case
 from cspr_jax.config.wording import either
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.errors.suggestions import did_you_mean
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 
 @dataclasses.dataclass(frozen=True)
@@ -45,18 +51,7 @@ _PULLEY = "base_rotating_pulley"
 
 
 def read(path: Path, cable_set: str | None) -> Body:
-    """A model.
-
-    Args:
-        path: of its bodies or its cables; the other file lies beside it.
-        cable_set: name of a set of cables; None: that of the file's default_cable_set.
-
-    Returns:
-        the body.
-
-    Raises:
-        ConfigError: no such set, no other file, several links, or content that no robot file can express.
-    """
+    """A model."""
     bodies, cables = _both(path)
     joint, body = _body(bodies)
     place, base_shift = body.centre, _joint_place(bodies, joint)
@@ -132,19 +127,8 @@ def _body(file: Path) -> tuple[_Joint, Body]:
 _PARTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 
 
-def joint_place(file: Path) -> tuple[str, np.ndarray, np.ndarray]:
-    """Kind and place of the joint of a model.
-
-    Args:
-        file: of its bodies.
-
-    Returns:
-        the kind, such as "PLANAR_XZ"; the rows x, y and z of the robot file in the axes of CASPR (3, 3); and the place
-        of the joint at coordinates 0, in the latter axes, from the origin of the former (3,) m.
-
-    Raises:
-        ConfigError: several links, or a joint that no robot file can express.
-    """
+def joint_place(file: Path) -> tuple[str, Float[np.ndarray, "3 3"], Float[np.ndarray, "3"]]:
+    """Kind and place of the joint of a model."""
     link = _link(file)
     joint = _joint_of(link, file)
     location = vector(child(child(link, "parent", file), "location", file), file, "parent")

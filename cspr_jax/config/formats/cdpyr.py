@@ -27,27 +27,12 @@ LARGEST = 1_000_000  # values of a file
 
 
 def read_json(path: Path) -> Body:
-    """A robot of a JSON file.
-
-    Returns:
-        the body.
-
-    Raises:
-        ConfigError: no JSON, several platforms, or content that no robot file can express.
-    """
+    """A robot of a JSON file."""
     return _read(path, _json, "JSON")
 
 
 def read_yaml(path: Path) -> Body:
-    """A robot of a YAML file.
-
-    Returns:
-        the body.
-
-    Raises:
-        ConfigError: no YAML, references that grow too much, several platforms, or content that no robot file can
-            express.
-    """
+    """A robot of a YAML file."""
     return _read(path, _yaml, "YAML")
 
 

@@ -1,14 +1,19 @@
 """Model that all formats are read into, one body on cables, and the keys of a robot file that it becomes."""
 
+from __future__ import annotations
+
 import dataclasses
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cspr_jax.errors import ConfigError
 from cspr_jax.robots.patterns import PATTERNS
 from cspr_jax.robots.spool_plane import SMALLEST_AREA_RATIO
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Rows: x, y and z of a robot file in the axes of another, for each plane, or line, of motion there.
 SAME = np.eye(3)
@@ -81,30 +86,14 @@ class Body:
     notes: list[str] = dataclasses.field(default_factory=list)
 
 
-def about_centre(tensor: np.ndarray, mass: float, centre: list[float]) -> np.ndarray:
-    """Inertia about the mass centre, from the inertia about the origin of the platform frame, by Steiner's theorem.
-
-    Args:
-        tensor: (3, 3) about the origin, kg m^2.
-        mass: kg.
-        centre: (3,) m.
-
-    Returns:
-        (3, 3) kg m^2.
-    """
+def about_centre(tensor: Float[np.ndarray, "3 3"], mass: float, centre: list[float]) -> Float[np.ndarray, "3 3"]:
+    """Inertia about the mass centre, from the inertia about the origin of the platform frame, by Steiner's theorem."""
     arm = np.asarray(centre)
     return tensor - mass * (float(arm @ arm) * np.eye(3) - np.outer(arm, arm))
 
 
 def robot_keys(body: Body) -> dict[str, Any]:
-    """Keys of the robot file that a body becomes.
-
-    Returns:
-        plain values, as TOML would give them.
-
-    Raises:
-        ConfigError: no cables, or one out of the plane of a planar robot.
-    """
+    """Keys of the robot file that a body becomes."""
     if not body.cables:
         raise ConfigError(body.file, "no cables: must be one or more")
     base = np.array([cable.base for cable in body.cables]) @ body.axes.T

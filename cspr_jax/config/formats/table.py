@@ -29,11 +29,7 @@ class Format:
     has_sets: bool = False
 
     def load(self) -> Callable[..., Body]:
-        """The function that reads a file, imported now.
-
-        Returns:
-            the function.
-        """
+        """The function that reads a file, imported now."""
         module, _, name = self.reader.partition(":")
         return getattr(importlib.import_module(module), name)
 
@@ -66,38 +62,18 @@ class Imported:
 
 
 def format_of(name: str) -> Format | None:
-    """The format of a file.
-
-    Returns:
-        its row; None if another program does not write such files.
-    """
+    """The format of a file."""
     return next((row for row in FORMATS if name.lower().endswith(row.endings)), None)
 
 
 def parted(reference: str) -> tuple[str, str | None]:
-    """File and set of cables that a reference such as "robot_cables.xml#set" names.
-
-    Returns:
-        the name of the file, and that of the set; None: not said.
-    """
+    """File and set of cables that a reference such as "robot_cables.xml#set" names."""
     name, mark, cable_set = reference.partition("#")
     return (name, cable_set) if mark and format_of(name) else (reference, None)
 
 
 def read(path: Path, cable_set: str | None = None) -> Imported:
-    """A robot of another program.
-
-    Args:
-        path: with an ending of `ENDINGS`.
-        cable_set: which set of cables, where the file has several; None: its default.
-
-    Returns:
-        the robot.
-
-    Raises:
-        ConfigError: a mistake in the file, or content that no robot file can express.
-        KeyError: another ending.
-    """
+    """A robot of another program."""
     row = format_of(path.name)
     if row is None:
         raise KeyError(path.name)

@@ -27,14 +27,7 @@ _TENSORS = (np.diag([14.0, 0.0, 0.0]), np.diag([2.0, 3.0, 4.0]))  # kg m^2
 
 
 def read(path: Path) -> Body:
-    """A robot.
-
-    Returns:
-        the body.
-
-    Raises:
-        ConfigError: no such XML, several platforms, or content that no robot file can express.
-    """
+    """A robot."""
     root = read_xml(path)
     if root.tag != "models":
         raise ConfigError(path, f"<{root.tag}>: must be <models>, a file of WireX")

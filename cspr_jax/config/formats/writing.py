@@ -9,14 +9,7 @@ from cspr_jax.errors import printable
 
 
 def robot_text(keys: Mapping[str, Any], cable_names: Sequence[str] = ()) -> str:
-    """Text of a robot file.
-
-    Args:
-        cable_names: named in a comment, if they have any.
-
-    Returns:
-        TOML that reads back to the same keys.
-    """
+    """Text of a robot file."""
     lines = []
     if any(cable_names):
         lines.append("# cables: " + ", ".join(printable(name) for name in cable_names))
@@ -24,14 +17,7 @@ def robot_text(keys: Mapping[str, Any], cable_names: Sequence[str] = ()) -> str:
 
 
 def value_text(value: Any) -> str:
-    """Text of a value.
-
-    Args:
-        value: a number, a word, a list, or a table.
-
-    Returns:
-        TOML; tables inline.
-    """
+    """Text of a value."""
     if isinstance(value, dict):
         return "{ " + ", ".join(f"{key} = {value_text(item)}" for key, item in value.items()) + " }"
     if isinstance(value, list) and value and isinstance(value[0], list):

@@ -22,15 +22,7 @@ _UTF16 = {
 
 
 def read_xml(path: Path) -> Element:
-    """Root of an XML file.
-
-    Returns:
-        the root. A DOCTYPE that names a file is passed over: that file is not read. The encoding is the one that the
-        file declares; without a declaration it is UTF-8, or UTF-16 if the file begins so.
-
-    Raises:
-        ConfigError: the file cannot be read, is larger than 1 MB, is no XML, or declares entities.
-    """
+    """Root of an XML file."""
     from defusedxml import DefusedXmlException, ElementTree  # imported only where XML is read, since it takes time
 
     data = read_bytes(path)
@@ -65,19 +57,7 @@ def _encoding(data: bytes) -> tuple[str | None, str]:
 
 
 def child(parent: Element, tag: str, file: object, place: str = "") -> Element:
-    """The one element of a kind below another.
-
-    Args:
-        tag: of the kind, directly below it.
-        file: named in errors.
-        place: name of the parent in errors.
-
-    Returns:
-        the element.
-
-    Raises:
-        ConfigError: none, or several.
-    """
+    """The one element of a kind below another."""
     elements = parent.findall(tag)
     if len(elements) != 1:
         raise ConfigError(file, f"{place or parent.tag}: {len(elements)} elements <{tag}>: must be one")
@@ -85,28 +65,12 @@ def child(parent: Element, tag: str, file: object, place: str = "") -> Element:
 
 
 def text_of(element: Element) -> str:
-    """Text of an element.
-
-    Returns:
-        its text without spaces around it.
-    """
+    """Text of an element."""
     return (element.text or "").strip()
 
 
 def number(text: str, file: object, place: str, *, infinite: bool = False) -> float:
-    """A number.
-
-    Args:
-        file: named in errors.
-        place: where it stands, for errors.
-        infinite: whether it may be infinite.
-
-    Returns:
-        the number.
-
-    Raises:
-        ConfigError: no number, or none that is finite.
-    """
+    """A number."""
     try:
         value = float(text[:100])
     except ValueError:
@@ -118,18 +82,7 @@ def number(text: str, file: object, place: str, *, infinite: bool = False) -> fl
 
 
 def vector(element: Element, file: object, place: str) -> list[float]:
-    """A point or a direction.
-
-    Args:
-        file: named in errors.
-        place: where it stands, for errors.
-
-    Returns:
-        (3,).
-
-    Raises:
-        ConfigError: not three finite numbers.
-    """
+    """A point or a direction."""
     words = text_of(element).split()
     if len(words) != 3:
         raise ConfigError(file, f"{place}.{element.tag} = {shown(text_of(element))}: must be three numbers")

@@ -28,17 +28,7 @@ class _Loader(_Base):
 
 
 def load(text: str) -> Any:
-    """Value of a YAML text.
-
-    Returns:
-        plain values; references (*name) share them.
-
-    Raises:
-        yaml.YAMLError: it is no YAML, has too many values, or too long ones.
-        ArithmeticError, AttributeError, LookupError, TypeError, ValueError: a number or a date cannot be made of its
-            text.
-        RecursionError: it is nested too deeply.
-    """
+    """Value of a YAML text."""
     try:
         _check_events(text)
     except yaml.MarkedYAMLError as error:

@@ -62,18 +62,7 @@ _COORDINATES = {
 
 
 def read(path: Path, name: str | None = None, bodies: Path | None = None) -> MotionPieces:
-    """A trajectory of CASPR, in the axes of the robot file that `config.formats.caspr` makes of its model.
-
-    Args:
-        name: its `id`; None: the only one.
-        bodies: of the model; None: NAME_bodies.xml beside the file.
-
-    Returns:
-        the motion.
-
-    Raises:
-        ConfigError: a mistake in the file, several trajectories and no name, or a kind that is not read.
-    """
+    """A trajectory of CASPR, in the axes of the robot file that `config.formats.caspr` makes of its model."""
     element = _chosen(path, name)
     place = f'trajectory "{element.get("id", "")[:40]}"'
     if element.tag not in _KINDS:

@@ -4,10 +4,13 @@ Units stand behind the names (`config.motions.heads`), in a row of their own, or
 Further lines of this kind are `# interpolation: quintic`, `# ends: periodic` and `# z: up`.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import re
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -32,6 +35,9 @@ from cspr_jax.errors import ConfigError, shown
 from cspr_jax.errors.suggestions import did_you_mean, nearest
 from cspr_jax.schema.quantities import TRAJECTORY
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # Columns that this program writes beside the motion.
 _BESIDE = re.compile(rf"(?:{'|'.join(sorted(TRAJECTORY.keys() - WRITTEN.keys() - {'t'}))})(?:_\w+)?|feasible")
 # Without a header, columns stand in the order of these.
@@ -54,14 +60,7 @@ MOST_SUGGESTIONS = 5  # columns that are not read, each of which gets a line
 
 
 def plain_names(count: int, has_times: bool) -> tuple[str, ...]:
-    """Names of columns that nothing names.
-
-    Args:
-        has_times: whether the table is that of a motion, and not of a path.
-
-    Returns:
-        the names; empty: so many columns say nothing.
-    """
+    """Names of columns that nothing names."""
     return (PLAIN if has_times else PLAIN_PATH).get(count, ())
 
 
@@ -93,22 +92,11 @@ class MotionColumns:
         return None if not self.is_written else "origin" if "mass_centre_x" in self.heads else "mass-centre"
 
     def has(self, group: str) -> bool:
-        """Tell whether the table has columns of a group of `GROUPS`.
-
-        Returns:
-            True if it has one.
-        """
+        """Tell whether the table has columns of a group of `GROUPS`."""
         return any(name in self.names for name in GROUPS[group][0])
 
-    def values(self, group: str, rows: np.ndarray) -> np.ndarray | None:
-        """Values of a group of columns.
-
-        Args:
-            rows: (n, columns) in the units of the file.
-
-        Returns:
-            (n, size of the group) in SI; zeros for y of planar robots; None: the table has none.
-        """
+    def values(self, group: str, rows: Float[np.ndarray, "n columns"]) -> np.ndarray | None:
+        """Values of a group of columns."""
         if not self.has(group):
             return None
         values = np.zeros((len(rows), len(GROUPS[group][0])))
@@ -120,18 +108,7 @@ class MotionColumns:
 
 
 def directives(comments: list[tuple[int, str]], path: Path) -> dict[str, str]:
-    """Directives among the comments of a file.
-
-    Args:
-        comments: line numbers and texts, without the mark.
-        path: named in errors.
-
-    Returns:
-        values by the names of `DIRECTIVES`.
-
-    Raises:
-        ConfigError: a value that a directive cannot have.
-    """
+    """Directives among the comments of a file."""
     values: dict[str, str] = {}
     for line, text in comments:
         name, mark, value = (part.strip().lower() for part in text.partition(":"))
@@ -157,25 +134,7 @@ def columns(
     own_units: dict[int, str] | None = None,
     notes: Iterable[str] = (),
 ) -> MotionColumns:
-    """Columns of a table.
-
-    Args:
-        heads: names of its columns; None: nothing names them.
-        count: of values in a row.
-        units: that its directive names, such as "mm, deg, ms".
-        path: named in errors.
-        line: of the names, or of the first row.
-        has_times: whether the table is that of a motion, and not of a path.
-        own_units: of a row of units, by the numbers of their columns.
-        notes: lines for the user, with which the columns' own go.
-
-    Returns:
-        the columns.
-
-    Raises:
-        ConfigError: missing columns, one that stands twice, units that are unknown, or a number of columns that says
-            nothing without names.
-    """
+    """Columns of a table."""
     common, plain = _common(units, path), PLAIN if has_times else PLAIN_PATH
     if heads is None and count not in plain:
         counts, words = ", ".join(map(str, plain)), "t, x, y, z, ..." if has_times else "x, y, z, ..."
@@ -214,12 +173,6 @@ def identified(heads: list[str], has_times: bool) -> tuple[list[Head], dict[int,
     """Names and units of heads; and the names, by the numbers of columns, that units and positions alone give.
 
     The one column of times has another name, or columns stand in the order of `PLAIN` and all have units.
-
-    Args:
-        has_times: whether the table is that of a motion, and not of a path.
-
-    Returns:
-        one for each head, and those names.
     """
     parts, plain = resolved(heads), plain_names(len(heads), has_times)
     names, placed = [part.name for part in parts], dict[int, str]()

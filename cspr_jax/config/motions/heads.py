@@ -89,11 +89,7 @@ class Head(NamedTuple):
 
 
 def unit_of(word: str) -> str:
-    """A unit in the words of `KINDS`.
-
-    Returns:
-        such as mm for millimetres, m/s^2 for m s^-2.
-    """
+    """A unit in the words of `KINDS`."""
     word = word.strip().strip("[]()").strip().lower().replace("²", "^2").replace("**", "^")
     above, _, below = word.partition("/")
     if not below:
@@ -107,31 +103,19 @@ def unit_of(word: str) -> str:
 
 
 def kind_of_unit(unit: str) -> str | None:
-    """Kind of a plain unit.
-
-    Returns:
-        "time", "length" or "angle"; None: it is none of these.
-    """
+    """Kind of a plain unit."""
     unit = unit_of(unit)
     return next((kind for kind in ("time", "length", "angle") if unit in KINDS[kind][0]), None)
 
 
 def is_unit(word: str) -> bool:
-    """Tell whether a word is a unit of a column, of a rate too.
-
-    Returns:
-        True if it is one.
-    """
+    """Tell whether a word is a unit of a column, of a rate too."""
     above, slash, below = unit_of(word).partition("/")
     return kind_of_unit(above) is not None and (not slash or below.rstrip("2").rstrip("^") in TIMES)
 
 
 def resolved(heads: list[str]) -> list[Head]:
-    """Names and units of heads: exact names first, then those of other programs for groups that have none.
-
-    Returns:
-        one for each head.
-    """
+    """Names and units of heads: exact names first, then those of other programs for groups that have none."""
     parts = [_parted(head) for head in heads]
     names = [_exact(stem) for stem, _ in parts]
     for group, letters in (
@@ -148,22 +132,14 @@ def resolved(heads: list[str]) -> list[Head]:
 
 
 def mentioned(text: str) -> list[str]:
-    """Names of columns among the words of a comment.
-
-    Returns:
-        the names, in their order.
-    """
+    """Names of columns among the words of a comment."""
     words = (word.strip("._") for word in re.findall(r"[^\W\d][\w.]*", text.lower()))
     names = (_exact(word) or _time(word) or _lettered(word, set(), _JOINED, "xyz", "") for word in words)
     return [name for name in names if name]
 
 
 def units_within(text: str) -> list[str]:
-    """Units among the words of a comment, but for those that need not be said.
-
-    Returns:
-        the units, in their order.
-    """
+    """Units among the words of a comment, but for those that need not be said."""
     words = re.findall(r"(?<![\w/])(?:[^\W\d_]+|°)(?![\w/])", text.lower())
     units = [unit_of(word) for word in words if word not in ("min", "us")]
     return [unit for unit in units if kind_of_unit(unit) and unit not in ("s", "m", "rad")]

@@ -1,8 +1,15 @@
 """Likely mistakes in a motion, of which a robot's size tells: units."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from cspr_jax.config.motions.table import MotionTable
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 FAR = 30.0  # sizes of the robot; farther motions are probably in other units
 # Motions of so many rows at whole numbers of seconds are probably in milliseconds, or without units.
@@ -10,15 +17,8 @@ MANY = 50
 CLOSER = 100.0  # times closer than others in the median are stamps that nearly repeat
 
 
-def unit_hints(table: MotionTable, base_points: np.ndarray) -> list[str]:
-    """Units that a table probably has, other than those that it is read in.
-
-    Args:
-        base_points: (n_cables, 3) of the robot, in its file's axes, m.
-
-    Returns:
-        one line each.
-    """
+def unit_hints(table: MotionTable, base_points: Float[np.ndarray, "n_cables 3"]) -> list[str]:
+    """Units that a table probably has, other than those that it is read in."""
     points = np.asarray(base_points, float)
     size = float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
     reach = float(np.abs(table.positions - points.mean(axis=0)).max())
@@ -37,15 +37,8 @@ def unit_hints(table: MotionTable, base_points: np.ndarray) -> list[str]:
     return lines
 
 
-def near_repeat(times: np.ndarray) -> tuple[int, float] | None:
-    """First two stamps that nearly repeat.
-
-    Args:
-        times: (n,) s.
-
-    Returns:
-        index of the first of the two, and by which factor their step is shorter than the median; None: there are none.
-    """
+def near_repeat(times: Float[np.ndarray, "n"]) -> tuple[int, float] | None:
+    """First two stamps that nearly repeat."""
     steps = np.diff(times)
     steps = np.where(steps > 0.0, steps, np.inf)
     if len(steps) < 4:

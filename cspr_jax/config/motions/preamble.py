@@ -42,14 +42,7 @@ class Preamble:
         self._units: list[str] | None = None
 
     def takes(self, line: int, text: str) -> bool:
-        """Take a line.
-
-        Returns:
-            False: it is the first row, with which the columns are known.
-
-        Raises:
-            ConfigError: columns that are missing, ambiguous or too many.
-        """
+        """Take a line."""
         if is_comment(text):
             self._comment_length += len(text)
             if self._comment_length > LARGEST_COMMENTS:
@@ -69,11 +62,7 @@ class Preamble:
         return False
 
     def end(self) -> None:
-        """Check the names of a table without rows.
-
-        Raises:
-            ConfigError: columns that are missing, ambiguous or too many.
-        """
+        """Check the names of a table without rows."""
         if self._names is not None:
             self._finish(None)
 
@@ -231,29 +220,17 @@ class Preamble:
 
 
 def is_comment(text: str) -> bool:
-    """Tell whether a line is a comment as a whole, also one that a spreadsheet has quoted.
-
-    Returns:
-        True if it is.
-    """
+    """Tell whether a line is a comment as a whole, also one that a spreadsheet has quoted."""
     return text.lstrip(' \t"').startswith(MARKS)
 
 
 def has_content(text: str) -> bool:
-    """Tell whether a line has a cell with content.
-
-    Returns:
-        True if it has.
-    """
+    """Tell whether a line has a cell with content."""
     return not text.lstrip().startswith("%") and bool(text.split("#")[0].strip(" \t,;\n"))
 
 
 def cells_of(row: str, delimiter: str | None) -> list[str]:
-    """Cells of a row.
-
-    Returns:
-        the cells, without quotes.
-    """
+    """Cells of a row."""
     text = row.split("#")[0].strip(" \n")
     if '"' in text and delimiter is not None:
         return [cell.strip() for cell in next(csv.reader([text], delimiter=delimiter, skipinitialspace=True))]
@@ -261,20 +238,12 @@ def cells_of(row: str, delimiter: str | None) -> list[str]:
 
 
 def is_number(cell: str) -> bool:
-    """Tell whether a cell is a number.
-
-    Returns:
-        True if it is, be it one that is not finite.
-    """
+    """Tell whether a cell is a number."""
     return not math.isnan(number_of(cell)) or cell.strip().lower().lstrip("+-") == "nan"
 
 
 def number_of(cell: str) -> float:
-    """A cell as a number.
-
-    Returns:
-        the number, with a decimal comma too; NaN: it is none.
-    """
+    """A cell as a number."""
     try:
         return float(cell.replace(",", ".")) if cell.isascii() and "_" not in cell else math.nan
     except ValueError:

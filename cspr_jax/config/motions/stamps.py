@@ -14,11 +14,7 @@ _WHOLE, _DECIMAL = re.compile(r"[0-9]+"), re.compile(r"[-+]?[0-9]+\.?[0-9]*")
 
 
 def unit_of_stamps(cell: str) -> str | None:
-    """Unit in which a whole number is an instant of our days, but for seconds.
-
-    Returns:
-        the unit; None: in none of them.
-    """
+    """Unit in which a whole number is an instant of our days, but for seconds."""
     if not _WHOLE.fullmatch(cell) or len(cell) > LONGEST:
         return None
     return next((unit for unit in UNITS if EPOCH[0] <= float(cell) * TIMES[unit] < EPOCH[1]), None)
@@ -32,25 +28,11 @@ class Stamps:
         self.offset = Decimal(first).to_integral_value(ROUND_FLOOR) if is_large else Decimal(0)
 
     def since(self, cell: str) -> float:
-        """A time, less the offset.
-
-        Returns:
-            the time, of which no digit is lost.
-
-        Raises:
-            ValueError: text that is no number.
-        """
+        """A time, less the offset."""
         return float(Decimal(cell) - self.offset) if _is_decimal(cell) else float(cell) - float(self.offset)
 
     def shown(self, t: float) -> str:
-        """A time as the file has it.
-
-        Args:
-            t: the time, less the offset.
-
-        Returns:
-            its digits.
-        """
+        """A time as the file has it."""
         return f"{Decimal(repr(t)) + self.offset:f}" if self.offset else repr(t)
 
 

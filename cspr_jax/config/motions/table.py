@@ -52,14 +52,7 @@ class MotionTable:
     notes: tuple[str, ...] = ()
 
     def in_axes(self, z_axis: str) -> "MotionTable":
-        """The motion in the axes of a robot file.
-
-        Args:
-            z_axis: of the robot file, "up" or "down".
-
-        Returns:
-            the table; itself where its own axes are these, or not said.
-        """
+        """The motion in the axes of a robot file."""
         if not _is_turned(self.z_axis, z_axis):
             return self
         return dataclasses.replace(
@@ -97,14 +90,7 @@ class MotionPieces:
     notes: tuple[str, ...] = ()
 
     def in_axes(self, z_axis: str) -> "MotionPieces":
-        """The motion in the axes of a robot file.
-
-        Args:
-            z_axis: of the robot file, "up" or "down".
-
-        Returns:
-            the pieces; themselves where their own axes are these, or not said.
-        """
+        """The motion in the axes of a robot file."""
         if not _is_turned(self.z_axis, z_axis):
             return self
         quaternion = _turned(self.quaternion, _TURN_QUATERNION)

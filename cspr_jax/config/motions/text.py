@@ -62,18 +62,7 @@ class MotionWindow:
 
 
 def read(path: Path, *, has_times: bool = True) -> MotionTable:
-    """A table of a motion, or of the points of a path, as a whole.
-
-    Args:
-        has_times: as for `windows`.
-
-    Returns:
-        the samples; of a path, times are the numbers of the rows.
-
-    Raises:
-        ConfigError: a mistake in the file.
-        TooLongError: more than `MOST_ROWS` rows; see `windows`.
-    """
+    """A table of a motion, or of the points of a path, as a whole."""
     window = next(windows(path, MOST_ROWS, has_times=has_times))
     if not window.is_last:
         raise TooLongError(path, f"more than {MOST_ROWS} rows: must be fewer where a motion is read as a whole")
@@ -81,18 +70,7 @@ def read(path: Path, *, has_times: bool = True) -> MotionTable:
 
 
 def windows(path: Path, rows: int = WINDOW, *, has_times: bool = True) -> Iterator[MotionWindow]:
-    """A table of a motion, window by window.
-
-    Args:
-        rows: from the first to the last row of a window, at least `OVERLAP`.
-        has_times: whether the table is that of a motion, and not of a path.
-
-    Yields:
-        the windows; each begins with the row with which the one before ends.
-
-    Raises:
-        ConfigError: a mistake in the file, when the window that holds it is due.
-    """
+    """A table of a motion, window by window."""
     reader = _Reader(path, has_times)
     pending, first, count = np.empty((0, 0)), 0, 0
     for block in reader.blocks():

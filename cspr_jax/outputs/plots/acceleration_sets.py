@@ -73,19 +73,7 @@ class AccelerationSet:
 
 
 def acceleration_set(result: Result, file: str, at: dict[str, float]) -> AccelerationSet:
-    """Feasible accelerations at an instant of a motion.
-
-    Args:
-        file: its name, for errors.
-        at: the instant as "t"; empty: that of the smallest margin.
-
-    Returns:
-        the set.
-
-    Raises:
-        InputError: a platform, a file without its robot, no such instant, or cables that do not span the space there.
-        ConfigError: a mistake in the plan that the file keeps.
-    """
+    """Feasible accelerations at an instant of a motion."""
     robot_file, keys = robot_and_plan(result, file, "acceleration")
     if robot_file.is_platform:
         fault = f'"acceleration" of {robot_file.kind}'

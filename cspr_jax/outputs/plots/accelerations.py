@@ -64,20 +64,7 @@ class AccelerationView(NamedTuple):
 
 
 def acceleration_figure(result: Result, file: str, at: dict[str, float]) -> Figure:
-    """The diagram.
-
-    Args:
-        result: a motion of a point mass.
-        file: its name, for errors.
-        at: the instant as "t"; empty: that of the smallest margin.
-
-    Returns:
-        the figure.
-
-    Raises:
-        InputError: a platform, a file without its robot, no such instant, or cables that do not span the space there.
-        ConfigError: a mistake in the plan that the file keeps.
-    """
+    """The diagram."""
     region = acceleration_set(result, file, at)
     views = _views(region)
     size = (6.6, 6.0) if len(views) == 1 else (4.2 * len(views), 5.8 if doubt(result) else 5.4)

@@ -16,13 +16,7 @@ AROUND = 48
 
 
 def draw_bodies(panel: Any, bodies: Sequence[Obstacle], *, is_down: bool) -> None:
-    """Draw obstacles behind cables and path, which stay visible.
-
-    Args:
-        panel: axes in three dimensions, as `scene.set_space` turns them.
-        bodies: in the axes of the file.
-        is_down: whether z points down.
-    """
+    """Draw obstacles behind cables and path, which stay visible."""
     view = across_and_up(is_down=is_down)
     for body in bodies:
         points = points_of(body)
@@ -34,11 +28,7 @@ def draw_bodies(panel: Any, bodies: Sequence[Obstacle], *, is_down: bool) -> Non
 
 
 def lines_on(body: Obstacle) -> list[np.ndarray]:
-    """Lines that show the shape of an obstacle: edges of a box, circles about the ends of a cylinder, or on a ball.
-
-    Returns:
-        (m, 3) points of each line, m.
-    """
+    """Lines that show the shape of an obstacle: edges of a box, circles about the ends of a cylinder, or on a ball."""
     if isinstance(body, Box):
         return list(hull_of(points_of(body))[1])
     if isinstance(body, Cylinder):

@@ -1,13 +1,18 @@
 """Boundary of the points of a grid that are inside: a surface of triangles in space, lines in a plane."""
 
+from __future__ import annotations
+
 import itertools
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.result import Result
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # A pose is outside where one of these margins is not positive.
 MARGINS = ("wrench_margin", "closure_margin", "clearance", "floor_margin", "length_margin", "speed_margin")
@@ -58,14 +63,7 @@ class Boundary(NamedTuple):
 
 
 def sides_of(result: Result, axes: list[str], index: dict[str, int]) -> BoundarySides:
-    """Points of a map of a workspace, and their sides.
-
-    Args:
-        index: of the point, for each of the other axes.
-
-    Returns:
-        the sides, with rising axes.
-    """
+    """Points of a map of a workspace, and their sides."""
     # The points of an axis may come in any order, and twice.
     orders = [np.unique(result.axes[axis], return_index=True)[1] for axis in axes]
 
@@ -86,12 +84,6 @@ def boundary(sides: BoundarySides) -> Boundary:
     It crosses every edge of the grid, and every diagonal of these simplices, between a point inside and one outside,
     and no other, so that it parts the points exactly as their verdicts do. Where margins decide it crosses where the
     first of them, linear on the edge, is zero; elsewhere half-way.
-
-    Args:
-        sides: of the points of a grid over two axes or three.
-
-    Returns:
-        the boundary; empty if nothing is inside.
     """
     # Around the grid lies a layer without thickness that is outside.
     is_in = np.pad(sides.verdict == 0, 1)
@@ -153,15 +145,8 @@ def _crossings(sides: BoundarySides, pairs: np.ndarray) -> np.ndarray:
     return grid[inner] + part[:, None] * (grid[outer] - grid[inner])
 
 
-def step_of(sides: BoundarySides) -> np.ndarray:
-    """The part of a plane in which the boundary may lie: between neighbours on different sides.
-
-    Args:
-        sides: of the points of a grid over two axes.
-
-    Returns:
-        (n, 3, 2) triangles.
-    """
+def step_of(sides: BoundarySides) -> Float[np.ndarray, "n 3 2"]:
+    """The part of a plane in which the boundary may lie: between neighbours on different sides."""
     is_in = sides.verdict == 0
     grid = np.stack([x.reshape(-1) for x in np.meshgrid(*sides.points, indexing="ij")], axis=1)
     corners = np.concatenate([places for places, _ in _simplices(is_in)])
@@ -170,15 +155,7 @@ def step_of(sides: BoundarySides) -> np.ndarray:
 
 
 def outlines(sides: BoundarySides) -> list[tuple[np.ndarray, bool]]:
-    """The boundary in a plane, as long lines.
-
-    Args:
-        sides: of the points of a grid over two axes.
-
-    Returns:
-        (n, 2) corners of each line, on edges of the grid, the first again at the end of a closed one; and whether it
-        runs along the end of the grid.
-    """
+    """The boundary in a plane, as long lines."""
     surface = boundary(sides)
     lines = []
     for is_end in (True, False):

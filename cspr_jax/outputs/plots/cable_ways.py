@@ -3,23 +3,24 @@
 `robots.pulleys` has the same geometry, with derivatives; here are the points of its arcs.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from cspr_jax.config.robot import RobotFile
 
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
+
 ON_ARC = 9  # points that an arc is drawn through, its ends included
 
 
-def cable_ways(robot_file: RobotFile, attached: np.ndarray) -> np.ndarray:
-    """Points that cables are drawn through.
-
-    Args:
-        attached: (..., n_cables, 3) where they are attached, axes of the file, m.
-
-    Returns:
-        (..., n_cables, m, 3) from where they enter, along the arcs on their pulleys, to where they are attached, m; two
-        points without pulleys, and NaN where a cable is attached within its pulley.
-    """
+def cable_ways(
+    robot_file: RobotFile, attached: Float[np.ndarray, "... n_cables 3"]
+) -> Num[np.ndarray, "... n_cables m 3"]:
+    """Points that cables are drawn through."""
     entry = np.asarray(robot_file.base_points, float)
     if robot_file.pulley_radius is None:
         return np.stack([np.broadcast_to(entry, attached.shape), attached], axis=-2)

@@ -48,15 +48,7 @@ class Scale:
 
 
 def scale_of(data: np.ndarray, *, signed: bool = False) -> Scale:
-    """The scale of the values that a picture shows.
-
-    Args:
-        data: all values of the picture.
-        signed: whether both signs are alike, so that zero is in the middle.
-
-    Returns:
-        the scale.
-    """
+    """The scale of the values that a picture shows."""
     if data.dtype.kind in "iu":
         return _of_counts(data)
     data = data.astype(float)  # the largest number is beyond those of single precision
@@ -121,15 +113,7 @@ def _of_counts(data: np.ndarray) -> Scale:
 
 
 def add_bar(figure: Figure, image, panels: list[Axes], scale: Scale, words: str) -> dict[str, Artist]:
-    """Explain the colours of panels: by a bar, below them in a narrow picture, or by entries of its legend for words.
-
-    Args:
-        image: that the bar explains.
-        panels: the panels that it belongs to.
-
-    Returns:
-        entries of the legend.
-    """
+    """Explain colours of panels: by a bar, below them in a narrow picture, or for words by entries of its legend."""
     ticks, texts = scale.ticks or ([], [])
     if is_narrow() and texts and not any(text.lstrip("-").isdigit() for text in texts):
         return {text: Patch(color=image.cmap(image.norm(tick))) for tick, text in zip(ticks, texts, strict=True)}

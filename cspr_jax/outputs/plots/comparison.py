@@ -55,17 +55,7 @@ class Compared(NamedTuple):
 
 
 def comparison_figure(compared: list[Compared], fixed: list[str]) -> Figure:
-    """Outlines of workspaces, one for each result, in the sections of the first.
-
-    Args:
-        fixed: words for the constants.
-
-    Returns:
-        the figure.
-
-    Raises:
-        InputError: too many, of different robots, or over other places.
-    """
+    """Outlines of workspaces, one for each result, in the sections of the first."""
     plane = next((pair for pair in PLANES if set(pair) <= set(compared[0].across)), [])
     _check(compared, plane)
     first = compared[0].result

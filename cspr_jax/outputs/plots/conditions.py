@@ -22,30 +22,17 @@ SETS = {"maximum": "some", "inclusion": "some", "dextrous": "every", "total": "e
 
 
 def is_workspace(result: Result) -> bool:
-    """Tell whether a result is a map of a workspace with its verdicts.
-
-    Returns:
-        whether it is.
-    """
+    """Tell whether a result is a map of a workspace with its verdicts."""
     return result.attributes.get("map") == "workspace" and "verdict" in result.data
 
 
 def said(result: Result) -> list[str]:
-    """Phrase with which the title of a picture of a map names its conditions.
-
-    Returns:
-        the conditions of a workspace, as one phrase; empty of another map.
-    """
+    """Phrase with which the title of a picture of a map names its conditions."""
     return [conditions(result)] if is_workspace(result) and result.settings else []
 
 
 def shown_first(result: Result) -> str:
-    """The quantity of a map that a picture shows by default.
-
-    Returns:
-        of a workspace with one margin that margin, with several the verdict, which alone counts all conditions; else
-        the one that its kind of map is about.
-    """
+    """The quantity of a map that a picture shows by default."""
     known = [name for name in MAP_KINDS[result.attributes["map"]].pictured if name in result.data]
     if is_workspace(result) and len({MARGINS[name] for name in workspace_of(result).conditions}) > 1:
         return "verdict"
@@ -55,20 +42,12 @@ def shown_first(result: Result) -> str:
 
 
 def is_margin(result: Result, name: str) -> bool:
-    """Tell whether a quantity is the margin of one condition of a workspace, positive inside.
-
-    Returns:
-        whether it is.
-    """
+    """Tell whether a quantity is the margin of one condition of a workspace, positive inside."""
     return is_workspace(result) and name.endswith(("_margin", "clearance"))
 
 
 def excluded(result: Result, name: str) -> np.ndarray:
-    """Cells that a margin of a workspace counts as inside, but other conditions exclude.
-
-    Returns:
-        a mask of the shape of the quantity; nowhere if it is no margin of a workspace.
-    """
+    """Cells that a margin of a workspace counts as inside, but other conditions exclude."""
     data = result.data[name]
     if not is_margin(result, name):
         return np.zeros(data.shape, bool)
@@ -76,11 +55,7 @@ def excluded(result: Result, name: str) -> np.ndarray:
 
 
 def conditions(result: Result) -> str:
-    """Conditions that the poses of a map of a workspace have to meet.
-
-    Returns:
-        the conditions with their numbers, and the orientations that must meet them, if the map says which.
-    """
+    """Conditions that the poses of a map of a workspace have to meet."""
     workspace, limits, robot = workspace_of(result), table(result.settings, "limits"), robot_of(result)
     words = []
     for name in workspace.conditions:

@@ -57,24 +57,7 @@ def drawn(
     solid: bool = False,
     ratio: bool = False,
 ) -> Figure:
-    """The picture of one result, or of several maps as lines or outlines; made inside `style.in_style`.
-
-    Args:
-        results: of `cspr run`, or motions of `cspr plan -o`.
-        quantity: of a map; None: the one that its kind of map is about. For a motion, a name of
-            `motion_pictures.MOTION_PICTURES`; None: its path and tensions.
-        at: fixed values of axes, within their ranges; the nearest point is taken.
-        lines: axis whose points become lines; None: sections, or one line.
-        envelope: whether to draw all orientations of one place, in three dimensions.
-        solid: whether to draw the boundary of a workspace with its robot, in three dimensions.
-        ratio: whether to draw the ratio of the quantity of two maps over the same cells.
-
-    Returns:
-        the figure.
-
-    Raises:
-        InputError: no such quantity or axis, or nothing to draw.
-    """
+    """The picture of one result, or of several maps as lines or outlines; made inside `style.in_style`."""
     if ratio:
         _refuse("--ratio", {"--solid": solid, "--envelope": envelope})
         return _map_figure(ratio_of(results, names, quantity), RATIO.name, at or {}, lines)

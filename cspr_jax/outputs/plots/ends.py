@@ -1,11 +1,16 @@
 """Start, way-points and end of a motion: marks that all can be seen where they fall together."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.lines import Line2D
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Int
 
 # More way-points than these would hide the path.
 MOST = 40
@@ -18,29 +23,16 @@ LOOKS: dict[str, dict[str, Any]] = {
 }
 
 
-def segment_rows(columns: Mapping[str, np.ndarray], time: np.ndarray) -> np.ndarray:
-    """Rows of a motion where segments begin and end.
-
-    Args:
-        columns: of the motion; "segment_end" (n,) s is absent in files of earlier versions.
-        time: (n_rows,) s.
-
-    Returns:
-        (n + 1,) their numbers, from the first row to the last.
-    """
+def segment_rows(columns: Mapping[str, np.ndarray], time: Float[np.ndarray, "n_rows"]) -> Int[np.ndarray, "n+1"]:
+    """Rows of a motion where segments begin and end."""
     ends = np.concatenate([time[:1], columns.get("segment_end", time[-1:])])
     return np.clip(np.searchsorted(time, ends - 1e-9 * max(float(time[-1]), 1.0)), 0, len(time) - 1)
 
 
-def draw_ends(panel: Any, path: np.ndarray, rows: np.ndarray, axes: Sequence[int] = (0, 1, 2)) -> None:
-    """Mark where a motion starts, where its segments meet, and where it ends.
-
-    Args:
-        panel: axes in a plane or in space.
-        path: (n_rows, 3) m.
-        rows: of `segment_rows`.
-        axes: components of the path that the panel shows.
-    """
+def draw_ends(
+    panel: Any, path: Float[np.ndarray, "n_rows 3"], rows: np.ndarray, axes: Sequence[int] = (0, 1, 2)
+) -> None:
+    """Mark where a motion starts, where its segments meet, and where it ends."""
     places = {"start": rows[:1], "way-points": rows[1:-1] if len(rows) - 2 <= MOST else rows[:0], "end": rows[-1:]}
     for name, look in LOOKS.items():
         if len(places[name]):
@@ -48,13 +40,6 @@ def draw_ends(panel: Any, path: np.ndarray, rows: np.ndarray, axes: Sequence[int
 
 
 def entries_of_ends(rows: np.ndarray) -> dict[str, Artist]:
-    """Entries of a legend for what `draw_ends` marks.
-
-    Args:
-        rows: of `segment_rows`.
-
-    Returns:
-        artists by their words.
-    """
+    """Entries of a legend for what `draw_ends` marks."""
     shown = [name for name in LOOKS if name != "way-points" or 0 < len(rows) - 2 <= MOST]
     return {name: Line2D([], [], **LOOKS[name]) for name in shown}

@@ -1,5 +1,9 @@
 """The orientations of one place in three dimensions: tilt around its azimuth, torsion upward."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -10,26 +14,19 @@ from cspr_jax.outputs.plots.labels import COLOURS, chosen, robot_name
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.result import Result
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 AXES = ("torsion", "tilt_azimuth", "tilt")
 SECTIONS = 17
 # The wide line shows on both sides of the narrow one where both have the same outline.
 _ACCESSIBLE, _ATTAINED = ("#b0b0b0", 2.6), (COLOURS[0], 1.0)
 
 
-def envelope_figure(result: Result, verdicts: np.ndarray, fixed: list[str]) -> Figure:
-    """Outlines of the accessible and of the attained orientations, at some torsions.
-
-    Args:
-        result: gives axes, labels and constants.
-        verdicts: (n_torsions, n_azimuths, n_tilts) flags.
-        fixed: words for the constants.
-
-    Returns:
-        the figure.
-
-    Raises:
-        InputError: nothing is accessible.
-    """
+def envelope_figure(
+    result: Result, verdicts: Float[np.ndarray, "n_torsions n_azimuths n_tilts"], fixed: list[str]
+) -> Figure:
+    """Outlines of the accessible and of the attained orientations, at some torsions."""
     torsion, azimuth, tilt = (result.axes[name] for name in AXES)
     flags = verdicts.astype(int)
     accessible = (flags & Verdict.NOT_ACCESSIBLE.value) == 0

@@ -1,14 +1,19 @@
 """Intervals of failure of a motion by the charts that show what fails."""
 
+from __future__ import annotations
+
 import functools
 import operator
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cspr_jax.arithmetic.intervals import united
 from cspr_jax.schema.verdicts import Verdict
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # By the quantity that a chart shows: the criteria that it shows. Those that no chart of a figure shows are in its chart
 # of the path, or of the tensions.
@@ -21,17 +26,8 @@ SHOWN = {
 }
 
 
-def failing_in(columns: Mapping[str, Any], chart: str, charts: Sequence[str]) -> np.ndarray:
-    """Intervals in which criteria fail that one of several charts shows.
-
-    Args:
-        columns: those of `schema.quantities.FAILURES` that a motion has; without criteria all of its failures count.
-        chart: name of the quantity that it shows.
-        charts: of all of them.
-
-    Returns:
-        (m, 2) s.
-    """
+def failing_in(columns: Mapping[str, Any], chart: str, charts: Sequence[str]) -> Float[np.ndarray, "m 2"]:
+    """Intervals in which criteria fail that one of several charts shows."""
     if "criterion_failing" not in columns:
         return np.reshape(columns.get("failing", ()), (-1, 2))
     shown = SHOWN.get(chart, Verdict.FEASIBLE)

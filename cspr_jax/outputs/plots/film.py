@@ -54,22 +54,7 @@ def film(
     keys: PlanFile,
     speed: float = 1.0,
 ) -> bytes:
-    """A film of a motion.
-
-    Args:
-        ending: of its file, one of `ENDINGS`.
-        columns: rows by the names of `schema.quantities.TRAJECTORY`, in the axes of the robot file, and what there is
-            of `FAILURES` and `FLIGHT`.
-        robot_file: the robot whose cables have these tensions.
-        keys: the plan, for limits, obstacles and the shape of the platform.
-        speed: times real time, positive.
-
-    Returns:
-        the content of the file.
-
-    Raises:
-        InputError: another ending, or a speed that is none; no encoder for .mp4.
-    """
+    """A film of a motion."""
     if ending not in ENDINGS:
         raise InputError("--animate", ending or "no ending", f"a file that ends in {', '.join(ENDINGS)}")
     if not 0.0 < speed < np.inf:

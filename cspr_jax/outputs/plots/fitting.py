@@ -29,14 +29,7 @@ FEWER_TICKS = (5, 4, 3, 2, 1)
 
 
 def shortened(text: str, most: int = LONGEST_NAME) -> str:
-    """A text from a file, on one line and not too long.
-
-    Args:
-        most: number of letters.
-
-    Returns:
-        the text, or its beginning and its end.
-    """
+    """A text from a file, on one line and not too long."""
     text = printable(text)
     if len(text) <= most:
         return text
@@ -48,10 +41,6 @@ def fit(figure: Figure, *, has_title: bool = True, lines: int | None = None) -> 
     """Break titles and labels that are longer than their place, at commas or else at spaces; legends likewise.
 
     Numbers get a real minus sign.
-
-    Args:
-        has_title: whether the title stays; its line about a doubt stays in any case.
-        lines: of the title, at most: 1, or None for as many as it needs.
     """
     width, height = figure.bbox.width, figure.bbox.height
     _fit_title(figure, 0.97 * width, has_title=has_title, lines=lines)
@@ -71,23 +60,12 @@ def fit(figure: Figure, *, has_title: bool = True, lines: int | None = None) -> 
 
 
 def with_minus(text: str) -> str:
-    """A text whose negative numbers have a minus sign, not a hyphen.
-
-    Returns:
-        the text.
-    """
+    """A text whose negative numbers have a minus sign, not a hyphen."""
     return HYPHEN.sub("\u2212", text)
 
 
 def share_of_panels(figure: Figure) -> float:
-    """The part of a picture's height that its panels take.
-
-    Args:
-        figure: the picture, drawn.
-
-    Returns:
-        the share that panels cover, at most 1; colour bars do not count.
-    """
+    """The part of a picture's height that its panels take."""
     spans = sorted(
         (panel.get_position(original=panel.name == "3d").intervaly for panel in figure.axes if _is_panel(panel)),
         key=lambda span: float(span[0]),
@@ -104,11 +82,7 @@ def _is_panel(panel: Axes) -> bool:
 
 
 def thin_ticks(figure: Figure) -> None:
-    """Give horizontal axes of numbers fewer ticks where these would meet.
-
-    Args:
-        figure: the picture, with its final size.
-    """
+    """Give horizontal axes of numbers fewer ticks where these would meet."""
     for panel in figure.axes:
         is_plane = panel.get_visible() and panel.name == "rectilinear"
         if not is_plane or not isinstance(panel.xaxis.get_major_locator(), MaxNLocator):
@@ -162,14 +136,7 @@ def _fit_above(panel: Axes, room: float) -> None:
 
 
 def legend_above(panel: Axes, columns: int, handles: list | None = None, words: list[str] | None = None) -> Legend:
-    """A legend above a panel, at its right; `fit` breaks it into lines.
-
-    Args:
-        handles: of the entries; None: those of the panel.
-
-    Returns:
-        the legend.
-    """
+    """A legend above a panel, at its right; `fit` breaks it into lines."""
     entries: Any = panel.get_legend_handles_labels() if handles is None or words is None else (handles, words)
     legend = panel.legend(
         *entries,

@@ -9,35 +9,20 @@ from cspr_jax.store.result import Result
 
 
 def table(settings: object, key: str) -> dict:
-    """A table of a sweep's settings.
-
-    Args:
-        settings: of a result, or a table in them.
-
-    Returns:
-        the table; empty if there is none.
-    """
+    """A table of a sweep's settings."""
     inner = settings.get(key) if isinstance(settings, dict) else None
     return inner if isinstance(inner, dict) else {}
 
 
 def start(result: Result) -> dict[str, float]:
-    """Start of all segments of a map, if it is one place.
-
-    Returns:
-        its coordinates; empty if there is no single start.
-    """
+    """Start of all segments of a map, if it is one place."""
     coordinates = table(table(result.settings, "trajectory"), "from").get("position") or ()
     moving = any(axis.startswith("from_") for axis in (*result.axes, *result.choices))
     return {} if moving else dict(zip("xyz", coordinates, strict=False))
 
 
 def starts_at_rest(result: Result, name: str) -> bool:
-    """Tell whether a quantity belongs to motions that start at rest.
-
-    Returns:
-        whether it does.
-    """
+    """Tell whether a quantity belongs to motions that start at rest."""
     kind = MAP_KINDS[result.attributes["map"]]
     if name in kind.motionless:
         return False
@@ -45,16 +30,7 @@ def starts_at_rest(result: Result, name: str) -> bool:
 
 
 def notes(result: Result, name: str, fixed: list[str], used: list[str]) -> list[str]:
-    """Constants of a picture of a map, in words.
-
-    Args:
-        name: of the quantity; empty where the picture shows several.
-        fixed: words for the axes that were fixed for the picture.
-        used: axes that the picture shows, or of which `fixed` speaks.
-
-    Returns:
-        phrases.
-    """
+    """Constants of a picture of a map, in words."""
     place = start(result)
     phrases = []
     if place:
@@ -79,11 +55,7 @@ def _best(result: Result, axis: str) -> str:
 
 
 def first_of(result: Result, axis: str) -> str:
-    """A coordinate that the picture shows by default.
-
-    Returns:
-        its value, and of how many points it is the first.
-    """
+    """A coordinate that the picture shows by default."""
     points = result.axes[axis]
     words = value(result, axis, points[0])
     return words if len(points) == 1 else f"{words} (the first of {len(points)})"

@@ -29,28 +29,12 @@ STATIC: dict[str, Any] = {"color": "0.35", "linestyle": ":", "linewidth": 1.2}
 
 
 def has_frequencies(result: Result, across: list[str]) -> bool:
-    """Tell whether a result has feasible frequencies over one axis.
-
-    Args:
-        across: axes that vary.
-
-    Returns:
-        whether it has.
-    """
+    """Tell whether a result has feasible frequencies over one axis."""
     return set(SHOWN) <= set(result.data) and len(across) == 1 and across != ["frequency"]
 
 
 def frequencies_figure(result: Result, across: str, data: dict[str, np.ndarray], fixed: list[str]) -> Figure:
-    """Band of the feasible frequencies, with the natural one and the one with the largest margin.
-
-    Args:
-        result: gives axes, units and settings.
-        data: (n,) along the axis, by the names in `SHOWN`.
-        fixed: words for the constants.
-
-    Returns:
-        the figure.
-    """
+    """Band of the feasible frequencies, with the natural one and the one with the largest margin."""
     order = np.argsort(result.axes[across], kind="stable")
     points = as_drawn(result, across, result.axes[across][order])
     low, high, natural, used, verdict = (data[name][order] for name in SHOWN)
@@ -80,12 +64,7 @@ def frequencies_figure(result: Result, across: str, data: dict[str, np.ndarray],
 
 
 def mark_ends(figure: Figure, result: Result, across: str, data: dict[str, np.ndarray]) -> None:
-    """Draw the ends of the feasible frequencies, and the natural ones, into a section over frequencies.
-
-    Args:
-        figure: its first panel has frequencies upward.
-        data: as for `frequencies_figure`.
-    """
+    """Draw the ends of the feasible frequencies, and the natural ones, into a section over frequencies."""
     panel = figure.axes[0]
     order = np.argsort(result.axes[across], kind="stable")
     points = as_drawn(result, across, result.axes[across][order])
@@ -101,14 +80,7 @@ def mark_ends(figure: Figure, result: Result, across: str, data: dict[str, np.nd
 
 
 def turns_in_words(result: Result, name: str) -> list[str]:
-    """Phrases with which the title of a picture of a map of ellipses says what turns it shows.
-
-    Args:
-        name: of the quantity.
-
-    Returns:
-        the size of the ellipses and the rule of their frequency, where one holds for all; empty of another map.
-    """
+    """Phrases with which the title of a picture of a map of ellipses says what turns it shows."""
     if result.attributes.get("map") != "ellipse" or not result.settings:
         return []
     ellipse, words = table(result.settings, "ellipse"), []

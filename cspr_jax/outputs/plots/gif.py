@@ -1,12 +1,17 @@
 """Films as GIF: at most 256 colours, which all pictures share; choosing them takes longer than drawing."""
 
-from typing import Any
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.animation import AbstractMovieWriter
 from PIL import Image
 
 from cspr_jax.outputs.plots.moving_figure import MovingFigure
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Pictures from which the colours come, and how many of these are exact: white, grey and the like cover most of them.
 SAMPLES, EXACT, COLOURS = 8, 32, 256
@@ -16,12 +21,7 @@ class GifWriter(AbstractMovieWriter):
     """A writer of films for matplotlib."""
 
     def setup(self, fig: Any, outfile: Any, dpi: float | None = None) -> None:
-        """Begin a film.
-
-        Args:
-            fig: a `moving_figure.MovingFigure`, which is settled.
-            dpi: pixels per inch.
-        """
+        """Begin a film."""
         super().setup(fig, outfile, dpi=dpi)
         self._moving: MovingFigure = fig
         self._pictures = list[np.ndarray]()
@@ -40,15 +40,8 @@ class GifWriter(AbstractMovieWriter):
         first.save(self.outfile, "gif", save_all=True, append_images=others, duration=round(1000 / self.fps), loop=0)
 
 
-def shared_colours(pictures: list[np.ndarray]) -> np.ndarray:
-    """Colours for pictures: their most frequent ones as they are, and means of the others.
-
-    Args:
-        pictures: (height, width, 4) each, 8 bits of red, green, blue, and of an opacity that is left out.
-
-    Returns:
-        (n, 3) with n <= 256, 8 bits of red, green and blue.
-    """
+def shared_colours(pictures: list[np.ndarray]) -> Float[np.ndarray, "n 3"]:
+    """Colours for pictures: their most frequent ones as they are, and means of the others."""
     numbers, counts = np.unique(np.stack([_number(picture) for picture in pictures]), return_counts=True)
     order = np.argsort(-counts, kind="stable")
     colours, counts = _colour(numbers[order]), counts[order]

@@ -1,8 +1,13 @@
 """Plane sections of sets that half-spaces bound, cut to the window of a panel."""
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Owner of a side that belongs to the window.
 WINDOW = -1
@@ -21,15 +26,8 @@ class Plane(NamedTuple):
     across: np.ndarray
     upward: np.ndarray
 
-    def seen(self, points: np.ndarray) -> np.ndarray:
-        """Points in the coordinates of the plane, those beside it projected onto it.
-
-        Args:
-            points: (..., 3).
-
-        Returns:
-            (..., 2).
-        """
+    def seen(self, points: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "... 2"]:
+        """Points in the coordinates of the plane, those beside it projected onto it."""
         return points @ np.stack([self.across, self.upward], axis=1)
 
 
@@ -57,17 +55,10 @@ class Window(NamedTuple):
     high: np.ndarray
 
 
-def section(plane: Plane, normals: np.ndarray, offsets: np.ndarray, window: Window) -> Polygon:
-    """The section of a set whose points keep `normals @ point >= offsets`.
-
-    Args:
-        normals: (n, 3).
-        offsets: (n,); -inf of a half-space that bounds nothing.
-        window: the visible part of the plane.
-
-    Returns:
-        the polygon.
-    """
+def section(
+    plane: Plane, normals: Float[np.ndarray, "n 3"], offsets: Float[np.ndarray, "n"], window: Window
+) -> Polygon:
+    """The section of a set whose points keep `normals @ point >= offsets`."""
     (left, low), (right, high) = window
     corners = np.array([[left, low], [right, low], [right, high], [left, high]])
     polygon = Polygon(corners, np.full(4, WINDOW))
@@ -93,17 +84,8 @@ def _cut(polygon: Polygon, normal: np.ndarray, offset: float, owner: int) -> Pol
     return Polygon(np.array(corners).reshape(-1, 2), np.array(owners, int))
 
 
-def window_around(points: np.ndarray, *, margin: float = 0.12, shape: float = 1.0) -> Window:
-    """A window that holds some points.
-
-    Args:
-        points: (n, 2).
-        margin: room beside them, over the larger side.
-        shape: width over height.
-
-    Returns:
-        the window.
-    """
+def window_around(points: Float[np.ndarray, "n 2"], *, margin: float = 0.12, shape: float = 1.0) -> Window:
+    """A window that holds some points."""
     low, high = points.min(axis=0), points.max(axis=0)
     height = (1.0 + 2.0 * margin) * max((high[0] - low[0]) / shape, high[1] - low[1])
     half = 0.5 * max(height, 1e-9) * np.array([shape, 1.0])

@@ -1,13 +1,18 @@
 """Words and colours that all pictures share: names, units, numbers."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cspr_jax.outputs.plots.fitting import shortened
 from cspr_jax.schema.quantities import MARGIN_UNITS
 from cspr_jax.store.result import Result
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Axes whose names in files are no words.
 WORDS = {
@@ -33,85 +38,41 @@ STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)))
 
 
 def line_look(number: int) -> dict[str, Any]:
-    """Colour and style of one line of many.
-
-    Args:
-        number: of the line, from 0 on.
-
-    Returns:
-        arguments of `plot`; behind the last colour another style begins.
-    """
+    """Colour and style of one line of many."""
     style = STYLES[(number + number // len(COLOURS)) % len(STYLES)]
     return {"color": COLOURS[number % len(COLOURS)], "linestyle": style}
 
 
 def cable_names(columns: Mapping[str, np.ndarray]) -> list[str]:
-    """Names of the columns of a motion's tensions.
-
-    Args:
-        columns: of the motion; "tension_each" is there where two cables share a winch.
-
-    Returns:
-        "cable 1", ... or "pair 1", ...
-    """
+    """Names of the columns of a motion's tensions."""
     word = "pair" if "tension_each" in columns else "cable"
     return [f"{word} {k + 1}" for k in range(columns["tension"].shape[1])]
 
 
 def margin_unit(segments: Mapping[str, np.ndarray], i: int) -> str:
-    """Unit of the margin of a segment as pictures show it.
-
-    Args:
-        segments: by the names of `schema.quantities.SEGMENTS`; files of earlier versions do not say it.
-        i: number of the segment.
-
-    Returns:
-        the unit; empty where it is 1, or not known.
-    """
+    """Unit of the margin of a segment as pictures show it."""
     codes = segments.get("segment_margin_unit", ())
     unit = MARGIN_UNITS[int(codes[i])] if len(codes) and 0 <= codes[i] < len(MARGIN_UNITS) else "1"
     return "" if unit == "1" else unit.replace("^2", "²")
 
 
 def robot_name(result: Result) -> str:
-    """The robot, as a title names it.
-
-    Returns:
-        its name, shortened.
-    """
+    """The robot, as a title names it."""
     return shortened(result.attributes["robot"])
 
 
 def heading(result: Result, name: str) -> str:
-    """The first line of a title.
-
-    Args:
-        result: gives the robot and the long name.
-
-    Returns:
-        both, shortened.
-    """
+    """The first line of a title."""
     return f"{robot_name(result)}: {shortened(result.labels[name], LONGEST_LABEL)}"
 
 
 def label(result: Result, name: str) -> str:
-    """A quantity for an axis or a colour bar.
-
-    Args:
-        result: gives its long name and unit.
-
-    Returns:
-        the words, with the unit if it has one.
-    """
+    """A quantity for an axis or a colour bar."""
     return shortened(result.labels[name], LONGEST_LABEL) + _in_brackets(result, name)
 
 
 def axis_label(result: Result, axis: str) -> str:
-    """A coordinate for an axis.
-
-    Returns:
-        the words, with the unit if it has one.
-    """
+    """A coordinate for an axis."""
     return WORDS.get(axis, shortened(axis)) + _in_brackets(result, axis)
 
 
@@ -121,65 +82,29 @@ def _in_brackets(result: Result, name: str) -> str:
 
 
 def unit(result: Result, name: str) -> str:
-    """The unit that a picture shows.
-
-    Args:
-        result: gives the unit of the file.
-        name: of the axis or the quantity.
-
-    Returns:
-        the unit; empty for a pure number.
-    """
+    """The unit that a picture shows."""
     units = result.units[name]
     symbol = "°" if is_angle(result, name) else WRITTEN.get(units, shortened(units))
     return "" if symbol == "1" else symbol
 
 
 def is_angle(result: Result, name: str) -> bool:
-    """Tell whether an axis or a quantity is an angle, in radians in the file and in degrees in pictures.
-
-    Returns:
-        whether it is one.
-    """
+    """Tell whether an axis or a quantity is an angle, in radians in the file and in degrees in pictures."""
     return result.units.get(name) == "rad"
 
 
 def as_drawn(result: Result, name: str, values: np.ndarray) -> np.ndarray:
-    """Values in the unit of the picture.
-
-    Args:
-        result: gives the unit of the file.
-        name: of the axis or the quantity.
-        values: as in the file.
-
-    Returns:
-        the values, angles in degrees.
-    """
+    """Values in the unit of the picture."""
     return np.degrees(values) if is_angle(result, name) else values
 
 
 def principal_angle(degrees: float) -> float:
-    """An angle without whole revolutions.
-
-    Args:
-        degrees: any.
-
-    Returns:
-        the angle between -180 and 180.
-    """
+    """An angle without whole revolutions."""
     return degrees if abs(degrees) <= 180.0 + 1e-9 else (degrees + 180.0) % 360.0 - 180.0
 
 
 def value(result: Result, axis: str, point: float, *, digits: int = 4) -> str:
-    """A coordinate with its value.
-
-    Args:
-        point: the value, as in the file.
-        digits: significant.
-
-    Returns:
-        such as "z0 = 1.7 m", "tilt = 45°", or "cable 1".
-    """
+    """A coordinate with its value."""
     drawn = float(as_drawn(result, axis, np.asarray(point, float)))
     symbol = unit(result, axis)
     if is_angle(result, axis):
@@ -192,15 +117,8 @@ def value(result: Result, axis: str, point: float, *, digits: int = 4) -> str:
     return f"{name} = {drawn:.{digits}g}" + (f" {symbol}" if symbol not in ("", "°") else symbol)
 
 
-def values(result: Result, axis: str, points: np.ndarray) -> list[str]:
-    """Coordinates with their values, in as few digits as tell them apart, but at least three.
-
-    Args:
-        points: (n,) values, as in the file.
-
-    Returns:
-        one text for each point.
-    """
+def values(result: Result, axis: str, points: Float[np.ndarray, "n"]) -> list[str]:
+    """Coordinates with their values, in as few digits as tell them apart, but at least three."""
     texts: list[str] = []
     for digits in range(3, 17):
         texts = [value(result, axis, point, digits=digits) for point in points]
@@ -210,12 +128,5 @@ def values(result: Result, axis: str, points: np.ndarray) -> list[str]:
 
 
 def chosen(count: int, most: int) -> np.ndarray:
-    """Evenly chosen points of many.
-
-    Args:
-        most: number of points.
-
-    Returns:
-        their indices.
-    """
+    """Evenly chosen points of many."""
     return np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int))

@@ -14,14 +14,7 @@ MILLIMETRES = 1e3
 
 
 def landing_figure(result: Result) -> Figure:
-    """The landings of a motion's sample of throws, over the target.
-
-    Args:
-        result: a motion that holds them.
-
-    Returns:
-        the figure.
-    """
+    """The landings of a motion's sample of throws, over the target."""
     figure = Figure(figsize=(6.4, 5.6), layout="constrained")
     panel = figure.subplots()
     landings = result.data["landing"]

@@ -20,20 +20,12 @@ NARROW, INCH = 12.0, 2.54
 
 
 def is_narrow() -> bool:
-    """Tell whether the picture that is made inside `style.in_style` is that of a column.
-
-    Returns:
-        whether it is.
-    """
+    """Tell whether the picture that is made inside `style.in_style` is that of a column."""
     return bool(matplotlib.rcParams["figure.figsize"][0] * INCH < NARROW)
 
 
 def columns_of(count: int) -> int:
-    """Number of panels side by side in a picture of the width that `in_style` has set.
-
-    Returns:
-        at most three, as many as the width has room for, in a full rectangle where that is possible.
-    """
+    """Number of panels side by side in a picture of the width that `in_style` has set."""
     room = max(1, int(matplotlib.rcParams["figure.figsize"][0] / LEAST_WIDTH))
     return min(room, 2 if count == 4 else min(3, count))
 
@@ -41,15 +33,7 @@ def columns_of(count: int) -> int:
 def panels(
     figure: Figure, count: int, *, polar: bool = False, same: bool = True
 ) -> tuple[list[Axes], list[Axes], list[Axes]]:
-    """Panels with common axes, or common horizontal ones.
-
-    Args:
-        count: number of panels.
-        same: whether their vertical axes are the same.
-
-    Returns:
-        all panels, those with nothing below, and those at the left.
-    """
+    """Panels with common axes, or common horizontal ones."""
     columns = columns_of(count)
     lines = -(-count // columns)
     kind = {"projection": "polar"} if polar else {}
@@ -65,33 +49,20 @@ def panels(
 
 
 def in_degrees(axis: Axis, span: float) -> None:
-    """Ticks of an angle, without whole revolutions.
-
-    Args:
-        span: of its values, degrees.
-    """
+    """Ticks of an angle, without whole revolutions."""
     step = next((step for step in DEGREES if span <= 7.0 * step), None)
     axis.set_major_locator(MaxNLocator(5) if step is None or span < 2.0 else MultipleLocator(step))
     axis.set_major_formatter(FuncFormatter(lambda tick, _: f"{principal_angle(tick) + 0.0:.6g}"))
 
 
 def in_whole_numbers(axis: Axis, *, none: bool = False) -> None:
-    """Ticks at whole numbers only.
-
-    Args:
-        none: whether zero means that there is none.
-    """
+    """Ticks at whole numbers only."""
     axis.set_major_locator(MaxNLocator(6, integer=True, min_n_ticks=1))
     axis.set_major_formatter(FuncFormatter(lambda tick, _: "none" if none and tick == 0.0 else f"{tick:.0f}"))
 
 
 def reach_polar(axes: list[Axes], reach: float, unit: str) -> None:
-    """Ticks around and outward.
-
-    Args:
-        axes: polar panels with a common radius.
-        reach: the largest radius shown.
-    """
+    """Ticks around and outward."""
     step = next((step for step in DEGREES if reach <= 4.5 * step), None)
     even = step is None or unit != "°"
     all_ticks = np.asarray(MaxNLocator(4).tick_values(0.0, reach)) if even else np.arange(0.0, reach, step)

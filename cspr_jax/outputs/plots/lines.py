@@ -1,7 +1,9 @@
 """Quantities of maps as lines over one axis: of several points of another axis, or of several results."""
 
+from __future__ import annotations
+
 import dataclasses
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -26,6 +28,9 @@ from cspr_jax.outputs.plots.labels import (
 from cspr_jax.outputs.plots.layout import columns_of, in_degrees, in_whole_numbers, panels
 from cspr_jax.outputs.plots.word_ticks import worded
 from cspr_jax.store.result import Result
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 LINES = len(COLOURS)
 # Mark of a point of a margin that other conditions exclude.
@@ -52,15 +57,7 @@ class PlottedLine:
 def line_figure(
     result: Result, name: str, groups: dict[str, list[PlottedLine]], across: str, title: str, fixed: list[str]
 ) -> Figure:
-    """Lines over one axis, in one panel or several.
-
-    Args:
-        groups: the lines of each panel, by its title; as in the file.
-        fixed: words for the constants.
-
-    Returns:
-        the figure.
-    """
+    """Lines over one axis, in one panel or several."""
     count = len(groups)
     columns = columns_of(count)
     figure = Figure(figsize=(6.8, 4.4) if count == 1 else (3.4 * columns + 1.0, 3.4 * -(-count // columns) + 0.9))
@@ -137,19 +134,10 @@ def _ticks(panel: Axes, result: Result, across: str, groups: list[list[PlottedLi
         in_whole_numbers(panel.xaxis)
 
 
-def lines_of(result: Result, data: np.ndarray, excluded: np.ndarray, across: str, by: str) -> list[PlottedLine]:
-    """The lines of one panel, one for each point of an axis, at most six.
-
-    Args:
-        result: gives axes and units.
-        data: (n_across, n_by).
-        excluded: of data's shape, points that other conditions exclude.
-        across: the axis along the lines.
-        by: the axis that tells them apart.
-
-    Returns:
-        the lines.
-    """
+def lines_of(
+    result: Result, data: Float[np.ndarray, "n_across n_by"], excluded: np.ndarray, across: str, by: str
+) -> list[PlottedLine]:
+    """The lines of one panel, one for each point of an axis, at most six."""
     points = result.axes[by]
     shown = chosen(len(points), LINES)
     names = values(result, by, points[shown])
@@ -159,14 +147,7 @@ def lines_of(result: Result, data: np.ndarray, excluded: np.ndarray, across: str
 
 
 def names_of(results: list[Result], stems: list[str]) -> list[str]:
-    """Names that tell results of one picture apart: their amplitude functions, else robots, else files.
-
-    Args:
-        stems: names of their files, all different.
-
-    Returns:
-        one name for each result.
-    """
+    """Names that tell results of one picture apart: their amplitude functions, else robots, else files."""
     if len(results) > 1:
         for words in (_amplitude, robot_name):
             names = [words(result) for result in results]
@@ -186,17 +167,7 @@ def _amplitude(result: Result) -> str:
 
 
 def overlaid(names: list[str], results: list[tuple[Result, str, PlottedLine]]) -> tuple[str, list[PlottedLine]]:
-    """One line for each result, over the same axis.
-
-    Args:
-        results: for each, the result, its axis and its line.
-
-    Returns:
-        the axis and the lines.
-
-    Raises:
-        InputError: different axes, or too many results.
-    """
+    """One line for each result, over the same axis."""
     if len(results) > LINES:
         raise InputError("results", len(results), f"at most {LINES} in one picture")
     axes = sorted({axis for _, axis, _ in results})

@@ -41,14 +41,6 @@ def mark(panel: Axes, result: Result, name: str, across: list[str], place: dict[
 
     P0 and that end are marked only where the section contains them, to half a step of the grid. The spools are
     projected onto it.
-
-    Args:
-        panel: the section, with its cells.
-        across: the two axes of the section.
-        place: the other axes, and where the section is.
-
-    Returns:
-        entries of the legend, by their words.
     """
     section = _section(panel, result, across, place)
     if section is None:
@@ -67,16 +59,7 @@ def mark(panel: Axes, result: Result, name: str, across: list[str], place: dict[
 
 
 def marked(result: Result, name: str, across: list[str], over: str, place: dict[str, float]) -> list[int]:
-    """Find the sections, among many parallel ones, that contain P0 or the fixed end of the motions.
-
-    Args:
-        across: the two axes of a section.
-        over: the axis along which the sections lie.
-        place: the axes that are the same for all, and where.
-
-    Returns:
-        their indices along that axis, at most two; empty where P0 is in each of them.
-    """
+    """Find the sections, among many parallel ones, that contain P0 or the fixed end of the motions."""
     section = _section(None, result, across, place)
     if section is None or over not in section.space:
         return []

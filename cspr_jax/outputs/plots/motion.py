@@ -33,14 +33,7 @@ LIMIT: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": "--"}
 
 
 def motion_figure(result: Result) -> Figure:
-    """Path and tensions of a motion.
-
-    Args:
-        result: of `cspr plan -o FILE.h5`.
-
-    Returns:
-        the figure.
-    """
+    """Path and tensions of a motion."""
     time, position, tension = result.axes["t"], result.data["position"], result.data["tension"]
     # The spools and the path of a planar robot lie in one vertical plane y = constant. Old files lack the spools.
     points = np.vstack([position, result.attributes.get("base_points", np.empty((0, 3)))])
@@ -107,14 +100,7 @@ def _name_ends(figure: Figure, panel: Axes, rows: np.ndarray) -> None:
 
 
 def point_words(columns: Mapping[str, Any]) -> str:
-    """Words for the point of a platform whose positions are shown, where it is not the mass centre.
-
-    Args:
-        columns: of the motion.
-
-    Returns:
-        the words behind a comma, or none.
-    """
+    """Words for the point of a platform whose positions are shown, where it is not the mass centre."""
     return ", positions of the origin of the platform's axes" if "mass_centre" in columns else ""
 
 
@@ -124,13 +110,7 @@ SHORT = {"smallest allowed": "at least", "largest allowed": "at most"}
 def draw_limits(
     panel: Axes, limits: list[tuple[str, float]], values: np.ndarray, unit: str, *, signed: bool = False
 ) -> None:
-    """Limits over time as lines, named in the legend; one far above all values is only named.
-
-    Args:
-        limits: words and values.
-        values: shown by the panel.
-        signed: whether a limit bounds both signs.
-    """
+    """Limits over time as lines, named in the legend; one far above all values is only named."""
     largest = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
     beyond = []
     for words, value in limits:
@@ -174,13 +154,7 @@ def _mark_intervals(panel: Axes, result: Result, chart: str, charts: Sequence[st
 
 
 def shade_failing(panel: Axes, columns: Mapping[str, Any], chart: str, charts: Sequence[str] = ("tension",)) -> None:
-    """Shade the intervals of time in which a motion fails, where they are known.
-
-    Args:
-        columns: of the motion; those of `schema.quantities.FAILURES`.
-        chart: name of the quantity that the panel shows.
-        charts: of all panels over time.
-    """
+    """Shade the intervals of time in which a motion fails, where they are known."""
     intervals = failing_in(columns, chart, charts)
     if len(intervals):
         # The areas reach from the bottom to the top of any panel; their edges show intervals without a length.
@@ -190,11 +164,7 @@ def shade_failing(panel: Axes, columns: Mapping[str, Any], chart: str, charts: S
 
 
 def doubt(result: Result) -> str:
-    """A line that says which segments of a motion are not proved feasible.
-
-    Returns:
-        the line after a line break; empty where all are.
-    """
+    """A line that says which segments of a motion are not proved feasible."""
     if result.attributes.get("feasible", 1):
         return ""
     none = result.data.get("segment_arcs", np.empty(0)) == 0

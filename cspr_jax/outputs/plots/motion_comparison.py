@@ -15,14 +15,7 @@ from cspr_jax.store.result import Result
 
 
 def motion_comparison_figure(results: list[Result], files: list[str]) -> Figure:
-    """Paths from the side and from above; over time the smallest tension and the largest speed of a cable.
-
-    Returns:
-        the figure.
-
-    Raises:
-        InputError: more motions than colours, or robots whose z axes differ.
-    """
+    """Paths from the side and from above; over time the smallest tension and the largest speed of a cable."""
     if len(results) > len(COLOURS):
         raise InputError("results", len(results), f"at most {len(COLOURS)} in one picture")
     axes = [str(result.attributes.get("z_axis", "down")) for result in results]

@@ -61,20 +61,7 @@ MOTION_PICTURES = {
 
 
 def motion_picture(result: Result, file: str, quantity: str | None, at: dict[str, float]) -> Figure:
-    """The requested picture of a motion.
-
-    Args:
-        file: its name, for errors.
-        quantity: a name of `MOTION_PICTURES`; None: path and tensions.
-        at: the instant, as "t", for a picture of one instant.
-
-    Returns:
-        the figure.
-
-    Raises:
-        InputError: no such picture of this motion, or no such instant.
-        ConfigError: a mistake in the plan that the file keeps.
-    """
+    """The requested picture of a motion."""
     instants = [name for name, row in MOTION_PICTURES.items() if row.at_instant]
     if at and quantity not in instants:
         raise InputError("--at", at, f"absent for a motion but with --quantity {', '.join(instants)}")

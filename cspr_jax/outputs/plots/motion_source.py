@@ -25,31 +25,14 @@ SAME_LENGTH = 1e-6
 
 
 def keeps_plan(result: Result) -> bool:
-    """Tell whether a motion has its robot and its plan.
-
-    Returns:
-        false for tables read without their plan, and for files of earlier versions.
-    """
+    """Tell whether a motion has its robot and its plan."""
     return bool(result.attributes.get("robot_settings") and result.attributes.get("plan"))
 
 
 def completed(
     result: Result, file: str, *, plan: Path | None, robot: dict[str, Any] | None, z_axis: str | None
 ) -> Result:
-    """A motion in CSV, which keeps neither robot nor axes, with what is given of these beside it.
-
-    Args:
-        file: its name, for errors.
-        plan: plan file.
-        robot: keys of a plan that takes the motion from its file, its robot among them.
-        z_axis: where z points, "up" or "down"; at most one of the three is given.
-
-    Returns:
-        the motion; itself where nothing is given.
-
-    Raises:
-        ConfigError: a mistake in it, or a motion that keeps its own.
-    """
+    """A motion in CSV, which keeps neither robot nor axes, with what is given of these beside it."""
     if plan is not None:
         return with_plan(result, file, plan)
     if robot is not None:
@@ -63,17 +46,7 @@ def completed(
 
 
 def with_plan(result: Result, file: str, path: Path) -> Result:
-    """A motion without robot and plan, with those of a plan file.
-
-    Args:
-        file: its name, for errors.
-
-    Returns:
-        the motion, with the attributes that an HDF5 file keeps.
-
-    Raises:
-        ConfigError: a mistake in the plan, a motion that has a plan or is a map, or one of another robot.
-    """
+    """A motion without robot and plan, with those of a plan file."""
     _refuse_kept("--plan", str(path), result, file)
     text = read_text(path)
     keys = read_plan(text, path)
@@ -83,18 +56,7 @@ def with_plan(result: Result, file: str, path: Path) -> Result:
 
 
 def with_robot(result: Result, file: str, keys: dict[str, Any]) -> Result:
-    """A motion without robot and plan, with a robot, as a plan that takes the motion from its file.
-
-    Args:
-        file: its name, for errors.
-        keys: of such a plan, its robot among them.
-
-    Returns:
-        the motion, with the attributes that an HDF5 file keeps.
-
-    Raises:
-        ConfigError: a mistake in the robot, a motion that has one or is a map, or one of another robot.
-    """
+    """A motion without robot and plan, with a robot, as a plan that takes the motion from its file."""
     robot = keys["robot"]
     _refuse_kept("--robot", robot if isinstance(robot, str) else robot["name"], result, file)
     plan = plan_keys(keys, "--robot")
@@ -142,19 +104,7 @@ def _check_cables(result: Result, file: str, robot_file: RobotFile, path: object
 
 
 def robot_and_plan(result: Result, file: str, quantity: str) -> tuple[RobotFile, PlanFile]:
-    """Robot and plan of a motion.
-
-    Args:
-        file: its name, for errors.
-        quantity: of the picture, for errors.
-
-    Returns:
-        the robot that was planned, and the plan.
-
-    Raises:
-        InputError: the file keeps none, as files of earlier versions.
-        ConfigError: a mistake in the plan.
-    """
+    """Robot and plan of a motion."""
     if not keeps_plan(result):
         fault = f'"{quantity}" of a motion that keeps no robot and no plan'
         allowed = "must have its plan, --plan FILE.toml, or its robot, --robot, or be an HDF5 file of `cspr plan -o`"

@@ -1,7 +1,9 @@
 """A figure of which few artists move from picture to picture, so that the others are drawn once."""
 
+from __future__ import annotations
+
 from collections.abc import Collection
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -10,17 +12,15 @@ from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from PIL import Image
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 
 class MovingFigure(Figure):
     """Pictures of the same axes; writers of films get them by `savefig`."""
 
     def settle(self, moving: Collection[Artist], dpi: float) -> None:
-        """Draw what lies behind the artists that move.
-
-        Args:
-            moving: these artists; all others, and the layout, are final.
-            dpi: pixels per inch of the pictures.
-        """
+        """Draw what lies behind the artists that move."""
         self.set_dpi(dpi)
         self._agg = FigureCanvasAgg(self)
         self._front = [artist for panel in self.axes for artist in _in_front(panel, moving)]
@@ -29,12 +29,8 @@ class MovingFigure(Figure):
         self._agg.draw()
         self._background = self._agg.copy_from_bbox(self.bbox)
 
-    def picture(self) -> np.ndarray:
-        """The figure as it is now.
-
-        Returns:
-            (height, width, 4) its pixels, 8 bits of red, green, blue and opacity.
-        """
+    def picture(self) -> Float[np.ndarray, "height width 4"]:
+        """The figure as it is now."""
         self._agg.restore_region(self._background)
         renderer = self._agg.get_renderer()
         for artist in self._front:
@@ -42,13 +38,7 @@ class MovingFigure(Figure):
         return np.array(self._agg.buffer_rgba())
 
     def savefig(self, fname: Any, *, transparent: bool | None = None, **settings: Any) -> None:
-        """Write the picture, as writers of films ask for it.
-
-        Args:
-            fname: stream.
-            transparent: without effect.
-            settings: "format", "png" or raw "rgba"; the others are those of `settle`.
-        """
+        """Write the picture, as writers of films ask for it."""
         if settings["format"] == "png":
             Image.fromarray(self.picture()).save(fname, "png")
         else:

@@ -1,7 +1,9 @@
 """Obstacles of maps of workspaces and of motions in pictures: sections, shadows, and surfaces in space."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -14,6 +16,9 @@ from cspr_jax.outputs.plots.robot_at import hull_of, workspace_of
 from cspr_jax.robots.shapes import Box, Cylinder, Obstacle
 from cspr_jax.store.result import Result
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 COLOUR = "#5c3d2e"
 AREA: dict[str, Any] = {"facecolor": (*to_rgb(COLOUR), 0.35), "edgecolor": COLOUR, "linewidth": 0.8}
 # Directions of the points of a ball: of azimuths and of heights.
@@ -22,23 +27,15 @@ CORNERS = np.stack(np.meshgrid(*[[-1.0, 1.0]] * 3), axis=-1).reshape(-1, 3)
 
 
 def obstacles(result: Result) -> list[np.ndarray]:
-    """Obstacles of a map of a workspace or of motions; all are convex.
-
-    Returns:
-        for each (n, 3) points, in the axes of the file, whose hull it is, m; none of another result.
-    """
+    """Obstacles of a map of a workspace or of motions; all are convex."""
     if "map" not in result.attributes or not result.settings:
         return []
     tables = SurroundingsKeys(obstacle=result.settings.get("obstacle"))
     return [points_of(body) for body in (*workspace_of(result).bodies, *tables.bodies)]
 
 
-def points_of(shape: Obstacle) -> np.ndarray:
-    """Points whose hull an obstacle is.
-
-    Returns:
-        (n, 3) m.
-    """
+def points_of(shape: Obstacle) -> Float[np.ndarray, "n 3"]:
+    """Points whose hull an obstacle is."""
     if isinstance(shape, Box):
         return shape.centre + (CORNERS * shape.half) @ shape.rotation.T
     around, upward = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False), np.linspace(-0.5, 0.5, UPWARD) * np.pi
@@ -49,13 +46,7 @@ def points_of(shape: Obstacle) -> np.ndarray:
 
 
 def draw_shadows(panel: Axes, bodies: Iterable[Obstacle], across: tuple[int, int]) -> None:
-    """Draw the shadows of obstacles beside a path, and make room for them.
-
-    Args:
-        panel: the path, seen along the third axis.
-        bodies: in the axes of the file.
-        across: numbers of the two axes of the panel.
-    """
+    """Draw the shadows of obstacles beside a path, and make room for them."""
     for number, body in enumerate(bodies):
         shadow = outline(points_of(body)[:, across])
         if len(shadow):
@@ -64,15 +55,8 @@ def draw_shadows(panel: Axes, bodies: Iterable[Obstacle], across: tuple[int, int
     panel.autoscale_view()
 
 
-def outline(points: np.ndarray) -> np.ndarray:
-    """The hull of points in a plane.
-
-    Args:
-        points: (n, 2).
-
-    Returns:
-        (m, 2) its corners in order; empty where the points lie on a line.
-    """
+def outline(points: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "m 2"]:
+    """The hull of points in a plane."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:
@@ -81,17 +65,8 @@ def outline(points: np.ndarray) -> np.ndarray:
         return np.empty((0, 2))
 
 
-def section_of(points: np.ndarray, across: list[str], place: float) -> np.ndarray:
-    """Section of a convex body with the plane over two axes.
-
-    Args:
-        points: (n, 3) whose hull it is, m.
-        across: the two axes of the plane, of x, y and z.
-        place: of the plane on the third axis, m.
-
-    Returns:
-        (m, 2) corners, coordinates in the order of `across`; empty where body and plane do not meet.
-    """
+def section_of(points: Float[np.ndarray, "n 3"], across: list[str], place: float) -> Float[np.ndarray, "m 2"]:
+    """Section of a convex body with the plane over two axes."""
     axis = next(k for k, name in enumerate("xyz") if name not in across)
     _, edges = hull_of(points)
     start, end = edges[:, 0], edges[:, 1]
@@ -103,16 +78,7 @@ def section_of(points: np.ndarray, across: list[str], place: float) -> np.ndarra
 
 
 def draw_obstacles(panel: Axes, result: Result, across: list[str], place: dict[str, float]) -> dict[str, Artist]:
-    """Draw obstacles into a section over two of x, y and z: filled where it cuts them, dashed where they are hidden.
-
-    Args:
-        panel: the section, with its cells.
-        across: the two axes of the section.
-        place: the other axes, and where the section is.
-
-    Returns:
-        entries of the legend, by their words.
-    """
+    """Draw obstacles into a section over two of x, y and z: filled where it cuts them, dashed where they are hidden."""
     if not set(across) < set("xyz"):
         return {}
     limits, entries = (panel.get_xlim(), panel.get_ylim()), dict[str, Artist]()
@@ -131,13 +97,6 @@ def draw_obstacles(panel: Axes, result: Result, across: list[str], place: dict[s
     return entries
 
 
-def faces_of(points: np.ndarray) -> np.ndarray:
-    """Surface of a convex body.
-
-    Args:
-        points: (n, 3) whose hull it is, m.
-
-    Returns:
-        (m, 3, 3) triangles, m.
-    """
+def faces_of(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "m 3 3"]:
+    """Surface of a convex body."""
     return hull_of(points)[0]

@@ -56,11 +56,7 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
 
 
 def add_best(parser: argparse.ArgumentParser) -> None:
-    """The argument for the best point of an axis of a map.
-
-    Args:
-        parser: of a command that shows maps.
-    """
+    """The argument for the best point of an axis of a map."""
     parser.add_argument(
         "--best",
         action="append",
@@ -81,11 +77,7 @@ def add_motion_plan(parser: argparse.ArgumentParser) -> None:
 
 
 def add_look(parser: argparse.ArgumentParser) -> None:
-    """Arguments of every picture; `style.style_of` reads them.
-
-    Args:
-        parser: of a command that draws.
-    """
+    """Arguments of every picture; `style.style_of` reads them."""
     parser.add_argument("--size", metavar="WIDTHxHEIGHT", help="size of the picture, cm, such as 16x10")
     presets = parser.add_mutually_exclusive_group()
     for name, widths in WIDTHS.items():
@@ -105,14 +97,7 @@ def add_look(parser: argparse.ArgumentParser) -> None:
 
 
 def with_widths(words: Sequence[str]) -> list[str]:
-    """Words of a command line in which each option of a width has one, since the name of a file may follow it.
-
-    Args:
-        words: behind the name of the program.
-
-    Returns:
-        the words, such as "--column=ieee" and "--page=usual".
-    """
+    """Words of a command line in which each option of a width has one, since the name of a file may follow it."""
     joined, rest = list[str](), list(words)
     while rest and rest[0] != "--":
         word = rest.pop(0)

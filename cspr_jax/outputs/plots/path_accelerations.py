@@ -40,19 +40,7 @@ class PathSamples(NamedTuple):
 
 
 def path_figure(result: Result, file: str) -> Figure:
-    """The acceleration along each line of a motion over the path, for at most six lines.
-
-    Args:
-        result: a motion along straight lines.
-        file: its name, for errors.
-
-    Returns:
-        the figure.
-
-    Raises:
-        InputError: the file keeps no plan, or its rows do not fit it.
-        ConfigError: a mistake in the plan that it keeps.
-    """
+    """The acceleration along each line of a motion over the path, for at most six lines."""
     robot_file, keys = robot_and_plan(result, file, "path_acceleration")
     ways = _ways(result, robot_file, keys)
     shown = [ways[k] for k in chosen(len(ways), PANELS)]

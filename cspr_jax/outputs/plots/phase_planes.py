@@ -20,14 +20,7 @@ MOST_NAMED = 12
 
 
 def phase_plane_figure(result: Result) -> Figure:
-    """Path speeds over the path, of all sections side by side.
-
-    Args:
-        result: a motion along paths in the least time.
-
-    Returns:
-        the figure.
-    """
+    """Path speeds over the path, of all sections side by side."""
     data = result.data
     figure = Figure(figsize=(7.2, 4.4), layout="constrained")
     panel = figure.subplots()

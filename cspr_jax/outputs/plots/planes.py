@@ -12,11 +12,7 @@ OTHERS = (AROUND, ("x", "z"), ("y", "z"), ("radius", "z"))
 
 
 def in_order(result: Result, across: Sequence[str]) -> list[str]:
-    """Axes that vary, those of the plane first.
-
-    Returns:
-        the same axes.
-    """
+    """Axes that vary, those of the plane first."""
     plane = next((pair for pair in PLANES if set(pair) <= set(across)), None) or max(
         (pair for pair in OTHERS if set(pair) <= set(across)),
         key=lambda pair: len(result.axes[pair[0]]) * len(result.axes[pair[1]]),

@@ -16,19 +16,7 @@ PAIR = 2
 
 
 def ratio_of(results: list[Result], names: list[str], quantity: str | None) -> Result:
-    """The map of the ratio of a quantity of one map to that of another.
-
-    Args:
-        results: two maps over the same cells; axes with one point alone need not be in both.
-        names: of them, for errors and words.
-        quantity: of both; None: the one that the first map is about.
-
-    Returns:
-        the first map, with the ratio as its only quantity; NaN where one of both has no number, or the second one zero.
-
-    Raises:
-        InputError: not two maps over the same cells, or no such quantity.
-    """
+    """The map of the ratio of a quantity of one map to that of another."""
     if len(results) != PAIR or not all(result.is_map for result in results):
         raise InputError("--ratio", f"{len(results)} results", "absent but for two maps")
     name = quantity or shown_first(results[0])

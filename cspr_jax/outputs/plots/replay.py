@@ -20,14 +20,7 @@ WINDOWS = 250  # of time, each with its largest deviation
 
 
 def replay_figure(replay: PlayedPlan) -> Figure:
-    """Planned and played path, and deviations of path and tensions.
-
-    Args:
-        replay: motion of a plan in MuJoCo.
-
-    Returns:
-        the figure.
-    """
+    """Planned and played path, and deviations of path and tensions."""
     is_planar = np.ptp(replay.position[:, 1]) <= ONE_PLANE * np.ptp(replay.position[:, 0])
     places: Any = [["xz", "xz"] if is_planar else ["xy", "xz"], ["path", "path"], ["tension", "tension"]]
     figure = Figure(figsize=(10.0, 8.5), layout="constrained")

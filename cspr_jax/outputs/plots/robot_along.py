@@ -1,7 +1,9 @@
 """The robot of a motion at its rows: where its cables are attached, and the edges of its platform."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -12,6 +14,9 @@ from cspr_jax.outputs.plots.obstacles import points_of
 from cspr_jax.outputs.plots.robot_at import hull_of
 from cspr_jax.robots.shapes import Hull, rotation_matrix
 from cspr_jax.schema.limits import LIMITS
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 
 class Moving(NamedTuple):
@@ -33,19 +38,12 @@ class Moving(NamedTuple):
 
 
 def moving(
-    columns: Mapping[str, np.ndarray], robot_file: RobotFile | None, rows: np.ndarray, keys: PlanFile | None = None
+    columns: Mapping[str, np.ndarray],
+    robot_file: RobotFile | None,
+    rows: Float[np.ndarray, "n"],
+    keys: PlanFile | None = None,
 ) -> Moving:
-    """The robot at rows of its motion.
-
-    Args:
-        columns: by the names of `schema.quantities.TRAJECTORY`.
-        robot_file: the robot whose cables have these tensions; None: it is not known, and has no cables here.
-        rows: (n,) their numbers.
-        keys: the plan, which may know the shape of the platform; None: the hull of the points of its cables is drawn.
-
-    Returns:
-        the robot.
-    """
+    """The robot at rows of its motion."""
     position, quaternion = np.asarray(columns["position"])[rows], columns.get("quaternion")
     if robot_file is None:
         nothing = np.empty((len(rows), 0, 3))
@@ -81,15 +79,7 @@ def _edges(robot_file: RobotFile, keys: PlanFile | None, attached: np.ndarray, c
 
 
 def limits_of(robot_file: RobotFile, plan: PlanFile, quantity: str = "tension") -> list[tuple[str, float]]:
-    """Limits of a quantity, to be drawn beside its values.
-
-    Args:
-        plan: the plan, whose limits go before the robot's.
-        quantity: of `schema.limits.LIMITS`.
-
-    Returns:
-        words and values, in the axes of the file; each finite value once.
-    """
+    """Limits of a quantity, to be drawn beside its values."""
     limits = []
     for row in LIMITS:
         limit_of_plan = getattr(plan, row.name, None)

@@ -1,6 +1,8 @@
 """Robot of a map at a pose, as pictures draw it: spools, cables, platform. Without jax."""
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -12,6 +14,9 @@ from cspr_jax.outputs.plots.cable_ways import cable_ways
 from cspr_jax.outputs.plots.fixed_axes import table
 from cspr_jax.robots.shapes import FLAT, UNIT_TOLERANCE, hull, is_flat, rotation_matrix
 from cspr_jax.store.result import Result
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 TURN = {"x": np.array([0.0, 1.0, 0.0, 0.0]), "z": np.array([0.0, 0.0, 0.0, 1.0])}
 
@@ -35,36 +40,17 @@ class Posed(NamedTuple):
 
 
 def robot_of(result: Result) -> RobotFile:
-    """The robot of a map.
-
-    Returns:
-        the robot, with the keys of its file.
-    """
+    """The robot of a map."""
     return RobotFile(**result.settings["robot"])
 
 
 def workspace_of(result: Result) -> WorkspaceTable:
-    """Requirements of a map of a workspace on its poses.
-
-    Returns:
-        the [workspace] table.
-    """
+    """Requirements of a map of a workspace on its poses."""
     return WorkspaceTable(**table(result.settings, "workspace"))
 
 
-def posed(result: Result, place: np.ndarray, angles: dict[str, float]) -> Posed:
-    """The robot of a map of a workspace, with the origin of the platform frame at a place.
-
-    Args:
-        place: (3,) in the axes of the file, m.
-        angles: tilt_azimuth, tilt and torsion, as far as the map has them, rad; `arithmetic.rotations`.
-
-    Returns:
-        the robot, turned as the map says, from the orientation of its sets where it has one.
-
-    Raises:
-        InputError: the orientation of the map is no unit quaternion.
-    """
+def posed(result: Result, place: Float[np.ndarray, "3"], angles: dict[str, float]) -> Posed:
+    """The robot of a map of a workspace, with the origin of the platform frame at a place."""
     robot_file = robot_of(result)
     azimuth, tilt, torsion = (angles.get(name, 0.0) for name in ("tilt_azimuth", "tilt", "torsion"))
     rotation = _about("z", azimuth) @ _about("x", tilt) @ _about("z", torsion - azimuth)
@@ -86,15 +72,8 @@ def _about(axis: str, angle: float) -> np.ndarray:
     return rotation_matrix(np.array([np.cos(0.5 * angle), 0.0, 0.0, 0.0]) + np.sin(0.5 * angle) * TURN[axis])
 
 
-def hull_of(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Hull of the points of a platform; a polygon for points in a plane, the two ends for points on a line.
-
-    Args:
-        points: (n, 3) m.
-
-    Returns:
-        (m, 3, 3) faces and (k, 2, 3) edges of it, m.
-    """
+def hull_of(points: Float[np.ndarray, "n 3"]) -> tuple[Float[np.ndarray, "m 3 3"], Float[np.ndarray, "k 2 3"]]:
+    """Hull of the points of a platform; a polygon for points in a plane, the two ends for points on a line."""
     if not is_flat(points):
         solid = hull(points)
         return solid.triangles, solid.edges

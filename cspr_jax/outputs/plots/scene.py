@@ -1,7 +1,9 @@
 """Axes in space for a robot in motion, and the colours of its cables by tension."""
 
+from __future__ import annotations
+
 import itertools
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
@@ -12,6 +14,9 @@ from matplotlib.ticker import FixedLocator, MaxNLocator
 from matplotlib.transforms import Bbox, TransformedBbox
 from mpl_toolkits.mplot3d import proj3d
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 ELEVATION, AZIMUTH = 18.0, -62.0  # degrees, of the eye
 # Room around the drawn points, over their size.
 ROOM = 0.04
@@ -21,22 +26,12 @@ FILLS = "fills its place"
 
 
 def colours_of_tension() -> ListedColormap:
-    """Colours of cables from the lowest tension to the largest.
-
-    Returns:
-        plasma without the end that is too light on white.
-    """
+    """Colours of cables from the lowest tension to the largest."""
     return ListedColormap(matplotlib.colormaps["plasma"](np.linspace(0.0, 0.88, 256)))
 
 
-def set_space(panel: Any, points: np.ndarray, *, is_down: bool) -> None:
-    """Axes of true proportions, seen from the side with z upward in the picture; `fill_places` makes them large.
-
-    Args:
-        panel: axes in three dimensions.
-        points: (n, 3) what is drawn, m.
-        is_down: whether z points down.
-    """
+def set_space(panel: Any, points: Float[np.ndarray, "n 3"], *, is_down: bool) -> None:
+    """Axes of true proportions, seen from the side with z upward in the picture; `fill_places` makes them large."""
     low, high = points.min(0), points.max(0)
     size = np.maximum(high - low, 0.1 * (high - low).max())
     middle = 0.5 * (low + high)
@@ -58,56 +53,28 @@ def set_space(panel: Any, points: np.ndarray, *, is_down: bool) -> None:
     panel.set_gid(FILLS)
 
 
-def across_and_up(*, is_down: bool) -> np.ndarray:
-    """Directions to the right and upward in the picture of a robot in space.
-
-    Args:
-        is_down: as for `set_space`.
-
-    Returns:
-        (2, 3) unit vectors, in the axes of the file.
-    """
+def across_and_up(*, is_down: bool) -> Float[np.ndarray, "2 3"]:
+    """Directions to the right and upward in the picture of a robot in space."""
     elevation, azimuth = np.radians([ELEVATION, AZIMUTH])
     across = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
     up = np.array([-np.sin(elevation) * np.cos(azimuth), -np.sin(elevation) * np.sin(azimuth), np.cos(elevation)])
     return np.stack([across, up]) * signs_of(is_down=is_down)
 
 
-def towards_eye(*, is_down: bool) -> np.ndarray:
-    """Direction towards the eye.
-
-    Args:
-        is_down: as for `set_space`.
-
-    Returns:
-        (3,) unit vector, in the axes of the file.
-    """
+def towards_eye(*, is_down: bool) -> Float[np.ndarray, "3"]:
+    """Direction towards the eye."""
     elevation, azimuth = np.radians([ELEVATION, AZIMUTH])
     level = np.cos(elevation)
     return np.array([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)]) * signs_of(is_down=is_down)
 
 
-def signs_of(*, is_down: bool) -> np.ndarray:
-    """Directions in which the axes of a picture in space grow.
-
-    Args:
-        is_down: whether z points down; then y is turned too, so that nothing is mirrored.
-
-    Returns:
-        (3,) signs.
-    """
+def signs_of(*, is_down: bool) -> Float[np.ndarray, "3"]:
+    """Directions in which the axes of a picture in space grow."""
     return np.array([1.0, -1.0, -1.0]) if is_down else np.ones(3)
 
 
-def shape_of(points: np.ndarray) -> float:
-    """Height of the picture of a box over its width.
-
-    Args:
-        points: (n, 3) what is drawn, m.
-
-    Returns:
-        the ratio.
-    """
+def shape_of(points: Float[np.ndarray, "n 3"]) -> float:
+    """Height of the picture of a box over its width."""
     sizes = np.ptp(points, axis=0)
     right, back, up = np.maximum(sizes, 0.1 * sizes.max())
     elevation, azimuth = np.radians([ELEVATION, AZIMUTH])
@@ -117,11 +84,7 @@ def shape_of(points: np.ndarray) -> float:
 
 
 def fill_places(figure: Figure) -> None:
-    """Make each robot in space as large as its place allows, with as many ticks as do not overlap.
-
-    Args:
-        figure: the picture, with its final size; its layout is final afterwards.
-    """
+    """Make each robot in space as large as its place allows, with as many ticks as do not overlap."""
     spaces: list[Any] = [panel for panel in figure.axes if panel.get_gid() == FILLS]
     if not spaces:
         return
@@ -196,14 +159,7 @@ def _axes(panel: Any) -> tuple[Any, ...]:
 
 
 def box_in_space(panel: Any) -> Bbox:
-    """Rectangle in which the corners of a box in space are drawn.
-
-    Args:
-        panel: axes in three dimensions.
-
-    Returns:
-        the rectangle around them, pixels.
-    """
+    """Rectangle in which the corners of a box in space are drawn."""
     low, high = np.array([panel.get_xlim(), panel.get_ylim(), panel.get_zlim()]).T
     corners = np.array(list(itertools.product(*zip(low, high, strict=True))))
     x, y, _ = proj3d.proj_transform(*corners.T, panel.get_proj())
@@ -212,14 +168,7 @@ def box_in_space(panel: Any) -> Bbox:
 
 
 def words_in_space(panel: Any) -> list[Bbox]:
-    """Rectangles in which ticks and labels of axes in space are written.
-
-    Args:
-        panel: axes in three dimensions.
-
-    Returns:
-        one rectangle for each, pixels.
-    """
+    """Rectangles in which ticks and labels of axes in space are written."""
     texts = [tick.label1 for axis in _axes(panel) for tick in axis.get_major_ticks() if tick.label1.get_text()]
     texts += [axis.label for axis in _axes(panel)]
     return [text.get_window_extent() for text in texts if text.get_visible() and text.get_text()]

@@ -1,6 +1,8 @@
 """Sections of maps, in colours."""
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -21,6 +23,9 @@ from cspr_jax.outputs.plots.word_ticks import word_scale, worded
 from cspr_jax.schema.quantities import EVERY
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.result import Result
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Azimuth and tilt of an orientation: a polar plane.
 POLAR = ("tilt_azimuth", "tilt")
@@ -52,18 +57,12 @@ class PlaneSection(NamedTuple):
 
 
 def section_figure(
-    result: Result, section: PlaneSection, data: np.ndarray, informative: np.ndarray | None = None
+    result: Result,
+    section: PlaneSection,
+    data: Float[np.ndarray, "n_first n_second n_panels"],
+    informative: np.ndarray | None = None,
 ) -> Figure:
-    """Sections of a map, one in each panel.
-
-    Args:
-        result: gives axes, labels and constants.
-        data: (n_first, n_second, n_panels).
-        informative: of data's shape, the cells that say more than "nothing here"; None: all.
-
-    Returns:
-        the figure.
-    """
+    """Sections of a map, one in each panel."""
     name, across, over = section.name, section.across, section.over
     polar = tuple(across) in (POLAR, AROUND)
     says = np.ones(data.shape, bool) if informative is None else informative
@@ -158,14 +157,7 @@ def _name_axes(result: Result, across: list[str], bottom: list[Axes], left: list
 
 
 def tells(name: str, data: np.ndarray) -> np.ndarray:
-    """Cells that say more than "nothing here": most orientations of a grid are impossible for the robot.
-
-    Args:
-        data: values of the quantity.
-
-    Returns:
-        of data's shape.
-    """
+    """Cells that say more than "nothing here": most orientations of a grid are impossible for the robot."""
     if EVERY[name].unflagged:
         return (data.astype(int) & Verdict.NOT_ACCESSIBLE.value) == 0
     return data > 0 if data.dtype.kind == "i" else np.isfinite(data)

@@ -16,17 +16,7 @@ LONGEST_NAMES = 64  # letters of a first line that tell whose table it is
 
 
 def result_at(path: Path) -> Path:
-    """The file to draw.
-
-    Args:
-        path: the file, or the directory of its run.
-
-    Returns:
-        the file.
-
-    Raises:
-        StoreError: a directory without a finished result.
-    """
+    """The file to draw."""
     if not path.is_dir():
         return path
     from cspr_jax.sweep.inspection import result_in  # only a directory needs it
@@ -35,11 +25,7 @@ def result_at(path: Path) -> Path:
 
 
 def is_own_motion(path: Path) -> bool:
-    """Tell whether a file is a motion of a user's own, and not one of this program's files.
-
-    Returns:
-        true for a table of samples in text, and for trajectories of CASPR.
-    """
+    """Tell whether a file is a motion of a user's own, and not one of this program's files."""
     if path.suffix.lower() in (".h5", ".hdf5", ".nc") or not path.is_file():
         return False
     with path.open("rb") as file:
@@ -47,18 +33,7 @@ def is_own_motion(path: Path) -> bool:
 
 
 def places(words: list[str], option: str = "--at") -> dict[str, float]:
-    """Values of axes as the command line gives them.
-
-    Args:
-        words: such as "z=1.7".
-        option: that gave them, for errors.
-
-    Returns:
-        the values by axis.
-
-    Raises:
-        ConfigError: a word of another form.
-    """
+    """Values of axes as the command line gives them."""
     at = {}
     for text in words:
         axis, _, number = text.partition("=")
@@ -72,18 +47,7 @@ def places(words: list[str], option: str = "--at") -> dict[str, float]:
 
 
 def nearest(result: Result, axis: str, coordinate: float, option: str = "--at") -> tuple[int, str]:
-    """The point of an axis that is drawn for a coordinate.
-
-    Args:
-        coordinate: that is asked for, in the unit of the axis.
-        option: that gave it, for errors.
-
-    Returns:
-        the index of the point, and the words of the picture for it, with the coordinate if the point is another one.
-
-    Raises:
-        InputError: no such axis, or a value out of its range.
-    """
+    """The point of an axis that is drawn for a coordinate."""
     if axis not in result.axes:
         raise InputError(option, axis, one_of(axis, result.axes))
     points = result.axes[axis]

@@ -1,7 +1,9 @@
 """A workspace in three dimensions: its boundary, and the robot in it."""
 
+from __future__ import annotations
+
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from matplotlib.colors import to_rgb
@@ -21,6 +23,9 @@ from cspr_jax.outputs.plots.robot_at import Posed, posed
 from cspr_jax.outputs.plots.scene import set_space, shape_of, signs_of, towards_eye
 from cspr_jax.outputs.volumes import WorkspaceVolume, volume_of
 from cspr_jax.store.result import Result
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 SPACE = ["x", "y", "z"]
 SURFACE, END, LINES, CABLES = COLOURS[5], "#9a9a9a", COLOURS[0], COLOURS[1]
@@ -52,19 +57,7 @@ class _LevelLines(Line3DCollection):
 
 
 def solid_figure(result: Result, index: dict[str, int], fixed: list[str]) -> Figure:
-    """The boundary of a workspace, with the robot at its centroid.
-
-    Args:
-        result: a map of a workspace over x, y and z.
-        index: of the point, for each of its other axes.
-        fixed: words for the constants.
-
-    Returns:
-        the figure.
-
-    Raises:
-        InputError: nothing is inside.
-    """
+    """The boundary of a workspace, with the robot at its centroid."""
     sides = sides_of(result, SPACE, index)
     if not (sides.verdict == 0).any():
         raise InputError("--solid", "nothing is inside", "a workspace with poses inside")
@@ -90,20 +83,12 @@ def solid_figure(result: Result, index: dict[str, int], fixed: list[str]) -> Fig
 
 
 def is_solid(result: Result) -> bool:
-    """Tell whether a map is a workspace over points in space.
-
-    Returns:
-        whether it is one.
-    """
+    """Tell whether a map is a workspace over points in space."""
     return is_workspace(result) and min(len(np.unique(result.axes.get(axis, ()))) for axis in SPACE) > 1
 
 
-def middle_of(sides: BoundarySides) -> np.ndarray:
-    """The centroid of the points inside; if it is not in the workspace itself, the point inside that is nearest.
-
-    Returns:
-        (3,) m.
-    """
+def middle_of(sides: BoundarySides) -> Float[np.ndarray, "3"]:
+    """The centroid of the points inside; if it is not in the workspace itself, the point inside that is nearest."""
     grid = np.stack(np.meshgrid(*sides.points, indexing="ij"), axis=-1)
     inside = grid[sides.verdict == 0]
     middle = inside.mean(0)
@@ -214,14 +199,7 @@ def _legend(surface: Boundary, *, has_obstacles: bool = False) -> tuple[list[Any
 
 
 def volume_words(result: Result, index: dict[str, int]) -> str:
-    """The volume of a workspace with its error, in words.
-
-    Args:
-        index: of the point, for each of the other axes.
-
-    Returns:
-        such as "volume 479 ± 32 m³".
-    """
+    """The volume of a workspace with its error, in words."""
     volume: WorkspaceVolume = volume_of(result)
     place = tuple(index[axis] for axis in volume.axes)
     size, error = float(volume.volume[place]), float(volume.error[place])

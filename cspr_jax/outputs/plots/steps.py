@@ -1,5 +1,9 @@
 """Points of an axis as colours: the edges between them, and the scale of a quantity that takes these values."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import matplotlib
 import numpy as np
 from matplotlib.colors import BoundaryNorm, ListedColormap
@@ -9,16 +13,12 @@ from cspr_jax.outputs.plots.labels import as_drawn
 from cspr_jax.schema.quantities import EVERY, best_name
 from cspr_jax.store.result import Result
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 
 def number_scale(result: Result, name: str, values: np.ndarray) -> Scale:
-    """The scale of a quantity whose numbers are no words.
-
-    Args:
-        values: all of the picture, as drawn.
-
-    Returns:
-        the scale; the best points of an axis, where they are few, have a colour each.
-    """
+    """The scale of a quantity whose numbers are no words."""
     choice = next((choice for axis, choice in result.choices.items() if best_name(axis) == name), None)
     points = np.zeros(0) if choice is None else np.unique(as_drawn(result, name, choice.points))
     if not 0 < len(points) <= TOLD_APART:
@@ -32,15 +32,8 @@ def number_scale(result: Result, name: str, values: np.ndarray) -> Scale:
     )
 
 
-def edges(points: np.ndarray) -> np.ndarray:
-    """Edges of cells about points.
-
-    Args:
-        points: (n,) ascending.
-
-    Returns:
-        (n + 1,) half-way between them, and as far beyond the ends.
-    """
+def edges(points: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n+1"]:
+    """Edges of cells about points."""
     if len(points) == 1:
         return points[0] + np.array([-0.5, 0.5]) * max(1.0, abs(points[0]))
     middles = 0.5 * (points[1:] + points[:-1])

@@ -81,21 +81,7 @@ def style_of(
     *,
     title: bool = True,
 ) -> Style:
-    """The style that options ask for.
-
-    Args:
-        size: such as "16x10" or (16, 10), cm; None: what suits the picture.
-        dpi: pixels an inch; None: the default.
-        font_size: points; None: the default.
-        preset: "column" or "page" of a paper, which may be followed by a width, such as "column elsevier" or "page
-            17cm"; None: neither.
-
-    Returns:
-        the style.
-
-    Raises:
-        ConfigError: a wrong text, or a number out of bounds.
-    """
+    """The style that options ask for."""
     name, _, of_width = (preset or "").partition(" ")
     if preset is not None and name not in PRESETS:
         raise ConfigError("preset", f"{shown(preset)}: {demand(one_of(preset, PRESETS))}, or absent")
@@ -143,11 +129,7 @@ def _bounded(key: str, value: float, bounds: tuple[float, float]) -> float:
 
 @contextmanager
 def in_style(style: Style) -> Iterator[None]:
-    """Make figures look alike, whatever the user's matplotlib is set to.
-
-    Yields:
-        nothing; figures are to be made and saved inside.
-    """
+    """Make figures look alike, whatever the user's matplotlib is set to."""
     look = LOOK | {"font.size": style.font_size}
     width = style.size[0] if style.size is not None else style.width
     if width is not None:
@@ -157,14 +139,7 @@ def in_style(style: Style) -> Iterator[None]:
 
 
 def laid_out(figure: Figure, style: Style) -> None:
-    """Give a picture its size, and its texts their lines.
-
-    Args:
-        figure: the picture, made inside `in_style`.
-
-    Raises:
-        InputError: too many pixels.
-    """
+    """Give a picture its size, and its texts their lines."""
     width, height = (float(side) for side in figure.get_size_inches())
     if style.size is not None:
         width, height = style.size[0] / INCH, style.size[1] / INCH
@@ -216,19 +191,7 @@ def _give_room(figure: Figure, style: Style) -> None:
 
 
 def rendered(figure: Figure, ending: str, style: Style) -> bytes:
-    """The content of a picture's file.
-
-    Args:
-        figure: the picture, `laid_out`.
-        ending: of its file, such as ".png": the format.
-
-    Returns:
-        the content.
-
-    Raises:
-        InputError: no room for the panels.
-        ValueError: an unknown format.
-    """
+    """The content of a picture's file."""
     content, ending = io.BytesIO(), ending.lower()
     with _no_missing_letters():
         warnings.filterwarnings("error", "constrained_layout not applied")

@@ -33,15 +33,7 @@ WIDE, NARROW = ((0.14, 0.1, 0.2, 0.16, 0.4), 36), ((0.18, 0.1, 0.2, 0.18, 0.34),
 
 
 def summary_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> Figure:
-    """The plan on a page.
-
-    Args:
-        robot_file: the robot whose cables have these tensions.
-        keys: the plan, whose limits go before the robot's.
-
-    Returns:
-        the figure.
-    """
+    """The plan on a page."""
     cells = _cells(result)
     lines = sum(_lines(row) for row in cells)
     height = (NARROW_LINE if is_narrow() else LINE) * (lines + 1)

@@ -15,15 +15,7 @@ from cspr_jax.store.result import Result
 
 
 def tensions_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> Figure:
-    """The band of tensions over time, with the limits.
-
-    Args:
-        robot_file: the robot whose cables have these tensions.
-        keys: the plan, whose limits go before the robot's.
-
-    Returns:
-        the figure.
-    """
+    """The band of tensions over time, with the limits."""
     figure = Figure(figsize=(7.2, 4.2), layout="constrained")
     panel = figure.subplots()
     draw_tensions(panel, result, limits_of(robot_file, keys))
@@ -33,11 +25,7 @@ def tensions_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> Fi
 
 
 def extremes(result: Result) -> str:
-    """The smallest and the largest tension of a motion's rows, in words.
-
-    Returns:
-        both, with their cables and instants.
-    """
+    """The smallest and the largest tension of a motion's rows, in words."""
     tension, time = result.data["tension"], result.axes["t"]
     if not np.isfinite(tension).any():
         return "no finite tension"
@@ -51,12 +39,7 @@ def extremes(result: Result) -> str:
 def draw_tensions(
     panel: Axes, result: Result, limits: list[tuple[str, float]], charts: Sequence[str] = ("tension",)
 ) -> None:
-    """Tensions as a band from the smallest to the largest of all cables, each cable as a thin line, and the limits.
-
-    Args:
-        limits: words and values, N.
-        charts: names of the quantities of all panels over time.
-    """
+    """Tensions as a band from the smallest to the largest of all cables, each cable as a thin line, and the limits."""
     time, tension = result.axes["t"], result.data["tension"]
     low, high = np.min(tension, axis=1), np.max(tension, axis=1)
     panel.fill_between(time, low, high, color=COLOURS[5], alpha=0.35, linewidth=0.0, label="range")

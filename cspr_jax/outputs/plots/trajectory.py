@@ -1,6 +1,8 @@
 """A motion in space: its path, the spools, and the robot at some instants with its cables coloured by tension."""
 
-from typing import Any
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -23,6 +25,9 @@ from cspr_jax.outputs.plots.robot_along import moving
 from cspr_jax.outputs.plots.scene import colours_of_tension, set_space, shape_of
 from cspr_jax.store.result import Result
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # The robot is drawn where segments begin and end, at most so often.
 SHOWN = 6
 # Inches: width of the robot, height of the texts above and below it, and heights of the picture.
@@ -32,15 +37,7 @@ TOGETHER = 0.08
 
 
 def trajectory_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> Figure:
-    """The motion in space.
-
-    Args:
-        robot_file: the robot whose cables have these tensions.
-        keys: the plan, for obstacles and the shape of the platform.
-
-    Returns:
-        the figure.
-    """
+    """The motion in space."""
     points = points_in_space(result, robot_file, keys)
     height = float(np.clip(ACROSS * shape_of(points) + BESIDE, LOW, HIGH))
     figure = Figure(figsize=(7.2, height), layout="constrained")
@@ -53,28 +50,15 @@ def trajectory_figure(result: Result, robot_file: RobotFile, keys: PlanFile) -> 
     return figure
 
 
-def points_in_space(result: Result, robot_file: RobotFile, keys: PlanFile) -> np.ndarray:
-    """Path, spools and corners of obstacles, which decide the shape of a picture.
-
-    Args:
-        keys: the plan, for obstacles.
-
-    Returns:
-        (n, 3) m.
-    """
+def points_in_space(result: Result, robot_file: RobotFile, keys: PlanFile) -> Float[np.ndarray, "n 3"]:
+    """Path, spools and corners of obstacles, which decide the shape of a picture."""
     return np.concatenate(
         [result.data["position"], np.asarray(robot_file.base_points, float), *map(points_of, keys.bodies)]
     )
 
 
 def draw_trajectory(figure: Figure, panel: Any, result: Result, robot_file: RobotFile, keys: PlanFile) -> None:
-    """Path, spools, obstacles, flight of a released object, and the robot where segments begin and end.
-
-    Args:
-        panel: axes in three dimensions, without computed z order.
-        robot_file: the robot whose cables have these tensions.
-        keys: the plan, for obstacles and the shape of the platform.
-    """
+    """Path, spools, obstacles, flight of a released object, and the robot where segments begin and end."""
     ends = segment_rows(result.data, result.axes["t"])
     rows = ends[np.unique(np.linspace(0, len(ends) - 1, min(SHOWN, len(ends))).round().astype(int))]
     robot, path = moving(result.data, robot_file, rows, keys), result.data["position"]
@@ -105,21 +89,12 @@ def draw_trajectory(figure: Figure, panel: Any, result: Result, robot_file: Robo
 
 
 def add_tension_bar(figure: Figure, panel: Any, colours: ScalarMappable) -> None:
-    """The bar of the cables' colours, below the robot, which needs the width.
-
-    Args:
-        panel: axes in three dimensions.
-    """
+    """The bar of the cables' colours, below the robot, which needs the width."""
     figure.colorbar(colours, ax=panel, label="tension (N)", location="bottom", shrink=0.5, aspect=36, pad=0.02)
 
 
-def name_spools(panel: Any, base: np.ndarray) -> None:
-    """Numbers of cables beside their spools; those of spools that stand together are one label.
-
-    Args:
-        panel: axes in three dimensions.
-        base: (n_cables, 3) of the spools, m.
-    """
+def name_spools(panel: Any, base: Float[np.ndarray, "n_cables 3"]) -> None:
+    """Numbers of cables beside their spools; those of spools that stand together are one label."""
     near = TOGETHER * np.ptp(base, axis=0).max()
     left = list(range(len(base)))
     while left:
@@ -136,14 +111,7 @@ def name_spools(panel: Any, base: np.ndarray) -> None:
 
 
 def legend_of(result: Result, keys: PlanFile) -> tuple[list[Artist], list[str]]:
-    """Entries of the legend of a motion in space.
-
-    Args:
-        keys: the plan, for obstacles.
-
-    Returns:
-        artists and words.
-    """
+    """Entries of the legend of a motion in space."""
     entries: dict[str, Artist] = {
         "path": Line2D([], [], color="black", linewidth=1.2),
         **entries_of_ends(segment_rows(result.data, result.axes["t"])),

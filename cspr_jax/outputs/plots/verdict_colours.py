@@ -1,8 +1,15 @@
 """Verdicts as colours: one reason for each cell, the first of those that its flags name."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from cspr_jax.schema.verdicts import NO_REASON, Verdict
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Deeper reasons come first, and refutations before open verdicts. The colours are Okabe and
 # Ito's, and greys.
@@ -30,16 +37,8 @@ REASONS = {
 FEASIBLE_COLOUR = "#009E73"
 
 
-def reasons(verdicts: np.ndarray, unflagged: str) -> tuple[np.ndarray, list[str], list[str]]:
-    """Verdicts as numbers of reasons.
-
-    Args:
-        verdicts: (...) flags.
-        unflagged: word where no flag is set.
-
-    Returns:
-        (...) number of the reason, from 0 on; the words of those that occur; their colours.
-    """
+def reasons(verdicts: Float[np.ndarray, "..."], unflagged: str) -> tuple[np.ndarray, list[str], list[str]]:
+    """Verdicts as numbers of reasons."""
     flags = verdicts.astype(int) & ~NO_REASON.value
     numbers = np.zeros(flags.shape, int)
     for number, flag in reversed(list(enumerate(REASONS, start=1))):

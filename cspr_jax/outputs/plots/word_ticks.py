@@ -1,5 +1,9 @@
 """Quantities whose numbers stand for words, as colours and ticks with these words: verdicts, and bounds by name."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import matplotlib
 import numpy as np
 from matplotlib.colors import BoundaryNorm, ListedColormap, to_hex
@@ -11,20 +15,17 @@ from cspr_jax.schema.map_kinds import quantity_of
 from cspr_jax.schema.meanings import meanings_of
 from cspr_jax.store.result import Result
 
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
 # Okabe and Ito's colours, too; if there are more words, the colours follow each other.
 MORE = (*COLOURS, "#F0E442", "#000000")
 
 
-def worded(result: Result, name: str, values: np.ndarray) -> tuple[np.ndarray, list[str], list[str]] | None:
-    """Words that the values of a quantity stand for.
-
-    Args:
-        result: gives the settings, on which the words may depend.
-        values: (...) of the quantity.
-
-    Returns:
-        (...) numbers of the words, from 0 on; the words of those that occur; their colours. None: it has no words.
-    """
+def worded(
+    result: Result, name: str, values: Float[np.ndarray, "..."]
+) -> tuple[np.ndarray, list[str], list[str]] | None:
+    """Words that the values of a quantity stand for."""
     quantity = quantity_of(result.attributes.get("map"), name)
     if quantity.unflagged:
         return reasons(values, quantity.unflagged)
@@ -44,13 +45,6 @@ def _named(values: np.ndarray, words: tuple[str, ...]) -> tuple[np.ndarray, list
 
 
 def word_scale(words: list[str], colours: list[str]) -> Scale:
-    """The scale of numbers that stand for words.
-
-    Args:
-        words: of 0, 1, 2, ...
-
-    Returns:
-        the scale.
-    """
+    """The scale of numbers that stand for words."""
     norm = BoundaryNorm(np.arange(len(colours) + 1) - 0.5, len(colours))
     return Scale(ListedColormap(colours), norm, ticks=([float(i) for i in range(len(words))], words))

@@ -29,12 +29,7 @@ SPACE, WORKSPACE = ("x", "y", "z"), "workspace"
 
 
 def order_of(result: Result) -> tuple[list[str], list[np.ndarray]]:
-    """Order of the axes in a page, the last one that of a row, and of their points.
-
-    Returns:
-        names: axes of the plane last, upward before across.
-        points: indices of each axis' points, ascending, each value once.
-    """
+    """Order of the axes in a page, the last one that of a row, and of their points."""
     varying = [axis for axis, points in result.axes.items() if len(np.unique(points)) > 1]
     alone = [axis for axis in result.axes if axis not in varying]
     order = in_order(result, varying)
@@ -45,17 +40,7 @@ def order_of(result: Result) -> tuple[list[str], list[np.ndarray]]:
 
 
 def map_content(result: Result, quantity: str | None = None) -> tuple[dict[str, Any], list[str]]:
-    """Content of the page of a map.
-
-    Args:
-        quantity: shown first; None: the one that its kind of map is about.
-
-    Returns:
-        plain values, for JSON; the names of quantities that are left out, since a page of all would be too large.
-
-    Raises:
-        InputError: no such quantity.
-    """
+    """Content of the page of a map."""
     kind = MAP_KINDS[result.attributes["map"]]
     known = [name for name in dict.fromkeys((*kind.pictured, *FIRST, *result.data)) if name in result.data]
     if quantity is not None and quantity not in known:

@@ -42,19 +42,7 @@ def motion_content(
     keys: PlanFile | None,
     z_axis: str = "down",
 ) -> dict[str, Any]:
-    """Content of the page of a motion.
-
-    Args:
-        columns: rows by the names of `schema.quantities.TRAJECTORY`, and what there is of `FLIGHT`, `FAILURES` and
-            `PATHS`.
-        segments: by the names of `schema.quantities.SEGMENTS`.
-        robot_file: the robot whose cables have these tensions; None: the file does not keep it.
-        keys: the plan, for limits, obstacles and the shape of the platform; None: the file does not keep it.
-        z_axis: where z points, of a file that does not keep its robot.
-
-    Returns:
-        plain values, for JSON.
-    """
+    """Content of the page of a motion."""
     rows = _chosen(np.asarray(columns["t"]))
     robot = moving(columns, robot_file, rows, keys)
     return {

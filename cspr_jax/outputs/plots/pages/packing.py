@@ -1,24 +1,22 @@
 """Arrays inside of a page: compressed, and as text."""
 
+from __future__ import annotations
+
 import base64
 import gzip
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Names of the typed arrays of browsers, by NumPy's names.
 TYPES = {"uint8": "Uint8Array", "uint16": "Uint16Array", "int32": "Int32Array", "float32": "Float32Array"}
 
 
-def packed(values: np.ndarray) -> dict[str, Any]:
-    """Values for a page.
-
-    Args:
-        values: (...) numbers; floats keep seven digits.
-
-    Returns:
-        the typed array of browsers that has them, and its bytes, compressed, in base64; C order.
-    """
+def packed(values: Float[np.ndarray, "..."]) -> dict[str, Any]:
+    """Values for a page."""
     values = np.asarray(values)
     if values.dtype.kind == "f":
         name = "float32"
@@ -31,15 +29,8 @@ def packed(values: np.ndarray) -> dict[str, Any]:
     return {"type": TYPES[name], "data": base64.b64encode(data).decode("ascii")}
 
 
-def unpacked(array: dict[str, Any]) -> np.ndarray:
-    """Values of a page, as a browser has them.
-
-    Args:
-        array: of `packed`.
-
-    Returns:
-        (n,) numbers.
-    """
+def unpacked(array: dict[str, Any]) -> Float[np.ndarray, "n"]:
+    """Values of a page, as a browser has them."""
     name = next(name for name, other in TYPES.items() if other == array["type"])
     data = gzip.decompress(base64.b64decode(array["data"]))
     return np.frombuffer(data, np.dtype(name).newbyteorder("<"))

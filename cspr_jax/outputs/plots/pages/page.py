@@ -16,19 +16,7 @@ PLACE = re.compile(r"<!-- (\w+) -->")
 
 
 def page_of(title: str, content: dict[str, Any]) -> str:
-    """A page.
-
-    Args:
-        title: of the window and the page.
-        content: "map" of `maps.map_content` or None, "motions" of `motions.motion_content`, "cells" by which a click
-            on the map finds these.
-
-    Returns:
-        HTML that needs nothing else.
-
-    Raises:
-        InputError: plotly is not installed.
-    """
+    """A page."""
     try:
         from plotly.offline import get_plotlyjs
     except ImportError as error:

@@ -17,15 +17,7 @@ MOST = 16
 
 
 def solids_content(result: Result, names: list[str], points: list[np.ndarray]) -> dict[str, Any] | None:
-    """The boundaries of a workspace, for the points of the axes that are not of space.
-
-    Args:
-        names: of the axes, in the order of the page.
-        points: indices of each axis' points there.
-
-    Returns:
-        plain values, for JSON; None where the map is no workspace over points in space.
-    """
+    """The boundaries of a workspace, for the points of the axes that are not of space."""
     if not is_solid(result):
         return None
     others = [k for k, name in enumerate(names) if name not in SPACE and len(points[k]) > 1]

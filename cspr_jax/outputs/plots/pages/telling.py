@@ -1,24 +1,23 @@
 """Cells of a map whose motions are most instructive: those at the edges of the feasible region, and others far away."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
 
 # Quantities whose extremes are instructive.
 EXTREME = ("margin", "duration", "arcs", "oscillations")
 
 
-def telling(data: dict[str, np.ndarray], verdict: np.ndarray, count: int) -> list[tuple[int, ...]]:
+def telling(data: dict[str, np.ndarray], verdict: Float[np.ndarray, "..."], count: int) -> list[tuple[int, ...]]:
     """Cells to look at, all of them feasible.
 
     First come the extremes of margins, durations and counts, and for each count the cell with the smallest margin;
     then, one after the other, the cell that is farthest from the chosen ones, in steps of the grid over its size.
-
-    Args:
-        data: quantities of the map, each of the shape of `verdict`.
-        verdict: (...) flags; 0 is feasible.
-        count: cells, at most.
-
-    Returns:
-        their indices; fewer where fewer are feasible.
     """
     feasible = np.argwhere(verdict == 0)
     if not len(feasible) or count < 1:
