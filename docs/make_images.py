@@ -25,6 +25,7 @@ class Image(NamedTuple):
         plot: arguments of `cspr plot` after the results.
         sources: sweeps or plans in `sweeps`, one result each; empty: the one of the picture's name.
         command: "run" for sweeps, "plan" for plans, "draw" for a script of its own.
+        suffix: of the file.
     """
 
     caption: str
@@ -32,6 +33,7 @@ class Image(NamedTuple):
     plot: str = ""
     sources: tuple[str, ...] = ()
     command: str = "run"
+    suffix: str = ".png"
 
 
 IMAGES = {
@@ -178,6 +180,12 @@ IMAGES = {
     "ellipse": Image(
         "Largest margin of turns on circles of radius 0.5 m about centres below the spools, level and inclined.", 8
     ),
+    "swing": Image(
+        "A load on three cables swings far outside of its posts, with taut cables: a plan, and its tensions.",
+        60,
+        command="draw",
+        suffix=".gif",
+    ),
     "concepts": Image("From start to target in five arcs, and the pseudotensions.", 8, command="draw"),
 }
 
@@ -214,7 +222,7 @@ def page_text() -> str:
     ]
     for name, image in IMAGES.items():
         lines = "\n".join(commands_of(name))
-        parts.append(f"## {name}\n\n![{image.caption}](../images/{name}.png)\n\n{image.caption} {image.seconds} s:\n")
+        parts.append(f"## {name}\n\n![{image.caption}](../images/{name}{image.suffix})\n\n{image.caption} {image.seconds} s:\n")
         parts.append(f"```sh\n{lines}\n```\n")
     return "\n".join(parts)
 
