@@ -222,7 +222,9 @@ def page_text() -> str:
     ]
     for name, image in IMAGES.items():
         lines = "\n".join(commands_of(name))
-        parts.append(f"## {name}\n\n![{image.caption}](../images/{name}{image.suffix})\n\n{image.caption} {image.seconds} s:\n")
+        parts.append(
+            f"## {name}\n\n![{image.caption}](../images/{name}{image.suffix})\n\n{image.caption} {image.seconds} s:\n"
+        )
         parts.append(f"```sh\n{lines}\n```\n")
     return "\n".join(parts)
 

@@ -213,7 +213,9 @@ def test_the_reference_is_generated():
 def test_every_picture_has_its_commands():
     """None is left of an older way to make it, and the README gives the arguments that made those it shows."""
     images = script("make_images")
-    assert {path.name for path in (ROOT / "docs" / "images").iterdir()} == {f"{name}{image.suffix}" for name, image in images.IMAGES.items()}
+    assert {path.name for path in (ROOT / "docs" / "images").iterdir()} == {
+        f"{name}{image.suffix}" for name, image in images.IMAGES.items()
+    }
     text = "\n".join((ROOT / name).read_text("utf-8") for name in ("README.md", "docs/usage.md"))
     shown = re.findall(r"!\[[^]]*\]\((?:docs/)?images/(\w+)\.png\)\n\n\*(.*?)\*\n\n", text, re.DOTALL)
     assert len(shown) >= 3
