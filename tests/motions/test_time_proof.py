@@ -216,6 +216,20 @@ def test_criteria_name_cables():
     assert (rows[6].flag, rows[6].cables, rows[6].unit) == (Verdict.BELOW_FLOOR, (), "m")
 
 
+def test_which_poses_of_a_robot_are_judged():
+    """The determinant of bodies, and the depth of what hangs below its spools, where the motion determines tensions."""
+    both = {Verdict.SINGULAR, Verdict.ABOVE_SPOOLS}
+    wanted = {
+        "transition-planar": {Verdict.ABOVE_SPOOLS},
+        "prototype": {Verdict.ABOVE_SPOOLS},
+        "laval-mssm": both,
+        "boralugoda-planar-three": set(),
+        "cogiro": set(),
+    }
+    for name, flags in wanted.items():
+        assert {row.flag for row in criteria(cspr_jax.load_robot(name), Limits())} & both == flags, name
+
+
 def tilting(times, angles, heights) -> interpolation.Spline:
     """A platform that tilts about x."""
     half = 0.5 * np.asarray(angles)

@@ -195,6 +195,16 @@ def test_cables_that_pass_through_each_other(offset, does):
     assert (float(low[place]) > 0.0) != does and float(high[place]) > 0.0
 
 
+def test_cables_are_as_thick_as_both_of_their_radii():
+    robot, diameters = crossed_robot(0.2), np.linspace(0.01, 0.06, 6)
+    scenes = [scene(robot, diameter=diameter) for diameter in (0.0, diameters)]
+    thin, thick = (PASSINGS(robot, bodies_of(robot, around), lifted(0.01))[0] for around in scenes)
+    pairs = np.array(scenes[0].pairs)
+    for before, after in zip(thin, thick, strict=True):
+        lost = np.asarray(before - after)[: len(pairs)]
+        np.testing.assert_allclose(lost, 0.5 * diameters[pairs].sum(1), atol=1e-12)
+
+
 def test_determinants_over_blocks():
     rng = np.random.default_rng(5)
     for n in (1, 2, 6):

@@ -139,8 +139,9 @@ def test_wrench_balance(robot):
         rotation, (velocity, omega, pull, spin) = oracle.matrix(quaternion), rng.normal(size=(4, 3))
         cases.append(State(position, velocity, pull, rotation, omega, spin))
     found = cables_at(ours(robot), State(*(np.stack(x) for x in zip(*(case[:6] for case in cases), strict=True))))
-    for pose, tension, determinant in zip(cases, found["tension"], found["determinant"], strict=True):
-        position, _, pull, rotation, omega, spin = pose[:6]
+    columns = found["tension"], found["determinant"], *found["motion"]
+    for pose, tension, determinant, length, rate, bend in zip(cases, *columns, strict=True):
+        position, velocity, pull, rotation, omega, spin = pose[:6]
         arms = robot.platform @ rotation.T
         cables = position + arms - robot.base
         units = -cables / np.linalg.norm(cables, axis=1)[:, None]
@@ -154,6 +155,12 @@ def test_wrench_balance(robot):
         wanted = oracle.tensions(robot, position, rotation, ratios).reshape(6)
         np.testing.assert_allclose(tension, wanted, rtol=1e-8, atol=1e-8 * scale)
         assert np.sign(determinant) == np.sign(np.linalg.det(oracle.jacobian(robot, position, rotation)))
+        swing = np.cross(omega, arms)
+        speed, acceleration = velocity + swing, pull + np.cross(spin, arms) + np.cross(omega, swing)
+        np.testing.assert_allclose(length, np.linalg.norm(cables, axis=1), rtol=1e-12)
+        np.testing.assert_allclose(length * rate, (cables * speed).sum(1), atol=1e-11)
+        wanted = (speed**2).sum(1) + (cables * acceleration).sum(1)
+        np.testing.assert_allclose(length * bend + rate**2, wanted, atol=1e-10)
 
 
 def test_work_of_the_cables_is_the_change_of_energy():
