@@ -38,6 +38,8 @@ def test_the_floor_is_below(z_axis, floor, capsys):
     row = check.demands["floor"]
     assert row["sense"] == ("at least" if z_axis == "up" else "at most")
     assert (row["value"] >= row["allowed"]) is (check.feasible == (z_axis == "up"))
+    assert row["allowed"] == pytest.approx(floor if z_axis == "up" else -floor)
+    assert all(cause["needed"] == row["value"] and cause["allowed"] == row["allowed"] for cause in check.cause)
     print_table(check.to_table())
     line = next(line for line in capsys.readouterr().out.splitlines() if "lowest z" in line)
     sign = "≥" if z_axis == "up" else "≤"

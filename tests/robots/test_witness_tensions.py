@@ -9,6 +9,7 @@ from scipy.optimize import linprog
 from support.splines import random_spline
 
 import cspr_jax
+from cspr_jax.arithmetic.affine_bounds import AffineBounds
 from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.curves.several import SeveralSplines
 from cspr_jax.robots import cables
@@ -145,6 +146,21 @@ def test_the_only_tensions(name, parabolas):
     known = tensions.is_regular
     assert known.mean() > 0.9
     assert (over <= tensions.tension.radius[:, None] + 1e-9 * np.abs(exact).max())[known].all()
+
+
+def loose(middle, radius) -> AffineBounds:
+    middle = np.asarray(middle, float)
+    return AffineBounds(middle, np.zeros_like(middle), np.full_like(middle, radius))
+
+
+@pytest.mark.parametrize(("pull", "load"), [(0.05, 0.1), (0.3, 0.02)])
+def test_wide_bounds_hold_the_quotients_at_their_ends(pull, load):
+    """Cables along one axis, whose pulls and load are known to so much: one alone, and two that share the load."""
+    one = jax.jit(witness_tensions)(loose([[1.0]], pull), loose([1.0], load), np.zeros(1), np.full(1, np.inf))
+    assert float(one.tension.high()[0]) == pytest.approx((1.0 + load) / (1.0 - pull), rel=1e-12)
+    for sign, ends in ((1.0, (1.0 + load) / (2.0 - 2.0 * pull)), (-1.0, (load - 1.0) / (2.0 + 2.0 * pull))):
+        two = jax.jit(witness_tensions)(loose([[1.0, 1.0]], pull), loose([sign], load), np.zeros(2), np.full(2, np.inf))
+        assert ends <= float(two.margin_high) <= ends + 0.1 * abs(ends)
 
 
 @pytest.mark.parametrize(("parabolas", "least", "most"), [(False, 3.0, 5.0), (True, 6.0, 10.0)])
