@@ -104,6 +104,8 @@ def test_slower():
     assert slower.is_static and slower.check.feasible
     assert slower.factor == pytest.approx(check.demands["cable_speed_max"]["value"] / 0.09, rel=2e-3)
     assert slower.check.duration == pytest.approx(6.0 * slower.factor)
+    again = slower.check.slower()
+    assert again.factor == 1.0 and again.check.duration == slower.check.duration
     assert not cspr_jax.check("prototype", TIMES * slower.factor * 0.9999, PLACES, limits=FAST).feasible
     beyond = cspr_jax.check("prototype", TIMES, PLACES, limits={"cable_length_max": 0.9}).slower()
     assert np.isnan(beyond.factor) and beyond.check is None and not beyond.is_static

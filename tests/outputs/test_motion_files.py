@@ -2,6 +2,7 @@
 
 import csv
 import json
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -12,6 +13,7 @@ from support.commands import plan
 import cspr_jax
 from cspr_jax import __version__
 from cspr_jax.cli import main
+from cspr_jax.outputs import motion_files
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.netcdf import LAYOUT
 from cspr_jax.store.seal import sealed
@@ -95,6 +97,12 @@ def test_rows_of_a_motion_that_is_not_feasible(tmp_path):
     assert code == 2 and err == "cspr: --anyway: must be absent without -o, --mjcf or --animate\n"
     assert plan(tmp_path, SHORT, "-o", str(output), "--anyway", "--rate", "20")[::2] == (0, "")
     assert output.read_text("utf-8").splitlines()[0].endswith("tension_3,binding,binding_cable")
+
+
+def test_a_row_at_a_border_is_of_both_segments():
+    plan = SimpleNamespace(answers=SimpleNamespace(duration=[1.0, 2.0, 1.0]), is_feasible=np.array([True, False, True]))
+    flags = motion_files._feasible_rows(plan, np.array([0.0, 0.5, 1.0, 2.0, 3.0, 3.5, 4.0]))
+    assert flags.tolist() == [True, True, False, False, False, True, True]
 
 
 def test_motions_of_the_version_before(motions, tmp_path, figures, capsys):
