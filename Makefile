@@ -9,12 +9,15 @@ TESTS := $(VENV)/.installed-tests
 # Python compiles modules when they are first imported; most of those installed never are.
 INSTALL := pip install --quiet --disable-pip-version-check --no-compile
 
+# Two processes; a folder's tests, which share compiled programs, run in one of them.
+PYTEST = $(BIN)/python -m pytest -n 2 --dist loadscope --no-loadscope-reorder $(if $(SHARD),--shard $(SHARD))
+
 # What another folder, or another version, is tried in: environments of their own, made anew.
 WHEEL := build/wheel
 LOWEST := build/lowest
 BEGIN := tests/outputs/test_templates.py tests/config/test_reading.py tests/outputs/test_outputs.py tests/plans/test_of_cells.py tests/api/test_searches.py
 
-.PHONY: demo test thorough soak check bench bench-record docs images gallery site wheel lowest clean
+.PHONY: demo test thorough tests soak check bench bench-record docs images gallery site wheel lowest clean
 
 demo: $(STAMP)
 	$(BIN)/cspr table 2.1
@@ -22,20 +25,27 @@ demo: $(STAMP)
 	$(BIN)/cspr plot results/demo/demo.h5 -o results/demo/demo.png
 	@echo "Look at results/demo/demo.png; the data are in results/demo/demo.h5."
 
+# Where time goes is in build/durations; SHARD=2/3 runs the second of three parts.
 test: $(TESTS)
-	$(BIN)/python -m pytest -m "not soak and not thorough" -n 2 --dist loadscope --no-loadscope-reorder
+	$(PYTEST) --record build/durations/test.jsonl -m "not soak and not thorough and not prose"
 
 # Longer cases of what the quick tests cover.
 thorough: $(TESTS)
-	$(BIN)/python -m pytest -m "thorough and not soak" -n 2 --dist loadscope --no-loadscope-reorder
+	$(PYTEST) --record build/durations/thorough.jsonl -m "thorough and not soak"
 
+# Both in one run, which compiles a program once.
+tests: $(TESTS)
+	$(PYTEST) --record build/durations/tests.jsonl -m "not soak and not prose"
+
+# Full counts, and new cases of what Hypothesis draws.
 soak: $(TESTS)
-	$(BIN)/python -m pytest -m soak
+	$(BIN)/python -m pytest -m "soak or drawn"
 
 check: $(TESTS)
 	$(BIN)/ruff format --check cspr_jax tests benchmarks docs/gallery hatch_build.py
 	$(BIN)/ruff check cspr_jax tests benchmarks docs/gallery hatch_build.py
 	$(BIN)/mypy
+	$(BIN)/python -m pytest -m prose tests/house
 
 wheel: $(STAMP)
 	rm -rf dist $(WHEEL)

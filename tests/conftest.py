@@ -1,5 +1,6 @@
 """Settings for every test: 64 bits, strict promotion, repeatable examples, kept code; robots that many tests share."""
 
+import collections
 import ctypes
 import gc
 import os
@@ -17,7 +18,7 @@ import jaxlib.version
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
-from support import readers, shapes
+from support import durations, readers, shapes
 from xdist.scheduler import LoadScopeScheduling
 
 shapes.install()
@@ -54,6 +55,8 @@ jax.config.update("jax_numpy_rank_promotion", "raise")
 jax.config.update("jax_default_matmul_precision", "highest")
 settings.register_profile("default", deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 settings.load_profile("default")
+# The soak draws new cases, and prints how to repeat one that fails.
+settings.register_profile("soak", derandomize=False, print_blob=True, max_examples=1000)
 
 
 def _group(path: str) -> str:
@@ -74,6 +77,12 @@ def pytest_xdist_make_scheduler(config, log):
     return _Groups(config, log)
 
 
+def pytest_addoption(parser):
+    """Where time goes, and parts of the tests for machines side by side."""
+    parser.addoption("--record", type=Path, metavar="FILE", help="write time and compiled programs of each test there")
+    parser.addoption("--shard", default="1/1", metavar="K/N", help="run only the K-th of N parts of the tests")
+
+
 def pytest_configure(config):
     """Before jax compiles anything. The soak takes batches and flags of users."""
     if "not soak" in config.option.markexpr:
@@ -84,7 +93,11 @@ def pytest_configure(config):
         cheap = xla.known_flags(place, [flag for flag in CHEAP if flag not in given])
         os.environ["XLA_FLAGS"] = " ".join([*cheap, *given])
         batches.LARGEST = LARGEST_BATCH
+    elif config.option.markexpr.startswith("soak"):
+        settings.load_profile("soak")
     is_first = not hasattr(config, "workerinput")
+    if config.option.record:
+        config.pluginmanager.register(durations.Recorder(config.option.record, is_first=is_first))
     if is_first and sum(path.stat().st_size for path in COMPILED.rglob("*") if path.is_file()) > LARGEST:
         for path in COMPILED.rglob("*"):
             if path.is_file():
@@ -102,13 +115,34 @@ def pytest_collection():
         gc.enable()
 
 
-def pytest_collection_modifyitems(items):
-    """The long groups first, so that both processes end together: those with most to read."""
+def _mark(items, is_part: bool):
+    """Cases that `quick` does not name are thorough; a name that no case has is an error. Hypothesis' are `drawn`."""
+    cases = collections.defaultdict(set)
+    for item in items:
+        if getattr(item.obj, "is_hypothesis_test", False):
+            item.add_marker("drawn")
+        for mark in item.iter_markers("quick"):
+            cases[item.nodeid.partition("[")[0], mark.args].add(item.callspec.id)
+            if item.callspec.id not in mark.args:
+                item.add_marker("thorough")
+    unknown = [(test, name) for (test, names), known in cases.items() for name in names if name not in known]
+    if unknown and not is_part:
+        raise pytest.UsageError(f"quick names cases that there are not: {unknown}")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config, items):
+    """The long groups first, so that both processes end together: those with most to read. A shard has every N-th."""
+    _mark(items, any("[" in name for name in config.args))
     groups = {item.path: _group(item.path.as_posix()) for item in items}
-    sizes: dict[str, int] = {}
+    sizes: dict[str, int] = collections.Counter()
     for path, group in groups.items():
-        sizes[group] = sizes.get(group, 0) + path.stat().st_size
+        sizes[group] += path.stat().st_size
     items.sort(key=lambda item: (-sizes[groups[item.path]], groups[item.path]))
+    number, count = map(int, config.option.shard.split("/"))
+    kept = sorted(sizes, key=lambda group: (-sizes[group], group))[number - 1 :: count]
+    config.hook.pytest_deselected(items=[item for item in items if groups[item.path] not in kept])
+    items[:] = [item for item in items if groups[item.path] in kept]
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -55,3 +55,18 @@ def test_versions_agree():
     version, date = re.search(r"^version: (.*)\ndate-released: \"(.*)\"$", files["CITATION.cff"], re.M).groups()
     dated = re.findall(r"^## (\d\S*) - (\d{4}-\d\d-\d\d)$", files["CHANGELOG.md"], re.M)
     assert (version, date) == dated[0] and version == __version__
+
+
+def test_the_hosted_workflow_runs_what_ci_runs():
+    """Its parts are all targets of .ci/run, and the tests in all of their shards."""
+    root = Path(__file__).parents[2]
+    script, workflow = (root / name for name in (".ci/run", ".github/workflows/ci.yml"))
+    targets = re.findall(r"^make (.*)$", script.read_text("utf-8"), re.M)
+    targets = [word for line in targets for word in line.split() if word.isalpha()]
+    parts = re.findall(r"^ {10}- (.*)$", workflow.read_text("utf-8"), re.M)
+    shards = [part.split("=")[1] for part in parts if "SHARD" in part]
+    assert shards == [f"{k}/{len(shards)}" for k in range(1, len(shards) + 1)]
+    words = {word for part in parts for word in part.split() if "=" not in word}
+    assert words == set(targets) and len(targets) == len(words)
+    makefile = (root / "Makefile").read_text("utf-8")
+    assert all(f"\n{target}: " in makefile or f"\n{target}:\n" in makefile for target in targets)
