@@ -76,6 +76,7 @@ def checkout(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.prose
 def test_fences_are_seen():
     """Every fence opens and closes a block, so no block escapes the tests below."""
     for page, text in texts().items():
@@ -84,13 +85,8 @@ def test_fences_are_seen():
     assert sum(len(commands(text)) for text in texts().values()) > 100
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "README.md",
-        *(pytest.param(f"docs/{name}.md", marks=pytest.mark.thorough) for name in ("usage", "get_started", "ellipses")),
-    ],
-)
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", ["README.md", "docs/usage.md", "docs/get_started.md", "docs/ellipses.md"])
 def test_python_of_the_first_pages_runs(name, checkout, capsys):
     namespace: dict[str, object] = {"__name__": "first"}
     for text in blocks(ROOT / name, "python"):
@@ -127,6 +123,7 @@ def test_types_of_the_python_of_the_documents(tmp_path):
     assert code == 0, found
 
 
+@pytest.mark.prose
 def test_commands_of_the_documents_parse(checkout):
     for words in (words for text in texts().values() for words in commands(text)):
         options = cli._parser().parse_args(with_widths(words[1:]))
@@ -137,6 +134,7 @@ def test_commands_of_the_documents_parse(checkout):
             assert options.name in tables.TABLES
 
 
+@pytest.mark.prose
 def test_sweeps_of_the_documents_are_read(checkout):
     for text in (block for page in texts().values() for block in fenced(page, "toml")):
         path = checkout / "shown.toml"
@@ -166,6 +164,7 @@ def test_the_first_robot_and_plan(checkout, capsys):
     assert line == f"cspr: {str(caught.value).replace(str(files[1]), 'hall_plan.toml')}\n"
 
 
+@pytest.mark.prose
 def test_sources_are_named_as_what_they_are():
     texts = [
         path for folder in ("cspr_jax", "docs", "sweeps", "tests", "benchmarks") for path in (ROOT / folder).rglob("*")
@@ -183,6 +182,7 @@ def test_files_in_sweeps_are_read():
             assert read_sweep(path).grid.size > 0
 
 
+@pytest.mark.prose
 def test_pages_of_commands_and_functions_are_generated():
     text = (ROOT / "docs" / "command_line.md").read_text("utf-8")
     assert script("generate_command_line").page_text() == text, "call `make docs`"
@@ -190,11 +190,13 @@ def test_pages_of_commands_and_functions_are_generated():
     assert all(f"\n## {name}\n" in texts()[BUILT / "api.md"] for name in cspr_jax.__all__)
 
 
+@pytest.mark.prose
 def test_every_kind_of_map_has_its_page():
     assert set(script("generate_maps").PAGES) == set(MAP_KINDS)
     assert all(f'map = "{name}"' in texts()[BUILT / "maps" / f"{name}.md"] for name in MAP_KINDS)
 
 
+@pytest.mark.thorough
 def test_the_page_of_accuracy_shows_what_is_computed():
     """The numbers that are stored are those of the program, and every table is there."""
     accuracy, text = script("generate_accuracy"), texts()[BUILT / "accuracy.md"]
@@ -203,6 +205,7 @@ def test_the_page_of_accuracy_shows_what_is_computed():
     assert re.findall(r"^## Table (\S+)$", text, re.MULTILINE) == [each for each in tables.TABLES if each != "peers"]
 
 
+@pytest.mark.prose
 def test_the_reference_is_generated():
     text = script("generate_reference").reference_text()
     assert text == (ROOT / "docs" / "reference.md").read_text("utf-8"), "call `make docs`"
@@ -210,6 +213,7 @@ def test_the_reference_is_generated():
     assert all(f"`{name}`" in text for name in wanted)
 
 
+@pytest.mark.prose
 def test_every_picture_has_its_commands():
     """None is left of an older way to make it, and the README gives the arguments that made those it shows."""
     images = script("make_images")
@@ -234,16 +238,19 @@ def long_lines(text: str) -> list[str]:
     return [line for line in lines if len(line) > COLUMNS and not line.startswith("|")]
 
 
+@pytest.mark.prose
 def test_prose_is_wrapped():
     assert {page: lines for page in PAGES if (lines := long_lines(page.read_text("utf-8")))} == {}
 
 
+@pytest.mark.prose
 def test_long_lines_of_prose_are_noticed():
     long = "word " * COLUMNS
     text = f"# Page\n\n| {long} |\n\n```sh\n{long}\n```\n\n[short]({'x' * COLUMNS})\n\n- {long}\n"
     assert long_lines(text) == [f"- {long}"]
 
 
+@pytest.mark.prose
 def test_links_lead_somewhere():
     """In a checkout, where pages that are built with the site are not there, and in these pages."""
     known = {*texts(), BUILT / "rates.png"}
@@ -261,6 +268,7 @@ def test_links_lead_somewhere():
                 assert anchor in slugs, (page, target)
 
 
+@pytest.mark.prose
 def test_what_the_readme_names_is_there():
     names = ("README.md", "docs/usage.md", "docs/comparisons.md", "docs/limits_of_the_program.md")
     text = "\n".join((ROOT / name).read_text("utf-8") for name in names)

@@ -20,11 +20,13 @@ def runner():
     return module
 
 
+@pytest.mark.prose
 def test_there_are_six():
     named = re.findall(r"\]\((\w+)\.ipynb\)", (GALLERY / "README.md").read_text("utf-8"))
     assert sorted(named) == [path.stem for path in NOTEBOOKS] and len(named) >= 6
 
 
+@pytest.mark.prose
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_notebook_is_shown_as_it_ran(path):
     """From its first cell to its last, without an error; it ends with a picture, and names nothing of a machine."""
@@ -41,6 +43,7 @@ def test_a_notebook_is_shown_as_it_ran(path):
     assert not re.search(r"/(?:home|root|tmp|work|Users)/", path.read_text("utf-8"))
 
 
+@pytest.mark.prose
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_the_code_of_a_notebook_can_be_read(path):
     notebook = nbformat.read(path, as_version=4)

@@ -7,6 +7,9 @@ import re
 import tokenize
 from pathlib import Path
 
+import pytest
+
+pytestmark = pytest.mark.prose
 PACKAGE = Path(__file__).parents[2] / "cspr_jax"
 SOURCES = {path.relative_to(PACKAGE).as_posix(): path.read_text("utf-8") for path in sorted(PACKAGE.rglob("*.py"))}
 # Words that say nothing of what they stand for, as names.
