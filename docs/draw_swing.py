@@ -111,7 +111,7 @@ def main() -> None:
         palette.paste(pictures[k], (0, i * pictures[0].height))
     colours = palette.quantize(64, dither=Image.Dither.NONE)
     values = np.array(colours.getpalette()).reshape(-1, 3)
-    values[values.sum(axis=1).argmax()] = 255  # the ground is white
+    values[values.min(axis=1) > 247] = 255  # the ground is white
     colours.putpalette(values.ravel().tolist())
     frames = [one.quantize(palette=colours, dither=Image.Dither.NONE) for one in pictures]
     times = [round(1000.0 / RATE)] * (len(frames) - 1) + [1500]

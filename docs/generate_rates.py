@@ -11,7 +11,7 @@ HEAD = """# Rates over time
 `make bench-record` measures on the machine where it is called, and appends a line to `benchmarks/history.jsonl`, from
 which this page is built. Rates are million checks a second. Ratios are to NumPy in the same run, and carry over to
 other machines better than rates; on a shared host single figures vary by 15 % and more.
-[Performance](../performance.md#a-check) says what a check is, and what limits it.
+[Performance](../performance.md#checks) says what a check is, and what limits it.
 
 ![Checks a second over those of NumPy in the same run, by commit.](rates.png)
 
