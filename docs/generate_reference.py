@@ -130,7 +130,7 @@ tensions and largest cable speeds.
 
 `cspr plan --mjcf NAME.xml` writes a model for MuJoCo, and `NAME_control.csv` with `t`, s, and `tension_1`, ..., N: two
 rows a step of at most `--step` seconds, and one more where steps end at a jump
-([plans in MuJoCo](concepts.md#plans-in-mujoco)).
+([plans in MuJoCo](mujoco.md)).
 """
 
 
