@@ -86,7 +86,7 @@ def test_fences_are_seen():
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("name", ["README.md", "docs/usage.md", "docs/get_started.md", "docs/ellipses.md"])
+@pytest.mark.parametrize("name", ["README.md", "docs/get_started.md", "docs/ellipses.md"])
 def test_python_of_the_first_pages_runs(name, checkout, capsys):
     namespace: dict[str, object] = {"__name__": "first"}
     for text in blocks(ROOT / name, "python"):
