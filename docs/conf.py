@@ -14,6 +14,8 @@ extensions = ["myst_nb"]
 exclude_patterns = ["examples"]
 html_theme = "furo"
 html_title = "cspr_jax"
+html_static_path = ["static"]
+html_css_files = ["site.css"]
 # Notebooks are shown as they ran; `make gallery` runs them.
 nb_execution_mode = "off"
 myst_enable_extensions = ["dollarmath"]

@@ -25,7 +25,7 @@ def row(record: dict) -> str:
     """One line of the table."""
     cells = [record["date"], record["commit"], f"{record['processor']}, {record['cores']}", record["jax"]]
     for kind, key in KINDS.items():
-        cells.append(" / ".join(f"{record[key][dtype] / 1e6:.3g}" for dtype in ("float32", "float64")))
+        cells.append(" / ".join(f"{float(f'{record[key][dtype] / 1e6:.3g}'):,g}" for dtype in ("float32", "float64")))
         cells.append(" / ".join(f"{record['ratio_to_numpy'][kind][dtype]:.3g}" for dtype in ("float32", "float64")))
     return f"| {' | '.join(cells)} |\n"
 
