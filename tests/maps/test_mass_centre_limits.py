@@ -76,7 +76,8 @@ FAR = dict.fromkeys(FLAGS, 1e6)  # the other limit is given all the same, so tha
 def cases():
     """Each kind, and that of point masses in both axes."""
     both = [(name, False) for name in FIXED] + [(name, True) for name in FIXED if name not in PLATFORMS]
-    return [pytest.param(*case, marks=[pytest.mark.thorough] * (case[0] not in QUICK)) for case in both]
+    marks = {case: pytest.mark.soak if case[1] else pytest.mark.thorough for case in both if case[0] not in QUICK}
+    return [pytest.param(*case, marks=marks.get(case, ())) for case in both]
 
 
 def turned_over(keys):
@@ -167,7 +168,7 @@ def test_motions_of_their_own_time_are_judged(tmp_path, kind, is_turned):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("is_turned", [False, True])
+@pytest.mark.parametrize("is_turned", [False, pytest.param(True, marks=pytest.mark.soak)])
 @pytest.mark.parametrize("kind", FASTEST)
 def test_motions_in_the_least_time_keep_them(tmp_path, kind, is_turned):
     keys = {"map": kind} | FASTEST[kind]

@@ -123,6 +123,7 @@ def test_normals_are_determinants():
                 assert normal @ matrix[:, k] == pytest.approx(wanted, abs=1e-13)
 
 
+@pytest.mark.quick("7")
 @pytest.mark.parametrize("count", [6, 7, 8])
 def test_wrenches_of_six_components(count):
     """The same faces serve platforms: against linear programs, and the wrenches of the corners lie on them."""

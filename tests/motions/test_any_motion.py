@@ -32,8 +32,6 @@ NAMES = {
     Verdict.CABLE_TOO_FAST: "cable_speed_max",
     Verdict.CABLE_OVER_ACCELERATION: "cable_acceleration_max",
 }
-# Each kind compiles kernels of its own.
-QUICK = ("2T-2", "3T-4")
 # Ends of intervals agree to this, s; the margin lies within its bounds but for this share of a criterion's size.
 TIME, SHARE = 1e-6, 1e-7
 
@@ -150,13 +148,11 @@ def compare_attained(case, expected, names, reached, start):
         assert np.min(np.abs(sides - reached.high[k])) <= size, (name, reached.high[k], sides)
 
 
-@pytest.mark.parametrize(
-    "kind",
-    [kind if kind in QUICK else pytest.param(kind, marks=pytest.mark.thorough) for kind in KINDS],
-)
+@pytest.mark.quick("2T-2")
+@pytest.mark.parametrize("kind", KINDS)
 def test_proofs_agree_with_the_reference(kind):
     rng = np.random.default_rng([46, KINDS.index(kind)])
-    decided = [compare(random_case(rng, PULLEYS, kind)) for _ in range(10 if kind in QUICK else 28)]
+    decided = [compare(random_case(rng, PULLEYS, kind)) for _ in range(10)]
     assert all(decided)
 
 

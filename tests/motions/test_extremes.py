@@ -108,6 +108,7 @@ def refined(at, motion, columns=None):
     return result
 
 
+@pytest.mark.quick("spline")
 @pytest.mark.parametrize(
     "family", [name if name in QUICK else pytest.param(name, marks=pytest.mark.thorough) for name in PLANS]
 )

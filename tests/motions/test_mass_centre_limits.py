@@ -49,6 +49,7 @@ def test_a_motion_is_proved_up_to_its_largest_value(name, largest, flag):
     assert start == pytest.approx(times[0], abs=0.01) and end == pytest.approx(times[-1], abs=0.01)
 
 
+@pytest.mark.thorough
 def test_platforms_too():
     """The mass centre of a platform that turns, and not another point of it."""
     quaternions = np.stack([np.cos(0.2 * LAW), 0.0 * LAW, 0.0 * LAW, np.sin(0.2 * LAW)], axis=1)
@@ -120,6 +121,7 @@ def test_motions_of_their_own_time_are_judged(family):
         assert cause["criterion"] == flag and cause["needed"] == pytest.approx(value, rel=1e-6)
 
 
+@pytest.mark.quick("bezier")
 @pytest.mark.parametrize("family", families(FASTEST))
 def test_motions_in_the_least_time_keep_them(family):
     keys = {"schema": 1, "family": family, "samples": 2001, **FASTEST[family]}

@@ -107,6 +107,7 @@ def drawn(name, seed):
 
 
 # Platforms compile for seconds.
+@pytest.mark.quick("cubic", "bezier", "transition", "hypocycloid-standard")
 @pytest.mark.parametrize(
     "name", [name if name != "plain" else pytest.param(name, marks=pytest.mark.thorough) for name in CASES]
 )

@@ -8,6 +8,8 @@ import scipy.interpolate
 import scipy.optimize
 from oracles import any_motion, any_motion_cases, motion_clearance, sampled_motion
 
+pytestmark = pytest.mark.thorough
+
 STEP = 1e-5
 
 

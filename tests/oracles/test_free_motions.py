@@ -16,6 +16,8 @@ from oracles import (
     sampled_motion,
 )
 
+pytestmark = pytest.mark.thorough
+
 Pose = free_motions.Pose
 # So deep that the sum of 1 / distance is concave over the ring and largest on its axis: no path is better than it.
 RING = least_time_forms.ring_robot(4, 0.5, 2.0)

@@ -15,6 +15,8 @@ from oracles import (
     sampled_motion,
 )
 
+pytestmark = pytest.mark.thorough
+
 RING, SPOOLS = least_time_forms.ring_robot(3, 1.0, 2.0), least_time_forms.two_spools(1.0)
 WEIGHT = 2.0 * 9.81
 LOW, HIGH = 0.1 * WEIGHT, 1.2 * WEIGHT

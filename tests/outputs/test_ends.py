@@ -71,6 +71,7 @@ def test_other_widths_are_refused(capsys):
         style_of(None, None, None, "side")
 
 
+@pytest.mark.quick("0.25-2", "4.0-3")
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 6])
 @pytest.mark.parametrize("stretched", [0.25, 4.0])
 def test_sections_of_a_column_name_their_axes(reference, count, stretched):
@@ -97,6 +98,7 @@ def test_sections_of_a_column_name_their_axes(reference, count, stretched):
         assert stretched < 1.0 or last - first > 0.7
 
 
+@pytest.mark.quick("None-size0", "column-size2")
 @pytest.mark.parametrize("size", [(3.0, 0.2, 0.2), (0.2, 3.0, 0.3), (0.2, 0.3, 4.0), (1.0, 1.0, 1.0)])
 @pytest.mark.parametrize("preset", [None, "column"])
 def test_boxes_in_space_are_within_the_picture(size, preset):

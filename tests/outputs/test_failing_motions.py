@@ -147,6 +147,7 @@ def shaded(panel):
     return np.stack([bands[..., 0].min(1), bands[..., 0].max(1)], axis=1)
 
 
+@pytest.mark.quick("None", "tensions")
 @pytest.mark.parametrize("quantity", [None, "tensions", "summary"])
 def test_pictures_over_time_shade_them(plan, file, quantity):
     figure = cspr_jax.plot(file, quantity=quantity)
@@ -162,6 +163,7 @@ def test_pictures_over_time_shade_them(plan, file, quantity):
     assert sum(text.get_text() == "fails" for legend in legends for text in legend.get_texts()) == 1
 
 
+@pytest.mark.quick("trajectory")
 @pytest.mark.parametrize("quantity", ["trajectory", "summary"])
 def test_pictures_in_space_have_the_obstacles(file, quantity):
     figure = cspr_jax.plot(file, quantity=quantity)

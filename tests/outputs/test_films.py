@@ -100,6 +100,7 @@ def test_pictures_are_those_of_the_whole_figure(plan):
                 artist.set_animated(True)
 
 
+@pytest.mark.thorough
 def test_a_gif_keeps_what_covers_most_of_its_pictures(plan):
     """White, the greys of the panes and black exactly; lines nearly."""
     columns = plan.rows(200.0)

@@ -17,7 +17,7 @@ from cspr_jax.outputs.plots.motion_pictures import MOTION_PICTURES
 from cspr_jax.outputs.plots.scene import FILLS, box_in_space, colours_of_tension, words_in_space
 from outputs.test_outputs import panels
 
-LIMITED = f"{SHORT}\n[limits]\ntension_min = 0.02\ntension_max = 1.5\n"
+LIMITED = f"{SHORT}\n[limits]\ntension_min = 0.02\ncable_speed_max = 9.0\ntension_max = 1.5\n"
 
 
 @pytest.fixture(scope="module")
@@ -132,13 +132,13 @@ def test_a_wrong_picture_names_those_there_are(motions, capsys):
     assert "absent for a motion but with --quantity acceleration" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    "ending", [pytest.param("png", marks=pytest.mark.thorough), "svg", pytest.param("pdf", marks=pytest.mark.thorough)]
-)
-def test_the_same_motion_gives_the_same_bytes(motions, tmp_path, capsys, ending):
+@pytest.mark.quick("svg-tensions")
+@pytest.mark.parametrize("quantity", ["summary", "tensions"])
+@pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
+def test_the_same_motion_gives_the_same_bytes(motions, tmp_path, capsys, ending, quantity):
     files = [tmp_path / f"{k}.{ending}" for k in range(2)]
     for file in files:
-        cspr_jax.plot(motions / "first.h5", quantity="summary", dpi=60, output=file)
+        cspr_jax.plot(motions / "first.h5", quantity=quantity, dpi=60, output=file)
     assert files[0].read_bytes() == files[1].read_bytes()
 
 
@@ -165,6 +165,7 @@ def test_several_motions_of_a_planar_robot_have_no_view_from_above(tmp_path, fig
     assert len(figure.legends[0].get_texts()) == 2
 
 
+@pytest.mark.quick("trajectory-size0")
 @pytest.mark.parametrize(
     ("quantity", "size"),
     [
@@ -217,10 +218,8 @@ def test_presets_and_titles(motions, figures, capsys):
     assert "cannot be combined with --column" in capsys.readouterr().err
 
 
-def test_speeds_have_their_limits(motions, tmp_path, figures, capsys):
-    text = LIMITED.replace("tension_max", "cable_speed_max = 9.0\ntension_max")
-    assert plan(tmp_path, text, "-o", str(tmp_path / "fast.h5"))[0] == 0
-    figure = drawn(figures, str(tmp_path / "fast.h5"), "--quantity", "summary")
+def test_speeds_have_their_limits(motions, figures, capsys):
+    figure = drawn(figures, str(motions / "first.h5"), "--quantity", "summary")
     rates = next(panel for panel in figure.axes if panel.get_ylabel() == "cable speed (m/s)")
     assert rates.get_legend().get_texts()[0].get_text().startswith("at most 9 m/s")
 

@@ -234,6 +234,7 @@ def test_a_motion_is_drawn(capsys, tmp_path, figures):
     assert panels(figures[0])[1].yaxis_inverted() and "z axis down" in figures[0].get_suptitle()
 
 
+@pytest.mark.quick("a.svg-<?xml")
 @pytest.mark.parametrize(("name", "start"), [("a.png", b"\x89PNG"), ("a.pdf", b"%PDF"), ("a.svg", b"<?xml")])
 def test_pictures_are_files(capsys, tmp_path, name, start):
     path = made(tmp_path / "map.h5", {"x": 3, "y": 3, "z": 1, "z0": 1})

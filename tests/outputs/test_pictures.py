@@ -135,17 +135,18 @@ def test_other_spools_have_their_own_shape(capsys, tmp_path, figures, base, side
     assert (last.get_marker() == "s") == (sides < 3) and (last.get_linewidth() > 0.0) == (sides > 0)
 
 
-def test_sections_are_moved_to_what_is_marked(capsys, tmp_path, figures):
+@pytest.mark.quick("margin")
+@pytest.mark.parametrize("quantity", ["arcs", "margin"])
+def test_sections_are_moved_to_what_is_marked(capsys, tmp_path, figures, quantity):
     """Of 30 heights six are shown; P0 at 1.7 m and the start at 3.0 m are among them, for every quantity."""
     axes = {"x": [-1.0, 1.0], "y": [-1.0, 1.0], "z": np.linspace(0.3, 3.2, 30), "z0": [1.6]}
     arcs = np.ones((2, 2, 30, 1), int)
     path = made(
         tmp_path / "map.h5", axes, {"arcs": arcs, "margin": arcs * 0.5}, trajectory={"from": {"position": [1, 1, 3]}}
     )
-    for quantity in ("arcs", "margin"):
-        cspr(capsys, "plot", path, "--quantity", quantity)
-        titles = [panel.get_title() for panel in panels(figures[-1])]
-        assert titles == ["z = 0.3 m", "z = 0.9 m", "z = 1.7 m", "z = 2 m", "z = 2.6 m", "z = 3 m"]
+    cspr(capsys, "plot", path, "--quantity", quantity)
+    titles = [panel.get_title() for panel in panels(figures[-1])]
+    assert titles == ["z = 0.3 m", "z = 0.9 m", "z = 1.7 m", "z = 2 m", "z = 2.6 m", "z = 3 m"]
 
 
 def test_a_vertical_half_plane_and_a_view_from_above(capsys, tmp_path, figures):
@@ -217,6 +218,7 @@ def test_an_orientation_plane_has_no_label_on_its_head(capsys, tmp_path, figures
     assert "from rest" not in figures[1].get_suptitle()
 
 
+@pytest.mark.quick("minimum-oscillations-oscillations-True", "transition-envelopes-lower_envelope-False")
 @pytest.mark.parametrize(
     ("kind", "quantity", "rest"),
     [

@@ -33,6 +33,7 @@ def passes(places, target):
     return float(np.linalg.norm(places - np.asarray(target), axis=1).min())
 
 
+@pytest.mark.quick("polyline-corner1", "cubic-corner2")
 @pytest.mark.parametrize(("kind", "corner"), [("line", {}), ("polyline", {}), ("cubic", {}), ("quintic", {})])
 def test_a_path_of_its_own_is_that_between_poses(kind, corner):
     """[path] with points, the same points as poses, and as points of the path of one pose."""
@@ -129,6 +130,18 @@ def test_files(tmp_path):
         np.testing.assert_allclose(walked(cspr_jax.plan(path)), whole, atol=1e-12)
 
 
+def test_a_platform_turns_on_the_spot():
+    """Its place stays, and the turn is the shortest."""
+    place, turn = [-0.5, 0.0, 1.0], [np.cos(0.15), 0.0, 0.0, np.sin(0.15)]
+    spot = [{"position": place}, {"position": place, "quaternion": turn}]
+    rows = cspr_jax.plan(PLATFORM | {"path": {"grid": 30}, "pose": spot}).rows()
+    np.testing.assert_allclose(rows["position"], np.tile(place, (201, 1)), atol=1e-12)
+    np.testing.assert_allclose(np.abs(rows["quaternion"][-1] @ turn), 1.0, atol=1e-12)
+    axis = rows["omega"] / np.maximum(np.linalg.norm(rows["omega"], axis=1), 1e-9)[:, None]
+    np.testing.assert_allclose(axis[5:-5], np.tile([0.0, 0.0, 1.0], (191, 1)), atol=1e-6)
+
+
+@pytest.mark.thorough
 def test_orientations_of_platforms(tmp_path):
     places = [[-0.5, 0.0, 1.0], [0.5, 0.0, 1.0], [0.5, 0.6, 1.2]]
     turns = Rotation.from_euler("z", [[0.1], [0.3], [-0.2]])
@@ -153,13 +166,6 @@ def test_orientations_of_platforms(tmp_path):
     np.testing.assert_allclose(np.abs(rows["quaternion"][: corner + 1] @ units[1]), 1.0, atol=1e-9)
     np.testing.assert_allclose(np.abs(rows["quaternion"][: corner + 4] @ units[1]), 1.0, atol=1e-4)
     assert abs(rows["quaternion"][-1] @ units[2]) == pytest.approx(1.0)
-    # On the spot: the place stays, and the turn is the shortest.
-    spot = [{"position": places[0]}, {"position": places[0], "quaternion": units[1]}]
-    rows = cspr_jax.plan(PLATFORM | {"path": {"grid": 30}, "pose": spot}).rows()
-    np.testing.assert_allclose(rows["position"], np.tile(places[0], (201, 1)), atol=1e-12)
-    np.testing.assert_allclose(np.abs(rows["quaternion"][-1] @ units[1]), 1.0, atol=1e-12)
-    axis = rows["omega"] / np.maximum(np.linalg.norm(rows["omega"], axis=1), 1e-9)[:, None]
-    np.testing.assert_allclose(axis[5:-5], np.tile([0.0, 0.0, 1.0], (191, 1)), atol=1e-6)
 
 
 HEAD = 'schema = 1\nrobot = "prototype"\nfamily = "path"\n'
@@ -277,6 +283,7 @@ def test_a_planar_robot_stays_in_its_plane():
         cspr_jax.plan(keys | {"path": {"points": [[0.0, 0.0, 1.0], [0.1, 0.1, 1.0]]}})
 
 
+@pytest.mark.thorough
 def test_a_robot_on_a_joint_turns_along_its_path():
     """The joint stays; the path is that of orientations, and one that moves the joint is refused."""
     ends = np.array([[0.3, 0.0, 0.2], [0.0, 0.3, 0.2], [-0.3, -0.3, 0.2], [0.2, -0.3, 0.2]])

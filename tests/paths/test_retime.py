@@ -167,6 +167,7 @@ def test_long_ramps_are_told(swing):
     assert "retime: ramp_time = 0.1 s: no ramps of that length were found: accelerations jump" in swing[1].warnings
 
 
+@pytest.mark.thorough
 def test_time_that_nothing_bounds(tmp_path):
     """Cables from four corners can pull as hard in all directions as one likes."""
     corners = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 2.0], [-1.0, 0.0, 2.0]]
@@ -206,6 +207,7 @@ def test_mistakes(tmp_path, arguments, line):
     assert (code, err) == (2, f"cspr: {line}\n")
 
 
+@pytest.mark.thorough
 def test_launches_have_their_time():
     planned = cspr_jax.plan(ROOT / "sweeps" / "launch.toml")
     with pytest.raises(ConfigError, match="must be absent for a plan that launches an object"):

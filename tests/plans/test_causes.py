@@ -151,8 +151,9 @@ def test_what_is_named_alone_stands_alone_in_the_way():
     assert kinds["alone"] >= 5 and kinds["several"] >= 5
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize("seed", range(5, 13))
+@pytest.mark.parametrize(
+    "seed", [pytest.param(seed, marks=pytest.mark.thorough if seed == 5 else pytest.mark.soak) for seed in range(5, 13)]
+)
 def test_what_is_named_alone_stands_alone_in_the_way_more(seed):
     check_causes(seed, 100)
 

@@ -185,6 +185,7 @@ def test_nothing_is_accessible_above_the_spools():
         assert len(accessible(ours(MSSM), place(1.0, 0.0, -0.5), definition, 8).angles) == 0
 
 
+@pytest.mark.thorough
 def test_attained_orientations():
     """More arcs allowed attain no fewer, and the same numbers where found; margins are positive where attained."""
     robot = ours(MSSM)

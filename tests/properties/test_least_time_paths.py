@@ -24,7 +24,7 @@ WEIGHT = 2.0 * 9.81
 LOW, HIGH = 0.1 * WEIGHT, 1.2 * WEIGHT
 BETWEEN = {"tension_min": np.full(3, LOW), "tension_max": np.full(3, HIGH)}
 QUICK = [("2T-2", 0, False), ("3T-4", 1, False), ("3R3T-8", 0, True)]
-THOROUGH = [(kind, seed, out) for kind in least_time_cases.KINDS for seed in range(2) for out in (False, True)]
+THOROUGH = [(kind, 1, k % 2 == 0) for k, kind in enumerate(least_time_cases.KINDS)]
 
 
 class Called:
@@ -169,7 +169,7 @@ def test_bounds_where_multipliers_change_fast(kind, seed):
 @pytest.mark.thorough
 @pytest.mark.parametrize("kind, seed, outside", THOROUGH)
 def test_more_random_paths(kind, seed, outside):
-    check_case(least_time_cases.case(kind, seed, outside), SAMPLES["thorough"], 300)
+    check_case(least_time_cases.case(kind, seed, outside), SAMPLES["thorough"], 150)
 
 
 def with_all_limits(case):

@@ -54,11 +54,13 @@ floor = 3.0
 tile = [1, 1, 1]
 """
 TEXTS = {"least-time": LEAST_TIME, "swing-range": SWING_RANGE}
-MAPS = pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS)
+# The other kind of map is searched in the soak.
+MARKS = {"least-time": [], "swing-range": [pytest.mark.soak]}
+MAPS = pytest.mark.parametrize("text", [pytest.param(TEXTS[name], marks=MARKS[name], id=name) for name in TEXTS])
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.fixture(scope="module", params=TEXTS)
+@pytest.fixture(scope="module", params=[pytest.param(name, marks=MARKS[name]) for name in TEXTS])
 def job(request, tmp_path_factory):
     """Words of a command that lack a directory, and the bytes of its result."""
     folder = tmp_path_factory.mktemp("job")

@@ -40,6 +40,7 @@ def judged(*arguments):
 SHAPES = [(2, 3), (3, 5), (3, 8), (6, 8), *(pytest.param(6, n, marks=pytest.mark.thorough) for n in (7, 10))]
 
 
+@pytest.mark.quick("2-3", "6-8")
 @pytest.mark.parametrize(("dof", "count"), SHAPES)
 def test_tensions_are_most_central(dof, count):
     matrices, wrenches, _ = balances(dof, count, count)

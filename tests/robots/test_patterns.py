@@ -96,6 +96,7 @@ def lengths(robot, position, rotation):
     return np.array([length(*map(np.asarray, one))[0] for one in wheels])
 
 
+@pytest.mark.quick("2T-False", "3T-True", "1R2T-True", "2R3T-False", "3R3T-True")
 @pytest.mark.parametrize("wheels", [False, True])
 @pytest.mark.parametrize("pattern", PATTERNS)
 def test_wrenches_are_those_of_virtual_work(pattern, wheels):
@@ -133,6 +134,7 @@ def test_inertial_wrenches_are_those_of_point_masses(pattern):
     np.testing.assert_allclose(found, wanted, atol=1e-12)
 
 
+@pytest.mark.quick("1T", "3R3T")
 @pytest.mark.parametrize("pattern", PATTERNS)
 def test_any_pattern_is_loaded_from_a_file(tmp_path, pattern):
     """With the fewest cables or more; it keeps its weight, and its wrenches do not depend on where z points."""

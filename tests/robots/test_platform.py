@@ -313,6 +313,7 @@ OTHERS = PlatformMotionKind(variable=False, plain=True)
 KINDS = [USUAL, STANDARD, PlatformMotionKind(plain=True), FROM_REST]
 
 
+@pytest.mark.quick("robot0-effective-c3-kind0")
 @pytest.mark.parametrize(
     ("robot", "name", "kind"),
     [

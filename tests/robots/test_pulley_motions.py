@@ -110,6 +110,7 @@ def test_pulleys_of_no_size_are_none():
 QUICK = ("2T", "3R3T")
 
 
+@pytest.mark.quick("3R3T")
 @pytest.mark.parametrize(
     "pattern",
     [pattern if pattern in QUICK else pytest.param(pattern, marks=pytest.mark.thorough) for pattern in PATTERNS],

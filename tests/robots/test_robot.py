@@ -218,6 +218,7 @@ tension_min = {each}\ntension_max = 90.0\ncable_speed_max = 3.0\n"""
     return folder / "robot.toml", each
 
 
+@pytest.mark.quick("four", "eight on a mass")
 @pytest.mark.parametrize("name", FILES)
 def test_files_of_any_number_of_cables_load(tmp_path, name):
     """With their limits, in the file's axes; what a plan or a map would need more for says so in one line."""

@@ -30,6 +30,7 @@ def hangs(drawn, low, high):
     return False
 
 
+@pytest.mark.quick("2T-4")
 @pytest.mark.parametrize(("pattern", "n"), SIZES)
 def test_who_hangs_still_is_who_the_programs_say(pattern, n):
     """Robots that hang and some that cannot, since their smallest tensions are above what the weight asks for."""

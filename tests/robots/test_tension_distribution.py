@@ -104,6 +104,7 @@ def distance(tensions, low, high):
     return np.minimum(tensions - low, high - tensions).min(-1)
 
 
+@pytest.mark.quick("2-4", "6-8")
 @pytest.mark.parametrize(("dof", "count"), SHAPES + [pytest.param(*shape, marks=pytest.mark.soak) for shape in OTHERS])
 def test_against_programs(dof, count):
     """Tensions that a controller takes: the least, the farthest from slack and overload, and a true verdict."""

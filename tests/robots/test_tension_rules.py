@@ -59,6 +59,7 @@ def pseudoinverse_rule(matrix, wrench, low, high, rounds):
     return None
 
 
+@pytest.mark.quick("6-8")
 @pytest.mark.parametrize(("dof", "count"), SHAPES)
 def test_closed_forms(dof, count):
     """What robots' controllers compute: the same tensions, and the same poses without any."""
@@ -165,6 +166,7 @@ def test_a_large_p_is_nearly_the_largest_distance():
         assert answer.x[-1] - 1e-6 <= largest <= answer.x[-1] * 5.0 ** (1.0 / 60.0) + 1e-6
 
 
+@pytest.mark.quick("2-4")
 @pytest.mark.parametrize(
     ("dof", "count"),
     [(6, 8), pytest.param(6, 7, marks=pytest.mark.soak), (2, 4), pytest.param(3, 4, marks=pytest.mark.thorough)],

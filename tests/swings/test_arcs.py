@@ -103,6 +103,7 @@ def test_without_arcs_the_best_candidate_is_reported():
         assert found.duration[i] == pytest.approx(duration)
 
 
+@pytest.mark.thorough
 def test_cables_choose_what_is_shown_without_limits(monkeypatch):
     """Where the cables refuse a cell, limits change nothing of what is shown, and few candidates are refined."""
     ends, wide = random_points(32, 30, far=4.5, deep=3.5, high=1.0)[1], {"base": equilateral(1.7), "z0": 1.2}

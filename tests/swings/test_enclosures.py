@@ -133,6 +133,7 @@ def limited(uncertainty, **tight):
     return Limits(**{name: np.full(3, value) for name, value in (LOOSE | tight).items()}, uncertainty=uncertainty)
 
 
+@pytest.mark.thorough
 def test_a_factor_of_the_mass_is_that_of_the_tensions():
     """T is proportional to the mass: the multiple follows from the extremes of the planned tensions."""
     factor = 1.05

@@ -198,6 +198,7 @@ def test_what_envelopes_prove(name):
     assert np.median(close) < 0.01
 
 
+@pytest.mark.quick("A1")
 @pytest.mark.parametrize("name", ["A1", "quintic", "effective"])
 def test_margins_of_transitions_from_two_functions(name, tilted):
     """The same as from the slack of each cable and the depth, where feasible and where not."""

@@ -125,7 +125,8 @@ def check(rng, body, cells, samples, pulley_radius=0.0):
 @pytest.mark.parametrize(
     ("body", "pulley_radius", "robots", "samples"),
     [
-        ("box", 0.0, 2, 6),
+        ("box", 0.0, 1, 6),
+        pytest.param("box", 0.0, 2, 6, marks=pytest.mark.thorough),
         pytest.param("none", 0.05, 2, 6, marks=pytest.mark.thorough),
         pytest.param("hull", 0.0, 2, 6, marks=pytest.mark.thorough),
         pytest.param("none", 0.0, 30, 100, marks=pytest.mark.soak),

@@ -122,6 +122,7 @@ def held(asked, place):
     return oracle.tension_margin(matrix, weight, low, high) > 0.0
 
 
+@pytest.mark.quick("2T-3", "3R-4", "3R3T-6")
 @pytest.mark.parametrize(("pattern", "n"), [("2T", 3), ("1R2T", 4), ("2R3T", 6), ("3R", 4), ("3R3T", 6)])
 def test_cells_and_poses_have_one_wrench_matrix(pattern, n):
     rng = np.random.default_rng(n)

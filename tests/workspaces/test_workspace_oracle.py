@@ -7,6 +7,8 @@ from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
 from support import cable_robots as robots
 
+pytestmark = pytest.mark.thorough
+
 G = robots.GRAVITY
 EYE = np.eye(3)
 UP = np.array([0.0, 0.0, 1.0])
