@@ -420,7 +420,8 @@ def test_the_section_over_frequencies_shows_their_ends(tmp_path, figures):
 
 
 @pytest.mark.parametrize(
-    "seed", [pytest.param(seed, marks=pytest.mark.thorough if seed in (1, 6) else pytest.mark.soak) for seed in range(8)]
+    "seed",
+    [pytest.param(seed, marks=pytest.mark.thorough if seed in (1, 6) else pytest.mark.soak) for seed in range(8)],
 )
 def test_plans_say_what_the_cells_say_of_random_robots(seed):
     """Three or four level, tilted or uneven spools anywhere, either z axis; limits on tension, speed and floor."""

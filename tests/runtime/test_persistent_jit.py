@@ -60,6 +60,7 @@ print(json.dumps([len(traces), [np.asarray(v).tobytes().hex() for v in values]])
 """
 
 
+@pytest.mark.thorough
 def test_a_second_process_traces_nothing_and_gives_the_same_bits(tmp_path):
     def told(off):
         names = ("XLA_FLAGS", "JAX_COMPILATION_CACHE_DIR", PROGRAMS)

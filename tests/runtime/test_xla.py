@@ -65,6 +65,7 @@ def test_proofs_are_compiled_least_where_little_is_computed(monkeypatch):
     assert compile_options.least() is None
 
 
+@pytest.mark.thorough
 def test_settings_of_the_user_win(tmp_path):
     """Ours stand before theirs, so that XLA takes theirs; their folder and an empty CSPR_CACHE_DIR are left alone."""
     code = SEEN.format(device=None)
@@ -82,6 +83,7 @@ def test_settings_of_the_user_win(tmp_path):
     assert nothing == {"XLA_FLAGS": None, "JAX_COMPILATION_CACHE_DIR": None, "JAX_PLATFORMS": "cpu"}
 
 
+@pytest.mark.thorough
 def test_plans_compile_in_less_time_and_flags_of_the_user_are_not_set_twice(tmp_path):
     """A flag that the user names is left to them, whatever its value."""
     code = SEEN.format(device="quick=True")
@@ -114,6 +116,7 @@ def test_a_flag_is_tried_once_and_refused_ones_are_left_out(tmp_path, monkeypatc
     assert not xla._is_known(tmp_path, "--xla_no_such_flag=1") and len(tries) == 2
 
 
+@pytest.mark.thorough
 def test_flags_that_another_xla_knows_do_not_take_ours_with_them(tmp_path, monkeypatch):
     """Versions of XLA drop flags; what the others are worth stays."""
     monkeypatch.setattr(xla, "QUICK", (xla.QUICK[0], "--xla_no_such_flag=1", xla.QUICK[2]))
@@ -240,6 +243,7 @@ print(own is not None and jax.config.jax_compilation_cache_dir == str(own))
     assert list(whole.iterdir())
 
 
+@pytest.mark.thorough
 def test_another_cache_of_python_users_stays(tmp_path):
     theirs, ours = str(tmp_path / "theirs"), str(tmp_path / "ours")
     code = f"""
@@ -655,6 +659,7 @@ def test_rows_on_a_gpu_give_what_they_give_on_a_cpu(monkeypatch, count):
         np.testing.assert_allclose(found["sine"], expected, rtol=1e-14)
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="arenas are glibc's")
 def test_few_arenas_of_memory(tmp_path):
     """For this process (glibc tells by its statistics) and for those started from it; a user's setting stays."""

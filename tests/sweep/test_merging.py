@@ -193,6 +193,7 @@ def test_what_is_no_map_is_refused(tmp_path, kind):
         cspr_jax.merge([file.parent, file], tmp_path / "joined")
 
 
+@pytest.mark.quick("half-20", "power-45")
 @pytest.mark.parametrize("at", [3, 20, 45, 70, pytest.param(None, marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("mode", ["before", "half", "power", "ENOSPC"])
 def test_a_merge_that_dies_goes_on(tmp_path, at, mode):
