@@ -190,6 +190,18 @@ def test_both_ends_of_feasible_durations_are_sharp():
             assert cspr_jax.bezier_verdicts(robot, first, middle, last, durations=own).feasible[0] == feasible
 
 
+def test_durations_between_two_touches_of_a_cable():
+    """At both ends two roots in c meet: only the discriminant tells them."""
+    robot = cspr_jax.point_mass(SPOOLS, mass=1.0, gravity=9.8)
+    points = np.array([[[0.3, -0.3, 1.7], [-0.3, 0.0, 0.7], [0.0, 0.2, 1.5]]])
+    first, middle, last = np.moveaxis(points, 1, 0)
+    ((low, high),) = cspr_jax.bezier_durations(robot, first, last, control_points=middle)[0]
+    times = np.array([low * (1.0 - 1e-9), low, high, high * (1.0 + 1e-9)])
+    found = cspr_jax.bezier_verdicts(robot, *(np.repeat(x, 4, axis=0) for x in (first, middle, last)), durations=times)
+    np.testing.assert_array_equal(found.feasible, [False, True, True, False])
+    assert (found.verdict[~found.feasible] == Verdict.SLACK_CABLE).all()
+
+
 def slack_of(name, limit, points, time, samples=4000):
     """Smallest slack of a limit by samples, without a unit, and whether it is met."""
     position, velocity, acceleration = oracle.states(points, time, samples)

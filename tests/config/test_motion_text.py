@@ -86,6 +86,14 @@ def test_units_of_rates(tmp_path):
     np.testing.assert_allclose(found.accelerations[0], [5.0 / 3600.0, 0.0, 6000.0], rtol=1e-15)
 
 
+def test_units_of_angular_rates(tmp_path):
+    head = "# units: mm, ms\nt,x,y,z,qw,qx,qy,qz,wx,wy [deg/s],wz [deg/min],wdx,wdy [deg/s^2],wdz [deg/min^2]\n"
+    found = table(tmp_path, head + "0,1,2,3,1,0,0,0,4,5,6,7,8,9\n1,1,2,3,1,0,0,0,4,5,6,7,8,9\n")
+    degree = np.pi / 180.0
+    np.testing.assert_allclose(found.angular_velocities[0], [4000.0, 5.0 * degree, 0.1 * degree], rtol=1e-14)
+    np.testing.assert_allclose(found.angular_accelerations[0], [7e6, 8.0 * degree, 0.0025 * degree], rtol=1e-14)
+
+
 def test_angles(tmp_path):
     """R = Rz(yaw) Ry(pitch) Rx(roll), and Z_phi X_theta Z_(sigma - phi)."""
     turns = {axis: lambda angle, axis=axis: Rotation.from_euler(axis, angle, degrees=True) for axis in "XYZ"}

@@ -9,6 +9,9 @@ from support.ellipses import ellipses, triangle
 from support.motions import states_along
 
 import cspr_jax
+from cspr_jax.ellipses.harmonics import Ellipse
+from cspr_jax.ellipses.ways import Turning, motion_between
+from cspr_jax.motions import amplitudes
 
 GRAVITY = 9.81
 CENTRE, A, B = np.array([0.2, -0.1, 2.0]), np.array([0.5, 0.1, 0.2]), np.array([-0.2, 0.4, -0.1])
@@ -36,6 +39,22 @@ def test_places_and_derivatives(z_axis):
     for value, slope in ((0, 1), (1, 2)):
         rate = jax.jit(jax.vmap(jax.jacfwd(lambda t, k=value: motion.state(t)[k])))(jnp.asarray(tau))
         np.testing.assert_allclose(rate / duration, state[slope], atol=1e-11)
+
+
+def test_derivatives_and_angles_between_ellipses():
+    last = Turning(Ellipse(CENTRE + 0.3, 1.4 * A, 0.6 * B), 2.9, 1.1)
+    motion = motion_between(amplitudes.named("quintic"), Turning(Ellipse(CENTRE, A, B), 2.3, 0.4), last, 2, 0.25)
+    duration, tau = float(motion.duration()), np.linspace(0.0, 1.0, 101)
+    state = states_along(motion, tau)
+    for value, slope in ((0, 1), (1, 2)):
+        rate = jax.jit(jax.vmap(jax.jacfwd(lambda t, k=value: motion.state(t)[k])))(jnp.asarray(tau))
+        np.testing.assert_allclose(rate / duration, state[slope], atol=1e-10)
+    np.testing.assert_allclose(state[0][0], CENTRE + A * np.cos(0.4) + B * np.sin(0.4), atol=1e-12)
+    exact = oracle.states(*last.ellipse, 2.9, np.array([1.1 + 0.5 * np.pi]))
+    for found, own in zip(state[:3], exact, strict=True):
+        np.testing.assert_allclose(found[-1], own[0, 0], atol=1e-11)
+    # From the one angle to the other at the mean pace, and a quarter of a turn.
+    assert duration == pytest.approx((1.1 - 0.4) / 2.6 + 0.5 * np.pi / 2.9, rel=1e-12)
 
 
 def test_bounds_contain_samples():
