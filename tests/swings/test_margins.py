@@ -100,7 +100,7 @@ def test_margins_do_not_depend_on_where_the_samples_lie():
 def test_margins_of_limits():
     """Every limit's column, against many samples; its sign, height and length against the independent reference."""
     name, limit = "prototype", {"tension_min": 0.5, "tension_max": 9.0, "cable_length_max": 2.4}
-    limit |= {"cable_speed_max": 4.0, "cable_acceleration_max": 12.0}
+    limit |= {"cable_speed_max": 4.0, "cable_acceleration_max": 8.0}
     limits = Limits(**{key: np.full(3, value) for key, value in limit.items()}, floor=np.asarray(3.1))
     problem = Problem(ROBOTS[name], limits, QUINTIC)
     starts, ends, arcs, segments = random_segments(name, 7)
@@ -116,7 +116,7 @@ def test_margins_of_limits():
         extremes = oracle.limits(BASES[name], 0.8, starts[i], ends[i], Z0, 9.81, int(arcs[i]), samples=10_001)
         assert found[i, 4] == pytest.approx((3.1 - extremes["z_max"]) / Z0, abs=1e-4)
         assert found[i, 5] == pytest.approx((2.4**2 - extremes["length_max"] ** 2) / (2.0 * Z0**2), abs=1e-4)
-        left = {6: 4.0 - extremes["speed_max"], 7: 12.0 - extremes["cable_acceleration_max"]}
+        left = {6: 4.0 - extremes["speed_max"], 7: 8.0 - extremes["cable_acceleration_max"]}
         if found[i, 1] > 0.0:
             left |= {2: extremes["tension_min"] - 0.5, 3: 9.0 - extremes["tension_max"]}
         assert all((found[i, column] > 0.0) == (value > 0.0) for column, value in left.items())
