@@ -12,7 +12,9 @@ from cspr_jax.robots.kernel_axes import centred
 from cspr_jax.robots.limits import Limits
 from cspr_jax.robots.platform import platform_robot
 from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.workspaces.exact import wrench_margin
 from cspr_jax.workspaces.questions import required_wrenches, requirement
+from cspr_jax.workspaces.required import RequiredWrenches
 from cspr_jax.workspaces.search import Poses, WorkspaceSearch
 
 G = cable_robots.GRAVITY
@@ -140,3 +142,13 @@ def test_cables_at_one_point_are_never_closed():
     places = np.c_[rng.uniform(-1.0, 1.0, 20), np.zeros(20), rng.uniform(-0.5, 0.5, 20)]
     found = cspr_jax.workspace(robot, places, condition="wrench-closure")
     assert (found.verdict == Verdict.WRENCH_INFEASIBLE).all()
+
+
+def test_ellipsoids_of_wrenches():
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        matrix, axes = rng.normal(size=(3, 5)), rng.uniform(0.0, 2.0, 3)
+        low, high = rng.uniform(0.0, 1.0, 5), rng.uniform(5.0, 9.0, 5)
+        held = matrix @ rng.uniform(low, high)
+        found = wrench_margin(matrix, RequiredWrenches(held[None], ellipsoids=(axes,)), low, high)
+        assert found == pytest.approx(oracle.ellipsoid_margin(matrix, held, np.diag(axes), low, high), abs=1e-9)
