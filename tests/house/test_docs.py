@@ -275,3 +275,28 @@ def test_what_the_readme_names_is_there():
     named = re.findall(r"\b(?:tests|docs|sweeps|benchmarks)/[\w/-]+(?:\.\w+)?", text)
     assert len(named) > 5 and all((ROOT / name).exists() for name in named)
     assert not re.search(r"@[A-Z0-9]+@", text), "a number that was never filled in"
+
+
+@pytest.mark.prose
+def test_modules_that_documents_name_exist():
+    """Names such as `platforms.accessible` end a module's path, or name what a module holds."""
+    modules = {
+        "." + ".".join(path.relative_to(ROOT / "cspr_jax").with_suffix("").parts).removesuffix(".__init__"): path
+        for path in (ROOT / "cspr_jax").rglob("*.py")
+    }
+    folders = {part for name in modules for part in name.split(".")}
+    pages = [
+        ROOT / "docs" / f"{name}.md" for name in ("architecture", "add_family", "add_map", "reliability", "theory")
+    ]
+    missing, count = [], 0
+    for page in [*pages, *(ROOT / "docs" / "theory").glob("*.md")]:
+        for name in re.findall(r"`((?:[a-z_0-9]+\.)+\w+)`", page.read_text("utf-8")):
+            head, _, last = name.rpartition(".")
+            if name.split(".")[0] not in folders or last in ("toml", "md", "py"):
+                continue
+            count += 1
+            holders = [path for module, path in modules.items() if module.endswith(f".{head}")]
+            is_module = any(module.endswith(f".{name}") for module in modules)
+            if not is_module and not any(re.search(rf"\b{last}\b", path.read_text("utf-8")) for path in holders):
+                missing.append((page.name, name))
+    assert count > 50 and missing == []
