@@ -15,12 +15,12 @@ def main() -> None:
     import numpy as np
 
     jax.config.update("jax_enable_x64", True)
-    from cspr_jax.arithmetic.chebyshev import DEGREE
-    from cspr_jax.platforms.accessible import accessible
-    from cspr_jax.platforms.attainable import VALUES
-    from cspr_jax.platforms.place_blocks import STEPS
-    from cspr_jax.platforms.place_proof import PARTS
-    from cspr_jax.platforms.proof import WITH_MARGINS
+    from cspr_jax.families.platforms.orientations.accessible import accessible
+    from cspr_jax.families.platforms.orientations.attainable import VALUES
+    from cspr_jax.families.platforms.six_cable_proof.pose_blocks import STEPS
+    from cspr_jax.families.platforms.six_cable_proof.pose_proof import PARTS
+    from cspr_jax.families.platforms.six_cable_proof.tension_proof import WITH_MARGINS
+    from cspr_jax.numerics.bounds.chebyshev import DEGREE
     from cspr_jax.published import chapter_3 as tables
 
     checker = tables.checker_of(options.amplitude)

@@ -16,8 +16,9 @@ def main() -> None:
     import numpy as np
 
     jax.config.update("jax_enable_x64", True)
-    from cspr_jax.robots import clearance, shapes
-    from cspr_jax.robots.platform import platform_robot
+    from cspr_jax.robots.contacts import clearance
+    from cspr_jax.robots.model import shapes
+    from cspr_jax.robots.model.platform import platform_robot
 
     rng, count, signs = np.random.default_rng(0), options.count, (-1.0, 1.0)
     corners = np.array([[x, y, z] for x in signs for y in signs for z in signs])

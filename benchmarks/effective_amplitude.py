@@ -11,15 +11,15 @@ import jax
 import numpy as np
 
 from cspr_jax import load_robot
-from cspr_jax.arithmetic.rotations import from_tilt_torsion
-from cspr_jax.motions import amplitudes
-from cspr_jax.motions.problem import Problem
-from cspr_jax.platforms.arcs import Candidates, smallest_arcs
-from cspr_jax.platforms.beta_hat import OPTIONS, end_options
-from cspr_jax.platforms.checker import PlatformChecker
-from cspr_jax.platforms.motion_checker import MANY
-from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.reference_pose import aligned
+from cspr_jax.families.platforms.arcs import Candidates, smallest_arcs
+from cspr_jax.families.platforms.beta_hat import OPTIONS, end_options
+from cspr_jax.families.platforms.motion_checker import MANY
+from cspr_jax.families.platforms.six_cable_proof.checker import PlatformChecker
+from cspr_jax.motion import amplitudes
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.linear.rotations import from_tilt_torsion
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.statics.reference_pose import aligned
 
 Z0, MAX_ARCS = 1.7, 20
 EPSILONS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5)

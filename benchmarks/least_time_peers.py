@@ -18,17 +18,17 @@ sys.path.append(str(Path(__file__).parents[1] / "tests"))
 from oracles import any_motion_cases, path_rows
 from support.least_time import robot_of, section_of
 
-from cspr_jax.arithmetic.elementary import double_precision, leaf
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.problem import Problem
-from cspr_jax.paths.bound import path_bound
-from cspr_jax.paths.discrete import discretes
-from cspr_jax.paths.jumping import jumping_motions, run_of, solved_together
-from cspr_jax.paths.section import SectionSettings
-from cspr_jax.paths.tightening import cell_slacks
-from cspr_jax.paths.timed import cell_times, timed
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.limits import Limits
+from cspr_jax.families.paths.geometry.section import SectionSettings
+from cspr_jax.families.paths.least_time.bound import path_bound
+from cspr_jax.families.paths.least_time.discrete import discretes
+from cspr_jax.families.paths.least_time.jumping import jumping_motions, run_of, solved_together
+from cspr_jax.families.paths.least_time.tightening import cell_slacks
+from cspr_jax.families.paths.least_time.timed import cell_times, timed
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.elementary import double_precision, leaf
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.statics.kernel_axes import centred
 
 try:
     import toppra

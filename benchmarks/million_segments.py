@@ -27,7 +27,7 @@ def main() -> None:
     from cspr_jax.config.reading import checked
     from cspr_jax.config.robot import resolve_robot
     from cspr_jax.config.sweep import SweepFile
-    from cspr_jax.platforms.poses_map import PosesMap
+    from cspr_jax.families.platforms.orientations.poses_map import PosesMap
 
     here = Path(__file__)
     start = {"position": [1.2, -0.4, 1.5], "tilt_torsion": [0.5, 0.4, 0.2]} if options.from_pose else {"rest": True}

@@ -19,10 +19,10 @@ def main() -> None:
 
     jax.config.update("jax_enable_x64", True)
     from cspr_jax.build.robots import load_robot
-    from cspr_jax.motions.amplitudes import named
-    from cspr_jax.motions.problem import Problem
-    from cspr_jax.robots.limits import Limits
-    from cspr_jax.swings.oscillations import minimum_oscillations, transitions_to
+    from cspr_jax.families.swings.transitions.oscillations import minimum_oscillations, transitions_to
+    from cspr_jax.motion.amplitudes import named
+    from cspr_jax.motion.problem import Problem
+    from cspr_jax.robots.model.limits import Limits
 
     rng, z0 = np.random.default_rng(0), np.full(options.count, 2.0)
     targets = rng.uniform(-3.5, 3.5, (options.count, 3))

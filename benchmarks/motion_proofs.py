@@ -9,13 +9,13 @@ import numpy as np
 from cspr_jax.build.robots import load_robot
 from cspr_jax.curves.interpolation import interpolated
 from cspr_jax.curves.several import SeveralSplines
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.proved_answers import proof_of, proofs_of
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.problem import Problem
 from cspr_jax.robots.cables import wrench_units
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.tension_programs import by_program
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.statics.kernel_axes import centred
+from cspr_jax.robots.tensions.tension_programs import by_program
+from cspr_jax.verification.proved_answers import proof_of, proofs_of
 
 INSTANTS, PROGRAMS, ROWS, DURATION = 200, 5, 10_001, 10.0
 # Robots, the middle of their motions and how far these go, m, tilts, and limits of tensions, N.

@@ -49,9 +49,9 @@ def six_cables(count: int) -> tuple[float, int]:
     """The bench's kernel over all trajectories, whatever their numbers."""
     import jax
 
-    from cspr_jax.arithmetic.batches import in_threads
     from cspr_jax.bench import six_cables as bench
     from cspr_jax.bench.timing import best
+    from cspr_jax.numerics.batches import in_threads
 
     given = bench.work(count)
 
@@ -68,7 +68,7 @@ def three_cables(count: int) -> tuple[float, int]:
 
     from cspr_jax.bench import three_cables as bench
     from cspr_jax.bench.timing import best
-    from cspr_jax.swings.arcs import minimum_arcs
+    from cspr_jax.families.swings.arcs import minimum_arcs
 
     given = bench.work()
     ends = np.random.default_rng(0).uniform([-1.5, -1.5, 0.3], [1.5, 1.5, 3.2], (count, 3))

@@ -1,5 +1,5 @@
 // The check of a platform on six cables that meet in pairs, by hand: sixteen transitions from rest a vector, threads
-// along the transitions. The mathematics are those of cspr_jax/platforms/from_rest_lanes.py and robots/wrench_lanes.py.
+// along the transitions. The mathematics are those of families/platforms/from_rest_lanes.py and robots/statics/wrench_lanes.py.
 #include "vectors.h"
 typedef Lanes Triple[3];
 

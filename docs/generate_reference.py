@@ -5,16 +5,16 @@ from pathlib import Path
 
 from pydantic import BaseModel
 
-from cspr_jax.config.launch import LaunchSearch
-from cspr_jax.config.limits import LimitTable
-from cspr_jax.config.obstacles import ObstacleTable
-from cspr_jax.config.path import PathTable, TargetPath
+from cspr_jax.config.keys.launch import LaunchSearch
+from cspr_jax.config.keys.limits import LimitTable
+from cspr_jax.config.keys.obstacles import ObstacleTable
+from cspr_jax.config.keys.path import PathTable, TargetPath
 from cspr_jax.config.plan import DepthRule, PlanFile
-from cspr_jax.config.pose import Pose
+from cspr_jax.config.keys.pose import Pose
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import Axes, AxisRange, From, Orientations, RunTable, SweepFile, SweepTrajectory
-from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude
-from cspr_jax.config.workspace import WorkspaceTable
+from cspr_jax.config.keys.trajectory import NamedAmplitude, PolynomialAmplitude
+from cspr_jax.config.keys.workspace import WorkspaceTable
 from cspr_jax.errors import ExitCode
 from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind
 from cspr_jax.schema.plan_fields import CHECK, LAUNCH, SCATTER, SECTION, SEGMENT, WHOLE

@@ -23,8 +23,8 @@ from xdist.scheduler import LoadScopeScheduling
 
 shapes.install()
 
-from cspr_jax.arithmetic import batches, elementary
-from cspr_jax.robots import point_mass
+from cspr_jax.numerics import batches, elementary
+from cspr_jax.robots.model import point_mass
 from cspr_jax.runtime import xla
 
 # Passes of Python's collector over the objects of jax take a tenth of the time.

@@ -10,12 +10,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
-from cspr_jax.api.argument_checks import checked
-from cspr_jax.api.check_keys import NAME, check_keys
+from cspr_jax.api.arguments.check_keys import NAME, check_keys
+from cspr_jax.api.arguments.checks import checked
 from cspr_jax.api.notebooks import Displayed
 from cspr_jax.api.plans import Plan
-from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.build.robots import build_robot
 from cspr_jax.build.scenes import scene_of
 from cspr_jax.config.mappings import text_of
@@ -25,20 +23,22 @@ from cspr_jax.config.robot import resolve_robot
 from cspr_jax.curves.files import reference_of, samples_of
 from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.motions.motion import Placed
-from cspr_jax.motions.proved_answers import MotionProof, proof_of
-from cspr_jax.motions.stretching import SLOWEST, least_stretching
+from cspr_jax.families.splines.functions import FunctionMotion, function_motion
+from cspr_jax.motion.motion import Placed
+from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.numerics.linear.frames import frame_of
 from cspr_jax.outputs import check_report
 from cspr_jax.outputs.limits_touched import TouchedLimit, limits_touched
 from cspr_jax.plans import planning
 from cspr_jax.plans.long_motions import long_plan
 from cspr_jax.robots.cables import AnyRobot
-from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.model.limits import Limits
 from cspr_jax.schema.limits import LIMITS
-from cspr_jax.splines.functions import FunctionMotion, function_motion
+from cspr_jax.verification.proved_answers import MotionProof, proof_of
+from cspr_jax.verification.time_stretching import SLOWEST, least_stretching
 
 if TYPE_CHECKING:
-    from cspr_jax.store.result import Result
+    from cspr_jax.store.reading.result import Result
 
 
 @dataclasses.dataclass(frozen=True, repr=False)

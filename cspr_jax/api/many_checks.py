@@ -7,10 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from cspr_jax.api.argument_checks import checked
-from cspr_jax.api.check_keys import NAME, check_keys
-from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.arithmetic.frames import frame_of
+from cspr_jax.api.arguments.check_keys import NAME, check_keys
+from cspr_jax.api.arguments.checks import checked
 from cspr_jax.build.problems import build_problem
 from cspr_jax.build.robots import build_robot
 from cspr_jax.build.scenes import scene_of
@@ -20,13 +18,15 @@ from cspr_jax.config.robot import resolve_robot
 from cspr_jax.curves.files import kept_to, placed_inward, reference_of, samples_of, source_spline
 from cspr_jax.curves.several import SeveralSplines
 from cspr_jax.errors import InputError
-from cspr_jax.motions.attained import with_attained
-from cspr_jax.motions.cause import Cause
-from cspr_jax.motions.proved_answers import answers_of, judge_all_robots, proofs_of
+from cspr_jax.motion.cause import Cause
+from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.numerics.linear.frames import frame_of
 from cspr_jax.robots.cables import AnyRobot
-from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.model.limits import Limits
 from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.families import FAMILIES
+from cspr_jax.verification.attained import with_attained
+from cspr_jax.verification.proved_answers import answers_of, judge_all_robots, proofs_of
 
 
 @dataclasses.dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 from cspr_jax.errors import CsprError, printable
 
 if TYPE_CHECKING:
-    from cspr_jax.store.result import Result
+    from cspr_jax.store.reading.result import Result
 
 MOST_LINES = 8
 DPI = 80  # of pictures in notebooks
@@ -41,7 +41,7 @@ class Displayed(abc.ABC):
 
 def _image(result: "Result") -> str:
     from cspr_jax.outputs.plots.draw import drawn  # matplotlib takes time
-    from cspr_jax.outputs.plots.style import Style, in_style, laid_out, rendered
+    from cspr_jax.outputs.plots.style.style import Style, in_style, laid_out, rendered
 
     style = Style(dpi=DPI)
     with in_style(style):

@@ -7,25 +7,25 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cspr_jax.api.argument_checks import checked
+from cspr_jax.api.arguments.checks import checked
 from cspr_jax.api.notebooks import Displayed, plan_summary
-from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.config.mappings import plain, text_of
 from cspr_jax.config.plan import plan_keys
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.motions.landings import LaunchErrors, Scatter
-from cspr_jax.motions.launch_outcome import LaunchOutcome
+from cspr_jax.launch.landings import LaunchErrors, Scatter
+from cspr_jax.launch.launch_result import LaunchOutcome
+from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.outputs import motion_files, plan_report
-from cspr_jax.outputs.mujoco_motion import STEP
+from cspr_jax.outputs.mujoco.motion import STEP
 from cspr_jax.plans import planning
 from cspr_jax.schema import labelled
-from cspr_jax.store.disk import Disk
-from cspr_jax.store.publishing import publish
+from cspr_jax.store.files.disk import Disk
+from cspr_jax.store.files.publishing import publish
 
 if TYPE_CHECKING:
     import xarray
 
-    from cspr_jax.store.result import Result
+    from cspr_jax.store.reading.result import Result
 
 # Errors name this in place of a file where there is none; paths are relative to the current folder.
 NAME = Path("plan")
@@ -121,7 +121,7 @@ class Plan(Displayed, planning.PlannedMotions):
         if not (self.feasible or anyway):
             raise ConfigError(path, "not written, since a segment is not proved feasible (anyway=True writes it)")
         with double_precision():
-            from cspr_jax.outputs.mjcf import write_mjcf  # SciPy's rotations take time
+            from cspr_jax.outputs.mujoco.mjcf import write_mjcf
 
             write_mjcf(self, path, step)
         return path
@@ -143,8 +143,8 @@ class Plan(Displayed, planning.PlannedMotions):
                 motion, or no encoder for .mp4.
             StoreError: a file cannot be written.
         """
-        from cspr_jax.outputs.plots.film import RATES, film
-        from cspr_jax.outputs.plots.style import Style, in_style
+        from cspr_jax.outputs.plots.films.film import RATES, film
+        from cspr_jax.outputs.plots.style.style import Style, in_style
 
         path, length = Path(path), float(np.sum(self.answers.duration))
         if not (self.feasible or anyway):
@@ -174,7 +174,7 @@ class Plan(Displayed, planning.PlannedMotions):
             StoreError: numbers that no motion file has.
         """
         from cspr_jax.outputs.path_columns import path_columns  # plans load no results
-        from cspr_jax.store.result import motion_result
+        from cspr_jax.store.reading.result import motion_result
 
         with double_precision():
             columns = motion_files.rows(self) | motion_files.segments(self) | self.outcome_columns

@@ -3,11 +3,11 @@
 import dataclasses
 from typing import TypeVar
 
-from cspr_jax.api.argument_checks import checked
+from cspr_jax.api.arguments.checks import checked
 from cspr_jax.api.checks import Check
 from cspr_jax.api.plans import NAME, Plan
-from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.config.path import GRID, RAMP_TIME
+from cspr_jax.config.keys.path import GRID, RAMP_TIME
+from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.plans.retiming import retimed
 
 Kind = TypeVar("Kind", Plan, Check)

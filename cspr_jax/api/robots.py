@@ -2,16 +2,16 @@
 
 import numpy as np
 
-from cspr_jax.api.argument_checks import checked
+from cspr_jax.api.arguments.checks import checked
 from cspr_jax.build.robots import load_robot as _load_robot
 from cspr_jax.errors import InputError
-from cspr_jax.motions.given_limits import pair_limits
+from cspr_jax.motion.given_limits import pair_limits
 from cspr_jax.robots.cables import with_cables as _with_cables
-from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.parallel_pairs import parallel_pairs
-from cspr_jax.robots.platform import RIGID, PlatformRobot, platform_robot
-from cspr_jax.robots.point_mass import STANDARD_GRAVITY, Axis, PointMassRobot
-from cspr_jax.robots.point_mass import point_mass_robot as _point_mass_robot
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.parallel_pairs import parallel_pairs
+from cspr_jax.robots.model.platform import RIGID, PlatformRobot, platform_robot
+from cspr_jax.robots.model.point_mass import STANDARD_GRAVITY, Axis, PointMassRobot
+from cspr_jax.robots.model.point_mass import point_mass_robot as _point_mass_robot
 
 load_robot = checked(_load_robot, "load_robot", __name__)
 platform = checked(platform_robot, "platform", __name__)
@@ -105,7 +105,7 @@ def parallel_pair_robot(
 
 @checked
 def three_cable_equivalent(robot: PlatformRobot) -> PointMassRobot:
-    """Point mass on three cables, equivalent to a platform on six in parallel pairs; see `robots.parallel_pairs`.
+    """Point mass on three cables, equivalent to a platform on six in parallel pairs; see `robots.model.parallel_pairs`.
 
     Args:
         robot: a platform whose axes are parallel to the fixed axes where the cables of its pairs are parallel.

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cspr_jax.api.argument_checks import checked
+from cspr_jax.api.arguments.checks import checked
 from cspr_jax.api.notebooks import Displayed
 from cspr_jax.config.mappings import plain, text_of
 from cspr_jax.errors import ConfigError
@@ -20,8 +20,8 @@ from cspr_jax.outputs.volumes import WorkspaceVolume, volume_of
 from cspr_jax.runtime.processes import check_count
 from cspr_jax.runtime.xla import keep_compiled_code as _keep_compiled_code
 from cspr_jax.schema import labelled
-from cspr_jax.store.result import Result
-from cspr_jax.store.result import open_result as _open_result
+from cspr_jax.store.reading.result import Result
+from cspr_jax.store.reading.result import open_result as _open_result
 from cspr_jax.sweep import engine, inspection
 from cspr_jax.sweep.definition import Sweep, read_sweep, run_directory, sweep_of
 from cspr_jax.sweep.work import Executor
@@ -36,7 +36,7 @@ keep_compiled_code = checked(_keep_compiled_code, "keep_compiled_code", __name__
 
 
 class DisplayedResult(Displayed, Result):
-    """Result that shows itself; see `store.result.Result`."""
+    """Result that shows itself; see `store.reading.result.Result`."""
 
     def _summary(self) -> list[str]:
         name = self.attributes.get("map") or "motion"

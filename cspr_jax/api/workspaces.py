@@ -5,24 +5,24 @@ import math
 
 import numpy as np
 
-from cspr_jax.api.argument_checks import checked
-from cspr_jax.api.arguments import check_in_plane, check_point_mass, points_of, quaternions
-from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.api.arguments.checks import checked
+from cspr_jax.api.arguments.kernel_arguments import check_in_plane, check_point_mass, points_of, quaternions
 from cspr_jax.errors import InputError
 from cspr_jax.errors.suggestions import one_of
-from cspr_jax.motions.given_limits import limits_over
-from cspr_jax.robots.kernel_axes import centred, prepared
-from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.patterns import PATTERNS
-from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.robots.point_mass import PLANAR, PointMassRobot
-from cspr_jax.robots.wrench_sets import Faces, spanning
+from cspr_jax.motion.given_limits import limits_over
+from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.numerics.linear.frames import Frame
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.patterns import PATTERNS
+from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.robots.model.point_mass import PLANAR, PointMassRobot
+from cspr_jax.robots.statics.kernel_axes import centred, prepared
+from cspr_jax.robots.statics.wrench_sets import Faces, spanning
 from cspr_jax.schema.given_numbers import numbers
 from cspr_jax.schema.verdicts import FLAGS
 from cspr_jax.workspaces.acceleration_search import faces_of, judged
-from cspr_jax.workspaces.geometry import mass_centres
-from cspr_jax.workspaces.questions import CONDITIONS, FEASIBLE, check_cables, required_wrenches, requirement
+from cspr_jax.workspaces.poses.geometry import mass_centres
+from cspr_jax.workspaces.requirements import CONDITIONS, FEASIBLE, check_cables, required_wrenches, requirement
 from cspr_jax.workspaces.search import WorkspaceAnswers, WorkspaceSearch
 from cspr_jax.workspaces.sensitivities import SensitivitySearch
 

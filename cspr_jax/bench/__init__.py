@@ -7,8 +7,8 @@ from typing import Any
 
 import jax
 
-from cspr_jax.arithmetic.batches import room
 from cspr_jax.bench import ellipses, hand_written, motions, paths, six_cables, three_cables, timing, workspaces
+from cspr_jax.numerics.batches import room
 
 SCHEMA = 1
 

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.bench.timing import best
 from cspr_jax.build.robots import load_robot
-from cspr_jax.ellipses import harmonics
-from cspr_jax.ellipses.harmonics import Ellipse
-from cspr_jax.ellipses.hull import SpoolHull, hull_of
-from cspr_jax.robots.kernel_axes import centred
+from cspr_jax.families.ellipses import harmonics
+from cspr_jax.families.ellipses.harmonics import Ellipse
+from cspr_jax.families.ellipses.hull import SpoolHull, hull_of
+from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.robots.statics.kernel_axes import centred
 
 if TYPE_CHECKING:
     from jaxtyping import Float

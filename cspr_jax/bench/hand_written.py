@@ -15,12 +15,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from cspr_jax.arithmetic.lanes import Vector
 from cspr_jax.bench import six_cables, three_cables
 from cspr_jax.bench.timing import best
 from cspr_jax.errors import ConfigError
-from cspr_jax.platforms.from_rest_lanes import rest_table, swings
-from cspr_jax.swings import sieve
+from cspr_jax.families.platforms.from_rest_lanes import rest_table, swings
+from cspr_jax.families.swings.proof import screen
+from cspr_jax.numerics.linear.lanes import Vector
 
 FLAGS = (
     "-O3",
@@ -93,21 +93,21 @@ def _pointers(*arrays: np.ndarray) -> list[ctypes.c_void_p]:
 
 
 def _three_cables(kernel: Callable, work: three_cables.ThreeCableWork) -> float:
-    tau = (np.arange(sieve.SAMPLES) + 0.5) / sieve.SAMPLES
+    tau = (np.arange(screen.SAMPLES) + 0.5) / screen.SAMPLES
     calls, buffers = [], []
     for first, segments in ((0, work.segments[1]), (1, work.segments[0])):
         arcs = np.arange(1, three_cables.MAX_ARCS + 1)[first::2]
         s = jax.tree.map(np.asarray, segments)
         fields = [s.start_radius, s.end_radius - s.start_radius, s.precession, s.sense, *s.tilt.T]
         fields += [*s.pull.reshape(-1, 6).T, *s.twist.T]
-        table = sieve.sample_table(work.problem.amplitude, arcs, tau, np.float32)
+        table = screen.sample_table(work.problem.amplitude, arcs, tau, np.float32)
         inputs = [_lined(x) for x in (np.stack(fields), table, arcs, tau)]
         out = _lined(np.zeros((len(arcs), len(s.rate))))
         sizes = ctypes.c_size_t(len(s.rate)), ctypes.c_int(len(arcs)), ctypes.c_int(len(tau))
         calls.append(partial(kernel, *_pointers(*inputs), *sizes, *_pointers(out)))
         buffers.append((inputs, out))
-        few = jax.tree.map(lambda x: x[: sieve.BATCH], s)
-        _compare("three_cables.cpp", out, calls[-1], sieve.smallest_sampled(work.problem.amplitude, few, arcs, tau))
+        few = jax.tree.map(lambda x: x[: screen.BATCH], s)
+        _compare("three_cables.cpp", out, calls[-1], screen.smallest_sampled(work.problem.amplitude, few, arcs, tau))
     return three_cables.checks(len(work.ends)) / best(lambda: [call() for call in calls])
 
 

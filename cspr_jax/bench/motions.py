@@ -6,18 +6,18 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.bench.timing import best
 from cspr_jax.build.robots import load_robot
 from cspr_jax.curves.interpolation import interpolated
 from cspr_jax.curves.several import SeveralSplines
 from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import SelfCheckError
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.proved_answers import MotionProof, proof_of, proofs_of
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.limits import Limits
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.elementary import leaf
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.statics.kernel_axes import centred
+from cspr_jax.verification.proved_answers import MotionProof, proof_of, proofs_of
 
 DURATION, PLACES = 10.0, 7  # s; way-points of a motion
 ROWS, TOGETHER = 10_001, 100  # of a record; motions that are judged together

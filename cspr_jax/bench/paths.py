@@ -6,9 +6,9 @@ from cspr_jax.bench import motions
 from cspr_jax.bench.timing import best
 from cspr_jax.curves.interpolation import interpolated
 from cspr_jax.errors import SelfCheckError
-from cspr_jax.paths.discrete import discretes
-from cspr_jax.paths.jumping import jumping_motions
-from cspr_jax.paths.section import Section, SectionSettings
+from cspr_jax.families.paths.geometry.section import Section, SectionSettings
+from cspr_jax.families.paths.least_time.discrete import discretes
+from cspr_jax.families.paths.least_time.jumping import jumping_motions
 
 # Paths that are solved together; cells of each.
 TOGETHER, CELLS = 64, 500

@@ -15,17 +15,17 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.arithmetic.batches import in_batches, in_threads, padded, room
-from cspr_jax.arithmetic.frames import IDENTITY
 from cspr_jax.bench.timing import best, operations
 from cspr_jax.build.robots import load_robot
-from cspr_jax.motions import amplitudes
-from cspr_jax.motions.platform_kind import PlatformMotionKind
-from cspr_jax.platforms.platform_segment import PlatformSegment, pose_segment
-from cspr_jax.platforms.sieve import smallest_tensions
-from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.robots.point_mass import rest_point
-from cspr_jax.robots.reference_pose import aligned
+from cspr_jax.families.platforms.platform_segment import PlatformSegment, pose_segment
+from cspr_jax.families.platforms.six_cable_proof.screen import smallest_tensions
+from cspr_jax.motion import amplitudes
+from cspr_jax.motion.platform_kind import PlatformMotionKind
+from cspr_jax.numerics.batches import in_batches, in_threads, padded, room
+from cspr_jax.numerics.linear.frames import IDENTITY
+from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.robots.model.point_mass import rest_point
+from cspr_jax.robots.statics.reference_pose import aligned
 
 if TYPE_CHECKING:
     from jaxtyping import Float

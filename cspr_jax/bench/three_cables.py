@@ -10,15 +10,15 @@ from typing import NamedTuple
 import jax
 import numpy as np
 
-from cspr_jax.arithmetic.batches import in_threads, room
 from cspr_jax.bench.timing import best
-from cspr_jax.motions import amplitudes
-from cspr_jax.motions.problem import Problem
-from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.point_mass import point_mass_robot, rest_point
-from cspr_jax.swings import sieve
-from cspr_jax.swings.arcs import segments_between
-from cspr_jax.swings.hypocycloid import Segment
+from cspr_jax.families.swings.arcs import segments_between
+from cspr_jax.families.swings.hypocycloid import Segment
+from cspr_jax.families.swings.proof import screen
+from cspr_jax.motion import amplitudes
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.batches import in_threads, room
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.point_mass import point_mass_robot, rest_point
 
 MAX_ARCS = 30
 BATCHES = 16
@@ -47,7 +47,7 @@ def work() -> ThreeCableWork:
     half = math.sqrt(3.0) / 2.0
     base = RADIUS * np.array([[half, -0.5, 0.0], [-half, -0.5, 0.0], [0.0, 1.0, 0.0]])
     problem = Problem(point_mass_robot(base, mass=0.198), Limits(), amplitudes.named("quintic"))
-    ends = np.random.default_rng(0).uniform([-1.5, -1.5, 0.3], [1.5, 1.5, 3.2], (BATCHES * room(sieve.BATCH), 3))
+    ends = np.random.default_rng(0).uniform([-1.5, -1.5, 0.3], [1.5, 1.5, 3.2], (BATCHES * room(screen.BATCH), 3))
     starts = np.broadcast_to(START, ends.shape).copy()
     parities, _ = segments_between(problem, starts, ends, np.full(len(ends), Z0))
     return ThreeCableWork(problem, ends, (parities[0], parities[1]))
@@ -59,14 +59,14 @@ def rate(work: ThreeCableWork, dtype: str) -> float:
     batches = [jax.device_put(jax.tree.map(lambda x, i=i: x[i::BATCHES], pair)) for i in range(BATCHES)]
 
     def one(batch):
-        return jax.block_until_ready(sieve.upper_bounds(work.problem.amplitude, *batch, max_arcs=MAX_ARCS))
+        return jax.block_until_ready(screen.upper_bounds(work.problem.amplitude, *batch, max_arcs=MAX_ARCS))
 
     return checks(len(work.ends)) / best(partial(in_threads, one, batches))
 
 
 def checks(count: int) -> int:
     """Number of checks of segments."""
-    return count * MAX_ARCS * sieve.SAMPLES
+    return count * MAX_ARCS * screen.SAMPLES
 
 
 def numpy_rate(work: ThreeCableWork) -> float:
@@ -77,7 +77,7 @@ def numpy_rate(work: ThreeCableWork) -> float:
 
 def _numpy_checks(base: np.ndarray, ends: np.ndarray) -> np.ndarray:
     # Return the smallest pseudotension of each segment and number of arcs: (segments, MAX_ARCS).
-    tau = (np.arange(sieve.SAMPLES) + 0.5) / sieve.SAMPLES
+    tau = (np.arange(screen.SAMPLES) + 0.5) / screen.SAMPLES
     amplitude = (10 * tau**3 - 15 * tau**4 + 6 * tau**5, 30 * tau**2 - 60 * tau**3 + 30 * tau**4)
     bend = 60 * tau - 180 * tau**2 + 120 * tau**3
     hub, start, g = rest_point(Z0), np.array(START), 9.81

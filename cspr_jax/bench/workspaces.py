@@ -7,21 +7,21 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from cspr_jax.arithmetic.batches import in_threads, room
-from cspr_jax.arithmetic.elementary import leaf
-from cspr_jax.arithmetic.frames import IDENTITY
 from cspr_jax.bench.timing import best
 from cspr_jax.build.robots import load_robot
-from cspr_jax.robots import clearance_kernels
-from cspr_jax.robots.clearance import scene
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.platform import PlatformRobot, platform_robot
-from cspr_jax.robots.point_mass import PointMassRobot, point_mass_robot
-from cspr_jax.robots.tension_distribution_lanes import least_norms
-from cspr_jax.robots.tension_programs import by_program, by_squares
-from cspr_jax.workspaces import geometry
-from cspr_jax.workspaces.questions import CLOSURE, FEASIBLE, requirement
+from cspr_jax.numerics.batches import in_threads, room
+from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.linear.frames import IDENTITY
+from cspr_jax.robots.contacts import clearance_kernels
+from cspr_jax.robots.contacts.clearance import scene
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.platform import PlatformRobot, platform_robot
+from cspr_jax.robots.model.point_mass import PointMassRobot, point_mass_robot
+from cspr_jax.robots.statics.kernel_axes import centred
+from cspr_jax.robots.tensions.tension_distribution_lanes import least_norms
+from cspr_jax.robots.tensions.tension_programs import by_program, by_squares
+from cspr_jax.workspaces.poses import geometry
+from cspr_jax.workspaces.requirements import CLOSURE, FEASIBLE, requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
 
 # Batches of poses, and of poses with twelve cables.

@@ -1,10 +1,10 @@
 """Limits for the kernels, built from checked files."""
 
-from cspr_jax.config.limits import LimitKeys
+from cspr_jax.config.keys.limits import LimitKeys
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.motions.given_limits import limits_of, pair_limits
-from cspr_jax.robots.limits import Limits
+from cspr_jax.motion.given_limits import limits_of, pair_limits
+from cspr_jax.robots.model.limits import Limits
 
 
 def build_limits(robot_file: RobotFile, keys: LimitKeys, file: object) -> Limits:

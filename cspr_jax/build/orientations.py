@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cspr_jax.arithmetic.frames import IDENTITY, Frame
-from cspr_jax.arithmetic.rotations import UNIT_TOLERANCE, cylindrical_frames, from_tilt_torsion
 from cspr_jax.errors import ConfigError, shown
-from cspr_jax.motions.waypoints import Waypoints
+from cspr_jax.motion.waypoints import Waypoints
+from cspr_jax.numerics.linear.frames import IDENTITY, Frame
+from cspr_jax.numerics.linear.rotations import UNIT_TOLERANCE, cylindrical_frames, from_tilt_torsion
 
 if TYPE_CHECKING:
     from jaxtyping import Float

@@ -2,17 +2,17 @@
 
 from cspr_jax.build.limits import build_limits
 from cspr_jax.build.robots import is_redundant_platform, kernel_robot
-from cspr_jax.config.limits import LimitTable
+from cspr_jax.config.keys.limits import LimitTable
+from cspr_jax.config.keys.trajectory import NamedAmplitude, PolynomialAmplitude, TrajectoryKeys
 from cspr_jax.config.robot import RobotFile
-from cspr_jax.config.trajectory import NamedAmplitude, PolynomialAmplitude, TrajectoryKeys
 from cspr_jax.errors import ConfigError, InputError, shown
-from cspr_jax.motions import amplitudes
-from cspr_jax.motions.amplitudes import Amplitude, boundary_errors
-from cspr_jax.motions.given_limits import check_bounded, check_certain
-from cspr_jax.motions.platform_kind import PlatformMotionKind
-from cspr_jax.motions.problem import Problem
-from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.robots.reference_pose import aligned
+from cspr_jax.motion import amplitudes
+from cspr_jax.motion.amplitudes import Amplitude, boundary_errors
+from cspr_jax.motion.given_limits import check_bounded, check_certain
+from cspr_jax.motion.platform_kind import PlatformMotionKind
+from cspr_jax.motion.problem import Problem
+from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.robots.statics.reference_pose import aligned
 from cspr_jax.schema.families import FAMILIES
 
 

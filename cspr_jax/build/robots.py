@@ -6,18 +6,18 @@ from typing import Any, Literal, overload
 import numpy as np
 
 from cspr_jax.build.limits import build_limits
-from cspr_jax.config.limits import LimitKeys
+from cspr_jax.config.keys.limits import LimitKeys
+from cspr_jax.config.keys.trajectory import TrajectoryKeys
 from cspr_jax.config.robot import RobotFile, resolve_robot
-from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.motions.given_limits import check_bounded
+from cspr_jax.motion.given_limits import check_bounded
 from cspr_jax.robots.cables import with_cables
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.platform import PlatformRobot, platform_robot
-from cspr_jax.robots.point_mass import STANDARD_GRAVITY, PointMassRobot, point_mass_robot
-from cspr_jax.robots.reference_pose import reference_pose
-from cspr_jax.robots.robot import MOVED, check_moved
+from cspr_jax.robots.model.platform import PlatformRobot, platform_robot
+from cspr_jax.robots.model.point_mass import STANDARD_GRAVITY, PointMassRobot, point_mass_robot
+from cspr_jax.robots.model.robot import MOVED, check_moved
 from cspr_jax.robots.static_equilibrium import slack_at_rest
+from cspr_jax.robots.statics.kernel_axes import centred
+from cspr_jax.robots.statics.reference_pose import reference_pose
 
 # Names of the catalogue, by which type checkers tell what `load_robot` returns.
 PointMassName = Literal[

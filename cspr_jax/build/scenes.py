@@ -1,16 +1,16 @@
 """Scenes of motions: what workspaces take, of a robot whose platform has its reference axes."""
 
-from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.build.robots import build_robot
 from cspr_jax.build.surroundings import build_scene
-from cspr_jax.config.obstacles import SurroundingsKeys
+from cspr_jax.config.keys.obstacles import SurroundingsKeys
+from cspr_jax.config.keys.trajectory import TrajectoryKeys
 from cspr_jax.config.robot import RobotFile
-from cspr_jax.config.trajectory import TrajectoryKeys
+from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.robots.cables import AnyRobot
-from cspr_jax.robots.clearance import Scene
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.robots.reference_pose import aligned
+from cspr_jax.robots.contacts.clearance import Scene
+from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.robots.statics.kernel_axes import centred
+from cspr_jax.robots.statics.reference_pose import aligned
 
 
 def scene_of(

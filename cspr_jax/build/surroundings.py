@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cspr_jax.arithmetic.frames import Frame
-from cspr_jax.config.obstacles import SurroundingsKeys
+from cspr_jax.config.keys.obstacles import SurroundingsKeys
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.robots.cables import AnyRobot
-from cspr_jax.robots.clearance import Scene, scene
-from cspr_jax.robots.patterns import PATTERNS
-from cspr_jax.robots.shapes import Body, Obstacle, inward, rotated, turned
+from cspr_jax.robots.contacts.clearance import Scene, scene
+from cspr_jax.robots.model.patterns import PATTERNS
+from cspr_jax.robots.model.shapes import Body, Obstacle, inward, rotated, turned
 
 if TYPE_CHECKING:
     from jaxtyping import Float

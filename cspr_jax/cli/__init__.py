@@ -14,7 +14,7 @@ from cspr_jax import __version__
 from cspr_jax.cli import checks, listings, pictures, plans, published, sweeps
 from cspr_jax.cli.command import Command, printing, warn, write
 from cspr_jax.errors import ConfigError, CsprError, ExitCode, StoreError, printable
-from cspr_jax.outputs.plots.options import with_widths
+from cspr_jax.outputs.plots.style.options import with_widths
 from cspr_jax.runtime import compile_cache, surroundings, terminal
 from cspr_jax.sweep.signals import Prompt, prompt_end
 

@@ -70,8 +70,8 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
 
 
 def _keys(options: argparse.Namespace) -> dict[str, Any]:
-    from cspr_jax.config.limits import LimitTable
-    from cspr_jax.config.obstacles import SurroundingsKeys
+    from cspr_jax.config.keys.limits import LimitTable
+    from cspr_jax.config.keys.obstacles import SurroundingsKeys
     from cspr_jax.config.reading import checked, read_toml
 
     if options.smooth is not None and not 0.0 < options.smooth < float("inf"):

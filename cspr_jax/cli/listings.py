@@ -18,7 +18,7 @@ def _add_import(parser: argparse.ArgumentParser) -> None:
 def _import(options: argparse.Namespace) -> int:
     if options.output is not None and options.output.suffix != ".toml":
         raise ConfigError("-o", f"{options.output}: must end in .toml")
-    from cspr_jax.api.imports import import_robot
+    from cspr_jax.api.files.imports import import_robot
 
     robot = import_robot(options.file, options.set)
     for line in robot.warnings:
@@ -50,7 +50,7 @@ def _robots(options: argparse.Namespace) -> int:
     if not options.names and not options.json:  # what takes long to import is not needed
         print_table(catalogue_table())
         return ExitCode.DONE
-    from cspr_jax.api.listings import list_robots
+    from cspr_jax.api.files.listings import list_robots
 
     robots = list_robots(options.names)
     if options.json:
@@ -62,7 +62,7 @@ def _robots(options: argparse.Namespace) -> int:
 
 
 def _quantities(options: argparse.Namespace) -> int:
-    from cspr_jax.api.listings import list_quantities
+    from cspr_jax.api.files.listings import list_quantities
     from cspr_jax.outputs.listings import quantities_table
 
     quantities = list_quantities()
@@ -78,7 +78,7 @@ def _add_examples(parser: argparse.ArgumentParser) -> None:
 
 
 def _examples(options: argparse.Namespace) -> int:
-    from cspr_jax.api.listings import copy_examples, list_examples
+    from cspr_jax.api.files.listings import copy_examples, list_examples
 
     known = list_examples()
     names = list(known) if options.all else options.name
@@ -106,7 +106,7 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
 
 
 def _new(options: argparse.Namespace) -> int:
-    from cspr_jax.api.listings import new_file
+    from cspr_jax.api.files.listings import new_file
 
     print_path(new_file(options.what, options.path, like=options.like, map=options.map, family=options.family))
     return ExitCode.DONE

@@ -5,12 +5,12 @@ from pathlib import Path
 
 from cspr_jax.cli.command import Command, add_all_errors, add_device, add_output, prepare_jax, print_path, warn
 from cspr_jax.errors import ConfigError, ExitCode
-from cspr_jax.outputs.plots.options import ACCELERATION, add_best, add_motion_plan, add_plot
+from cspr_jax.outputs.plots.style.options import ACCELERATION, add_best, add_motion_plan, add_plot
 from cspr_jax.runtime.progress import waiting
 
 
 def _plot(options: argparse.Namespace) -> int:
-    from cspr_jax.api.pictures import plot
+    from cspr_jax.api.files.pictures import plot
     from cspr_jax.outputs.plots import selection
 
     at = selection.places(options.at)
@@ -74,7 +74,7 @@ def _report(options: argparse.Namespace) -> int:
     output = options.output or source.with_suffix(".html")
     with waiting():
         prepare_jax(options, quick=True)
-        from cspr_jax.api.reports import report
+        from cspr_jax.api.files.reports import report
 
         choices = {
             name: getattr(options, name) for name in ("trajectories", "quantity", "best", "plan", "robot", "z_axis")

@@ -18,9 +18,9 @@ from cspr_jax.cli.command import (
     warn,
 )
 from cspr_jax.errors import ConfigError, ExitCode
-from cspr_jax.outputs.plots.options import add_look
+from cspr_jax.outputs.plots.style.options import add_look
 from cspr_jax.runtime.progress import waiting
-from cspr_jax.store.publishing import check_place
+from cspr_jax.store.files.publishing import check_place
 
 ENDINGS = (".csv", ".h5", ".json")
 SAME_TICK = 1e-6  # of a step, by which the end of a motion may miss the grid of its rows
@@ -237,8 +237,8 @@ def _replay(options: argparse.Namespace) -> int:
         raise ConfigError("-o", f"{options.output}: must end in .png, .pdf, .svg or another picture format")
     _check_step(options)
     check_place(options.output)
-    from cspr_jax.outputs.mujoco_module import need_mujoco
-    from cspr_jax.outputs.plots.style import style_of
+    from cspr_jax.outputs.mujoco.module import need_mujoco
+    from cspr_jax.outputs.plots.style.style import style_of
 
     look = {name: getattr(options, name) for name in ("size", "dpi", "font_size", "preset", "title")}
     style_of(**look)  # before what takes long
@@ -248,7 +248,7 @@ def _replay(options: argparse.Namespace) -> int:
         warn(f"{options.plan}: not played, since a segment is not proved feasible (--anyway plays it)")
         return ExitCode.NOT_FEASIBLE
     with waiting():
-        from cspr_jax.api.replays import replay
+        from cspr_jax.api.files.replays import replay
 
         played = replay(plan, anyway=True, **({} if options.step is None else {"step": options.step}))
         if options.output is not None:

@@ -39,7 +39,7 @@ def _add_table(parser: argparse.ArgumentParser) -> None:
 def _table(options: argparse.Namespace) -> int:
     with waiting():
         prepare_jax(options)
-        from cspr_jax.api import published
+        from cspr_jax.api.files import published
         from cspr_jax.published.tables import table_for_people, table_object
 
     if options.list:
@@ -68,7 +68,7 @@ def _add_bench(parser: argparse.ArgumentParser) -> None:
 
 def _bench(options: argparse.Namespace) -> int:
     prepare_jax(options, prefers_cpu=False)
-    from cspr_jax.api.published import benchmark
+    from cspr_jax.api.files.published import benchmark
     from cspr_jax.bench import lines
 
     report = benchmark(options.kernels)

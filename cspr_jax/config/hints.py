@@ -4,13 +4,13 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.config.near_rest import almost_at_rest
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile, axis_points
 from cspr_jax.errors import shown
-from cspr_jax.robots.spool_plane import in_plane
+from cspr_jax.numerics.linear.frames import frame_of
+from cspr_jax.robots.model.spool_plane import in_plane
 
 # Cameras over stadiums hang from spools up to 250 m apart; a larger robot, such as the cabin of a radio telescope,
 # weighs tonnes.

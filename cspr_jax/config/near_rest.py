@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.errors import shown
-from cspr_jax.robots.spool_plane import AT_P0, size
+from cspr_jax.numerics.linear.frames import frame_of
+from cspr_jax.robots.model.spool_plane import AT_P0, size
 
 # Places nearer to P0 than this, m or of z0, are hardly meant to be other places.
 NEAR_P0 = 1e-3

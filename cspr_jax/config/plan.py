@@ -6,19 +6,19 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, PrivateAttr, Tag, model_validator
 
-from cspr_jax.config.ellipse import WHOLE, EllipseTable
-from cspr_jax.config.free_motions import FreeMotionKeys
+from cspr_jax.config.keys.ellipse import WHOLE, EllipseTable
+from cspr_jax.config.keys.free_motions import FreeMotionKeys
+from cspr_jax.config.keys.launch import LaunchTable
+from cspr_jax.config.keys.limits import LimitTable, Point, Positive
+from cspr_jax.config.keys.obstacles import SurroundingsKeys
+from cspr_jax.config.keys.path import PathTable
+from cspr_jax.config.keys.pose import Pose, Turns
+from cspr_jax.config.keys.trajectory import TrajectoryKeys
 from cspr_jax.config.kinds import refuse_other_kinds
-from cspr_jax.config.launch import LaunchTable
-from cspr_jax.config.limits import LimitTable, Point, Positive
-from cspr_jax.config.obstacles import SurroundingsKeys
-from cspr_jax.config.path import PathTable
-from cspr_jax.config.pose import Pose, Turns
 from cspr_jax.config.reading import LARGEST_FILE, Table, checked, parse_toml
-from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.config.wording import fault, name_of
 from cspr_jax.errors import ConfigError, shown
-from cspr_jax.robots.tension_rule_table import CENTRED, TENSION_RULES
+from cspr_jax.robots.model.tension_rule_table import CENTRED, TENSION_RULES
 
 
 class DepthRule(Table):

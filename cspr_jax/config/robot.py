@@ -9,8 +9,7 @@ from pydantic import Field, PrivateAttr, model_validator
 from cspr_jax.config import catalogue
 from cspr_jax.config.catalogue import catalogue_names as catalogue_names
 from cspr_jax.config.formats.table import ENDINGS, Imported, format_of, parted, read
-from cspr_jax.config.kinds import refuse_other_kinds
-from cspr_jax.config.limits import (
+from cspr_jax.config.keys.limits import (
     LARGEST_LENGTH,
     MOST_CABLES,
     LimitKeys,
@@ -20,18 +19,20 @@ from cspr_jax.config.limits import (
     Positive,
     Row,
 )
+from cspr_jax.config.kinds import refuse_other_kinds
 from cspr_jax.config.reading import checked, other_case, read_toml
 from cspr_jax.config.wording import fault
 from cspr_jax.errors import ConfigError, InputError, demand, shown
 from cspr_jax.errors.suggestions import did_you_mean
-from cspr_jax.robots.parallel_pairs import ParallelPairs, parallel_pairs
-from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.robots.model.parallel_pairs import ParallelPairs, parallel_pairs
+from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.schema.limits import LIMITS
 
 LEAST = "least numbers of cables are " + ", ".join(f"{row.dof} ({row.description})" for row in PATTERNS.values())
 BODIES = " or ".join(f'"{row.name}"' for row in PATTERNS.values() if row.is_body)
 POINTS = " or ".join(f'"{row.name}"' for row in PATTERNS.values() if not row.is_body)
-# Two spools count as level if their heights differ by less than this part of their distance; as in `robots.point_mass`.
+# Two spools count as level if their heights differ by less than this part of their distance; as in
+# `robots.model.point_mass`.
 LEVEL = 1e-9
 
 
@@ -163,7 +164,7 @@ class RobotFile(LimitKeys):
         return self
 
     def parallel_pairs(self) -> ParallelPairs:
-        """Pairs of a platform's cables, `robots.parallel_pairs`."""
+        """Pairs of a platform's cables, `robots.model.parallel_pairs`."""
         if self.platform_points is None:
             raise InputError("platform_points", None, "given", fault="it has no platform_points")
         if self.own_pattern != "3R3T":

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
-from cspr_jax.config.ellipse import SweepEllipse
-from cspr_jax.config.launch import LaunchSearch
-from cspr_jax.config.limits import Coordinate, LimitTable, Point
-from cspr_jax.config.obstacles import Obstacles, SurroundingsKeys
-from cspr_jax.config.path import TargetPath
+from cspr_jax.config.keys.ellipse import SweepEllipse
+from cspr_jax.config.keys.launch import LaunchSearch
+from cspr_jax.config.keys.limits import Coordinate, LimitTable, Point
+from cspr_jax.config.keys.obstacles import Obstacles, SurroundingsKeys
+from cspr_jax.config.keys.path import TargetPath
+from cspr_jax.config.keys.trajectory import BetaHat, Quaternion, TiltTorsion, TrajectoryKeys
+from cspr_jax.config.keys.workspace import WorkspaceTable
 from cspr_jax.config.reading import Table
-from cspr_jax.config.trajectory import BetaHat, Quaternion, TiltTorsion, TrajectoryKeys
 from cspr_jax.config.wording import either, name_of
-from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.schema.quantities import QUANTITIES
 from cspr_jax.schema.tiles import LARGEST_TILE

@@ -3,20 +3,21 @@
 What controllers play is a table of samples or way-points and an interpolation between them: polynomials, piece by
 piece. Over a block of time each lies within a narrow band around a straight line, found from its Bernstein
 coefficients, whether the block holds a part of a piece or hundreds of pieces. From such bands follow bounds of cables,
-of the balance and of tensions (`robots.state_bounds`, `robots.witness_tensions`), and so verdicts between the samples.
-The parameter of a curve is the time of a motion, or the coordinate along a path that no motion runs along yet.
+of the balance and of tensions (`robots.bounds.state_bounds`, `robots.bounds.witness_tensions`), and so verdicts between
+the samples. The parameter of a curve is the time of a motion, or the coordinate along a path that no motion runs along
+yet.
 
 Orientations are quaternions that are interpolated as they are and normalised afterwards.
 
 Files, each importing only from those above it:
 
-    blocks              bounds of states over blocks of time
-    spline              positions and rotations over time
-    several             blocks of several motions together
-    interpolation       cubic, quintic and Hermite curves through samples
-    thinned             curves through every second sample
-    reading             tables and pieces that were read, curves of SciPy, tables window by window
-    noise               noise of recorded samples
-    smoothing           the smoothest curve near them
-    files               motions of files and arrays, in the axes of the kernels
+    blocks          bounds of states over blocks of time
+    spline          positions and rotations over time
+    several         blocks of several motions together
+    interpolation   cubic, quintic and Hermite curves through samples
+    thinned         curves through every second sample
+    reading         tables and pieces that were read, curves of SciPy, tables window by window
+    noise           noise of recorded samples
+    smoothing       the smoothest curve near them
+    files           motions of files and arrays, in the axes of the kernels
 """

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import jax
 import numpy as np
 
-from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.arithmetic.piecewise_bounds import overlaps, piecewise_bounds
-from cspr_jax.arithmetic.rotation_bounds import rotation_bounds
-from cspr_jax.robots.state_bounds import StateBounds
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.bounds.piecewise_bounds import overlaps, piecewise_bounds
+from cspr_jax.numerics.bounds.rotation_bounds import rotation_bounds
+from cspr_jax.robots.bounds.state_bounds import StateBounds
 from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
 

@@ -9,20 +9,20 @@ import numpy as np
 from scipy.interpolate import BarycentricInterpolator
 from scipy.spatial.transform import Rotation
 
-from cspr_jax.arithmetic.elementary import leaf
-from cspr_jax.arithmetic.frames import IDENTITY, Frame
-from cspr_jax.arithmetic.rotations import products
 from cspr_jax.config.motions.table import MotionPieces, MotionTable
 from cspr_jax.config.motions.text import LONGEST, SHORTEST
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.curves.reading import pieces_of, spline_of
 from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import InputError
+from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.linear.frames import IDENTITY, Frame
+from cspr_jax.numerics.linear.rotations import products
 from cspr_jax.robots.cables import AnyRobot
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.patterns import PATTERNS
-from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.robots.reference_pose import aligned
+from cspr_jax.robots.model.patterns import PATTERNS
+from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.robots.statics.kernel_axes import centred
+from cspr_jax.robots.statics.reference_pose import aligned
 
 if TYPE_CHECKING:
     from jaxtyping import Float

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.interpolate import BSpline, CubicSpline, PPoly, make_interp_spline
 
-from cspr_jax.arithmetic.elementary import leaf
-from cspr_jax.arithmetic.piecewise_bounds import bernstein_of_powers
 from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import InputError
+from cspr_jax.numerics.bounds.piecewise_bounds import bernstein_of_powers
+from cspr_jax.numerics.elementary import leaf
 
 if TYPE_CHECKING:
     from jaxtyping import Float

@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import BPoly, BSpline, PPoly
 
-from cspr_jax.arithmetic import rotations
-from cspr_jax.arithmetic.elementary import leaf
-from cspr_jax.arithmetic.piecewise_bounds import bernstein_of_powers
 from cspr_jax.config.motions.table import MotionPieces, MotionTable
 from cspr_jax.config.motions.text import MotionWindow
 from cspr_jax.curves.interpolation import check_order, check_steps, continuous, hermite, interpolated
 from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import InputError
+from cspr_jax.numerics.bounds.piecewise_bounds import bernstein_of_powers
+from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.linear import rotations
 
 # Shares of the largest coefficient by which pieces may miss each other, and by which windows may.
 MEETING, WINDOWS_MEETING = 1e-6, 1e-9

@@ -9,7 +9,7 @@ import numpy as np
 
 from cspr_jax.curves.blocks import spline_bounds
 from cspr_jax.curves.spline import Spline, moved
-from cspr_jax.robots.state_bounds import StateBounds
+from cspr_jax.robots.bounds.state_bounds import StateBounds
 
 if TYPE_CHECKING:
     from jaxtyping import Float, Int
@@ -41,7 +41,7 @@ class SeveralSplines:
         *,
         parabolas: bool = False,
     ) -> StateBounds:
-        """Bounds of the states over blocks; see `motions.motion.BoundedMotion.bounds`."""
+        """Bounds of the states over blocks; see `motion.motion.BoundedMotion.bounds`."""
         bounds = spline_bounds(
             self._knots,
             self._position,

@@ -11,12 +11,12 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.arithmetic import rotations
-from cspr_jax.arithmetic.affine_bounds import cross, turned
-from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.curves.blocks import spline_bounds
-from cspr_jax.robots.state import State
-from cspr_jax.robots.state_bounds import StateBounds
+from cspr_jax.numerics.bounds.affine_bounds import cross, turned
+from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.linear import rotations
+from cspr_jax.robots.bounds.state_bounds import StateBounds
+from cspr_jax.robots.model.state import State
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ USUAL = (64, 256, 1024, 4096)
 
 @dataclasses.dataclass(frozen=True)
 class Spline:
-    """Piecewise polynomial motion; see `motions.motion.Motion`.
+    """Piecewise polynomial motion; see `motion.motion.Motion`.
 
     Fields:
         knots: (m + 1,) instants between the m pieces, the first 0, increasing; s.
@@ -187,7 +187,7 @@ def _bernstein(coefficients: Array, share: Array) -> Array:
 def turning_of(
     quaternion: Float[Array, "4"], first: Float[Array, "4"], second: Float[Array, "4"]
 ) -> tuple[Float[Array, "3 3"], Float[Array, "3"], Float[Array, "3"], Float[Array, "4"]]:
-    """Rotation of a quaternion that is normalised afterwards; as in `arithmetic.rotation_bounds`."""
+    """Rotation of a quaternion that is normalised afterwards; as in `numerics.bounds.rotation_bounds`."""
     square = jnp.dot(quaternion, quaternion)
     unit = quaternion / jnp.sqrt(square)
     rotation = rotations.matrix(unit)

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.curves.interpolation import hermite
 from cspr_jax.curves.spline import Spline
+from cspr_jax.numerics.elementary import leaf
 
 JUMP = 1e-6  # share of the largest acceleration by which one jumps, but for rounding, where legs meet
 

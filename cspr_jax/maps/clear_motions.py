@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from cspr_jax.motions.judged import Join, Judge
-from cspr_jax.motions.problem import Problem
-from cspr_jax.robots.clearance import Scene
+from cspr_jax.motion.problem import Problem
+from cspr_jax.robots.contacts.clearance import Scene
+from cspr_jax.verification.judged import Join, Judge
 
 
 def clear_motions(

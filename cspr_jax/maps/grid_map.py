@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.build.problems import build_problem
 from cspr_jax.config.equivalents import no_equivalent
 from cspr_jax.config.hints import axis_question
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
-from cspr_jax.robots.patterns import PATTERNS
-from cspr_jax.robots.point_mass import AT_P0, plane_normal, rest_point, spool_radius
+from cspr_jax.numerics.linear.frames import frame_of
+from cspr_jax.robots.model.patterns import PATTERNS
+from cspr_jax.robots.model.point_mass import AT_P0, plane_normal, rest_point, spool_radius
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import FLAGS, NOT_PROVED, Verdict
 

@@ -13,12 +13,12 @@ from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
 from cspr_jax.maps.from_places import check_place
 from cspr_jax.maps.grid_map import ROUNDING, GridMap, exceeds
-from cspr_jax.motions.criteria import FLAGS, judged_poses
-from cspr_jax.motions.proved_answers import ProvedAnswers
-from cspr_jax.robots.patterns import PATTERNS
-from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.model.patterns import PATTERNS
+from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.verification.criteria import FLAGS, judged_poses
+from cspr_jax.verification.proved_answers import ProvedAnswers
 
 CONTACTS = functools.reduce(operator.or_, FLAGS.values())
 # Flags that say something of a motion beside its contacts.

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.errors import InputError
-from cspr_jax.robots.point_mass import PLANAR, PointMassRobot, spool_radius
+from cspr_jax.numerics.linear.frames import Frame
+from cspr_jax.robots.model.point_mass import PLANAR, PointMassRobot, spool_radius
 
 # Reach over the size of the robot: to each side of the central vertical, and down from the centroid of the spools.
 ASIDE, DEEP = 2.0, 4.0

@@ -5,7 +5,7 @@ from typing import Self
 
 import numpy as np
 
-from cspr_jax.arithmetic.frames import Frame
+from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.schema.columns import Columns
 
 

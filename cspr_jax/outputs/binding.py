@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cspr_jax.motions.criteria import judged_poses
-from cspr_jax.motions.limits import other_limits
-from cspr_jax.motions.problem import Problem
-from cspr_jax.robots.point_mass import plane_normal, spool_radius
-from cspr_jax.robots.state import State
-from cspr_jax.robots.wrench_sets import tension_range
+from cspr_jax.motion.limits import other_limits
+from cspr_jax.motion.problem import Problem
+from cspr_jax.robots.model.point_mass import plane_normal, spool_radius
+from cspr_jax.robots.model.state import State
+from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.schema.verdicts import FLAGS, Verdict
+from cspr_jax.verification.criteria import judged_poses
 
 if TYPE_CHECKING:
     from jaxtyping import Float
@@ -44,7 +44,7 @@ def binding(
 
 
 def _slacks(problem: Problem, state: State, of_cables: Mapping[str, np.ndarray]) -> list[tuple[Verdict, np.ndarray]]:
-    # Slacks (m, 1), or (m, n_cables), of each criterion, as `motions.proved_answers` compares them.
+    # Slacks (m, 1), or (m, n_cables), of each criterion, as `verification.proved_answers` compares them.
     robot, limits = problem.robot, problem.limits
     weight, size = float(robot.mass * robot.gravity) / robot.n_cables, float(spool_radius(robot))
     low, high = (np.asarray(side, float) for side in tension_range(robot, limits))

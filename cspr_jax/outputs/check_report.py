@@ -6,14 +6,14 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.curves.spline import Spline
-from cspr_jax.motions.criteria import Criterion
-from cspr_jax.motions.demands import EXTREMES
-from cspr_jax.motions.proved_answers import MotionProof, ProvedAnswers
+from cspr_jax.motion.demands import EXTREMES
 from cspr_jax.outputs.plan_report import axes_text, finite, retimed_words, verdict_text
 from cspr_jax.plans.planning import PlannedMotions
-from cspr_jax.robots.wrench_sets import tension_range
+from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.runtime.terminal import cell
 from cspr_jax.schema.verdicts import CRITERIA, Verdict
+from cspr_jax.verification.criteria import Criterion
+from cspr_jax.verification.proved_answers import MotionProof, ProvedAnswers
 
 SCHEMA = 1
 # Intervals of failure that the text names; the JSON has all of them.

@@ -4,8 +4,8 @@ import difflib
 from pathlib import Path
 
 from cspr_jax.errors import ConfigError, RefusedError, StoreError, printable, shown
-from cspr_jax.store.disk import Disk
-from cspr_jax.store.publishing import make_folders
+from cspr_jax.store.files.disk import Disk
+from cspr_jax.store.files.publishing import make_folders
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 

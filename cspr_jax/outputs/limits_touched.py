@@ -12,11 +12,11 @@ import numpy as np
 from cspr_jax.build.scenes import scene_of
 from cspr_jax.curves.spline import Spline
 from cspr_jax.curves.thinned import thinned
-from cspr_jax.motions.block_slacks import block_slacks
-from cspr_jax.motions.cause import Cause
-from cspr_jax.motions.motion_tolerances import instant_states
-from cspr_jax.motions.proved_answers import MotionProof, cause_of
+from cspr_jax.motion.cause import Cause
 from cspr_jax.plans.planning import PlannedMotions
+from cspr_jax.verification.bounds.block_slacks import block_slacks
+from cspr_jax.verification.proved_answers import MotionProof, cause_of
+from cspr_jax.verification.robustness.motion_tolerances import instant_states
 
 # Share of its scale within which the smallest slack of a criterion is compared with what samples leave open.
 NEAR = 1e-3

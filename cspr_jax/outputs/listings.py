@@ -7,7 +7,7 @@ from typing import Any
 
 from cspr_jax.config import catalogue
 from cspr_jax.config.catalogue import FAULTS, catalogue_keys, catalogue_names
-from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.runtime.terminal import cell
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.quantities import AXES, FAILURES, FLIGHT, PATHS, QUANTITIES, SEGMENTS, TRAJECTORY

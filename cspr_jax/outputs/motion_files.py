@@ -12,18 +12,18 @@ import jax.numpy as jnp
 import numpy as np
 
 from cspr_jax import __version__
-from cspr_jax.arithmetic.intervals import united
 from cspr_jax.errors import ConfigError
-from cspr_jax.lines.motion import TimedLine
-from cspr_jax.motions.acceleration_sets import along
-from cspr_jax.motions.motion import Motion, common_shape, outward
+from cspr_jax.families.lines.motion import TimedLine
+from cspr_jax.motion.acceleration_sets import along
+from cspr_jax.motion.motion import Motion, common_shape, outward
+from cspr_jax.numerics.bounds.intervals import united
 from cspr_jax.outputs.binding import binding
 from cspr_jax.outputs.path_columns import path_columns
 from cspr_jax.plans.causes import cause_columns
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.robots import cables
-from cspr_jax.robots.limits import NO_LIMITS, Limits
-from cspr_jax.robots.tension_couples import is_rectangle, tension_couples
+from cspr_jax.robots.model.limits import NO_LIMITS, Limits
+from cspr_jax.robots.tensions.tension_couples import is_rectangle, tension_couples
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.identity import canonical_json
 from cspr_jax.schema.quantities import (
@@ -38,9 +38,9 @@ from cspr_jax.schema.quantities import (
     flag_attributes,
 )
 from cspr_jax.schema.verdicts import FLAGS, Verdict
-from cspr_jax.store.disk import Disk
-from cspr_jax.store.netcdf import describe, new_hdf5, set_attributes
-from cspr_jax.store.publishing import publish
+from cspr_jax.store.files.disk import Disk
+from cspr_jax.store.files.netcdf import describe, new_hdf5, set_attributes
+from cspr_jax.store.files.publishing import publish
 
 SCHEMA = 2
 # Fields of a state by their names in files.

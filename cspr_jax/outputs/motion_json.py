@@ -11,8 +11,8 @@ from cspr_jax.outputs.motion_files import OPEN, SCHEMA, attributes, rows
 from cspr_jax.outputs.plan_report import finite
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.schema.quantities import TRAJECTORY
-from cspr_jax.store.disk import Disk
-from cspr_jax.store.publishing import publish
+from cspr_jax.store.files.disk import Disk
+from cspr_jax.store.files.publishing import publish
 
 # Attributes of motion files that stand beside the rows.
 BESIDE = ("title", "software", "feasible", "family", "robot", "mass", "z_axis", "point", "z0")

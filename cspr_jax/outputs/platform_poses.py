@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from cspr_jax.arithmetic.frames import frame_of
-from cspr_jax.arithmetic.rotations import products
 from cspr_jax.build.robots import build_robot
+from cspr_jax.config.keys.trajectory import TrajectoryKeys
 from cspr_jax.config.robot import RobotFile
-from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.curves.files import reference_of
+from cspr_jax.numerics.linear.frames import frame_of
+from cspr_jax.numerics.linear.rotations import products
 from cspr_jax.schema.quantities import TRAJECTORY
 
 if TYPE_CHECKING:  # pictures need no plans

@@ -13,7 +13,7 @@ from pydantic.fields import FieldInfo
 
 from cspr_jax.config import catalogue
 from cspr_jax.config.formats.writing import value_text
-from cspr_jax.config.obstacles import SurroundingsKeys
+from cspr_jax.config.keys.obstacles import SurroundingsKeys
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import Table
 from cspr_jax.config.robot import RobotFile
@@ -23,8 +23,8 @@ from cspr_jax.errors.suggestions import one_of
 from cspr_jax.outputs.example_files import folder
 from cspr_jax.schema.families import FAMILIES
 from cspr_jax.schema.map_kinds import MAP_KINDS
-from cspr_jax.store.disk import Disk
-from cspr_jax.store.publishing import make_folders
+from cspr_jax.store.files.disk import Disk
+from cspr_jax.store.files.publishing import make_folders
 
 # Keys that are tables of their own; one of them is an array of tables.
 TABLES = ("axes", "trajectory", "orientations", "launch", "ellipse", "workspace", "limits", "run", "pose")

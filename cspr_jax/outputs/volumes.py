@@ -9,7 +9,7 @@ from cspr_jax.errors import InputError
 from cspr_jax.errors.suggestions import with_suggestions
 from cspr_jax.schema.meanings import CELL_SIDES, OPEN_CONDITIONS
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.store.result import Result
+from cspr_jax.store.reading.result import Result
 
 _, INSIDE, OUTSIDE = range(len(CELL_SIDES))
 # Reasons why cells are open, in lines of text.

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cspr_jax.arithmetic.frames import Frame
-from cspr_jax.motions.answers import Answers
-from cspr_jax.motions.cause import UNITS, Cause
-from cspr_jax.motions.motion import Motion
-from cspr_jax.motions.needs import Need, needs
-from cspr_jax.motions.problem import Problem
+from cspr_jax.motion.answers import Answers
+from cspr_jax.motion.cause import UNITS, Cause
+from cspr_jax.motion.motion import Motion
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.schema.verdicts import NO_REASON, Verdict
+from cspr_jax.verification.needs import Need, needs
 
 if TYPE_CHECKING:
     from jaxtyping import Float
@@ -90,8 +90,8 @@ def _of_flag(flag: Verdict, problem: Problem, frame: Frame, answers: Answers, i:
         return Cause(flag.text, needed=1.0, allowed=float(stands), unit=UNITS[flag])
     refuted = answers.details(i).get("refuted_at", math.nan)
     if flag == Verdict.WRENCH_INFEASIBLE and not math.isfinite(refuted) and math.isfinite(answers.duration[i]):
-        from cspr_jax.motions.attained import attained  # few motions need the general proof
-        from cspr_jax.motions.proved_answers import cause_of, sampled_proof
+        from cspr_jax.verification.attained import attained
+        from cspr_jax.verification.proved_answers import cause_of, sampled_proof
 
         return cause_of(attained(problem, motion, sampled_proof(problem, motion)), 0, frame)
     if flag == Verdict.WRENCH_INFEASIBLE:

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from cspr_jax.arithmetic.frames import frame_of
-from cspr_jax.config.ellipse import SweepEllipse, cell_axes
-from cspr_jax.config.obstacles import SurroundingsKeys
-from cspr_jax.config.path import SAME_PLACE, TargetPath
+from cspr_jax.config.keys.ellipse import SweepEllipse, cell_axes
+from cspr_jax.config.keys.obstacles import SurroundingsKeys
+from cspr_jax.config.keys.path import SAME_PLACE, TargetPath
+from cspr_jax.config.keys.trajectory import TrajectoryKeys
 from cspr_jax.config.plan import PlanFile
-from cspr_jax.config.trajectory import TrajectoryKeys
+from cspr_jax.numerics.linear.frames import frame_of
 from cspr_jax.schema.map_kinds import MAP_KINDS
 
 # Quantities that fix the number of arcs, and how many arcs one is.

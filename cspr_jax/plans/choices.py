@@ -10,17 +10,17 @@ from cspr_jax.config.hints import plan_hints
 from cspr_jax.config.near_rest import almost_at_rest
 from cspr_jax.config.plan import DepthRule
 from cspr_jax.errors import ConfigError, shown
-from cspr_jax.motions.amplitudes import Amplitude
-from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.waypoints import Waypoints
+from cspr_jax.families.swings import depths
+from cspr_jax.families.swings.transitions.envelope_oscillations import best_inclination
+from cspr_jax.families.swings.transitions.transition import depth_for, transition, weights
+from cspr_jax.motion.amplitudes import Amplitude
+from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.waypoints import Waypoints
 from cspr_jax.plans.sequence import PlanLegs
-from cspr_jax.robots.point_mass import AT_P0, LARGEST_LENGTH, rest_point, spool_radius
-from cspr_jax.robots.robot import Robot
+from cspr_jax.robots.model.point_mass import AT_P0, LARGEST_LENGTH, rest_point, spool_radius
+from cspr_jax.robots.model.robot import Robot
 from cspr_jax.runtime.stages import within
 from cspr_jax.schema.families import FAMILIES
-from cspr_jax.swings import depths
-from cspr_jax.swings.envelope_oscillations import best_inclination
-from cspr_jax.swings.transition import depth_for, transition, weights
 
 # A conservative z0 must lie above its bound: by this part of it.
 ABOVE_BOUND = 1e-6
@@ -131,7 +131,7 @@ def _depth_of_inclination(problem: Problem, stops: Waypoints) -> float:
 def _best_inclination(problem: Problem, stops: Waypoints) -> float:
     target = stops.targets[0]
     if problem.robot.n_cables > problem.robot.dof:
-        from cspr_jax.swings.oscillations import best_inclinations  # with proofs, which others need not
+        from cspr_jax.families.swings.transitions.oscillations import best_inclinations
 
         return float(best_inclinations(problem, target[None], max_arcs=stops.max_arcs)[0])
     # The weights do not depend on the depth of P0.

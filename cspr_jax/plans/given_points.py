@@ -5,15 +5,15 @@ from typing import Any
 
 import numpy as np
 
-from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.build.orientations import pose_quaternions
 from cspr_jax.build.robots import build_robot
+from cspr_jax.config.keys.pose import Pose
 from cspr_jax.config.plan import PlanFile
-from cspr_jax.config.pose import Pose
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.curves.files import centre_from, reference_of
 from cspr_jax.errors import ConfigError
-from cspr_jax.motions.waypoints import Waypoints
+from cspr_jax.motion.waypoints import Waypoints
+from cspr_jax.numerics.linear.frames import frame_of
 
 # Keys of plans and poses that are of the mass centre, whatever point the positions of poses are of.
 OTHERS = ("ellipse", "path", "launch", "first_control_point", "velocity", "acceleration")

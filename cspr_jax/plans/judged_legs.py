@@ -1,8 +1,8 @@
 """Legs of families that know neither surroundings nor pulleys: each motion is judged with both once it is made.
 
-See `motions.judged`. Where numbers of arcs are free, point masses take the smallest number that is proved, over pulleys
-only those on as many cables as degrees of freedom. Without pulleys platforms do so in legs of one segment. Others keep
-the number that their family chooses.
+See `verification.judged`. Where numbers of arcs are free, point masses take the smallest number that is proved, over
+pulleys only those on as many cables as degrees of freedom. Without pulleys platforms do so in legs of one segment.
+Others keep the number that their family chooses.
 """
 
 import copy
@@ -11,17 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.build.scenes import scene_of
-from cspr_jax.motions.answers import Answers
-from cspr_jax.motions.cause import Cause
-from cspr_jax.motions.judged import Judge
-from cspr_jax.motions.leg import JoinedLeg, Leg
-from cspr_jax.motions.motion import Motion
-from cspr_jax.motions.outcome import LegOutcome
-from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.proved_answers import TENSIONS, MotionProof
+from cspr_jax.motion.answers import Answers
+from cspr_jax.motion.cause import Cause
+from cspr_jax.motion.leg import JoinedLeg, Leg
+from cspr_jax.motion.leg_result import LegOutcome
+from cspr_jax.motion.motion import Motion
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.schema.families import FAMILIES
+from cspr_jax.verification.judged import Judge
+from cspr_jax.verification.proved_answers import TENSIONS, MotionProof
 
 # Details of segments that hold for cables from points alone.
 FROM_POINTS = (
@@ -125,7 +125,7 @@ class JudgedLeg(Leg):
         most = stops.max_arcs if is_searched else 0
         judged = judge.smallest(join, prescribed, step=self._leg.step, max_arcs=most)
         motions = join(np.arange(len(self)), judged.arcs)[1]
-        from cspr_jax.motions.attained import attained  # few plans need it
+        from cspr_jax.verification.attained import attained
 
         proofs = [
             None if proof is None else attained(problem, motion, proof, judge.scene, contacts_alone=not has_pulleys)

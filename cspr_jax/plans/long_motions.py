@@ -7,8 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cspr_jax.arithmetic.frames import IDENTITY, Frame, frame_of
-from cspr_jax.arithmetic.intervals import united
 from cspr_jax.build.problems import build_problem
 from cspr_jax.build.robots import build_robot
 from cspr_jax.build.scenes import scene_of
@@ -19,17 +17,19 @@ from cspr_jax.curves.files import centre_from, kept_to, placed_inward, reference
 from cspr_jax.curves.reading import window_splines
 from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.motions.attained import attained
-from cspr_jax.motions.demands import EXTREMES, SAMPLES, Demands, demands
-from cspr_jax.motions.leg import JoinedLeg
-from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.proved_answers import MotionProof, answers_of, proof_of
-from cspr_jax.motions.time_proof import TimeProof
+from cspr_jax.motion.demands import EXTREMES, SAMPLES, Demands, demands
+from cspr_jax.motion.leg import JoinedLeg
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.bounds.intervals import united
+from cspr_jax.numerics.linear.frames import IDENTITY, Frame, frame_of
 from cspr_jax.plans.planning import PlannedMotions
-from cspr_jax.robots.contact_bodies import shape_corners
-from cspr_jax.robots.limits import NO_LIMITS
+from cspr_jax.robots.contacts.contact_bodies import shape_corners
+from cspr_jax.robots.model.limits import NO_LIMITS
 from cspr_jax.schema.families import FAMILIES
-from cspr_jax.store.motion_samples import motion_windows
+from cspr_jax.store.reading.motion_samples import motion_windows
+from cspr_jax.verification.attained import attained
+from cspr_jax.verification.proved_answers import MotionProof, answers_of, proof_of
+from cspr_jax.verification.time_proof import TimeProof
 
 # Demands that are smallest values; the others are largest ones.
 SMALLEST = ("tension_min", "mu_min", "depth_min", "are_found")

@@ -8,29 +8,29 @@ from typing import Any
 
 import numpy as np
 
-from cspr_jax.arithmetic.frames import Frame
 from cspr_jax.build.problems import build_problem
 from cspr_jax.config.equivalents import as_moved
+from cspr_jax.config.keys.trajectory import NamedAmplitude
 from cspr_jax.config.plan import PlanFile, read_plan
 from cspr_jax.config.reading import read_text
 from cspr_jax.config.robot import RobotFile, resolve_robot
-from cspr_jax.config.trajectory import NamedAmplitude
 from cspr_jax.errors import ConfigError
-from cspr_jax.motions.answers import Answers, joined
-from cspr_jax.motions.demands import SAMPLES, Demands, demands
-from cspr_jax.motions.leg import JoinedLeg
-from cspr_jax.motions.motion import Motion, Placed, states_at
-from cspr_jax.motions.outcome import LegOutcome
-from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.waypoints import Waypoints
+from cspr_jax.motion.answers import Answers, joined
+from cspr_jax.motion.demands import SAMPLES, Demands, demands
+from cspr_jax.motion.leg import JoinedLeg
+from cspr_jax.motion.leg_result import LegOutcome
+from cspr_jax.motion.motion import Motion, Placed, states_at
+from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.waypoints import Waypoints
+from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.plans.causes import Cause, causes
 from cspr_jax.plans.choices import best_amplitude, chosen_depth, nearly_resting
 from cspr_jax.plans.sequence import PlanLegs
-from cspr_jax.robots.limits import NO_LIMITS
-from cspr_jax.robots.patterns import PATTERNS
-from cspr_jax.robots.point_mass import spool_radius
-from cspr_jax.robots.tension_rule_table import TENSION_RULES
-from cspr_jax.robots.wrench_sets import tension_range
+from cspr_jax.robots.model.limits import NO_LIMITS
+from cspr_jax.robots.model.patterns import PATTERNS
+from cspr_jax.robots.model.point_mass import spool_radius
+from cspr_jax.robots.model.tension_rule_table import TENSION_RULES
+from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.schema.families import FAMILIES
 
 # Value that a search for z0 takes for a "best" epsilon, until that is chosen.
@@ -186,7 +186,7 @@ def _attained(problem: Problem, leg: JoinedLeg, stops: Waypoints) -> JoinedLeg:
         return leg
     # Families with proofs of their own need none of these.
     from cspr_jax.build.scenes import scene_of
-    from cspr_jax.motions.attained import with_attained
+    from cspr_jax.verification.attained import with_attained
 
     answers: Any = leg.answers
     keys = stops.keys
@@ -218,7 +218,7 @@ def _shape(problem: Problem, robot_file: RobotFile, frame: Frame, keys: PlanFile
     if keys.platform_box is None and keys.platform_hull is None:
         return None
     from cspr_jax.build.scenes import scene_of  # few plans have a shape
-    from cspr_jax.robots.contact_bodies import shape_corners
+    from cspr_jax.robots.contacts.contact_bodies import shape_corners
 
     scene = scene_of(problem.robot, robot_file, frame, keys, Path("plan"), trajectory=keys)
     return shape_corners(problem.robot, scene)

@@ -11,18 +11,18 @@ import numpy as np
 from cspr_jax.build.scenes import scene_of
 from cspr_jax.curves.spline import Spline, chained
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.motions.answers import replaced
-from cspr_jax.motions.attained import with_attained
-from cspr_jax.motions.motion import Motion, states_at
-from cspr_jax.motions.proved_answers import ProvedAnswers, proved_answers
-from cspr_jax.paths.answers import PathAnswers, feeds_of
-from cspr_jax.paths.discrete import FASTER
-from cspr_jax.paths.least_time import LeastTime, least_time_motions
-from cspr_jax.paths.leg import Ride, cut, section_answer
-from cspr_jax.paths.retraced import Retraced, retraced
-from cspr_jax.paths.section import SectionSettings
+from cspr_jax.families.paths.answers import PathAnswers, feeds_of
+from cspr_jax.families.paths.geometry.section import SectionSettings
+from cspr_jax.families.paths.least_time.discrete import FASTER
+from cspr_jax.families.paths.least_time.least_time import LeastTime, least_time_motions
+from cspr_jax.families.paths.leg import Ride, cut, section_answer
+from cspr_jax.families.paths.retraced import Retraced, retraced
+from cspr_jax.motion.answers import replaced
+from cspr_jax.motion.motion import Motion, states_at
 from cspr_jax.plans.planning import PlannedMotions, with_motions
-from cspr_jax.robots.clearance import Scene
+from cspr_jax.robots.contacts.clearance import Scene
+from cspr_jax.verification.attained import with_attained
+from cspr_jax.verification.proved_answers import ProvedAnswers, proved_answers
 
 # Part of the planned duration by which a motion is shorter at least that takes its place.
 LEAST_GAIN = 1e-4

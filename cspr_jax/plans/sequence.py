@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.config.equivalents import no_equivalent
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.wording import either
 from cspr_jax.errors import ConfigError, shown
-from cspr_jax.motions.leg import Leg
-from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.waypoints import Waypoints
+from cspr_jax.motion.leg import Leg
+from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.waypoints import Waypoints
+from cspr_jax.numerics.linear.frames import frame_of
 from cspr_jax.plans.judged_legs import judged
 from cspr_jax.schema.families import FAMILIES, moving
 

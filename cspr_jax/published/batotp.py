@@ -11,19 +11,19 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from cspr_jax.arithmetic.elementary import leaf
-from cspr_jax.arithmetic.piecewise_bounds import bernstein_of_powers
 from cspr_jax.config.reading import read_toml
 from cspr_jax.curves.spline import Spline
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.proved_answers import proved_answers
-from cspr_jax.paths.least_time import least_time_motion
-from cspr_jax.paths.section import Section, SectionSettings
+from cspr_jax.families.paths.geometry.section import Section, SectionSettings
+from cspr_jax.families.paths.least_time.least_time import least_time_motion
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.bounds.piecewise_bounds import bernstein_of_powers
+from cspr_jax.numerics.elementary import leaf
 from cspr_jax.published.chapter_1 import Key
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.point_mass import point_mass_robot
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.point_mass import point_mass_robot
+from cspr_jax.robots.statics.kernel_axes import centred
+from cspr_jax.verification.proved_answers import proved_answers
 
 # 200 cells for each segment, as many as its file has.
 CELLS = 3800

@@ -13,12 +13,12 @@ from cspr_jax.build.robots import kernel_robot
 from cspr_jax.config.plan import read_plan
 from cspr_jax.config.reading import read_text
 from cspr_jax.config.robot import resolve_robot
-from cspr_jax.lines.faces import Sides, line_faces, sides
-from cspr_jax.lines.motion import s_curve
-from cspr_jax.lines.s_model import least_s_curve
+from cspr_jax.families.lines.faces import Sides, line_faces, sides
+from cspr_jax.families.lines.motion import s_curve
+from cspr_jax.families.lines.s_model import least_s_curve
 from cspr_jax.plans.sequence import PlanLegs
 from cspr_jax.published.chapter_1 import Key
-from cspr_jax.robots.point_mass import PointMassRobot
+from cspr_jax.robots.model.point_mass import PointMassRobot
 
 CASE, PRINTED = (Path(__file__).with_name(name) for name in ("table_4_1.toml", "table_4_3.csv"))
 TIMES = np.round(np.arange(2.9, 4.401, 0.05), 2)

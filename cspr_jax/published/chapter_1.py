@@ -8,19 +8,19 @@ from jax import Array
 
 from cspr_jax.build.robots import kernel_robot
 from cspr_jax.config.catalogue import CATALOGUE
+from cspr_jax.config.keys.trajectory import TrajectoryKeys
 from cspr_jax.config.robot import read_robot
-from cspr_jax.config.trajectory import TrajectoryKeys
-from cspr_jax.motions.amplitudes import Amplitude, named
-from cspr_jax.runtime.stages import stage
-from cspr_jax.swings import zero_tension
-from cspr_jax.swings.envelope_oscillations import (
+from cspr_jax.families.swings.transitions import zero_tension
+from cspr_jax.families.swings.transitions.envelope_oscillations import (
     best_epsilon,
     best_inclination,
     horizontal_oscillations,
     least_oscillations,
     many_oscillations,
 )
-from cspr_jax.swings.transition import transition, weights
+from cspr_jax.families.swings.transitions.transition import transition, weights
+from cspr_jax.motion.amplitudes import Amplitude, named
+from cspr_jax.runtime.stages import stage
 
 Key = tuple[str, str, str]  # row, column, reading of the table; "" where there is one reading
 DISTANCE = 4.0  # of Table 1.1, in radii of the spools

@@ -11,21 +11,21 @@ from pathlib import Path
 
 import numpy as np
 
-from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.build.robots import kernel_robot
+from cspr_jax.config.keys.trajectory import TrajectoryKeys
 from cspr_jax.config.robot import resolve_robot
-from cspr_jax.config.trajectory import TrajectoryKeys
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.platform_kind import PlatformMotionKind
-from cspr_jax.motions.problem import Problem
-from cspr_jax.platforms import attainable
-from cspr_jax.platforms.accessible import DEFINITIONS, Accessible, accessible_sets
-from cspr_jax.platforms.checker import PlatformChecker
-from cspr_jax.platforms.motion_checker import MANY
+from cspr_jax.families.platforms.motion_checker import MANY
+from cspr_jax.families.platforms.orientations import attainable
+from cspr_jax.families.platforms.orientations.accessible import DEFINITIONS, Accessible, accessible_sets
+from cspr_jax.families.platforms.six_cable_proof.checker import PlatformChecker
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.platform_kind import PlatformMotionKind
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.published.chapter_1 import Key
-from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.reference_pose import aligned
-from cspr_jax.robots.symmetries import symmetries
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.statics.reference_pose import aligned
+from cspr_jax.robots.statics.symmetries import symmetries
 from cspr_jax.runtime.processes import Spread
 from cspr_jax.runtime.stages import within
 
@@ -47,7 +47,7 @@ class TableSettings:
     """Settings of a table of orientations.
 
     Fields:
-        definitions: of the accessible set, of `platforms.accessible.DEFINITIONS`.
+        definitions: of the accessible set, of `families.platforms.orientations.accessible.DEFINITIONS`.
         amplitudes: of `AMPLITUDES`.
         finer: factor by which the step is finer than pi / 32.
         max_arcs: largest number of arcs tried.

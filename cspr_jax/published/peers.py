@@ -12,13 +12,13 @@ from scipy.spatial.transform import Rotation
 
 from cspr_jax.build.robots import load_robot
 from cspr_jax.published.chapter_1 import Key
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.tension_programs import CLOSE, by_program, by_squares
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.statics.kernel_axes import centred
+from cspr_jax.robots.tensions.tension_programs import CLOSE, by_program, by_squares
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.workspaces import geometry
-from cspr_jax.workspaces.geometry import mass_centres
-from cspr_jax.workspaces.questions import CLOSURE, FEASIBLE, STATIC, Requirement, requirement
+from cspr_jax.workspaces.poses import geometry
+from cspr_jax.workspaces.poses.geometry import mass_centres
+from cspr_jax.workspaces.requirements import CLOSURE, FEASIBLE, STATIC, Requirement, requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
 
 # Poses that linear programs and least squares decide as well, evenly over the grid.
@@ -32,7 +32,7 @@ class PoseGrid(NamedTuple):
     Fields:
         name: of the row.
         robot: of the catalogue.
-        condition: of `workspaces.questions.CONDITIONS`.
+        condition: of `workspaces.requirements.CONDITIONS`.
         positions: (n, 3) of the platform frame's origin, axes of the file, m.
         quaternions: (n, 4) unit quaternions, scalar first.
     """

@@ -12,15 +12,15 @@ from collections.abc import Callable
 import jax
 import numpy as np
 
-from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.arithmetic.elementary import leaf
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.elementary import leaf
 from cspr_jax.published.chapter_1 import Key
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.platform import platform_robot
-from cspr_jax.robots.tension_rules import closed_form
-from cspr_jax.workspaces import geometry
-from cspr_jax.workspaces.questions import FEASIBLE, required_wrenches, requirement
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.platform import platform_robot
+from cspr_jax.robots.statics.kernel_axes import centred
+from cspr_jax.robots.tensions.tension_rules import closed_form
+from cspr_jax.workspaces.poses import geometry
+from cspr_jax.workspaces.requirements import FEASIBLE, required_wrenches, requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
 
 SIGNS = np.array([[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]])

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from cspr_jax.platforms import attainable
+from cspr_jax.families.platforms.orientations import attainable
 from cspr_jax.published.chapter_1 import Key
 from cspr_jax.published.chapter_3 import (
     DIVISIONS,
@@ -20,7 +20,7 @@ from cspr_jax.published.chapter_3 import (
     sizes,
     variant,
 )
-from cspr_jax.robots.symmetries import folded, symmetries
+from cspr_jax.robots.statics.symmetries import folded, symmetries
 from cspr_jax.runtime.processes import Spread
 from cspr_jax.runtime.stages import within
 

@@ -1,1 +1,1 @@
-"""Robots: geometry, mass, the balance of forces and wrenches, rest, symmetries, contacts of cables."""
+"""Robots: what they are, their statics, tensions and contacts at one state, and bounds of these over blocks."""

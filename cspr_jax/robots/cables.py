@@ -11,20 +11,20 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.arithmetic.elementary import leaf, solved
 from cspr_jax.errors import InputError
-from cspr_jax.robots import force_balance, wrench_balance
-from cspr_jax.robots.limits import NO_LIMITS, Limits
-from cspr_jax.robots.patterns import PATTERNS
-from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.robots.point_mass import PointMassRobot
-from cspr_jax.robots.pulleys import pulleys_of
-from cspr_jax.robots.robot import MOVED
-from cspr_jax.robots.state import State
-from cspr_jax.robots.tension_distribution import Distribution
-from cspr_jax.robots.tension_rule_table import CENTRED
-from cspr_jax.robots.tension_rules import by_rule
-from cspr_jax.robots.wrench_sets import tension_range
+from cspr_jax.numerics.elementary import leaf, solved
+from cspr_jax.robots.model.limits import NO_LIMITS, Limits
+from cspr_jax.robots.model.patterns import PATTERNS
+from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.robots.model.point_mass import PointMassRobot
+from cspr_jax.robots.model.pulleys import pulleys_of
+from cspr_jax.robots.model.robot import MOVED
+from cspr_jax.robots.model.state import State
+from cspr_jax.robots.model.tension_rule_table import CENTRED
+from cspr_jax.robots.statics import force_balance, wrench_balance
+from cspr_jax.robots.statics.wrench_sets import tension_range
+from cspr_jax.robots.tensions.tension_distribution import Distribution
+from cspr_jax.robots.tensions.tension_rules import by_rule
 
 if TYPE_CHECKING:
     from jaxtyping import Float

@@ -3,11 +3,11 @@
 import jax.numpy as jnp
 import numpy as np
 
-from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.robots.cables import AnyRobot
-from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.tension_programs import by_program
-from cspr_jax.robots.wrench_balance import at_rest
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.statics.wrench_balance import at_rest
+from cspr_jax.robots.tensions.tension_programs import by_program
 
 # Depths that are tried, over the mean distance of the spools from their centroid.
 DEPTHS = np.linspace(-0.95, 1.0, 40)

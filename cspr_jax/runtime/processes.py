@@ -16,8 +16,8 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
-from cspr_jax.arithmetic.cores import SHARE, cores
 from cspr_jax.errors import ConfigError, ResourceError
+from cspr_jax.numerics.cores import SHARE, cores
 from cspr_jax.runtime.surroundings import check_threads_of_jax
 
 SAFE_PATH = "PYTHONSAFEPATH"

@@ -12,8 +12,8 @@ import threading
 import warnings
 from pathlib import Path
 
-from cspr_jax.arithmetic.cores import cores
 from cspr_jax.errors import ConfigError, ResourceError
+from cspr_jax.numerics.cores import cores
 
 # Threads that every command needs: for signals, and those of NumPy's library, one for each core. Then threads for jax:
 # some pools of XLA have one for each core.

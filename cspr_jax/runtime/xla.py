@@ -21,8 +21,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from cspr_jax.arithmetic.cores import SHARE, cores, quota
 from cspr_jax.errors import ConfigError, printable, shown
+from cspr_jax.numerics.cores import SHARE, cores, quota
 from cspr_jax.runtime import compile_cache, stages
 from cspr_jax.runtime.compile_options import QUICK
 

@@ -1,6 +1,6 @@
 """Table of trajectory families: one row for each.
 
-A new family is a motion (`motions.motion.Motion`), a class that joins poses by it (`motions.leg.Leg`), and a row.
+A new family is a motion (`motion.motion.Motion`), a class that joins poses by it (`motion.leg.Leg`), and a row.
 """
 
 import contextlib
@@ -17,9 +17,8 @@ class Family:
     """Trajectory family.
 
     Fields:
-        name: in files.
-        description: for people, without a full stop.
-        legs: by patterns of motion of the robots that it moves, rows of `robots.patterns`, the class that joins poses:
+        name: in files. description: for people, without a full stop. legs: by patterns of motion of the robots that it
+        moves, rows of `robots.model.patterns`, the class that joins poses:
             "module:Class".
         free_end: whether A''(1) of its amplitude function is free: (1.27) and (1.28) in place of (2.49).
         rests_anywhere: whether its poses are at rest wherever they are, so that it knows neither P0 nor an amplitude
@@ -67,13 +66,16 @@ class Family:
 
 # Time functions of a platform's rotation that take no beta-hat.
 WITHOUT_BETA_HAT = ("beta_0", "beta_1")
-# All rows of `robots.patterns`.
+# All rows of `robots.model.patterns`.
 ANY_PATTERN = ("1T", "2T", "3T", "1R2T", "2R3T", "3R3T", "3R")
 _ROWS = (
     Family(
         "hypocycloid-standard",
         "standard hypocycloids between any poses (thesis chapter 2)",
-        {"3T": "cspr_jax.swings.hypocycloid_leg:Hypocycloids", "3R3T": "cspr_jax.platforms.leg:StandardPoses"},
+        {
+            "3T": "cspr_jax.families.swings.hypocycloid_leg:Hypocycloids",
+            "3R3T": "cspr_jax.families.platforms.leg:StandardPoses",
+        },
         any_cables=("3T", "3R3T"),
         knows_uncertainty=True,
         begins_searches=True,
@@ -81,7 +83,7 @@ _ROWS = (
     Family(
         "transition",
         "from rest to a target, swings at it, and back to rest (thesis chapter 1)",
-        dict.fromkeys(("2T", "3T"), "cspr_jax.swings.transition_leg:Transitions"),
+        dict.fromkeys(("2T", "3T"), "cspr_jax.families.swings.transitions.transition_leg:Transitions"),
         free_end=True,
         any_cables=("2T", "3T"),
         knows_uncertainty=True,
@@ -90,7 +92,7 @@ _ROWS = (
     Family(
         "hypocycloid",
         "hypocycloids of variable amplitude, for platforms (thesis chapter 3)",
-        {"3R3T": "cspr_jax.platforms.leg:VariablePoses"},
+        {"3R3T": "cspr_jax.families.platforms.leg:VariablePoses"},
         any_cables=("3R3T",),
         knows_uncertainty=True,
         begins_searches=True,
@@ -99,7 +101,7 @@ _ROWS = (
         Family(
             name,
             f"straight lines from rest to rest {law}",
-            dict.fromkeys(("2T", "3T"), "cspr_jax.lines.leg:TimedLines"),
+            dict.fromkeys(("2T", "3T"), "cspr_jax.families.lines.leg:TimedLines"),
             rests_anywhere=True,
             takes_amplitude=False,
             any_cables=("2T", "3T"),
@@ -116,7 +118,7 @@ _ROWS = (
     Family(
         "bezier",
         "Bezier curves of the second order, at rest in every pose (launch paper)",
-        dict.fromkeys(("2T", "3T"), "cspr_jax.beziers.leg:Beziers"),
+        dict.fromkeys(("2T", "3T"), "cspr_jax.families.beziers.leg:Beziers"),
         rests_anywhere=True,
         takes_amplitude=False,
         any_cables=("2T", "3T"),
@@ -126,7 +128,7 @@ _ROWS = (
     Family(
         "spline",
         "splines through poses at their times, or a file of samples",
-        dict.fromkeys(ANY_PATTERN, "cspr_jax.splines.leg:Splines"),
+        dict.fromkeys(ANY_PATTERN, "cspr_jax.families.splines.leg:Splines"),
         rests_anywhere=True,
         takes_amplitude=False,
         any_cables=ANY_PATTERN,
@@ -141,7 +143,7 @@ _ROWS = (
     Family(
         "ellipse",
         "turns on harmonic ellipses, circles and lines, and the ways from one to another, from rest and to rest",
-        dict.fromkeys(("2T", "3T", "3R3T"), "cspr_jax.ellipses.leg:Ellipses"),
+        dict.fromkeys(("2T", "3T", "3R3T"), "cspr_jax.families.ellipses.leg:Ellipses"),
         rests_anywhere=True,
         any_cables=("2T", "3T", "3R3T"),
         knows_uncertainty=True,
@@ -155,7 +157,7 @@ _ROWS = (
     Family(
         "path",
         "along lines, splines, arcs, files of points and G-code, in the least time",
-        dict.fromkeys(ANY_PATTERN, "cspr_jax.paths.leg:Paths"),
+        dict.fromkeys(ANY_PATTERN, "cspr_jax.families.paths.leg:Paths"),
         rests_anywhere=True,
         takes_amplitude=False,
         any_cables=ANY_PATTERN,
@@ -171,7 +173,7 @@ _ROWS = (
     Family(
         "free",
         "the fastest, or otherwise best, motions between poses that a search finds",
-        dict.fromkeys(("1T", "2T", "3T", "1R2T", "3R3T"), "cspr_jax.free.leg:FreeMotions"),
+        dict.fromkeys(("1T", "2T", "3T", "1R2T", "3R3T"), "cspr_jax.families.free.leg:FreeMotions"),
         rests_anywhere=True,
         takes_amplitude=False,
         any_cables=("1T", "2T", "3T", "1R2T", "3R3T"),

@@ -16,7 +16,7 @@ class Uncertain:
     """A part of the uncertainty of a robot.
 
     Fields:
-        name: key in files, and field of `robots.limits.Uncertainty`.
+        name: key in files, and field of `robots.model.limits.Uncertainty`.
         unit: of its values.
         least: smallest value, of a robot without this uncertainty.
         largest: largest value.
@@ -47,10 +47,10 @@ class Limit:
     """A limit of a quantity of the robot's state.
 
     Fields:
-        name: key in files, and field of `robots.limits.Limits`.
+        name: key in files, and field of `robots.model.limits.Limits`.
         flag: the verdict where it is broken.
         sense: whether the quantity must be at least or at most so large.
-        quantity: of `motions.limits.Values`.
+        quantity: of `motion.limits.Values`.
         unit: of both.
         per_cable: whether each cable has a value of its own.
         of_motion: whether the quantity depends on how the effector moves, not only on where it is.

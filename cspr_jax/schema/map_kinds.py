@@ -54,15 +54,12 @@ class MapKind:
         start: where its motions may start. "rest": at rest in P0, `trajectory.from` says so or is absent; "point": as
             `trajectory.from` or the axes from_x, from_y and from_z say; "pose": as `trajectory.from` says, with an
             orientation or without, at rest in P0 where it is absent.
-        needs: keys that must be given.
-        takes: further keys that may be given, of those that only some kinds have.
-        one_of: keys of which exactly one must be given.
-        limits: rows of `schema.limits.LIMITS` that it takes where it takes limits; none: all.
-        definitions: of the accessible set that it takes.
-        is_over_orientations: whether its grid has axes over all orientations besides those of the sweep file.
-        cells: of a tile, at most, where the sweep file does not say.
-        cost: of a cell, by which a run is divided into tiles.
-        patterns: of motion of the robots that it moves, rows of `robots.patterns`, by which `config.equivalents` finds
+        needs: keys that must be given. takes: further keys that may be given, of those that only some kinds have.
+        one_of: keys of which exactly one must be given. limits: rows of `schema.limits.LIMITS` that it takes where it
+        takes limits; none: all. definitions: of the accessible set that it takes. is_over_orientations: whether its
+        grid has axes over all orientations besides those of the sweep file. cells: of a tile, at most, where the sweep
+        file does not say. cost: of a cell, by which a run is divided into tiles. patterns: of motion of the robots that
+        it moves, rows of `robots.model.patterns`, by which `config.equivalents` finds
             which robot that is; none: robots go to its class as their files have them.
         by_processes: whether the command line has several processes compute its tiles, where nobody says how many: much
             of the work is outside of XLA, where threads of one process wait for each other.
@@ -129,7 +126,7 @@ _ROWS: dict[str, MapKind] = {
             name="minimum-arcs",
             title="Smallest number of arcs",
             description="smallest number of arcs to each target",
-            implementation="cspr_jax.swings.arcs_map:MinimumArcsMap",
+            implementation="cspr_jax.families.swings.arcs_map:MinimumArcsMap",
             cost=CellCost(seconds=6e-5, limits=0.05),
             quantities=("arcs", "tried_arcs", *columns.COMMON, *columns.TOLERATED, "clearance"),
             stored=("arcs", "verdict", "duration", "margin", "feasible_at_infinity"),
@@ -148,7 +145,7 @@ _ROWS: dict[str, MapKind] = {
             name="minimum-oscillations",
             title="Smallest number of oscillations",
             description="smallest number of oscillations of a transition from rest to each target",
-            implementation="cspr_jax.swings.oscillations_map:MinimumOscillationsMap",
+            implementation="cspr_jax.families.swings.transitions.oscillations_map:MinimumOscillationsMap",
             cost=CellCost(seconds=1e-4, limits=0.05, uncertainty=0.3),
             quantities=columns.OF_OSCILLATIONS,
             stored=columns.OSCILLATIONS_STORED,
@@ -164,7 +161,7 @@ _ROWS: dict[str, MapKind] = {
             name="transition-envelopes",
             title="Envelopes of the pseudotensions along transitions",
             description="oscillations that each instant of a transition from rest to each target requires",
-            implementation="cspr_jax.swings.envelopes_map:TransitionEnvelopesMap",
+            implementation="cspr_jax.families.swings.transitions.envelopes_map:TransitionEnvelopesMap",
             quantities=columns.OF_INSTANTS,
             stored=columns.OF_INSTANTS,
             pictured=("lower_envelope",),
@@ -180,7 +177,7 @@ _ROWS: dict[str, MapKind] = {
             name="poses",
             title="Smallest number of arcs to poses",
             description="smallest number of arcs of a platform to each pose",
-            implementation="cspr_jax.platforms.poses_map:PosesMap",
+            implementation="cspr_jax.families.platforms.orientations.poses_map:PosesMap",
             cost=CellCost(seconds=1.5e-3, limits=5.0, uncertainty=5.0),
             quantities=(*columns.OF_POSES, "clearance"),
             stored=columns.POSES_STORED,
@@ -203,7 +200,7 @@ _ROWS: dict[str, MapKind] = {
             name="orientations",
             title="Smallest number of arcs to accessible orientations",
             description="smallest number of arcs of a platform from rest to each orientation accessible at each place",
-            implementation="cspr_jax.platforms.orientations_map:OrientationsMap",
+            implementation="cspr_jax.families.platforms.orientations.orientations_map:OrientationsMap",
             cost=CellCost(seconds=3e-4, limits=5.0, uncertainty=5.0),
             quantities=columns.OF_POSES,
             stored=columns.POSES_STORED,
@@ -221,7 +218,7 @@ _ROWS: dict[str, MapKind] = {
             name="orientation-workspace",
             title="Accessible orientations",
             description="orientations of a platform that are accessible at each place",
-            implementation="cspr_jax.platforms.places_map:OrientationWorkspaceMap",
+            implementation="cspr_jax.families.platforms.orientations.places_map:OrientationWorkspaceMap",
             cost=CellCost(orientation=3e-6),
             quantities=columns.OF_PLACES,
             stored=columns.OF_PLACES,
@@ -237,7 +234,7 @@ _ROWS: dict[str, MapKind] = {
             name="attainability",
             title="Accessible and attainable orientations",
             description="orientations of a platform that are accessible at each place, and attained from rest",
-            implementation="cspr_jax.platforms.places_map:AttainabilityMap",
+            implementation="cspr_jax.families.platforms.orientations.places_map:AttainabilityMap",
             cost=CellCost(orientation=6e-5, limits=5.0, uncertainty=5.0),
             quantities=(*columns.OF_PLACES, *columns.OF_ATTAINED),
             stored=(*columns.OF_PLACES, *columns.OF_ATTAINED),
@@ -269,7 +266,7 @@ _ROWS: dict[str, MapKind] = {
             name="least-time",
             title="Least durations along straight lines",
             description="least duration of the S-model along the straight line to each target, beside the least of all",
-            implementation="cspr_jax.lines.map:LeastTimeMap",
+            implementation="cspr_jax.families.lines.map:LeastTimeMap",
             cost=CellCost(limits=2.0),
             quantities=columns.OF_LINES,
             stored=columns.OF_LINES,
@@ -284,7 +281,7 @@ _ROWS: dict[str, MapKind] = {
                     name="least-time",
                     title="Least durations along paths",
                     description="least duration of all motions along the path to each target, and a lower bound of it",
-                    implementation="cspr_jax.paths.map:PathsMap",
+                    implementation="cspr_jax.families.paths.map:PathsMap",
                     cost=CellCost(seconds=0.5),
                     quantities=(*columns.OF_PATHS, *columns.TOLERATED, "clearance"),
                     stored=columns.OF_PATHS,
@@ -305,7 +302,7 @@ _ROWS: dict[str, MapKind] = {
                     name="least-time",
                     title="Least durations of free motions",
                     description="least duration of all motions to each target that a search finds, and a lower bound",
-                    implementation="cspr_jax.free.map:FreeMap",
+                    implementation="cspr_jax.families.free.map:FreeMap",
                     cost=CellCost(seconds=1.0),
                     quantities=(*columns.OF_PATHS, *columns.TOLERATED, "clearance"),
                     stored=columns.OF_PATHS,
@@ -329,7 +326,7 @@ _ROWS: dict[str, MapKind] = {
             name="launch-range",
             title="Range of launches",
             description="least speed with which an object, released on one Bezier segment, reaches each landing place",
-            implementation="cspr_jax.beziers.launch_range_map:LaunchRangeMap",
+            implementation="cspr_jax.families.beziers.launches.launch_range_map:LaunchRangeMap",
             cost=CellCost(seconds=2e-2),
             quantities=columns.OF_LAUNCHES,
             stored=columns.OF_LAUNCHES,
@@ -344,7 +341,7 @@ _ROWS: dict[str, MapKind] = {
             name="swing-range",
             title="Range of throws from swings",
             description="least speed with which an object that is released from an ellipse reaches each landing place",
-            implementation="cspr_jax.ellipses.swing_range_map:SwingRangeMap",
+            implementation="cspr_jax.families.ellipses.swing_range_map:SwingRangeMap",
             cost=CellCost(seconds=3e-3),
             quantities=columns.OF_SWINGS,
             stored=columns.OF_SWINGS,
@@ -360,7 +357,7 @@ _ROWS: dict[str, MapKind] = {
             name="ellipse",
             title="Feasible frequencies of ellipses",
             description="frequencies, margins and verdicts of turns on an ellipse about each centre",
-            implementation="cspr_jax.ellipses.map:EllipseMap",
+            implementation="cspr_jax.families.ellipses.map:EllipseMap",
             cost=CellCost(seconds=2e-6, limits=1.0),
             quantities=columns.OF_ELLIPSES,
             stored=columns.ELLIPSES_STORED,

@@ -11,7 +11,7 @@ from cspr_jax.schema.quantities import Quantity
 
 
 def line_bounds(settings: Mapping[str, Any]) -> tuple[str, ...]:
-    """Bounds of the acceleration along a straight line, as `lines.durations.names_of` names them from 1 on."""
+    """Bounds of the acceleration along a straight line, as `families.lines.durations.names_of` names them from 1 on."""
     robot, limits = settings["robot"], settings.get("limits") or {}
     count = 3 if robot.get("translation_only") else len(robot["base_points"])
     chosen = itertools.combinations(range(1, count + 1), 1 if robot.get("planar") else 2)
@@ -57,7 +57,7 @@ NEAREST_BODIES = ("none", "two cables", "cable and obstacle", "cable and platfor
 
 
 def nearest_bodies(_: Mapping[str, Any]) -> tuple[str, ...]:
-    """Two bodies whose distance is the least of all, in the order of `robots.clearance.Kind` from 1 on."""
+    """Two bodies whose distance is the least of all, in the order of `robots.contacts.clearance.Kind` from 1 on."""
     return NEAREST_BODIES
 
 

@@ -138,7 +138,7 @@ MARGIN = (
     "or smallest depth below the spools over z0, whichever is less; platforms on more cables: distance that all "
     "tensions can keep from their limits, over the weight per cable."
 )
-# Margins of maps are as close as `motions.time_proof.CLOSE`.
+# Margins of maps are as close as `verification.time_proof.CLOSE`.
 _BOUNDED = (
     "As its proof bounds it: the smallest itself may be less by 0.2 %, near zero by 0.02 % of what is usual along the "
     "motion."

@@ -15,20 +15,13 @@ from cspr_jax.errors import StoreError
 from cspr_jax.schema.identity import identity
 from cspr_jax.schema.quantities import AXES, QUANTITIES
 from cspr_jax.schema.tiles import Grid
-from cspr_jax.store import guard
-from cspr_jax.store.disk import Disk
 from cspr_jax.store.documents import Settings, document, plain_json
-from cspr_jax.store.guard import ReadableDataset
-from cspr_jax.store.netcdf import (
-    UNREADABLE,
-    make_datasets,
-    open_hdf5,
-    plain,
-    reason,
-    set_attributes,
-)
-from cspr_jax.store.publishing import new_file
-from cspr_jax.store.seal import DamagedError
+from cspr_jax.store.files import guard
+from cspr_jax.store.files.checksum import DamagedError
+from cspr_jax.store.files.disk import Disk
+from cspr_jax.store.files.guard import ReadableDataset
+from cspr_jax.store.files.netcdf import UNREADABLE, make_datasets, open_hdf5, plain, reason, set_attributes
+from cspr_jax.store.files.publishing import new_file
 from cspr_jax.store.shards import Layout, Shard, digest_of
 
 LARGEST_TILE_BYTES, LARGEST_AXIS_BYTES, LARGEST_TILES = 1 << 24, 1 << 28, 100_000

@@ -15,8 +15,8 @@ from pydantic.functional_validators import PlainValidator
 from cspr_jax.errors import printable
 from cspr_jax.schema.identity import FORMAT_VERSION, digest
 from cspr_jax.schema.tiles import LARGEST_TILE, Tiling
-from cspr_jax.store.guard import LARGEST_CHUNKS, LARGEST_RANK
-from cspr_jax.store.seal import DamagedError
+from cspr_jax.store.files.checksum import DamagedError
+from cspr_jax.store.files.guard import LARGEST_CHUNKS, LARGEST_RANK
 
 # Settings nest some six deep; functions that walk through them may be recursive.
 DEEPEST = 32

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from cspr_jax.errors import RefusedError, StoreError, printable
-from cspr_jax.store.disk import Disk, check_plain, open_plain
-from cspr_jax.store.publishing import PART, make_folders, refusal
+from cspr_jax.store.files.disk import Disk, check_plain, open_plain
+from cspr_jax.store.files.publishing import PART, make_folders, refusal
 
 _SHARD = re.compile(r"(\d{5,})\.h5")
 # A lock names its holder; it is empty when it is new.

@@ -4,10 +4,10 @@ import json
 from pathlib import Path
 
 from cspr_jax.schema.identity import digest
-from cspr_jax.store.disk import READ_ONLY, Disk
 from cspr_jax.store.documents import Record, document, plain_json
-from cspr_jax.store.publishing import publish
-from cspr_jax.store.seal import DamagedError, read_regular
+from cspr_jax.store.files.checksum import DamagedError, read_regular
+from cspr_jax.store.files.disk import READ_ONLY, Disk
+from cspr_jax.store.files.publishing import publish
 
 LARGEST_RECORD = 64 << 20
 

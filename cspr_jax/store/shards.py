@@ -14,11 +14,11 @@ import numpy as np
 from cspr_jax.errors import printable
 from cspr_jax.schema.identity import canonical_json
 from cspr_jax.schema.quantities import EARLIER
-from cspr_jax.store import guard
 from cspr_jax.store.documents import Header, document, plain_json
-from cspr_jax.store.guard import ReadableDataset
-from cspr_jax.store.netcdf import LAYOUT, UNREADABLE, dtype_of, new_dataset, reason
-from cspr_jax.store.seal import DamagedError, sealed
+from cspr_jax.store.files import guard
+from cspr_jax.store.files.checksum import DamagedError, sealed
+from cspr_jax.store.files.guard import ReadableDataset
+from cspr_jax.store.files.netcdf import LAYOUT, UNREADABLE, dtype_of, new_dataset, reason
 
 LARGEST_SHARD = 64 << 20
 

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import numpy as np
 
-from cspr_jax.config.limits import LimitTable
-from cspr_jax.config.obstacles import SurroundingsKeys
+from cspr_jax.config.keys.limits import LimitTable
+from cspr_jax.config.keys.obstacles import SurroundingsKeys
+from cspr_jax.config.keys.workspace import WorkspaceTable
 from cspr_jax.config.reading import Table
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import Axes, SweepFile
 from cspr_jax.config.wording import either
-from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.schema.families import WITHOUT_BETA_HAT
 from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind, kinds_with

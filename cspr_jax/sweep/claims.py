@@ -9,10 +9,10 @@ from cspr_jax.errors import RefusedError, printable
 from cspr_jax.schema.identity import differences, digest
 from cspr_jax.store.consolidation import Content
 from cspr_jax.store.documents import Record
+from cspr_jax.store.files.checksum import DamagedError
 from cspr_jax.store.folder import RunFolder
-from cspr_jax.store.isolated import Reader
+from cspr_jax.store.reading.isolated import Reader
 from cspr_jax.store.record import read_record, write_record
-from cspr_jax.store.seal import DamagedError
 from cspr_jax.sweep.definition import Sweep
 
 

@@ -13,16 +13,16 @@ import numpy as np
 
 from cspr_jax import __version__
 from cspr_jax.config.equivalents import as_moved
+from cspr_jax.config.keys.workspace import WorkspaceTable
 from cspr_jax.config.kinds import refuse_other_kinds
 from cspr_jax.config.reading import checked, parse_toml, read_text
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.config.sweep import AxisRange, Orientations, SweepFile, axis_points
-from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.schema.identity import FORMAT_VERSION, canonical_json, identity
 from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind
 from cspr_jax.schema.tiles import LARGEST_TILE, Grid, Tiling, tile_shape
-from cspr_jax.store.netcdf import bytes_needed, dtype_of
+from cspr_jax.store.files.netcdf import bytes_needed, dtype_of
 from cspr_jax.store.shards import Layout
 from cspr_jax.sweep.checks import check_map, check_points, check_store, is_asked, is_given
 from cspr_jax.sweep.tile_sizes import tile_cells

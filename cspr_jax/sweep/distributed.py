@@ -13,7 +13,7 @@ from typing import Any, cast
 
 from cspr_jax.errors import ConfigError, RefusedError, ResourceError, StoppedError
 from cspr_jax.schema.identity import differences
-from cspr_jax.store.netcdf import reason
+from cspr_jax.store.files.netcdf import reason
 from cspr_jax.sweep.definition import Sweep
 from cspr_jax.sweep.environment import environment
 from cspr_jax.sweep.signals import Stop

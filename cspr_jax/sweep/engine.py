@@ -14,12 +14,12 @@ from pathlib import Path
 from cspr_jax.errors import ExitCode, RefusedError, StoppedError, StoreError, printable
 from cspr_jax.schema.identity import canonical_json, digest
 from cspr_jax.store.consolidation import Content, consolidate
-from cspr_jax.store.disk import Disk
 from cspr_jax.store.documents import Record
+from cspr_jax.store.files.checksum import DamagedError, seal_of
+from cspr_jax.store.files.disk import Disk
+from cspr_jax.store.files.publishing import make_folders, publish, refusal
 from cspr_jax.store.folder import RunFolder
-from cspr_jax.store.isolated import Reader
-from cspr_jax.store.publishing import make_folders, publish, refusal
-from cspr_jax.store.seal import DamagedError, seal_of
+from cspr_jax.store.reading.isolated import Reader
 from cspr_jax.store.shards import Shard, encode
 from cspr_jax.sweep import claims
 from cspr_jax.sweep.definition import Sweep, attributes, check_room

@@ -16,14 +16,14 @@ from cspr_jax.errors import StoreError, printable
 from cspr_jax.runtime.progress import Pace
 from cspr_jax.schema.tiles import Tiling
 from cspr_jax.store.consolidation import Content
-from cspr_jax.store.disk import Disk
 from cspr_jax.store.documents import Entry, Record, Settings, document, plain_json
+from cspr_jax.store.files.checksum import DamagedError, read_regular
+from cspr_jax.store.files.disk import Disk
+from cspr_jax.store.files.netcdf import file_size
 from cspr_jax.store.folder import RunFolder
-from cspr_jax.store.isolated import Reader
-from cspr_jax.store.netcdf import file_size
+from cspr_jax.store.reading.isolated import Reader
+from cspr_jax.store.reading.result import open_result
 from cspr_jax.store.record import read_record
-from cspr_jax.store.result import open_result
-from cspr_jax.store.seal import DamagedError, read_regular
 from cspr_jax.store.shards import Layout
 
 LOG_TAIL = 1 << 16

@@ -18,13 +18,13 @@ from cspr_jax.errors import InputError, RefusedError, StoreError, printable
 from cspr_jax.schema.identity import differences, digest
 from cspr_jax.schema.tiles import Tiling
 from cspr_jax.schema.verdicts import NOT_PROVED
-from cspr_jax.store.disk import Disk
 from cspr_jax.store.documents import plain_json
+from cspr_jax.store.files.checksum import DamagedError
+from cspr_jax.store.files.disk import Disk
 from cspr_jax.store.folder import RunFolder
-from cspr_jax.store.isolated import Reader
+from cspr_jax.store.reading.isolated import Reader
+from cspr_jax.store.reading.result import open_result
 from cspr_jax.store.record import read_record
-from cspr_jax.store.result import open_result
-from cspr_jax.store.seal import DamagedError
 from cspr_jax.store.shards import Shard
 from cspr_jax.sweep.definition import Sweep, sweep_of_settings
 from cspr_jax.sweep.signals import Stop

@@ -6,9 +6,9 @@ import pickle
 import jax
 import numpy as np
 
-from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import ResourceError, SelfCheckError
 from cspr_jax.maps.grid_map import GridMap
+from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.schema.identity import digest
 from cspr_jax.store.shards import Shard
 from cspr_jax.sweep.definition import Sweep

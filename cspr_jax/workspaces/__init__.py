@@ -12,30 +12,18 @@ has the formulas.
 
 Files, each importing only from those above it:
 
-    geometry                unit vectors and wrench matrices of many poses
-    required                wrenches that cables must supply
-    questions               conditions with their limits and wrenches
-    cocircuits              cocircuits that a robot has
-    worst_cocircuits        the cocircuit that decides at a pose
-    margins                 margins, cocircuit by cocircuit, between two bounds
-    exact                   margins of single poses by singular values
-    kernels                 compiled margins of many poses
-    search                  margins and verdicts of many poses
-    shifts                  how far cables move within a cell
-    cells                   boxes of positions, and bounds over them
-    inside_cells            cells in which tensions stay within limits at every position
-    outside_cells           cells in which no tensions within limits suffice at any position
-    all_robots              requirements of all robots within an uncertainty
-    cell_proofs             proofs of many cells
-    contact_cells           clearances over cells
-    clearances              clearances of robots at rest
-    speeds                  speeds of cables
-    whole_cells             cells of maps, halved where they stay open
-    rest_poses              all conditions together, and sets of orientations
-    rest_cells              all conditions together over cells
-    acceleration_search     feasible accelerations at many places
-    sensitivities           sensitivities to errors of the cable lengths
-    map                     maps of workspaces
-    accelerations_map       maps of feasible accelerations
-    sensitivity_map         maps of sensitivities
+    required_wrenches     wrenches that cables must supply
+    poses                 margins of poses, one by one and compiled
+    requirements          conditions with their limits and wrenches
+    search                margins and verdicts of many poses
+    cells                 proofs of whole cells
+    all_robots            requirements of all robots within an uncertainty
+    clearances            clearances of robots at rest
+    static_poses          all conditions together, and sets of orientations
+    static_cells          all conditions together over cells
+    acceleration_search   feasible accelerations at many places
+    sensitivities         sensitivities to errors of the cable lengths
+    map                   maps of workspaces
+    accelerations_map     maps of feasible accelerations
+    sensitivity_map       maps of sensitivities
 """

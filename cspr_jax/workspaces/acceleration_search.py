@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import jax
 import numpy as np
 
-from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.motions.acceleration_sets import AccelerationReach, faces_at, reaches, verdict
-from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.point_mass import PointMassRobot
-from cspr_jax.robots.wrench_sets import Faces
+from cspr_jax.motion.acceleration_sets import AccelerationReach, faces_at, reaches, verdict
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.point_mass import PointMassRobot
+from cspr_jax.robots.statics.wrench_sets import Faces
 
 if TYPE_CHECKING:
     from jaxtyping import Float

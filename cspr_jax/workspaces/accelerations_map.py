@@ -6,7 +6,7 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
 from cspr_jax.maps.grid_map import PointMassMap
-from cspr_jax.motions.acceleration_sets import TOLERANCE
+from cspr_jax.motion.acceleration_sets import TOLERANCE
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import FLAGS
 from cspr_jax.workspaces.acceleration_search import reach_of

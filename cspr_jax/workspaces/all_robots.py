@@ -13,12 +13,12 @@ from typing import NamedTuple
 import jax.numpy as jnp
 import numpy as np
 
+from cspr_jax.robots.bounds.uncertain_tensions import with_mass
 from cspr_jax.robots.cables import AnyRobot
-from cspr_jax.robots.limits import Uncertainty
-from cspr_jax.robots.patterns import PATTERNS
-from cspr_jax.robots.uncertain_tensions import with_mass
-from cspr_jax.workspaces.questions import CLOSURE, Requirement
-from cspr_jax.workspaces.required import RequiredWrenches
+from cspr_jax.robots.model.limits import Uncertainty
+from cspr_jax.robots.model.patterns import PATTERNS
+from cspr_jax.workspaces.required_wrenches import RequiredWrenches
+from cspr_jax.workspaces.requirements import CLOSURE, Requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
 
 

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
-from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.arithmetic.elementary import unit_vectors
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.elementary import unit_vectors
 from cspr_jax.robots.cables import AnyRobot
-from cspr_jax.robots.clearance import Clearances, Kind, Scene, clearances
-from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.robots.contacts.clearance import Clearances, Kind, Scene, clearances
+from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.schema.verdicts import FLAGS, Verdict
-from cspr_jax.workspaces import geometry
+from cspr_jax.workspaces.poses import geometry
 
 if TYPE_CHECKING:
     from jaxtyping import Float, Int

@@ -6,30 +6,30 @@ from functools import partial
 
 import numpy as np
 
-from cspr_jax.arithmetic.frames import frame_of
-from cspr_jax.arithmetic.rotations import from_tilt_torsion, products
 from cspr_jax.build.limits import build_limits
 from cspr_jax.build.orientations import given_quaternion
 from cspr_jax.build.robots import build_robot
 from cspr_jax.build.surroundings import build_scene
+from cspr_jax.config.keys.workspace import WorkspaceTable
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile, axis_points
-from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.maps.grid_map import GridMap
+from cspr_jax.numerics.linear.frames import frame_of
+from cspr_jax.numerics.linear.rotations import from_tilt_torsion, products
 from cspr_jax.robots.cables import AnyRobot
-from cspr_jax.robots.clearance import Scene
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.orientation_grids import cone_grid, equal_volume_grid, planar_grid
-from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.robots.contacts.clearance import Scene
+from cspr_jax.robots.model.orientation_grids import cone_grid, equal_volume_grid, planar_grid
+from cspr_jax.robots.model.patterns import PATTERNS
+from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.schema.quantities import TILT_TORSION
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.workspaces.all_robots import AllRobots, mass_searches
-from cspr_jax.workspaces.questions import FEASIBLE, Requirement, check_cables, required_wrenches, requirement
-from cspr_jax.workspaces.rest_cells import RestCells
-from cspr_jax.workspaces.rest_poses import MARGINS, OrientationSet, RestPoses, over_orientations
+from cspr_jax.workspaces.cells.speeds import CableSpeeds, cable_speeds
+from cspr_jax.workspaces.requirements import FEASIBLE, Requirement, check_cables, required_wrenches, requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
-from cspr_jax.workspaces.speeds import CableSpeeds, cable_speeds
+from cspr_jax.workspaces.static_cells import RestCells
+from cspr_jax.workspaces.static_poses import MARGINS, OrientationSet, RestPoses, over_orientations
 
 INTERFERENCE = "interference-free"
 TENSIONS = ("tension_min", "tension_max")

@@ -14,19 +14,19 @@ import jax
 import numpy as np
 from jax import Array
 
-from cspr_jax.arithmetic.batches import in_batches, in_parts
-from cspr_jax.arithmetic.elementary import leaf
-from cspr_jax.arithmetic.frames import IDENTITY
 from cspr_jax.errors import InputError
+from cspr_jax.numerics.batches import in_batches, in_parts
+from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.linear.frames import IDENTITY
 from cspr_jax.robots.cables import AnyRobot
-from cspr_jax.robots.patterns import PATTERNS
-from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.model.patterns import PATTERNS
+from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.verdicts import FLAGS, Verdict
-from cspr_jax.workspaces import cocircuits, exact, geometry, kernels
-from cspr_jax.workspaces.margins import Wrenches
-from cspr_jax.workspaces.questions import CLOSURE, Requirement
-from cspr_jax.workspaces.required import RequiredWrenches
+from cspr_jax.workspaces.poses import exact, facet_normals, geometry, kernels
+from cspr_jax.workspaces.poses.margins import Wrenches
+from cspr_jax.workspaces.required_wrenches import RequiredWrenches
+from cspr_jax.workspaces.requirements import CLOSURE, Requirement
 
 if TYPE_CHECKING:
     from jaxtyping import Float
@@ -118,11 +118,11 @@ class WorkspaceSearch:
             sizes = requirement.wrenches.size, float(robot.mass * robot.gravity)
             self._boundary *= np.abs([*requirement.low, *requirement.high[np.isfinite(requirement.high)], *sizes]).max()
         matrices = self._trials()
-        self._choices = cocircuits.choices_of(matrices[:FEW_TRIALS])
+        self._choices = facet_normals.choices_of(matrices[:FEW_TRIALS])
         self._order = tuple[int, ...]()
-        is_few = 0 <= robot.n_cables - cocircuits.CABLES <= cocircuits.MOST_OTHERS
-        if robot.dof == cocircuits.CABLES and is_few and self._wrenches.is_one and self._measure != "capacity":
-            self._order = cocircuits.base_order(matrices)
+        is_few = 0 <= robot.n_cables - facet_normals.CABLES <= facet_normals.MOST_OTHERS
+        if robot.dof == facet_normals.CABLES and is_few and self._wrenches.is_one and self._measure != "capacity":
+            self._order = facet_normals.base_order(matrices)
 
     def __call__(
         self,
@@ -253,13 +253,13 @@ class WorkspaceSearch:
         return stage
 
     @property
-    def _relations(self) -> cocircuits.CableSubsets:
+    def _relations(self) -> facet_normals.CableSubsets:
         # Return only the cables of each cocircuit, in the order of the block.
         table, counts = self._choices
         places = np.argsort(self._order)[table[:, self.robot.dof - 1 :]].astype(np.int32)
         sorting = np.argsort(places, axis=1)
         ordered = None if counts is None else np.take_along_axis(counts, sorting, 1)
-        return cocircuits.CableSubsets(np.take_along_axis(places, sorting, 1), ordered)
+        return facet_normals.CableSubsets(np.take_along_axis(places, sorting, 1), ordered)
 
     def required(self, position: Float[np.ndarray, "3"], quaternion: Float[np.ndarray, "4"]) -> RequiredWrenches:
         """Wrenches that the cables must supply at a pose."""

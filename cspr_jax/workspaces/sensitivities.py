@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING
 import jax
 import numpy as np
 
-from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.arithmetic.elementary import leaf
-from cspr_jax.arithmetic.frames import IDENTITY
-from cspr_jax.arithmetic.rotations import matrix
 from cspr_jax.errors import InputError
-from cspr_jax.robots.parallel_pairs import ParallelPairs, parallel_pairs
-from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.robots.point_mass import PointMassRobot
-from cspr_jax.robots.reference_pose import aligned
-from cspr_jax.robots.robot import check_determined
-from cspr_jax.robots.sensitivities import Sensitivities, pair_sensitivities, sensitivities
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.linear.frames import IDENTITY
+from cspr_jax.numerics.linear.rotations import matrix
+from cspr_jax.robots.model.parallel_pairs import ParallelPairs, parallel_pairs
+from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.robots.model.point_mass import PointMassRobot
+from cspr_jax.robots.model.robot import check_determined
+from cspr_jax.robots.statics.reference_pose import aligned
+from cspr_jax.robots.statics.sensitivities import Sensitivities, pair_sensitivities, sensitivities
 
 if TYPE_CHECKING:
     from jaxtyping import Float

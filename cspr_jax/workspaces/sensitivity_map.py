@@ -8,7 +8,7 @@ from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
 from cspr_jax.maps.grid_map import GridMap
 from cspr_jax.schema.tiles import Grid
-from cspr_jax.workspaces.geometry import mass_centres
+from cspr_jax.workspaces.poses.geometry import mass_centres
 from cspr_jax.workspaces.sensitivities import SensitivitySearch
 
 ROUNDING = 1e-9

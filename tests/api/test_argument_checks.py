@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import cspr_jax
-from cspr_jax.api import imports, plans, replays, workspaces
+from cspr_jax.api import plans, workspaces
+from cspr_jax.api.files import imports, replays
 from cspr_jax.errors import CsprError, InputError
 from cspr_jax.schema.given_numbers import numbers
 

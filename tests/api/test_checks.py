@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import cspr_jax
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.robots.point_mass import guided_robot
+from cspr_jax.robots.model.point_mass import guided_robot
 from cspr_jax.schema.verdicts import Verdict
 
 TIMES = np.linspace(0.0, 6.0, 7)

@@ -10,7 +10,7 @@ import pytest
 from support.platforms import margin_of, state_of
 
 import cspr_jax
-from cspr_jax.api.motions import (
+from cspr_jax.api.families.motions import (
     hypocycloid,
     make_problem,
     platform_motion,

@@ -19,8 +19,8 @@ from cspr_jax import cli
 from cspr_jax.api import plans
 from cspr_jax.build.robots import PlatformName, PointMassName
 from cspr_jax.errors import ConfigError, CsprError, StoreError
-from cspr_jax.robots.platform import PlatformRobot
-from cspr_jax.robots.point_mass import PointMassRobot
+from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.robots.model.point_mass import PointMassRobot
 
 __all__ = ["folder"]  # a fixture
 

@@ -19,8 +19,8 @@ from cspr_jax import cli
 from cspr_jax.config.catalogue import CATALOGUE, catalogue_names
 from cspr_jax.config.robot import read_robot
 from cspr_jax.errors import InputError
+from cspr_jax.families.platforms.answers import PlatformMotionAnswers
 from cspr_jax.outputs.plan_report import plan_object
-from cspr_jax.platforms.answers import PlatformMotionAnswers
 
 PLACES = np.array([[0.5, 0.3, 1.4], [1.2, 0.2, 1.5], [-0.4, 0.6, 1.3]])
 TURNS = np.array([[1.0, 0.0, 0.0, 0.0], [np.cos(0.1), np.sin(0.1), 0.0, 0.0], [np.cos(0.05), 0.0, 0.0, np.sin(0.05)]])

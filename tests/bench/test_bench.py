@@ -10,12 +10,12 @@ from oracles import point_mass
 from outputs.test_outputs import cspr, strict_json
 
 from cspr_jax import load_robot
-from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.bench import ellipses, motions, paths, six_cables, three_cables, timing, workspaces
 from cspr_jax.cli import main
-from cspr_jax.ellipses import harmonics
 from cspr_jax.errors import SelfCheckError
-from cspr_jax.swings import sieve
+from cspr_jax.families.ellipses import harmonics
+from cspr_jax.families.swings.proof import screen
+from cspr_jax.numerics.elementary import double_precision
 
 ROOT = Path(__file__).parents[2]
 with_compiler = pytest.mark.skipif(shutil.which("c++") is None, reason="no C++ compiler")
@@ -141,7 +141,7 @@ def test_the_numpy_version_of_the_six_cable_check(small_bench):
 
 def test_the_numpy_version_of_the_three_cable_check():
     base, ends = np.asarray(load_robot("prototype").base_points), np.array([[-1.1, 0.2, 1.2]])
-    found, tau = three_cables._numpy_checks(base, ends), (np.arange(sieve.SAMPLES) + 0.5) / sieve.SAMPLES
+    found, tau = three_cables._numpy_checks(base, ends), (np.arange(screen.SAMPLES) + 0.5) / screen.SAMPLES
     for arcs in range(1, 31):
         _, place, _, acceleration = point_mass.motion([0.7, 0.7, 3.0], ends[0], [0, 0, 1.7], 9.81, arcs, tau)
         wanted = point_mass.pseudotensions(base, place, acceleration, 9.81).min()

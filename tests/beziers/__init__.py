@@ -1,1 +1,1 @@
-"""Tests of `cspr_jax.beziers`."""
+"""Tests of `cspr_jax.families.beziers`."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import cspr_jax
-from cspr_jax.motions import launch_outcome
+from cspr_jax.launch import launch_result
 
 PLAN = {
     "schema": 1,
@@ -29,13 +29,13 @@ PLAN = {
 @pytest.fixture
 def throws(monkeypatch):
     """How often a sample was thrown."""
-    counts, scatter = [], launch_outcome.scatter
+    counts, scatter = [], launch_result.scatter
 
     def counted(*arguments):
         counts.append(1)
         return scatter(*arguments)
 
-    monkeypatch.setattr(launch_outcome, "scatter", counted)
+    monkeypatch.setattr(launch_result, "scatter", counted)
     return counts
 
 

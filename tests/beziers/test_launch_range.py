@@ -7,8 +7,8 @@ import pytest
 from support.commands import cspr
 
 import cspr_jax
-from cspr_jax.beziers.launch_range_map import LaunchRangeMap
 from cspr_jax.errors import InputError
+from cspr_jax.families.beziers.launches.launch_range_map import LaunchRangeMap
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.sweep.definition import read_sweep
 

@@ -12,9 +12,9 @@ from scipy.optimize import fsolve
 from support.commands import cspr, plan, planned
 
 import cspr_jax
-from cspr_jax.beziers.launch import through
-from cspr_jax.beziers.motion import Bezier
-from cspr_jax.motions.landings import LaunchErrors, Throw, scatter
+from cspr_jax.families.beziers.launches.through_release import through
+from cspr_jax.families.beziers.motion import Bezier
+from cspr_jax.launch.landings import LaunchErrors, Throw, scatter
 
 GRAVITY = 9.80665
 PLACES = [[0, 0, -0.5], [-0.05, -0.05, -0.7], [0.1, 0.15, -0.8], [-0.1, -0.3, -1.2]]

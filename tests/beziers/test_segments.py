@@ -12,9 +12,9 @@ from support.motions import states_along
 
 import cspr_jax
 from cspr_jax import Limits, Verdict
-from cspr_jax.beziers.margins import smallest_cubic, smallest_margins, smallest_quadratic
-from cspr_jax.beziers.motion import Bezier
 from cspr_jax.errors import InputError
+from cspr_jax.families.beziers.margins import smallest_cubic, smallest_margins, smallest_quadratic
+from cspr_jax.families.beziers.motion import Bezier
 
 HEIGHT = 0.35 * np.sqrt(3.0) / 2.0
 SPOOLS = np.array([[0.35, 0.0, 0.0], [-0.175, HEIGHT, 0.0], [-0.175, -HEIGHT, 0.0]])

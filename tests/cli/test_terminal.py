@@ -13,8 +13,8 @@ import jax
 import pytest
 from rich.table import Table
 
-from cspr_jax.arithmetic import cores, elementary
 from cspr_jax.errors import RefusedError, ResourceError, printable
+from cspr_jax.numerics import cores, elementary
 from cspr_jax.runtime import surroundings, terminal, xla
 
 HOSTILE = [

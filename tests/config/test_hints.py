@@ -12,10 +12,10 @@ import cspr_jax
 from config.test_wording import BODY, RING, SPOOLS, spec_of
 from cspr_jax.cli import main
 from cspr_jax.config import hints, near_rest
+from cspr_jax.config.keys.workspace import WorkspaceTable
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.config.sweep import SweepFile, SweepTrajectory
-from cspr_jax.config.workspace import WorkspaceTable
 from cspr_jax.errors import shown
 
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cspr_jax.api.imports import import_robot
+from cspr_jax.api.files.imports import import_robot
 from cspr_jax.cli import main
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import checked, read_toml

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from support.splines import random_spline, states_of
 
-from cspr_jax.arithmetic import piecewise_bounds
+from cspr_jax.numerics.bounds import piecewise_bounds
 
 S = np.linspace(-1.0, 1.0, 33)
 NAMES = ("position", "velocity", "acceleration", "rotation", "angular_velocity", "angular_acceleration")

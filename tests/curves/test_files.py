@@ -9,7 +9,7 @@ from cspr_jax.config.motions.table import MotionPieces, MotionTable
 from cspr_jax.curves.files import kept_to, moving_ends, samples_of
 from cspr_jax.curves.reading import pieces_of, spline_of
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.splines.functions import function_motion
+from cspr_jax.families.splines.functions import function_motion
 
 TIMES = np.linspace(0.0, 1.0, 5)
 PLACES = np.stack([TIMES, 0.0 * TIMES, 2.0 + TIMES], axis=1)

@@ -8,8 +8,8 @@ import pytest
 from support.commands import cspr
 
 import cspr_jax
-from cspr_jax.ellipses import map as ellipse_map
 from cspr_jax.errors import ConfigError
+from cspr_jax.families.ellipses import map as ellipse_map
 from cspr_jax.plans.cell_plan import cell_plan
 from cspr_jax.schema.verdicts import Verdict
 

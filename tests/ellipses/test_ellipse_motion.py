@@ -9,9 +9,9 @@ from support.ellipses import ellipses, triangle
 from support.motions import states_along
 
 import cspr_jax
-from cspr_jax.ellipses.harmonics import Ellipse
-from cspr_jax.ellipses.ways import Turning, motion_between
-from cspr_jax.motions import amplitudes
+from cspr_jax.families.ellipses.harmonics import Ellipse
+from cspr_jax.families.ellipses.transfers import Turning, motion_between
+from cspr_jax.motion import amplitudes
 
 GRAVITY = 9.81
 CENTRE, A, B = np.array([0.2, -0.1, 2.0]), np.array([0.5, 0.1, 0.2]), np.array([-0.2, 0.4, -0.1])

@@ -7,11 +7,11 @@ from oracles.beziers import tensions
 from support.ellipses import ellipses, flat_spools, triangle
 
 import cspr_jax
-from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.ellipses import harmonics
-from cspr_jax.ellipses.harmonics import Ellipse
-from cspr_jax.ellipses.hull import hull_of
-from cspr_jax.robots.kernel_axes import prepared
+from cspr_jax.families.ellipses import harmonics
+from cspr_jax.families.ellipses.harmonics import Ellipse
+from cspr_jax.families.ellipses.hull import hull_of
+from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.robots.statics.kernel_axes import prepared
 
 GRAVITY = 9.81
 LEVEL = np.array([[np.sqrt(0.75), -0.5, 0.0], [-np.sqrt(0.75), -0.5, 0.0], [0.0, 1.0, 0.0]])

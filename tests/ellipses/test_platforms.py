@@ -8,8 +8,8 @@ from scipy.optimize import linprog
 from support.motions import states_along
 
 import cspr_jax
-from cspr_jax.arithmetic import rotations
 from cspr_jax.curves.files import reference_of
+from cspr_jax.numerics.linear import rotations
 
 SIX = {
     "schema": 1,

@@ -10,16 +10,16 @@ import pytest
 from support.motions import states_along
 
 import cspr_jax
-from cspr_jax.arithmetic import rotations
-from cspr_jax.arithmetic.elementary import leaf
-from cspr_jax.ellipses.harmonics import Ellipse
-from cspr_jax.ellipses.motion import EllipseMotion, integral, with_turns
-from cspr_jax.ellipses.rotation import Rotation, turn_between
-from cspr_jax.ellipses.rotation_frequencies import rotation_frequencies
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.problem import Problem
-from cspr_jax.robots.kernel_axes import prepared
-from cspr_jax.robots.limits import NO_LIMITS
+from cspr_jax.families.ellipses.harmonics import Ellipse
+from cspr_jax.families.ellipses.motion import EllipseMotion, integral, with_turns
+from cspr_jax.families.ellipses.rotation import Rotation, turn_between
+from cspr_jax.families.ellipses.rotation_frequencies import rotation_frequencies
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.linear import rotations
+from cspr_jax.robots.model.limits import NO_LIMITS
+from cspr_jax.robots.statics.kernel_axes import prepared
 
 TIME = 9.3
 

@@ -9,13 +9,13 @@ from scipy.optimize import least_squares
 from support.commands import plan as command
 
 import cspr_jax
-from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.ellipses.harmonics import Ellipse
-from cspr_jax.ellipses.motion import turning
-from cspr_jax.motions.landings import Throw, landing, state_at
-from cspr_jax.robots.force_balance import cable_motion
-from cspr_jax.robots.kernel_axes import prepared
-from cspr_jax.robots.pulleys import Pulleys
+from cspr_jax.families.ellipses.harmonics import Ellipse
+from cspr_jax.families.ellipses.motion import turning
+from cspr_jax.launch.landings import Throw, landing, state_at
+from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.robots.model.pulleys import Pulleys
+from cspr_jax.robots.statics.force_balance import cable_motion
+from cspr_jax.robots.statics.kernel_axes import prepared
 
 # A triangle with a side of 1.8 m and two others, z up; the centre lies below its centroid.
 SPOOLS = np.array([[1.0, 0.1, 3.0], [-0.6, 0.8, 3.0], [-0.4, -0.9, 3.0]])

@@ -6,9 +6,9 @@ from scipy.optimize import minimize
 from support.commands import cspr
 
 import cspr_jax
-from cspr_jax.ellipses.swing_range import swing_range
-from cspr_jax.ellipses.swing_range_map import SwingRangeMap
 from cspr_jax.errors import InputError
+from cspr_jax.families.ellipses.swing_range import swing_range
+from cspr_jax.families.ellipses.swing_range_map import SwingRangeMap
 from cspr_jax.maps.release_box import ReleaseBox
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.sweep.definition import read_sweep

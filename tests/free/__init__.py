@@ -1,1 +1,1 @@
-"""Tests of `cspr_jax.free`."""
+"""Tests of `cspr_jax.families.free`."""

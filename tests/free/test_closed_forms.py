@@ -7,15 +7,15 @@ import pytest
 from support.motions import states_along
 
 import cspr_jax
-from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.free import leg, no_slower
-from cspr_jax.free.closed_forms import ClosedForm, closed_forms, controls_of, form_starts
-from cspr_jax.free.free_motion import _keep, free_motion
-from cspr_jax.free.poses import segments_of
-from cspr_jax.free.question import FreeQuestion
-from cspr_jax.free.search import Optima, started
-from cspr_jax.free.starts import starts
-from cspr_jax.motions.motion import states_at
+from cspr_jax.families.free import leg, no_slower
+from cspr_jax.families.free.closed_forms import ClosedForm, closed_forms, controls_of, form_starts
+from cspr_jax.families.free.free_motion import _keep, free_motion
+from cspr_jax.families.free.poses import segments_of
+from cspr_jax.families.free.problem import FreeQuestion
+from cspr_jax.families.free.search.interior_point import Optima, started
+from cspr_jax.families.free.search.starts import starts
+from cspr_jax.motion.motion import states_at
+from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.schema.families import FAMILIES
 from cspr_jax.schema.verdicts import Verdict
 

@@ -7,18 +7,18 @@ import pytest
 from oracles import clearance as oracle
 
 import cspr_jax
-from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.free import contacts
-from cspr_jax.free.poses import FreePoses, motions_of
-from cspr_jax.free.question import FreeQuestion, FreeSettings, slacks_of
-from cspr_jax.free.search import Optima, started
-from cspr_jax.free.tasks import Unknowns
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.problem import Problem
-from cspr_jax.robots.clearance import Meeting, scene
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.shapes import box, cylinder, hull, sphere
+from cspr_jax.families.free import contacts
+from cspr_jax.families.free.poses import FreePoses, motions_of
+from cspr_jax.families.free.problem import FreeQuestion, FreeSettings, slacks_of
+from cspr_jax.families.free.search.interior_point import Optima, started
+from cspr_jax.families.free.search.tasks import Unknowns
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.robots.contacts.clearance import Meeting, scene
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.shapes import box, cylinder, hull, sphere
+from cspr_jax.robots.statics.kernel_axes import centred
 
 # A sphere half-way on the fastest motion between two poses.
 BESIDE = {

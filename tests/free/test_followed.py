@@ -7,14 +7,14 @@ import pytest
 from support.motions import states_along
 
 import cspr_jax
-from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.free import followed as module
-from cspr_jax.free.closed_forms import ClosedForm, form_starts
-from cspr_jax.free.followed import energy_along, followed
-from cspr_jax.free.poses import FreePoses, segments_of
-from cspr_jax.free.question import FreeQuestion, FreeSettings
-from cspr_jax.motions.motion import states_at
-from cspr_jax.motions.proved_answers import proved_answers
+from cspr_jax.families.free import followed as module
+from cspr_jax.families.free.closed_forms import ClosedForm, form_starts
+from cspr_jax.families.free.followed import energy_along, followed
+from cspr_jax.families.free.poses import FreePoses, segments_of
+from cspr_jax.families.free.problem import FreeQuestion, FreeSettings
+from cspr_jax.motion.motion import states_at
+from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.verification.proved_answers import proved_answers
 
 # Targets 1 and 2 of Table 3.2 of the Dion-Gauvin thesis.
 POSES = [

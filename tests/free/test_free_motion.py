@@ -5,13 +5,13 @@ import pytest
 from oracles import any_motion, least_time_forms
 from support.free_motions import QUICK, Judged, problem_of, solve
 
-from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import InputError
-from cspr_jax.free import free_motion as free_motions
-from cspr_jax.free import search
-from cspr_jax.free.instants import DEPTH
-from cspr_jax.free.poses import FreePoses
-from cspr_jax.free.question import FreeQuestion, FreeSettings, slacks_of, tightened
+from cspr_jax.families.free import free_motion as free_motions
+from cspr_jax.families.free.poses import FreePoses
+from cspr_jax.families.free.problem import FreeQuestion, FreeSettings, slacks_of, tightened
+from cspr_jax.families.free.search import interior_point
+from cspr_jax.families.free.search.instants import DEPTH
+from cspr_jax.numerics.elementary import double_precision
 
 RING, SQUARE = (least_time_forms.ring_robot(count, 1.0, 2.0) for count in (3, 4))
 # One spool is out of the plane of the others.
@@ -179,7 +179,7 @@ def test_bounds_tighten_more_each_time(aside):
 )
 def test_few_intervals_are_tried_where_no_start_has_led_to_a_motion(monkeypatch, misses, starts, intervals):
     """The search after the usual ones is for such segments alone, not for those of which no two starts agree."""
-    begun, whole = [], search.optima
+    begun, whole = [], interior_point.optima
 
     def missing(tasks, *arguments, **keywords):
         result = whole(tasks, *arguments, **keywords)

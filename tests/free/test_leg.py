@@ -6,8 +6,8 @@ from support.commands import plan
 from support.motions import states_along
 
 import cspr_jax
-from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import ConfigError
+from cspr_jax.numerics.elementary import double_precision
 
 LIMITS = {"tension_max": 1.6, "cable_speed_max": 3.85}
 PLACES = [[-1.1, -1.1, 0.5], [-1.1, -0.9, 1.5], [0.8, 0.5, 1.5]]

@@ -9,12 +9,12 @@ from support.commands import plan
 from support.motions import states_along
 
 import cspr_jax
-from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.config.robot import resolve_robot
-from cspr_jax.free import leg
-from cspr_jax.free.free_motion import FreeMotion, free_motion
-from cspr_jax.free.search import Ending
+from cspr_jax.families.free import leg
+from cspr_jax.families.free.free_motion import FreeMotion, free_motion
+from cspr_jax.families.free.search.interior_point import Ending
+from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.numerics.linear.frames import frame_of
 from cspr_jax.schema.verdicts import Verdict
 
 # Below the spools, where the robot can stand still, so that lines are there.

@@ -8,10 +8,10 @@ from oracles import free_motion_cases, free_motion_times
 from support.free_motions import problem_of
 
 from cspr_jax import compute_sweep, plan
-from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import ConfigError
-from cspr_jax.free.many import free_motions
-from cspr_jax.free.poses import FreePoses
+from cspr_jax.families.free.batch import free_motions
+from cspr_jax.families.free.poses import FreePoses
+from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.plans.cell_plan import cell_plan
 from cspr_jax.schema.verdicts import Verdict
 

@@ -7,17 +7,17 @@ import pytest
 from oracles import least_time_forms
 from support.free_motions import problem_of
 
-from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.free.basis import basis
-from cspr_jax.free.elimination import Softness, eliminated, less_missed, times, transposed
-from cspr_jax.free.instants import ValueBounds, bounds
-from cspr_jax.free.newton import gathered, newton_step
-from cspr_jax.free.objectives import OBJECTIVES
-from cspr_jax.free.poses import FreePoses, tasks_of
-from cspr_jax.free.search import started
-from cspr_jax.free.starts import starts
-from cspr_jax.free.tasks import ClearancePlanes, Unknowns
-from cspr_jax.motions.criteria import criteria
+from cspr_jax.families.free.poses import FreePoses, tasks_of
+from cspr_jax.families.free.search.basis import basis
+from cspr_jax.families.free.search.condensation import Softness, eliminated, less_missed, times, transposed
+from cspr_jax.families.free.search.instants import ValueBounds, bounds
+from cspr_jax.families.free.search.interior_point import started
+from cspr_jax.families.free.search.newton import gathered, newton_step
+from cspr_jax.families.free.search.objectives import OBJECTIVES
+from cspr_jax.families.free.search.starts import starts
+from cspr_jax.families.free.search.tasks import ClearancePlanes, Unknowns
+from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.verification.criteria import criteria
 
 RING = least_time_forms.ring_robot(3, 1.0, 2.0)
 LIMITS = {"tension_min": np.full(3, 0.4), "tension_max": np.full(3, 16.0)}

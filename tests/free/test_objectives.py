@@ -5,16 +5,17 @@ import pytest
 from oracles import least_time_forms
 from support.free_motions import QUICK, solve
 
-from cspr_jax.arithmetic.elementary import double_precision, leaf
-from cspr_jax.free import proofs, search
-from cspr_jax.free.free_motion import free_motion
-from cspr_jax.free.newton import newton_step
-from cspr_jax.free.poses import FreePoses
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.problem import Problem
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.point_mass import guided_robot
+from cspr_jax.families.free import proofs
+from cspr_jax.families.free.free_motion import free_motion
+from cspr_jax.families.free.poses import FreePoses
+from cspr_jax.families.free.search import interior_point
+from cspr_jax.families.free.search.newton import newton_step
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.elementary import double_precision, leaf
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.point_mass import guided_robot
+from cspr_jax.robots.statics.kernel_axes import centred
 
 RING = least_time_forms.ring_robot(3, 1.0, 2.0)
 WEIGHT = 2.0 * 9.81
@@ -121,7 +122,7 @@ def test_control_c_keeps_the_best_so_far(monkeypatch, when):
             raise interrupts.pop()
         return newton_step(tasks, unknowns, *others)
 
-    monkeypatch.setattr(search, "newton_step", interrupted)
+    monkeypatch.setattr(interior_point, "newton_step", interrupted)
     if when in ("early", "joining"):
         with pytest.raises(KeyboardInterrupt):
             best("time")

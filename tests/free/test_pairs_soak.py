@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import cspr_jax
-from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import ConfigError
+from cspr_jax.numerics.linear.frames import frame_of
 
 pytestmark = pytest.mark.soak
 

@@ -6,7 +6,7 @@ from oracles import any_motion, least_time_forms
 from support.free_motions import Judged, solve
 from support.other_robots import on_balls, uncertain
 
-from cspr_jax.free.question import FreeSettings
+from cspr_jax.families.free.problem import FreeSettings
 from cspr_jax.schema.verdicts import Verdict
 
 RING = least_time_forms.ring_robot(3, 1.0, 2.0)

@@ -5,7 +5,7 @@ import pytest
 from oracles import free_motion_cases, free_motions
 from support.free_motions import solve
 
-from cspr_jax.free.question import FreeSettings
+from cspr_jax.families.free.problem import FreeSettings
 
 pytestmark = pytest.mark.soak
 

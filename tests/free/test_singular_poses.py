@@ -9,16 +9,16 @@ from support.motions import states_along
 from support.platforms import general, ours, random_pose
 
 import cspr_jax
-from cspr_jax.arithmetic.elementary import double_precision, leaf
-from cspr_jax.free.derivatives import instant_values, residuals
-from cspr_jax.free.determinants import determinant, unit_wrenches, with_derivatives
-from cspr_jax.free.free_motion import free_motion
-from cspr_jax.free.poses import FreePoses, determinants, divided
-from cspr_jax.free.question import FreeQuestion, FreeSettings
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.problem import Problem
-from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.wrench_balance import at_rest
+from cspr_jax.families.free.free_motion import free_motion
+from cspr_jax.families.free.poses import FreePoses, determinants, divided
+from cspr_jax.families.free.problem import FreeQuestion, FreeSettings
+from cspr_jax.families.free.search.derivatives import instant_values, residuals
+from cspr_jax.families.free.search.determinants import determinant, unit_wrenches, with_derivatives
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.elementary import double_precision, leaf
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.statics.wrench_balance import at_rest
 
 FREE = np.full((2, 6), np.nan)
 # Spools and attachment points of a planar platform on three cables, m.

@@ -7,13 +7,13 @@ from hypothesis import strategies as st
 from oracles import least_time_forms
 
 import cspr_jax
-from cspr_jax.arithmetic.elementary import double_precision, leaf
 from cspr_jax.curves.spline import Spline
-from cspr_jax.free.time_bounds import least_time, time_bounds
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.problem import Problem
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.limits import Limits
+from cspr_jax.families.free.search.time_bounds import least_time, time_bounds
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.elementary import double_precision, leaf
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.statics.kernel_axes import centred
 
 SIZES = st.floats(0.01, 100.0)
 

@@ -12,17 +12,17 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "cspr_jax"
 
-# From the bottom up, as docs/architecture.md draws them. A room is a folder or a loose module, with all modules in it
-# that no longer name has. A room imports from the floors below it alone.
+# From the bottom up, as docs/architecture.md draws them. A room is a folder, or a loose module, with all that is in it
+# and has no floor of its own. A room imports from the floors below it alone; within it, too, imports lead one way.
 FLOORS = (
-    ("errors", "arithmetic"),
+    ("errors", "numerics"),
     ("schema", "runtime", "robots"),
     ("config",),
-    ("motions", "store"),
-    ("build",),
-    ("maps", "curves"),
+    ("motion", "store"),
+    ("verification", "build"),
+    ("launch", "maps", "curves"),
     ("workspaces",),
-    ("swings", "lines", "beziers", "platforms", "splines", "ellipses", "paths", "free"),
+    ("families",),
     ("plans", "sweep", "bench"),
     ("outputs",),
     ("published", "outputs.plots"),
@@ -33,17 +33,30 @@ FLOORS = (
 ROOMS = [room for floor in FLOORS for room in floor]
 # Families import nothing of each other: what two of them need lies below. Poses at rest are asked about by platforms.
 FAMILIES = ("swings", "lines", "beziers", "platforms", "splines", "ellipses", "paths", "free")
-KERNELS = ("errors", "arithmetic", "schema", "robots", "motions", "curves", "workspaces", *FAMILIES)
-# What a room is about, what it rests on, and its files in the order in which they are read, stand in its guide.
-GUIDES = ("motions", "curves", "workspaces", *FAMILIES)
+FAMILIES = tuple(f"families.{name}" for name in FAMILIES)
+KERNELS = (
+    "errors",
+    "numerics",
+    "schema",
+    "robots",
+    "motion",
+    "verification",
+    "launch",
+    "curves",
+    "workspaces",
+    "families",
+)
+# What a folder is about, what it rests on, and its files in the order in which they are read, stand in its guide.
+GUIDES = ("motion", "verification", "launch", "curves", "workspaces", *FAMILIES)
 # Tables of rows: to split one hides rows and shortens nothing. They may have more than 400 lines.
 TABLES = ("schema.map_kinds", "schema.quantities")
+LARGEST_FOLDER = 16
 # Folders, all of them, and modules that never import jax.
 WITHOUT_JAX = (
-    "api.listings",
-    "api.pictures",
+    "api.files.listings",
+    "api.files.pictures",
     "api.sweeps",
-    "arithmetic.frames",
+    "numerics.linear.frames",
     "cli",
     "config",
     "errors",
@@ -105,29 +118,41 @@ def _functions(tree: ast.Module) -> Iterator[ast.FunctionDef | ast.AsyncFunction
     return (node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef))
 
 
+def _parts(folder: str) -> dict[str, list[str]]:
+    """Modules of each file and folder right below a folder, by its name."""
+    found: dict[str, list[str]] = {}
+    for name in INNER:
+        if name.startswith(f"{folder}.") and not (name in PACKAGES and len(MODULES[name].body) == 1):
+            found.setdefault(".".join(name.split(".")[: folder.count(".") + 2]), []).append(name)
+    return found
+
+
 def test_every_module_has_a_room():
     assert [name for name in INNER if _room(name) is None] == []
     assert {_room(name) for name in INNER} == set(ROOMS)
-    # A folder in a room belongs to it, unless it is one of its own.
-    folders = {_room(_name(path.parent / "__init__.py")) for path in PACKAGE.rglob("*.py")} - {None}
     loose = {path.stem for path in PACKAGE.glob("*.py")} - {"__init__"}
-    assert folders | loose == set(ROOMS)
+    folders = {name for name in PACKAGES if name and "." not in name}
+    assert folders | loose == {room.partition(".")[0] for room in ROOMS}
+
+
+def test_folders_are_short():
+    files = {folder: [name for name in INNER if name.rpartition(".")[0] == folder] for folder in PACKAGES - {""}}
+    assert {folder: len(names) for folder, names in files.items() if len(names) > LARGEST_FOLDER} == {}
 
 
 def test_tests_lie_in_folders_like_those_of_the_package():
     """Beside what they share, and what belongs to no folder."""
     shared = {"house", "oracles", "properties", "reliability", "support"}
     folders = {path.parent.relative_to(ROOT / "tests").parts[0] for path in (ROOT / "tests").glob("*/*.py")}
-    assert folders - shared <= {room.split(".")[0] for room in ROOMS}
+    assert folders - shared <= {name.rpartition(".")[2] for name in PACKAGES}
     assert not list((ROOT / "tests").glob("test_*.py"))
 
 
 def test_the_house_stays_small():
     loose = {path.stem for path in PACKAGE.glob("*.py")}
     assert loose <= {"__init__", "__main__", "cli", "api", "errors"}
-    assert len(ROOMS) <= 29
+    assert len(ROOMS) <= 24
     assert len(FLOORS) <= 14
-    assert {FLOOR_OF[room] for room in FAMILIES} == {FLOOR_OF[FAMILIES[0]]}
 
 
 def test_imports_point_down():
@@ -139,26 +164,52 @@ def test_imports_point_down():
     assert upward == []
 
 
-def test_imports_have_no_cycle():
-    left = {name: _inner_imports(name) - {name} for name in INNER}
+def _is_ordered(imports: dict[str, set[str]]) -> bool:
+    """Whether names can be read one after the other, each after those that it imports."""
+    left = dict(imports)
     while left:
         free = [name for name, targets in left.items() if not targets & left.keys()]
-        assert free, f"cycle among {sorted(left)}"
+        if not free:
+            return False
         for name in free:
             del left[name]
+    return True
+
+
+def test_imports_have_no_cycle():
+    """Neither modules, nor the files and folders of any folder."""
+    assert _is_ordered({name: _inner_imports(name) - {name} for name in INNER})
+    for folder in PACKAGES - {""}:
+        parts = _parts(folder)
+        owners = {name: part for part, names in parts.items() for name in names}
+        imports = {part: set().union(*map(_inner_imports, names)) for part, names in parts.items()}
+        assert _is_ordered({p: {owners[t] for t in targets if t in owners} - {p} for p, targets in imports.items()}), (
+            folder
+        )
+
+
+def test_families_import_nothing_of_each_other():
+    for family in FAMILIES:
+        own = [name for name in INNER if name.startswith(f"{family}.")]
+        others = {target for name in own for target in _inner_imports(name) if target.startswith("families.")} - set(
+            own
+        )
+        assert others == set(), family
 
 
 def test_a_guide_names_the_files_of_a_room_in_reading_order():
-    """Each once, and none before what it imports."""
+    """Of a room and of each folder in it: each file or folder once, and none before what it imports."""
+    folders = [name for name in PACKAGES for room in GUIDES if name == room or name.startswith(f"{room}.")]
     misplaced = []
-    for room in GUIDES:
-        lines = ast.get_docstring(MODULES[room]).splitlines()
-        files = [line.split()[0] for line in lines if re.match(r" {4}\w+ {2,}\S", line)]
-        assert sorted(files) == sorted(name.removeprefix(f"{room}.") for name in INNER if _room(name) == room), room
-        for i, file in enumerate(files):
-            above = {f"{room}.{earlier}" for earlier in files[:i]}
-            inner = {target for target in _inner_imports(f"{room}.{file}") if _room(target) == room}
-            misplaced += [(f"{room}.{file}", target) for target in inner - above]
+    for folder in folders:
+        parts, above = _parts(folder), set()
+        lines = ast.get_docstring(MODULES[folder]).splitlines()
+        listed = [f"{folder}.{line.split()[0]}" for line in lines if re.match(r" {4}\w+ {2,}\S", line)]
+        assert sorted(listed) == sorted(parts), folder
+        for part in listed:
+            above |= set(parts[part])
+            targets = set().union(*map(_inner_imports, parts[part])) - above
+            misplaced += [(part, target) for target in targets if target.startswith(f"{folder}.")]
     assert misplaced == []
 
 
@@ -169,7 +220,7 @@ def test_kernels_know_no_files_and_pictures():
 
 
 def test_no_compiled_function_calls_lapack():
-    """Batches of them can wait for ever for their own threads in jaxlib 0.10; see `arithmetic.elementary.solved`."""
+    """Batches of them can wait for ever for their own threads in jaxlib 0.10; see `numerics.elementary.solved`."""
     calls = re.compile(r"jnp\.linalg\.(?!norm\b)|jax\.scipy\.linalg|lax\.linalg")
     assert [path.name for path in PACKAGE.rglob("*.py") if calls.search(path.read_text("utf-8"))] == []
 
@@ -221,8 +272,9 @@ def test_a_function_imports_what_it_is_about(name, most):
     code = f"import sys, cspr_jax; cspr_jax.{name}; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     loaded = set(done.stdout.split())
-    assert len([module for module in loaded if module.startswith("cspr_jax.")]) <= most
-    assert not {f"cspr_jax.platforms.{proof}" for proof in ("tension_blocks", "place_blocks", "proof")} & loaded
+    own = {module.removeprefix("cspr_jax.") for module in loaded if module.startswith("cspr_jax.")}
+    assert len(own - PACKAGES) <= most
+    assert [module for module in own if "six_cable_proof" in module] == []
     pieces = {f"scipy.{piece}" for piece in ("linalg", "spatial", "special", "interpolate", "optimize")}
     assert name != "plan" or not pieces & loaded
 

@@ -18,7 +18,7 @@ from cspr_jax.config.plan import PlanFile, read_plan
 from cspr_jax.config.reading import checked, read_toml
 from cspr_jax.config.robot import read_robot
 from cspr_jax.errors import ConfigError
-from cspr_jax.outputs.plots.options import with_widths
+from cspr_jax.outputs.plots.style.options import with_widths
 from cspr_jax.published import tables
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.schema.quantities import QUANTITIES
@@ -279,7 +279,7 @@ def test_what_the_readme_names_is_there():
 
 @pytest.mark.prose
 def test_modules_that_documents_name_exist():
-    """Names such as `platforms.accessible` end a module's path, or name what a module holds."""
+    """Names such as `families.platforms.orientations.accessible` end a module's path, or name what a module holds."""
     modules = {
         "." + ".".join(path.relative_to(ROOT / "cspr_jax").with_suffix("").parts).removesuffix(".__init__"): path
         for path in (ROOT / "cspr_jax").rglob("*.py")

@@ -1,1 +1,1 @@
-"""Tests of `cspr_jax.lines`."""
+"""Tests of `cspr_jax.families.lines`."""

@@ -9,12 +9,12 @@ from support.motions import states_along
 
 import cspr_jax
 from cspr_jax import Verdict
-from cspr_jax.lines.durations import by_formula
-from cspr_jax.lines.timed_lines import motions_of, timed_lines
-from cspr_jax.lines.verdicts import verdicts
-from cspr_jax.motions.given_limits import limits_over
-from cspr_jax.motions.problem import Problem
-from cspr_jax.robots.kernel_axes import prepared
+from cspr_jax.families.lines.durations import by_formula
+from cspr_jax.families.lines.timed_lines import motions_of, timed_lines
+from cspr_jax.families.lines.verdicts import verdicts
+from cspr_jax.motion.given_limits import limits_over
+from cspr_jax.motion.problem import Problem
+from cspr_jax.robots.statics.kernel_axes import prepared
 
 MASS = 10.0
 

@@ -9,17 +9,17 @@ import pytest
 from oracles import lines as oracle
 
 import cspr_jax
-from cspr_jax.lines.faces import Sides, line_faces, sides
-from cspr_jax.lines.motion import fixed_law, s_curve
-from cspr_jax.lines.proof import smallest_slacks
-from cspr_jax.lines.s_model import least_of_law, least_s_curve, least_time, thesis_s_curve
-from cspr_jax.lines.slacks import line_slacks
-from cspr_jax.lines.timed_lines import motions_of, timed_lines
-from cspr_jax.motions.amplitudes import derivatives, named
-from cspr_jax.motions.problem import Problem
-from cspr_jax.robots.kernel_axes import prepared
-from cspr_jax.robots.limits import NO_LIMITS
-from cspr_jax.robots.point_mass import in_one_plane
+from cspr_jax.families.lines.faces import Sides, line_faces, sides
+from cspr_jax.families.lines.motion import fixed_law, s_curve
+from cspr_jax.families.lines.proof import smallest_slacks
+from cspr_jax.families.lines.s_model import least_of_law, least_s_curve, least_time, thesis_s_curve
+from cspr_jax.families.lines.slacks import line_slacks
+from cspr_jax.families.lines.timed_lines import motions_of, timed_lines
+from cspr_jax.motion.amplitudes import derivatives, named
+from cspr_jax.motion.problem import Problem
+from cspr_jax.robots.model.limits import NO_LIMITS
+from cspr_jax.robots.model.point_mass import in_one_plane
+from cspr_jax.robots.statics.kernel_axes import prepared
 from cspr_jax.schema.verdicts import Verdict
 
 GRAVITY = 9.81

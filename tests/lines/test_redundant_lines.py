@@ -6,8 +6,8 @@ import pytest
 from support.redundant import PLANAR_THREE, RECTANGLE, least_distances
 
 import cspr_jax
-from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.motions.proved import proved
+from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.verification.proved import proved
 
 KEYS = {"schema": 1, "max_acceleration": 20.0, "samples": 241}
 CASES = {

@@ -10,8 +10,8 @@ from support.commands import cspr, plan, planned
 
 import cspr_jax
 from cspr_jax.errors import InputError
-from cspr_jax.lines.durations import names_of
-from cspr_jax.lines.s_model import LONGER
+from cspr_jax.families.lines.durations import names_of
+from cspr_jax.families.lines.s_model import LONGER
 from cspr_jax.published import boralugoda
 from cspr_jax.schema.verdicts import Verdict
 

@@ -11,9 +11,9 @@ from outputs.test_pictures import GRID, bar, made, marked, ticks
 from support.reading import read_here
 
 import cspr_jax
-from cspr_jax.api.reports import report
+from cspr_jax.api.files.reports import report
 from cspr_jax.errors import InputError
-from cspr_jax.outputs.plots.colours import NONE_COLOUR
+from cspr_jax.outputs.plots.style.colours import NONE_COLOUR
 from cspr_jax.schema.best import best_of
 from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.quantities import EVERY

@@ -21,7 +21,7 @@ from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.schema.map_kinds import MAP_KINDS, MapKind, register, registered
 from cspr_jax.schema.quantities import AXES, QUANTITIES, Quantity
-from cspr_jax.store.result import open_result
+from cspr_jax.store.reading.result import open_result
 from cspr_jax.sweep.definition import read_sweep
 
 MODULE = (Path(__file__).parents[2] / "docs" / "examples" / "spool_distances.py").read_text("utf-8")

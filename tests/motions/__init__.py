@@ -1,1 +1,1 @@
-"""Tests of `cspr_jax.motions`."""
+"""Tests of `cspr_jax.motion`, `cspr_jax.verification` and `cspr_jax.launch`."""

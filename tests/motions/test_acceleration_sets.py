@@ -10,7 +10,7 @@ from support.commands import cspr
 
 import cspr_jax
 from cspr_jax.errors import InputError
-from cspr_jax.robots.wrench_sets import normals_to, spanning, wrench_faces
+from cspr_jax.robots.statics.wrench_sets import normals_to, spanning, wrench_faces
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.schema.verdicts import Verdict
 

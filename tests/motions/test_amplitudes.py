@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from oracles import point_mass as oracle
 
 from cspr_jax.errors import InputError
-from cspr_jax.motions import amplitudes
-from cspr_jax.motions.problem import Problem
-from cspr_jax.robots.limits import Limits
-from cspr_jax.swings.arcs import minimum_arcs
+from cspr_jax.families.swings.arcs import minimum_arcs
+from cspr_jax.motion import amplitudes
+from cspr_jax.motion.problem import Problem
+from cspr_jax.robots.model.limits import Limits
 
 DERIVATIVES = jax.jit(partial(amplitudes.derivatives, order=5))
 LOCAL_BOUNDS = jax.jit(amplitudes.local_bounds)

@@ -11,15 +11,15 @@ from oracles.any_motion_cases import KINDS, random_case
 
 import cspr_jax
 from cspr_jax.curves.interpolation import interpolated
-from cspr_jax.motions.attained import attained
-from cspr_jax.motions.block_slacks import block_slacks
-from cspr_jax.motions.criteria import criteria
-from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.proved_answers import MotionProof
-from cspr_jax.motions.time_proof import time_proof
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.limits import Limits
+from cspr_jax.motion.problem import Problem
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.verification.attained import attained
+from cspr_jax.verification.bounds.block_slacks import block_slacks
+from cspr_jax.verification.criteria import criteria
+from cspr_jax.verification.proved_answers import MotionProof
+from cspr_jax.verification.time_proof import time_proof
 
 # Two robots have pulleys.
 PULLEYS = True

@@ -4,9 +4,9 @@ import jax
 import numpy as np
 import pytest
 
-from cspr_jax.motions.amplitudes import from_polynomial, named
-from cspr_jax.motions.blocks import INSTANTS, Parts, growing, parts_of_arcs
-from cspr_jax.platforms.work_list import least_nodes
+from cspr_jax.families.platforms.six_cable_proof.work_list import least_nodes
+from cspr_jax.motion.amplitudes import from_polynomial, named
+from cspr_jax.verification.bounds.blocks import INSTANTS, Parts, growing, parts_of_arcs
 
 AMPLITUDES = {
     "quintic": named("quintic"),

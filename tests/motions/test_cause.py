@@ -2,7 +2,7 @@
 
 import pytest
 
-from cspr_jax.motions.cause import Cause
+from cspr_jax.motion.cause import Cause
 
 
 @pytest.mark.parametrize("needed", [0.0, -0.0, 1e-17, -1e-12])

@@ -6,8 +6,8 @@ from support.commands import plan
 
 import cspr_jax
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.motions.cause import Cause
-from cspr_jax.motions.given_limits import limits_over
+from cspr_jax.motion.cause import Cause
+from cspr_jax.motion.given_limits import limits_over
 
 # Up by a quintic law within a second: largest speed 1.875 times the way, largest acceleration 10 / sqrt(3) times.
 WAY, SPEED, ACCELERATION = 0.1, 1.875, 10.0 / np.sqrt(3.0)

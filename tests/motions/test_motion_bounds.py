@@ -9,17 +9,17 @@ import pytest
 from support.platforms import MSSM, Z0, made, ours, random_pose
 
 import cspr_jax
-from cspr_jax.arithmetic.elementary import leaf
-from cspr_jax.beziers.motion import Bezier
-from cspr_jax.lines.motion import TimedLine, fixed_law, s_curve
-from cspr_jax.motions import amplitudes
-from cspr_jax.motions.motion import Backwards
-from cspr_jax.motions.platform_kind import PlatformMotionKind
-from cspr_jax.platforms.platform_segment import PlatformMotion
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.swings import hypocycloid
-from cspr_jax.swings.hypocycloid import Hypocycloid
-from cspr_jax.swings.transition import transition
+from cspr_jax.families.beziers.motion import Bezier
+from cspr_jax.families.lines.motion import TimedLine, fixed_law, s_curve
+from cspr_jax.families.platforms.platform_segment import PlatformMotion
+from cspr_jax.families.swings import hypocycloid
+from cspr_jax.families.swings.hypocycloid import Hypocycloid
+from cspr_jax.families.swings.transitions.transition import transition
+from cspr_jax.motion import amplitudes
+from cspr_jax.motion.motion import Backwards
+from cspr_jax.motion.platform_kind import PlatformMotionKind
+from cspr_jax.numerics.elementary import leaf
+from cspr_jax.robots.statics.kernel_axes import centred
 
 # A polynomial of a user, whose end bends; it serves transitions alone.
 BENT = amplitudes.from_polynomial([0.0, 0.0, 0.0, 4.0, -3.0])

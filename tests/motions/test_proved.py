@@ -8,23 +8,24 @@ import pytest
 from support.platforms import EFFECTIVE, MSSM, Z0, checker_of, made, ours, random_pose, stacked
 
 import cspr_jax
-from cspr_jax.arithmetic.elementary import leaf
-from cspr_jax.motions import amplitudes, proved
-from cspr_jax.motions.block_slacks import BlockSlacks
-from cspr_jax.motions.criteria import Criterion
-from cspr_jax.motions.motion import Backwards
-from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.proved_answers import MotionProof, proved_answers
-from cspr_jax.motions.time_proof import time_proof
-from cspr_jax.platforms.platform_segment import PlatformMotion
+from cspr_jax.families.platforms.platform_segment import PlatformMotion
+from cspr_jax.families.swings.arcs import segments_between
+from cspr_jax.families.swings.hypocycloid import Hypocycloid
+from cspr_jax.families.swings.parities import pick
+from cspr_jax.families.swings.proof import verdicts as swing_proof
+from cspr_jax.motion import amplitudes
+from cspr_jax.motion.motion import Backwards
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.elementary import leaf
 from cspr_jax.robots import cables
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.swings import proof as swing_proof
-from cspr_jax.swings.arcs import segments_between
-from cspr_jax.swings.hypocycloid import Hypocycloid
-from cspr_jax.swings.parities import pick
+from cspr_jax.verification import proved
+from cspr_jax.verification.bounds.block_slacks import BlockSlacks
+from cspr_jax.verification.criteria import Criterion
+from cspr_jax.verification.proved_answers import MotionProof, proved_answers
+from cspr_jax.verification.time_proof import time_proof
 
 COUNT = 12
 

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from cspr_jax.motions.criteria import Criterion
-from cspr_jax.motions.proved_answers import MotionProof
-from cspr_jax.motions.stretching import least_stretching
-from cspr_jax.motions.time_proof import TimeProof
 from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.verification.criteria import Criterion
+from cspr_jax.verification.proved_answers import MotionProof
+from cspr_jax.verification.time_proof import TimeProof
+from cspr_jax.verification.time_stretching import least_stretching
 
 ROWS = (Criterion(Verdict.SLACK_CABLE, (0,), "N"), Criterion(Verdict.CABLE_TOO_FAST, (0,), "m/s", allowed=1.0))
 

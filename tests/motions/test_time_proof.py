@@ -14,18 +14,21 @@ import cspr_jax
 from cspr_jax.curves import interpolation
 from cspr_jax.curves.several import SeveralSplines
 from cspr_jax.curves.spline import Spline
-from cspr_jax.motions.block_slacks import BlockSlacks, block_slacks
-from cspr_jax.motions.criteria import Criterion, criteria
-from cspr_jax.motions.time_proof import time_proof, time_proofs
-from cspr_jax.robots import cables, clearance, interference, interference_lanes, shapes, wrench_balance
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.platform import platform_robot
-from cspr_jax.robots.point_mass import plane_normal
-from cspr_jax.robots.pulleys import exits
-from cspr_jax.robots.tension_distribution import centred as most_central
-from cspr_jax.robots.wrench_sets import tension_range
+from cspr_jax.robots import cables
+from cspr_jax.robots.contacts import clearance, interference, interference_lanes
+from cspr_jax.robots.model import shapes
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.platform import platform_robot
+from cspr_jax.robots.model.point_mass import plane_normal
+from cspr_jax.robots.model.pulleys import exits
+from cspr_jax.robots.statics import wrench_balance
+from cspr_jax.robots.statics.kernel_axes import centred
+from cspr_jax.robots.statics.wrench_sets import tension_range
+from cspr_jax.robots.tensions.tension_distribution import centred as most_central
 from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.verification.bounds.block_slacks import BlockSlacks, block_slacks
+from cspr_jax.verification.criteria import Criterion, criteria
+from cspr_jax.verification.time_proof import time_proof, time_proofs
 
 # Robots, where they move and how far, m, their tilt, and limits that some motions break.
 CASES = {

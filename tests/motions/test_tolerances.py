@@ -9,7 +9,7 @@ from support.other_robots import uncertain
 from cspr_jax import least_time, load_robot, minimum_arcs
 from cspr_jax.cli import main
 from cspr_jax.errors import InputError
-from cspr_jax.robots.limits import Limits, Uncertainty
+from cspr_jax.robots.model.limits import Limits, Uncertainty
 
 SWEEP = """
 schema = 1

@@ -9,12 +9,12 @@ from support.other_robots import on_balls, uncertain
 from support.splines import random_spline
 
 import cspr_jax
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.block_slacks import block_slacks
-from cspr_jax.motions.motion_tolerances import motion_tolerances
-from cspr_jax.motions.problem import Problem
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.limits import Limits
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.problem import Problem
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.statics.kernel_axes import centred
+from cspr_jax.verification.bounds.block_slacks import block_slacks
+from cspr_jax.verification.robustness.motion_tolerances import motion_tolerances
 
 # Robots, where they move and how far, m, their tilt, limits.
 CASES = {

@@ -9,15 +9,15 @@ from support.other_robots import displaced, on_balls, ratios, uncertain, worst_r
 from support.platforms import FROM_REST, stacked
 from support.random_motions import ROBOTS, motions_of, problem_of, quintic
 
-from cspr_jax.motions.blocks import parts_of_arcs
-from cspr_jax.motions.enclosures import influence
-from cspr_jax.motions.platform_kind import PlatformMotionKind
-from cspr_jax.motions.uncertainty import closer_changes, deviations, requirements_of, worst
-from cspr_jax.motions.uncertainty import tensions as tensions_of
-from cspr_jax.platforms.checker import PlatformChecker
-from cspr_jax.platforms.enclosures import Robustness
-from cspr_jax.platforms.motions import rows as some_of
-from cspr_jax.robots.limits import Limits, Uncertainty
+from cspr_jax.families.platforms.motions import rows as some_of
+from cspr_jax.families.platforms.six_cable_proof.checker import PlatformChecker
+from cspr_jax.families.platforms.six_cable_proof.enclosures import Robustness
+from cspr_jax.motion.platform_kind import PlatformMotionKind
+from cspr_jax.robots.model.limits import Limits, Uncertainty
+from cspr_jax.verification.bounds.blocks import parts_of_arcs
+from cspr_jax.verification.bounds.enclosures import influence
+from cspr_jax.verification.robustness.uncertainty import closer_changes, deviations, requirements_of, worst
+from cspr_jax.verification.robustness.uncertainty import tensions as tensions_of
 
 BETWEEN = PlatformMotionKind()
 SPOOLS, CENTRE = 0.004, 0.006

@@ -11,16 +11,16 @@ from matplotlib.colors import to_hex
 from support.reading import read_here
 
 import cspr_jax
-from cspr_jax.lines.durations import names_of
-from cspr_jax.lines.map import LeastTimeMap
-from cspr_jax.motions.given_limits import limits_over
-from cspr_jax.outputs.plots.colours import NONE_COLOUR
-from cspr_jax.outputs.plots.half_planes import WINDOW, Plane, Window, section
-from cspr_jax.robots.limits import Limits
+from cspr_jax.families.lines.durations import names_of
+from cspr_jax.families.lines.map import LeastTimeMap
+from cspr_jax.motion.given_limits import limits_over
+from cspr_jax.outputs.plots.motions.half_planes import WINDOW, Plane, Window, section
+from cspr_jax.outputs.plots.style.colours import NONE_COLOUR
+from cspr_jax.robots.model.limits import Limits
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.schema.meanings import line_bounds, value_attributes
 from cspr_jax.schema.quantities import QUANTITIES, SEGMENTS, TRAJECTORY
-from cspr_jax.store.netcdf import describe, dtype_of, new_hdf5
+from cspr_jax.store.files.netcdf import describe, dtype_of, new_hdf5
 from outputs.test_outputs import cspr, panels
 from outputs.test_pictures import GRID, bar, made, ticks
 

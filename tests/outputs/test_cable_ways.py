@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from cspr_jax.config.robot import RobotFile
-from cspr_jax.outputs.plots.cable_ways import ON_ARC, cable_ways
 from cspr_jax.outputs.plots.pages.motions import motion_content
 from cspr_jax.outputs.plots.pages.packing import unpacked
-from cspr_jax.robots.pulleys import exits
+from cspr_jax.outputs.plots.robots.cable_paths import ON_ARC, cable_ways
+from cspr_jax.robots.model.pulleys import exits
 
 BASE = [[2.0, 0.0, 3.0], [-1.0, 2.0, 3.0], [-1.0, -2.0, 3.0]]
 RADII, AXES = [0.1, 0.4, 0.0], [[0.0, 0.0, 1.0], [0.4, -0.7, -0.9], [0.0, 1.0, 0.0]]

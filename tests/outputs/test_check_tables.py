@@ -9,8 +9,8 @@ from support.commands import cspr, strict_json
 import cspr_jax
 from cspr_jax.cli.command import print_table
 from cspr_jax.outputs import plan_report
-from cspr_jax.outputs.plots.labels import margin_unit
 from cspr_jax.outputs.plots.pages.motions import motion_content
+from cspr_jax.outputs.plots.style.labels import margin_unit
 
 BASE = np.array([[0.0, 0.0, 4.0], [3.0, 0.0, 4.0], [1.5, 2.6, 4.0]])
 PLACES = np.array([[1.5, 0.8, 2.0], [1.6, 0.8, 2.1], [1.7, 0.8, 2.2]])

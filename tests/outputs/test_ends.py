@@ -10,11 +10,11 @@ from matplotlib.figure import Figure
 import cspr_jax
 from cspr_jax.cli import main
 from cspr_jax.errors import ConfigError
-from cspr_jax.outputs.plots import summary
-from cspr_jax.outputs.plots.ends import draw_ends, entries_of_ends, segment_rows
-from cspr_jax.outputs.plots.options import with_widths
-from cspr_jax.outputs.plots.scene import box_in_space, set_space, words_in_space
-from cspr_jax.outputs.plots.style import in_style, laid_out, style_of
+from cspr_jax.outputs.plots.motions import summary
+from cspr_jax.outputs.plots.motions.ends import draw_ends, entries_of_ends, segment_rows
+from cspr_jax.outputs.plots.style.options import with_widths
+from cspr_jax.outputs.plots.style.scene import box_in_space, set_space, words_in_space
+from cspr_jax.outputs.plots.style.style import in_style, laid_out, style_of
 
 REFERENCE = "results/reference/minimum_arcs.h5"
 

@@ -12,16 +12,16 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 from scipy.spatial import ConvexHull
 
 import cspr_jax
-from cspr_jax.arithmetic.intervals import united
 from cspr_jax.config.plan import plan_keys
 from cspr_jax.config.robot import resolve_robot
+from cspr_jax.numerics.bounds.intervals import united
 from cspr_jax.outputs.motion_files import failures
-from cspr_jax.outputs.plots import film as films
-from cspr_jax.outputs.plots.bodies_in_space import lines_on
-from cspr_jax.outputs.plots.obstacles import COLOUR, points_of
-from cspr_jax.outputs.plots.robot_along import moving
-from cspr_jax.outputs.plots.style import Style, in_style
-from cspr_jax.robots import shapes
+from cspr_jax.outputs.plots.films import film as films
+from cspr_jax.outputs.plots.robots.bodies_in_space import lines_on
+from cspr_jax.outputs.plots.robots.obstacles import COLOUR, points_of
+from cspr_jax.outputs.plots.robots.robot_along import moving
+from cspr_jax.outputs.plots.style.style import Style, in_style
+from cspr_jax.robots.model import shapes
 from cspr_jax.schema.verdicts import Verdict
 from outputs.test_pages import content_of
 

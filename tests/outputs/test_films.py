@@ -10,8 +10,8 @@ from PIL import Image
 import cspr_jax
 from cspr_jax.cli import main
 from cspr_jax.errors import ConfigError
-from cspr_jax.outputs.plots import film as films
-from cspr_jax.outputs.plots.style import Style, in_style
+from cspr_jax.outputs.plots.films import film as films
+from cspr_jax.outputs.plots.style.style import Style, in_style
 
 PLAN = """
 schema = 1

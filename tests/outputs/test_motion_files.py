@@ -15,8 +15,8 @@ from cspr_jax import __version__
 from cspr_jax.cli import main
 from cspr_jax.outputs import motion_files
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.store.netcdf import LAYOUT
-from cspr_jax.store.seal import sealed
+from cspr_jax.store.files.checksum import sealed
+from cspr_jax.store.files.netcdf import LAYOUT
 from outputs.test_outputs import panels
 
 # The second segment, which needs six arcs, ends above the spools.

@@ -11,10 +11,10 @@ from swings.test_transition_leg import text as transition_text
 
 import cspr_jax
 from cspr_jax.cli import main
-from cspr_jax.outputs.plots.fitting import share_of_panels, with_minus
-from cspr_jax.outputs.plots.labels import cable_names
-from cspr_jax.outputs.plots.motion_pictures import MOTION_PICTURES
-from cspr_jax.outputs.plots.scene import FILLS, box_in_space, colours_of_tension, words_in_space
+from cspr_jax.outputs.plots.motions.motion_pictures import MOTION_PICTURES
+from cspr_jax.outputs.plots.style.fitting import share_of_panels, with_minus
+from cspr_jax.outputs.plots.style.labels import cable_names
+from cspr_jax.outputs.plots.style.scene import FILLS, box_in_space, colours_of_tension, words_in_space
 from outputs.test_outputs import panels
 
 LIMITED = f"{SHORT}\n[limits]\ntension_min = 0.02\ncable_speed_max = 9.0\ntension_max = 1.5\n"

@@ -9,10 +9,10 @@ from scipy.spatial.transform import Rotation
 from support.platforms import EFFECTIVE, SHORT, Z0, cables_at, general, made, ours, states
 
 import cspr_jax
-from cspr_jax.outputs.mjcf import model_xml
-from cspr_jax.outputs.mujoco_motion import Played, Suspended, in_world, played, suspended, upward
-from cspr_jax.outputs.replay import ends_of_steps, tension_deviation, way_of
-from cspr_jax.platforms.platform_segment import duration
+from cspr_jax.families.platforms.platform_segment import duration
+from cspr_jax.outputs.mujoco.mjcf import model_xml
+from cspr_jax.outputs.mujoco.motion import Played, Suspended, in_world, played, suspended, upward
+from cspr_jax.outputs.mujoco.replay import ends_of_steps, tension_deviation, way_of
 
 mujoco = pytest.importorskip("mujoco")
 

@@ -12,12 +12,12 @@ from support.splines import random_spline
 
 import cspr_jax
 from cspr_jax.errors import ConfigError
-from cspr_jax.outputs.mjcf import LEAD, model_xml
-from cspr_jax.outputs.mujoco_motion import Suspended, attachments, coordinates, in_world, upward
-from cspr_jax.outputs.replay import ends_of_steps, tension_deviation, way_of
+from cspr_jax.outputs.mujoco.mjcf import LEAD, model_xml
+from cspr_jax.outputs.mujoco.motion import Suspended, attachments, coordinates, in_world, upward
+from cspr_jax.outputs.mujoco.replay import ends_of_steps, tension_deviation, way_of
 from cspr_jax.robots import cables
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.pulleys import Pulleys
+from cspr_jax.robots.model.pulleys import Pulleys
+from cspr_jax.robots.statics.kernel_axes import centred
 
 mujoco = pytest.importorskip("mujoco")
 STEPS = 1000

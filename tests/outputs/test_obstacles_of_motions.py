@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from support.commands import cspr
 
-from cspr_jax.outputs.mjcf import _geom
-from cspr_jax.outputs.plots.obstacles import outline, points_of
-from cspr_jax.robots import shapes
+from cspr_jax.outputs.mujoco.mjcf import _geom
+from cspr_jax.outputs.plots.robots.obstacles import outline, points_of
+from cspr_jax.robots.model import shapes
 from cspr_jax.schema.families import registered
 
 FAMILY = Path(__file__).parents[2] / "docs" / "examples" / "straight_lines"

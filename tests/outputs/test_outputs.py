@@ -16,11 +16,11 @@ from cspr_jax.cli import main
 from cspr_jax.errors import ConfigError, InputError, StoreError
 from cspr_jax.outputs.plan_report import plan_object
 from cspr_jax.outputs.plots.draw import _map_figure
-from cspr_jax.outputs.plots.sections import NONE_COLOUR
+from cspr_jax.outputs.plots.maps.sections import NONE_COLOUR
 from cspr_jax.schema.quantities import AXES, FAILURES, FLIGHT, PATHS, QUANTITIES, SEGMENTS, TRAJECTORY, flag_attributes
 from cspr_jax.schema.verdicts import SENTENCES
-from cspr_jax.store.netcdf import make_datasets, new_hdf5
-from cspr_jax.store.result import Result
+from cspr_jax.store.files.netcdf import make_datasets, new_hdf5
+from cspr_jax.store.reading.result import Result
 
 ROOT = Path(__file__).parents[2]
 SHAPE = {"x": 5, "y": 4, "z": 8, "z0": 1}

@@ -20,11 +20,11 @@ from cspr_jax.cli import main
 from cspr_jax.config.plan import plan_keys
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import ConfigError
+from cspr_jax.outputs.plots.pages.informative import telling
 from cspr_jax.outputs.plots.pages.maps import map_content, order_of
 from cspr_jax.outputs.plots.pages.motions import motion_content
 from cspr_jax.outputs.plots.pages.packing import packed, unpacked
 from cspr_jax.outputs.plots.pages.page import page_of
-from cspr_jax.outputs.plots.pages.telling import telling
 
 SWEEP = {
     "schema": 1,

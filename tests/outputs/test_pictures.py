@@ -11,8 +11,8 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from support.reading import read_here
 
-from cspr_jax.outputs.plots.colours import NONE_COLOUR, scale_of
-from cspr_jax.store.netcdf import make_datasets, new_hdf5
+from cspr_jax.outputs.plots.style.colours import NONE_COLOUR, scale_of
+from cspr_jax.store.files.netcdf import make_datasets, new_hdf5
 from outputs.test_outputs import cspr, panels
 
 

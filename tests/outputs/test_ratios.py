@@ -8,8 +8,8 @@ from support.reading import read_here
 
 import cspr_jax
 from cspr_jax.errors import ConfigError
-from cspr_jax.outputs.plots.ratio import ratio_of
-from cspr_jax.store.result import open_result
+from cspr_jax.outputs.plots.maps.ratio import ratio_of
+from cspr_jax.store.reading.result import open_result
 from outputs.test_pictures import bar, made
 
 FREE = {"x": [0.0, 1.0, 2.0], "y": [0.0, 1.0], "z": [1.0]}

@@ -9,12 +9,12 @@ import pytest
 from support.folder import PLAN, folder
 
 import cspr_jax
-from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.config.reading import read_toml
 from cspr_jax.errors import ConfigError
-from cspr_jax.outputs.mujoco_module import need_mujoco
-from cspr_jax.outputs.mujoco_motion import played, suspended
-from cspr_jax.outputs.replay import tension_deviation, way_of
+from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.outputs.mujoco.module import need_mujoco
+from cspr_jax.outputs.mujoco.motion import played, suspended
+from cspr_jax.outputs.mujoco.replay import tension_deviation, way_of
 from outputs.test_outputs import cspr, strict_json
 
 mujoco = pytest.importorskip("mujoco")

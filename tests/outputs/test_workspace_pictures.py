@@ -10,12 +10,12 @@ from support.reading import read_here
 
 import cspr_jax
 from cspr_jax.errors import ConfigError
-from cspr_jax.outputs.plots import solid
-from cspr_jax.outputs.plots.boundary import BoundarySides, boundary, outlines
-from cspr_jax.outputs.plots.labels import COLOURS
+from cspr_jax.outputs.plots.maps import solid
+from cspr_jax.outputs.plots.maps.boundary import BoundarySides, boundary, outlines
+from cspr_jax.outputs.plots.style.labels import COLOURS
 from cspr_jax.schema.quantities import EVERY
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.store.result import Result
+from cspr_jax.store.reading.result import Result
 from outputs.test_outputs import cspr, panels
 from outputs.test_pictures import made, words
 

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 import cspr_jax
-from cspr_jax.arithmetic.elementary import leaf
 from cspr_jax.curves.spline import Spline
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.feeds import feed_proof
-from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.proved_answers import proved_answers
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.elementary import leaf
 from cspr_jax.outputs.path_lines import path_lines
-from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.verification.feeds import feed_proof
+from cspr_jax.verification.proved_answers import proved_answers
 
 # Corners of a program whose feeds were exceeded by half a per cent behind a blended corner; mm, and mm a minute.
 PLACES = np.array(

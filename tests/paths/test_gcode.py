@@ -6,10 +6,10 @@ import math
 import numpy as np
 import pytest
 
-from cspr_jax.config.gcode import read_program
+from cspr_jax.config.gcode.reading import read_program
 from cspr_jax.errors import ConfigError
-from cspr_jax.paths.corners import tracks_of
-from cspr_jax.paths.shapes import elements_of
+from cspr_jax.families.paths.geometry.arcs import elements_of
+from cspr_jax.families.paths.geometry.corners import tracks_of
 
 PROGRAM = """%
 N10 G21 G90 (millimetres; absolute) ; and more

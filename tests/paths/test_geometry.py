@@ -9,11 +9,11 @@ from scipy.spatial.transform import Rotation
 from support.motions import states_along
 
 from cspr_jax.errors import InputError
-from cspr_jax.paths.corners import ROUNDED, tracks_of
-from cspr_jax.paths.elements import Arc, Straight
-from cspr_jax.paths.section import section_of
-from cspr_jax.paths.shapes import arc_of
-from cspr_jax.paths.through_points import through_points
+from cspr_jax.families.paths.geometry.arcs import arc_of
+from cspr_jax.families.paths.geometry.corners import ROUNDED, tracks_of
+from cspr_jax.families.paths.geometry.elements import Arc, Straight
+from cspr_jax.families.paths.geometry.section import section_of
+from cspr_jax.families.paths.geometry.through_points import through_points
 
 POINTS = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, 0.8, 1.2], [1.6, 1.4, 1.0], [0.2, 1.9, 0.7]])
 UP = np.array([0.0, 0.0, 1.0])

@@ -11,7 +11,7 @@ import cspr_jax
 from cspr_jax.config.catalogue import CATALOGUE
 from cspr_jax.config.reading import read_toml
 from cspr_jax.errors import ConfigError
-from cspr_jax.paths import leg
+from cspr_jax.families.paths import leg
 from cspr_jax.runtime import stages
 
 ROBOT = {"schema": 1, "robot": "prototype", "family": "path", "samples": 201}

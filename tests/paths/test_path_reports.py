@@ -11,13 +11,13 @@ from support.commands import plan
 
 import cspr_jax
 from cspr_jax.errors import ConfigError
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.problem import Problem
-from cspr_jax.outputs.plots.phase_planes import phase_plane_figure
-from cspr_jax.paths.row_names import row_names
-from cspr_jax.paths.rows import path_rows
-from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.state import State
+from cspr_jax.families.paths.least_time.constraint_names import row_names
+from cspr_jax.families.paths.least_time.constraints import path_rows
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.problem import Problem
+from cspr_jax.outputs.plots.motions.phase_planes import phase_plane_figure
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.state import State
 from cspr_jax.schema.verdicts import CRITERIA, Verdict
 
 SPOOLS = np.array([[0.22516660498395405, -0.13, 0.0], [-0.22516660498395405, -0.13, 0.0], [0.0, 0.26, 0.0]])

@@ -11,8 +11,8 @@ from support.commands import cspr, plan, strict_json
 from support.motions import states_along
 
 import cspr_jax
-from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.numerics.elementary import double_precision
 
 ROOT = Path(__file__).parents[2]
 # The largest tension and cable speed of the whole sequence of Table 2.1, rounded up.

@@ -7,17 +7,17 @@ import pytest
 from oracles import any_motion_cases, least_time_bounds, path_rows
 from support.least_time import robot_of, sampled_states, section_of
 
-from cspr_jax.arithmetic.elementary import double_precision, leaf
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.motion import Placed
-from cspr_jax.motions.problem import Problem
-from cspr_jax.paths.discrete import discretes
-from cspr_jax.paths.jumping import jumping_motions
-from cspr_jax.paths.section import SectionSettings
-from cspr_jax.paths.tightening import Trial, cell_slacks
-from cspr_jax.paths.timed import timed
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.limits import Limits
+from cspr_jax.families.paths.geometry.section import SectionSettings
+from cspr_jax.families.paths.least_time.discrete import discretes
+from cspr_jax.families.paths.least_time.jumping import jumping_motions
+from cspr_jax.families.paths.least_time.tightening import Trial, cell_slacks
+from cspr_jax.families.paths.least_time.timed import timed
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.motion import Placed
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.elementary import double_precision, leaf
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.statics.kernel_axes import centred
 
 CELLS, SHARES = 40, np.linspace(1e-9, 1.0 - 1e-9, 9)
 

@@ -12,10 +12,10 @@ import cspr_jax
 from cspr_jax.config.plan import plan_keys
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import ConfigError
-from cspr_jax.motions.limits import lowest_depth
+from cspr_jax.motion.limits import lowest_depth
 from cspr_jax.plans.given_points import with_mass_centres
-from cspr_jax.robots.state import State
-from cspr_jax.workspaces.rest_poses import RestPoses
+from cspr_jax.robots.model.state import State
+from cspr_jax.workspaces.static_poses import RestPoses
 
 PLAN = Path("plan.toml")
 CENTRE = [0.03, -0.02, 0.05]

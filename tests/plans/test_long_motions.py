@@ -7,7 +7,7 @@ from support.commands import cspr, strict_json
 import cspr_jax
 from cspr_jax.config.motions import text
 from cspr_jax.plans import long_motions
-from cspr_jax.store import motion_samples
+from cspr_jax.store.reading import motion_samples
 
 LIMITS = {"cable_speed_max": 0.015}
 

@@ -18,11 +18,11 @@ from support.commands import cspr
 from support.platforms import state_of
 
 import cspr_jax
-from cspr_jax.motions.outcome import LegOutcome
+from cspr_jax.motion.leg_result import LegOutcome
 from cspr_jax.schema import map_kinds
 from cspr_jax.schema.families import FAMILIES, moving, registered
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.store.result import open_result
+from cspr_jax.store.reading.result import open_result
 
 SWEEPS = Path(__file__).parents[2] / "sweeps"
 FAMILY = Path(__file__).parents[2] / "docs" / "examples" / "straight_lines"

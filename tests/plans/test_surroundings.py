@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 import cspr_jax
-from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.build.surroundings import build_scene, surroundings
 from cspr_jax.config.plan import read_plan
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import ConfigError
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.platform import platform_robot
-from cspr_jax.robots.reference_pose import aligned
-from cspr_jax.robots.shapes import hull, is_within, rotation_matrix
+from cspr_jax.numerics.linear.frames import frame_of
+from cspr_jax.robots.model.platform import platform_robot
+from cspr_jax.robots.model.shapes import hull, is_within, rotation_matrix
+from cspr_jax.robots.statics.kernel_axes import centred
+from cspr_jax.robots.statics.reference_pose import aligned
 
 PLAN = """schema = 1
 robot = "{robot}"

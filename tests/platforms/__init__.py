@@ -1,1 +1,1 @@
-"""Tests of `cspr_jax.platforms`."""
+"""Tests of `cspr_jax.families.platforms`."""

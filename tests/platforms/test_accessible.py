@@ -12,14 +12,14 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 from support.platforms import FROM_REST, MSSM, checker_of, ours, place
 
-from cspr_jax.arithmetic.rotations import from_tilt_torsion
-from cspr_jax.platforms import accessible as scans
-from cspr_jax.platforms.accessible import DEFINITIONS, accessible
-from cspr_jax.platforms.attainable import attainable, attained, rounds
-from cspr_jax.platforms.beta_hat import end_options
-from cspr_jax.platforms.orientation_steps import OrientationSteps
-from cspr_jax.robots.orientation_grids import equal_volume_grid, tilt_torsion_grid
-from cspr_jax.robots.symmetries import NONE, alike, folded, symmetries
+from cspr_jax.families.platforms.beta_hat import end_options
+from cspr_jax.families.platforms.orientations import accessible as scans
+from cspr_jax.families.platforms.orientations.accessible import DEFINITIONS, accessible
+from cspr_jax.families.platforms.orientations.attainable import attainable, attained, rounds
+from cspr_jax.families.platforms.orientations.orientation_steps import OrientationSteps
+from cspr_jax.numerics.linear.rotations import from_tilt_torsion
+from cspr_jax.robots.model.orientation_grids import equal_volume_grid, tilt_torsion_grid
+from cspr_jax.robots.statics.symmetries import NONE, alike, folded, symmetries
 
 
 def rotations(angles):

@@ -29,15 +29,15 @@ from support.platforms import (
 )
 
 import cspr_jax
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.platforms import place_proof
-from cspr_jax.platforms.arcs import Candidates, smallest_arcs
-from cspr_jax.platforms.beta_hat import LARGEST, cheapest_path, options
-from cspr_jax.platforms.checker import PlatformChecker
-from cspr_jax.platforms.platform_segment import motion
-from cspr_jax.platforms.slacks import pose_slacks
+from cspr_jax.families.platforms.arcs import Candidates, smallest_arcs
+from cspr_jax.families.platforms.beta_hat import LARGEST, cheapest_path, options
+from cspr_jax.families.platforms.platform_segment import motion
+from cspr_jax.families.platforms.six_cable_proof import pose_proof
+from cspr_jax.families.platforms.six_cable_proof.checker import PlatformChecker
+from cspr_jax.families.platforms.six_cable_proof.slacks import pose_slacks
+from cspr_jax.motion.amplitudes import named
 from cspr_jax.published import table_3_2
-from cspr_jax.robots.interference import cable_directions, cables_cross, contacts, gaps, platform_hit
+from cspr_jax.robots.contacts.interference import cable_directions, cables_cross, contacts, gaps, platform_hit
 from cspr_jax.schema.verdicts import Verdict
 
 
@@ -106,8 +106,8 @@ def check_verdicts(checker, count):
 def test_verdicts_do_not_change_with_more_blocks(checker, monkeypatch):
     cases = random_cases(12, 40, lowest=-5.0, highest=0.0, arcs=(3, 9))
     before = checked(checker, cases)
-    for name, parts in (("proof.FROM_REST", 7), ("proof.BETWEEN", 19), ("place_proof.PARTS", 9)):
-        monkeypatch.setattr(f"cspr_jax.platforms.{name}", parts)
+    for name, parts in (("tension_proof.FROM_REST", 7), ("tension_proof.BETWEEN", 19), ("pose_proof.PARTS", 9)):
+        monkeypatch.setattr(f"cspr_jax.families.platforms.six_cable_proof.{name}", parts)
     after = checked(checker, cases)
     np.testing.assert_array_equal(after.verdict, before.verdict)
     regular = after.slack[:, 1] > 0.0
@@ -158,7 +158,7 @@ def test_blocks_are_halved_where_cables_turn(checker, monkeypatch):
     cases = random_cases(17, 60, lowest=-8.0, highest=1.0, arcs=(2, 6))
     flags = Verdict.CABLE_CABLE.value | Verdict.CABLE_PLATFORM.value
     before = checked(checker, cases).verdict & flags
-    monkeypatch.setattr(place_proof, "PARTS", 1)
+    monkeypatch.setattr(pose_proof, "PARTS", 1)
     np.testing.assert_array_equal((checked(checker, cases).verdict & flags) > 0, before > 0)
     assert (before > 0).sum() > 3
 

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from cspr_jax.platforms.motions import Motions, rows
+from cspr_jax.families.platforms.motions import Motions, rows
 
 LEAVES = {"angle": np.arange(5.0), "pose": np.arange(60.0).reshape(5, 4, 3)}
 

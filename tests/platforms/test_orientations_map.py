@@ -8,13 +8,13 @@ import pytest
 from support.commands import cspr
 from support.platforms import FROM_REST, LOOSE, MSSM, checker_of, ours, place
 
-from cspr_jax.outputs.plots.verdict_colours import reasons
-from cspr_jax.platforms.accessible import accessible
-from cspr_jax.platforms.attainable import attainable
+from cspr_jax.families.platforms.orientations.accessible import accessible
+from cspr_jax.families.platforms.orientations.attainable import attainable
+from cspr_jax.outputs.plots.style.verdict_colours import reasons
 from cspr_jax.published import chapter_3
 from cspr_jax.published.table_3_4 import smallest_proportions
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.store.result import open_result
+from cspr_jax.store.reading.result import open_result
 
 NEAR = ("x = 1.5b", "y = 1.5b")
 

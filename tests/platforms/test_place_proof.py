@@ -11,13 +11,13 @@ from scipy.spatial.transform import Rotation
 from support.platforms import FROM_REST, MSSM, USUAL, Z0, general, limits_of, stacked
 from support.random_motions import BATCH, ROBOTS, drawn, motions_of, problem_of, turned
 
-from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.platforms import meetings
-from cspr_jax.platforms.meetings import CablesOfStep
-from cspr_jax.platforms.place_blocks import STEPS, place_blocks
-from cspr_jax.platforms.place_proof import PARTS, PlaceCertifier
-from cspr_jax.robots.interference import contacts, platform_hit
-from cspr_jax.robots.interference_lanes import residual
+from cspr_jax.families.platforms.six_cable_proof import cable_contacts
+from cspr_jax.families.platforms.six_cable_proof.cable_contacts import CablesOfStep
+from cspr_jax.families.platforms.six_cable_proof.pose_blocks import STEPS, place_blocks
+from cspr_jax.families.platforms.six_cable_proof.pose_proof import PARTS, PlaceCertifier
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.robots.contacts.interference import contacts, platform_hit
+from cspr_jax.robots.contacts.interference_lanes import residual
 
 # Spools far from level: the plane through them rises by 80 degrees.
 STEEP = turned(dataclasses.replace(MSSM, base=MSSM.base @ Rotation.from_euler("x", 80, degrees=True).as_matrix().T))
@@ -182,7 +182,7 @@ def test_cables_that_meet():
         # Exactly in one plane at an instant: no sign changes beyond rounding, in this step or in that.
         (False, cables_from(first, last, 0.0, steps=2)),
     ):
-        assert (meetings.cables_meet(base, pairs, cables) >= 0).tolist() == [meets]
+        assert (cable_contacts.cables_meet(base, pairs, cables) >= 0).tolist() == [meets]
 
 
 def test_cables_in_wide_steps():
@@ -191,7 +191,7 @@ def test_cables_in_wide_steps():
     low, high = np.array([[2.0, 0.0, -0.1], [0.0, 2.0, 0.0]]), np.array([[2.0, 0.0, 0.1], [0.0, 2.0, 0.0]])
     for shift, meets in ((0.0, True), (1.5, False), (-1.5, False)):
         moved = high + np.array([[0.0, 0.0, 0.0], [shift, 0.0, 0.0]])
-        assert meetings.cables_meet(base, pairs, cables_from(low, moved, 0.0, steps=1)).tolist() == [meets - 1]
+        assert cable_contacts.cables_meet(base, pairs, cables_from(low, moved, 0.0, steps=1)).tolist() == [meets - 1]
 
 
 def test_cables_on_the_platform():
@@ -205,7 +205,7 @@ def test_cables_on_the_platform():
         (False, cables_from(high, low, 0.6, steps=3)),
         (False, cables_from(*beside, 0.2, steps=3)),
     ):
-        assert (meetings.cables_hit(sides, normal, cables) >= 0).tolist() == [hits]
+        assert (cable_contacts.cables_hit(sides, normal, cables) >= 0).tolist() == [hits]
 
 
 def test_what_touches_in_a_wide_step_stays_in_the_sector():
@@ -215,7 +215,7 @@ def test_what_touches_in_a_wide_step_stays_in_the_sector():
     high, near, far = (np.array([[1.0, y, z]]) for y, z in ((0.9, 0.1), (0.7, -0.1), (-0.5, -0.1)))
     for last, hits in ((near, True), (far, False)):
         cables = cables_from(high, last, 0.0, steps=1)
-        assert (meetings.cables_hit(sides, normal, cables) >= 0).tolist() == [hits]
+        assert (cable_contacts.cables_hit(sides, normal, cables) >= 0).tolist() == [hits]
 
 
 # Six points of a flat platform: one on an edge, one inside, two that coincide.
@@ -243,7 +243,7 @@ def test_sectors_are_those_of_the_convex_hull():
             every = np.tile(near.normal, (2, 1, 6, 1))
             every[:, 0, k] = steps
             cables = CablesOfStep(np.zeros((2, 1, 6, 3)), every, np.zeros((1, 6)), np.zeros(1))
-            hits = bool(meetings.cables_hit(near.sides, near.normal, cables)[0] == 0)
+            hits = bool(cable_contacts.cables_hit(near.sides, near.normal, cables)[0] == 0)
             crossed = bool(platform_hit(near.sides, near.normal, every[0, 0], every[1, 0])[k])
             # What moves by 0.02 in between proves nothing beside the edges.
             edges = [np.cross(side, direction) @ near.normal / np.linalg.norm(side) for side in near.sides[k] if k != 4]

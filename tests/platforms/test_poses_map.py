@@ -27,22 +27,22 @@ from support.platforms import (
     states,
 )
 
-from cspr_jax.motions.platform_kind import USUAL, PlatformMotionKind
-from cspr_jax.motions.problem import Problem
+from cspr_jax.families.platforms.platform_segment import motion
+from cspr_jax.families.platforms.platform_segment_lanes import instant_lanes, state
+from cspr_jax.families.platforms.six_cable_proof.checker import slacks_at
+from cspr_jax.families.platforms.six_cable_proof.pose_proof import cables_beside
+from cspr_jax.families.platforms.six_cable_proof.slack_lanes import moving_slacks, order, still_slacks
+from cspr_jax.families.platforms.six_cable_proof.slacks import pose_slacks
+from cspr_jax.motion.platform_kind import USUAL, PlatformMotionKind
+from cspr_jax.motion.problem import Problem
 from cspr_jax.plans import choices, planning
-from cspr_jax.platforms.checker import slacks_at
-from cspr_jax.platforms.place_proof import cables_beside
-from cspr_jax.platforms.platform_segment import motion
-from cspr_jax.platforms.platform_segment_lanes import instant_lanes, state
-from cspr_jax.platforms.slack_lanes import moving_slacks, order, still_slacks
-from cspr_jax.platforms.slacks import pose_slacks
-from cspr_jax.robots import interference, interference_lanes
-from cspr_jax.robots.limits import NO_LIMITS
-from cspr_jax.robots.platform import rays as rays_of
-from cspr_jax.robots.state import State
-from cspr_jax.robots.wrench_lanes import cable_lanes
+from cspr_jax.robots.contacts import interference, interference_lanes
+from cspr_jax.robots.model.limits import NO_LIMITS
+from cspr_jax.robots.model.platform import rays as rays_of
+from cspr_jax.robots.model.state import State
+from cspr_jax.robots.statics.wrench_lanes import cable_lanes
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.store.result import open_result
+from cspr_jax.store.reading.result import open_result
 
 REST = "{ rest = true }"
 POSE = "{ position = [0.6, -0.4, 1.5], tilt_torsion = [0.3, 0.4, -0.2], beta_hat = -2.0 }"

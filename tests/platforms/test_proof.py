@@ -12,24 +12,25 @@ import pytest
 from oracles import platform as oracle
 from support.platforms import FROM_REST, general, ours
 
-from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.build.robots import kernel_robot
+from cspr_jax.config.keys.trajectory import TrajectoryKeys
 from cspr_jax.config.robot import resolve_robot
-from cspr_jax.config.trajectory import TrajectoryKeys
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.platform_kind import USUAL
-from cspr_jax.motions.problem import Problem
-from cspr_jax.platforms import proof, redundant_kernels
-from cspr_jax.platforms.arcs import Candidates, segments_with
-from cspr_jax.platforms.beta_hat import end_options
-from cspr_jax.platforms.checker import PlatformChecker, slacks_at
-from cspr_jax.platforms.crossings import passed_over
-from cspr_jax.platforms.motions import Motions
-from cspr_jax.platforms.place_blocks import STEPS
-from cspr_jax.platforms.place_proof import PARTS
-from cspr_jax.robots.interference import contacts
-from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.reference_pose import aligned
+from cspr_jax.families.platforms.arcs import Candidates, segments_with
+from cspr_jax.families.platforms.beta_hat import end_options
+from cspr_jax.families.platforms.motions import Motions
+from cspr_jax.families.platforms.redundant import redundant_kernels
+from cspr_jax.families.platforms.redundant.crossings import passed_over
+from cspr_jax.families.platforms.six_cable_proof import tension_proof
+from cspr_jax.families.platforms.six_cable_proof.checker import PlatformChecker, slacks_at
+from cspr_jax.families.platforms.six_cable_proof.pose_blocks import STEPS
+from cspr_jax.families.platforms.six_cable_proof.pose_proof import PARTS
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.platform_kind import USUAL
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.robots.contacts.interference import contacts
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.statics.reference_pose import aligned
 from cspr_jax.schema.verdicts import Verdict
 
 ROBOTS = ("fast", "greenline", "laval-mssm", "nist-robocrane", "without symmetry")
@@ -88,7 +89,7 @@ class Samples:
 
     def tension(self, motions, row, tau):
         """Smallest slack of taut cables, (k,), in other orders of these, of which one has digits everywhere."""
-        orders = [order.problem for order in proof._orders(self._problem)[1:3]]
+        orders = [order.problem for order in tension_proof._orders(self._problem)[1:3]]
 
         def kernel(problem, items):
             return slacks_at(problem, items, pairs=(), kind=self._kind)[0]

@@ -11,22 +11,22 @@ from oracles import workspaces as oracle
 from support.commands import cspr, plan
 
 import cspr_jax
-from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.build.robots import load_robot
 from cspr_jax.config.reading import read_toml
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.given_limits import limits_over
-from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.proved import ProofSummary
+from cspr_jax.families.platforms.beta_hat import LARGEST
+from cspr_jax.families.platforms.redundant import redundant_checker
+from cspr_jax.families.platforms.redundant.redundant_checker import RedundantChecker
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.given_limits import limits_over
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.outputs import example_files, motion_files
-from cspr_jax.platforms import redundant_checker
-from cspr_jax.platforms.beta_hat import LARGEST
-from cspr_jax.platforms.redundant_checker import RedundantChecker
-from cspr_jax.robots.kernel_axes import prepared
-from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.tension_rule_table import TENSION_RULES
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.tension_rule_table import TENSION_RULES
+from cspr_jax.robots.statics.kernel_axes import prepared
 from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.verification.proved import ProofSummary
 
 EXAMPLE = example_files.folder() / "cogiro.toml"
 LOW, HIGH, GRAVITY = 100.0, 5000.0, 9.81

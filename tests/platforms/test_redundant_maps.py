@@ -5,9 +5,9 @@ import pytest
 from oracles import any_motion, sampled_motion
 
 import cspr_jax
-from cspr_jax.arithmetic.rotations import cylindrical_frames, from_tilt_torsion
 from cspr_jax.config.reading import read_toml
-from cspr_jax.robots.kernel_axes import prepared
+from cspr_jax.numerics.linear.rotations import cylindrical_frames, from_tilt_torsion
+from cspr_jax.robots.statics.kernel_axes import prepared
 from cspr_jax.schema.verdicts import Verdict
 
 TRAJECTORY = {"family": "hypocycloid", "amplitude": {"name": "effective-c3", "epsilon": 0.3}, "max_arcs": 2}

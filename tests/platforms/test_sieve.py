@@ -9,12 +9,12 @@ import pytest
 from oracles import platform as oracle
 from support.platforms import EFFECTIVE, FROM_REST, MSSM, Z0, checker_of, made, ours
 
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.platform_kind import USUAL
-from cspr_jax.platforms import sieve
-from cspr_jax.platforms.arcs import Candidates, _Segments, smallest_arcs
-from cspr_jax.platforms.slack_lanes import certain_tension
-from cspr_jax.robots.wrench_lanes import CableLanes, balance
+from cspr_jax.families.platforms.arcs import Candidates, _Segments, smallest_arcs
+from cspr_jax.families.platforms.six_cable_proof import screen
+from cspr_jax.families.platforms.six_cable_proof.slack_lanes import certain_tension
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.platform_kind import USUAL
+from cspr_jax.robots.statics.wrench_lanes import CableLanes, balance
 
 BENDS, ARCS = 5, 8
 
@@ -77,14 +77,14 @@ def test_nothing_is_refuted_that_float64_would_pass(kind, monkeypatch):
     np.testing.assert_array_equal(checker.sieve.refuted(segments, 6, tau), wanted)
     few = jax.tree.map(lambda x: x[:16], segments)
     np.testing.assert_array_equal(checker.sieve.refuted(few, 6, tau), wanted[:16])
-    whole = sieve._rough_and_certain
+    whole = screen._rough_and_certain
     for wrong in (lambda x: x - 0.3, lambda x: np.inf * x, lambda x: np.nan * x):
 
         def spoiled(*given, wrong=wrong, **options):
             single_precision, certain = whole(*given, **options)
             return wrong(single_precision), certain
 
-        monkeypatch.setattr(sieve, "_rough_and_certain", spoiled)
+        monkeypatch.setattr(screen, "_rough_and_certain", spoiled)
         refuted = checker.sieve.refuted(segments, 6, tau)
         assert not (refuted & ~wanted).any()
 
@@ -121,7 +121,7 @@ def test_the_size_of_the_robot_changes_nothing(scale):
         given = given._replace(start=start, end=end, z0=given.z0 * unit)
         segments = _Segments(checker.problem.robot, given)(5, np.arange(300))
         sizes.append(checker.sieve.refuted(segments, 5, np.linspace(1.0, 0.0, 33)))
-        single_precision, _ = sieve.smallest_tensions(
+        single_precision, _ = screen.smallest_tensions(
             checker.problem.robot,
             EFFECTIVE,
             5.0,

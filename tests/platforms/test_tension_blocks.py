@@ -13,12 +13,15 @@ from oracles import platform as oracle
 from support.platforms import FROM_REST, Z0, limits_of, stacked
 from support.random_motions import BATCH, QUINTIC, ROBOTS, drawn, jets, motions_of, problem_of
 
-from cspr_jax.arithmetic import chebyshev, packed
-from cspr_jax.motions.blocks import Blocks
-from cspr_jax.motions.platform_kind import USUAL, PlatformMotionKind
-from cspr_jax.platforms import platform_reach, platform_segment_lanes, proof, tension_blocks
-from cspr_jax.platforms.proof import Certifier, determinant_at_rest
+from cspr_jax.families.platforms import platform_segment_lanes
+from cspr_jax.families.platforms.six_cable_proof import complex_bounds, tension_blocks
+from cspr_jax.families.platforms.six_cable_proof import tension_proof as proof
+from cspr_jax.families.platforms.six_cable_proof.tension_proof import Certifier, determinant_at_rest
+from cspr_jax.motion.platform_kind import USUAL, PlatformMotionKind
+from cspr_jax.numerics.bounds import chebyshev
+from cspr_jax.numerics.linear import packed_arrays
 from cspr_jax.schema.limits import LIMITS
+from cspr_jax.verification.bounds.blocks import Blocks
 
 STANDARD = PlatformMotionKind(variable=False, plain=True)
 G = 9.81
@@ -26,8 +29,8 @@ G = 9.81
 
 @partial(jax.jit, static_argnames="kind")
 def _reach(segments, arcs, middles, axes, *, kind):
-    middle = platform_reach.middle_of(QUINTIC, middles)
-    return platform_reach.reach(segments, arcs, middle, axes, kind)
+    middle = complex_bounds.middle_of(QUINTIC, middles)
+    return complex_bounds.reach(segments, arcs, middle, axes, kind)
 
 
 def reach_breaks(count, seed, kind, robot):
@@ -167,7 +170,7 @@ def test_rounding_of_values_is_allowed_for():
     kappa = (whole.nodes[:, 0] * whole.nodes[:, 1]).max(0)
     more = rough.allowed - whole.allowed
     known = (whole.nodes[:, 1] > 0.0).all(0) & (kappa > 0.05) & (whole.allowed < 1e-3)
-    assert known.sum() > 20 and (more[known] > 2.9 * packed.ROUNDING * kappa[known]).all()
+    assert known.sum() > 20 and (more[known] > 2.9 * packed_arrays.ROUNDING * kappa[known]).all()
     np.testing.assert_array_equal(whole.rounding[known] < 1e-6, rough.rounding[known] < 1e-6)
 
 
@@ -370,14 +373,14 @@ def test_slacks_at_nodes_are_no_lower_than_they_are(limits, least):
 @partial(jax.jit, static_argnames="kind")
 def _rests(problem, items, *, kind):
     segments, arcs, regular, start, stop = items
-    middle, half = platform_reach.middle_of(problem.amplitude, 0.5 * (start + stop)), 0.5 * (stop - start)
+    middle, half = complex_bounds.middle_of(problem.amplitude, 0.5 * (start + stop)), 0.5 * (stop - start)
     z0 = problem.robot.gravity / segments.rate
     block = tension_blocks._Block(segments, platform_segment_lanes.squared_duration(segments, arcs), regular, z0)
-    now = platform_reach.instant_beside(middle, segments.sense, arcs, 0.0 * half)
+    now = complex_bounds.instant_beside(middle, segments.sense, arcs, 0.0 * half)
     lengths = tension_blocks._lengths(problem.robot, platform_segment_lanes.state(segments, arcs, now, kind))
     radii, every = np.array(chebyshev.RADII), []
     for (along, aside), factor in zip(chebyshev.semi_axes(radii), chebyshev.remainders(radii), strict=True):
-        bounds = platform_reach.reach(segments, arcs, middle, (along * half, aside * half), kind)
+        bounds = complex_bounds.reach(segments, arcs, middle, (along * half, aside * half), kind)
         sizes = jnp.stack(tension_blocks._sizes(problem, block, bounds, along * half, lengths)[:7])
         every.append(jnp.where(jnp.isnan(sizes), jnp.inf, sizes * factor))
     return jnp.min(jnp.stack(every), axis=0)
@@ -437,13 +440,13 @@ def test_planted_errors_in_bounds_are_found(monkeypatch, request, fault):
     if fault in ("no wrench", "remainder"):
         request.getfixturevalue("few_nodes")
     if fault == "less growth":
-        whole = platform_reach.reach
+        whole = complex_bounds.reach
 
         def less(*given):
             found = whole(*given)
             return found._replace(omega=0.5 * found.omega, angular_acceleration=0.5 * found.angular_acceleration)
 
-        monkeypatch.setattr(platform_reach, "reach", less)
+        monkeypatch.setattr(complex_bounds, "reach", less)
         assert (reach_breaks(200, 1, USUAL, ROBOTS["mssm"]) > 1.0).any()
     elif fault == "rounded polynomial":
         monkeypatch.setattr(chebyshev, "bernstein", lambda: np.eye(chebyshev.DEGREE + 1))

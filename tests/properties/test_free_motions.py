@@ -8,12 +8,12 @@ from oracles import free_motion_times, motion_judge
 from support.free_motions import problem_of
 from support.least_time import sampled_states
 
-from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.free.free_motion import free_motion
-from cspr_jax.free.poses import FreePoses
-from cspr_jax.free.time_bounds import time_bounds
-from cspr_jax.motions.motion import Placed
-from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.families.free.free_motion import free_motion
+from cspr_jax.families.free.poses import FreePoses
+from cspr_jax.families.free.search.time_bounds import time_bounds
+from cspr_jax.motion.motion import Placed
+from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.schema.verdicts import Verdict
 
 # By how much a time may be below the reference's estimate of the least one, and above its motion.

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import cspr_jax
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.robots import point_mass
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.robots.model import point_mass
 
 N, EXAMPLES = 64, 10
 QUINTIC = named("quintic")

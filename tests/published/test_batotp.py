@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.published import batotp, tables
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.published import peers
 
 # Ours: no source prints them.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from oracles import workspaces as oracle
 
-from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.published import ray_hulls, tables
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from cspr_jax.schema.identity import digest
-from cspr_jax.store.disk import Disk
+from cspr_jax.store.files.disk import Disk
 from cspr_jax.store.record import read_record
 from cspr_jax.store.shards import Shard
 from cspr_jax.sweep.definition import Sweep, read_sweep

@@ -12,7 +12,7 @@ from cspr_jax.errors import RefusedError
 from cspr_jax.schema.identity import FORMAT_VERSION, digest, identity
 from cspr_jax.store import documents
 from cspr_jax.store.documents import DEEPEST, plain_json
-from cspr_jax.store.seal import DamagedError
+from cspr_jax.store.files.checksum import DamagedError
 from cspr_jax.sweep.inspection import status
 from reliability.support import check_same, content, go, sweep_of
 from reliability.test_damage import without_quarantine

@@ -17,7 +17,7 @@ from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import ConfigError, CsprError, InputError
 from cspr_jax.plans.choices import chosen_depth
 from cspr_jax.plans.sequence import PlanLegs
-from cspr_jax.robots.reference_pose import reference_pose
+from cspr_jax.robots.statics.reference_pose import reference_pose
 from cspr_jax.sweep.definition import read_sweep
 from cspr_jax.sweep.tile import TileMap
 

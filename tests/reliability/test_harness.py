@@ -8,8 +8,9 @@ import time
 import pytest
 
 from cspr_jax.errors import RefusedError
-from cspr_jax.store import folder, publishing, record, seal, shards
-from cspr_jax.store.disk import Disk
+from cspr_jax.store import folder, record, shards
+from cspr_jax.store.files import checksum, publishing
+from cspr_jax.store.files.disk import Disk
 from cspr_jax.sweep import engine
 from reliability import support, test_crashes, test_damage
 from reliability.support import content, go, sweep_of
@@ -50,13 +51,13 @@ def test_power_loss_shows_it_too(job, tmp_path, monkeypatch):
     sweep, reference, _ = job
     disk = support.FaultyDisk()
     go(sweep, tmp_path / "whole", disk=disk)
-    with pytest.raises((AssertionError, seal.DamagedError)):
+    with pytest.raises((AssertionError, checksum.DamagedError)):
         test_crashes.every_crash((sweep, reference, disk.count), tmp_path, lambda k: ["power"])
 
 
 def test_without_renaming(job, tmp_path, monkeypatch):
     without_replace(monkeypatch)
-    with pytest.raises((AssertionError, seal.DamagedError)):
+    with pytest.raises((AssertionError, checksum.DamagedError)):
         test_crashes.every_crash(job, tmp_path, lambda k: test_crashes.CRASHES)
 
 
@@ -66,7 +67,7 @@ def test_without_checksums(tmp_path, monkeypatch):
     go(sweep, tmp_path / "run")
     finished = sweep, tmp_path / "run", content(tmp_path / "run")
     monkeypatch.setattr(shards.Shard, "digest", property(lambda self: Anything()))
-    monkeypatch.setattr(seal, "_check", lambda line, digest: None)
+    monkeypatch.setattr(checksum, "_check", lambda line, digest: None)
     with pytest.raises((AssertionError, TypeError, ValueError)):
         test_damage.test_flipped_bits(finished, tmp_path / "copy")
 

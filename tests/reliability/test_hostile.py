@@ -20,7 +20,7 @@ from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.reading import checked, read_toml
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import CsprError
-from cspr_jax.store.seal import sealed
+from cspr_jax.store.files.checksum import sealed
 from cspr_jax.sweep.definition import read_sweep
 from reliability.support import SWEEP, content, go, sweep_of
 

@@ -18,13 +18,13 @@ from support.reading import read_here
 import cspr_jax
 from cspr_jax.errors import StoreError
 from cspr_jax.outputs.plots.draw import _map_figure
-from cspr_jax.outputs.plots.motion import motion_figure
+from cspr_jax.outputs.plots.motions.motion import motion_figure
 from cspr_jax.schema.identity import identity
-from cspr_jax.store import isolated
 from cspr_jax.store.consolidation import content_of
-from cspr_jax.store.disk import Disk
-from cspr_jax.store.netcdf import LAYOUT, make_datasets, set_attributes
-from cspr_jax.store.seal import LENGTH, DamagedError, seal_file, sealed
+from cspr_jax.store.files.checksum import LENGTH, DamagedError, seal_file, sealed
+from cspr_jax.store.files.disk import Disk
+from cspr_jax.store.files.netcdf import LAYOUT, make_datasets, set_attributes
+from cspr_jax.store.reading import isolated
 
 AXES = {"x": [0.1, 0.2, 0.3, 0.4], "y": [0.1, 0.2, 0.3], "z": [1.0, 1.5], "z0": [1.7]}
 SHAPE = tuple(len(points) for points in AXES.values())
@@ -393,7 +393,7 @@ def test_mutations_all(tmp_path):
 def test_a_process_that_fails_says_so(tmp_path, monkeypatch):
     """That reads a file: killed, without end, without an interpreter; before it has begun, the file had no part."""
     path = forged(tmp_path / "map.h5", a_map)
-    usual, instead = isolated._CODE, "import cspr_jax.store.reader as r, os\nr.answer = lambda *a: {}\nserve()"
+    usual, instead = isolated._CODE, "import cspr_jax.store.reading.reader as r, os\nr.answer = lambda *a: {}\nserve()"
     for end, words, at_first in (
         ("os.kill(os.getpid(), 11)", "cannot be read as a result: HDF5 fails on it", "did not start: exit code -11"),
         ("os.kill(os.getpid(), 9)", "was killed: signal 9", "did not start: exit code -9"),
@@ -419,7 +419,7 @@ def test_a_process_that_fails_says_so(tmp_path, monkeypatch):
 def test_the_limits_hold(tmp_path, monkeypatch, code, words):
     """Of time and of memory, were the checks of what a file holds to miss something."""
     path = forged(tmp_path / "map.h5", a_map)
-    body = f"import cspr_jax.store.guard as g\ndef datasets(*a, **k):\n    {code}\ng.datasets = datasets\n"
+    body = f"import cspr_jax.store.files.guard as g\ndef datasets(*a, **k):\n    {code}\ng.datasets = datasets\n"
     monkeypatch.setattr(isolated, "_CODE", isolated._CODE.replace("serve()", body + "serve()"))
     with pytest.raises(StoreError, match=words):
         cspr_jax.open_result(path)

@@ -18,9 +18,9 @@ from support.commands import cspr
 
 from cspr_jax.errors import StoreError
 from cspr_jax.schema.identity import canonical_json, digest
-from cspr_jax.store import isolated
-from cspr_jax.store.netcdf import LAYOUT
-from cspr_jax.store.seal import LENGTH, sealed
+from cspr_jax.store.files.checksum import LENGTH, sealed
+from cspr_jax.store.files.netcdf import LAYOUT
+from cspr_jax.store.reading import isolated
 from cspr_jax.sweep.inspection import verify
 from reliability.support import ENVIRONMENT, Paper, check_same, content, go, sweep_of
 from reliability.test_damage import without_quarantine
@@ -72,7 +72,7 @@ def test_one_without_end_among_others(finished, tmp_path, monkeypatch):
     sweep, source, reference = finished
     shutil.copytree(source, tmp_path / "run")
     (tmp_path / "run" / "small.h5").unlink()
-    hang = """import cspr_jax.store.reader as r
+    hang = """import cspr_jax.store.reading.reader as r
 usual = r.decode
 def decode(place, layout, index, *rest):
     while index == 2:
@@ -100,7 +100,8 @@ def test_a_reader_that_somebody_ends_is_no_damage(finished, tmp_path, monkeypatc
     sweep, source, reference = finished
     shutil.copytree(source, tmp_path / "run")
     (tmp_path / "run" / "small.h5").unlink()
-    code = f"import cspr_jax.store.reader as r, os, signal\nr.answer = lambda *a: os.kill(os.getpid(), {int(number)})\n"
+    code = "import cspr_jax.store.reading.reader as r, os, signal\n"
+    code += f"r.answer = lambda *a: os.kill(os.getpid(), {int(number)})\n"
     if number != signal.SIGKILL:  # a shell's background job inherits some of them ignored
         code += f"signal.signal({int(number)}, signal.SIG_DFL)\n"
     code += "serve()"
@@ -225,7 +226,9 @@ def test_a_disk_without_locks_is_named(finished, tmp_path, monkeypatch):
 
 def test_each_library_of_the_process_may_lie_in_a_folder_of_its_own():
     """A variable or a loader of modules may name folders one by one: it is told the folders of all that it imports."""
-    code = "import sys, cspr_jax.store.reader; print(*[getattr(m, '__file__', '') for m in sys.modules.values()])"
+    code = (
+        "import sys, cspr_jax.store.reading.reader; print(*[getattr(m, '__file__', '') for m in sys.modules.values()])"
+    )
     words = [sys.executable, "-c", code]
     files = subprocess.run(words, capture_output=True, text=True, check=True).stdout.split()
     sites = {sysconfig.get_path("purelib"), sysconfig.get_path("platlib")}

@@ -7,9 +7,9 @@ import pytest
 from support.reading import read_here
 
 from cspr_jax.errors import CsprError, RefusedError
-from cspr_jax.store import publishing
-from cspr_jax.store.disk import Disk
-from cspr_jax.store.publishing import publish
+from cspr_jax.store.files import publishing
+from cspr_jax.store.files.disk import Disk
+from cspr_jax.store.files.publishing import publish
 from cspr_jax.sweep.inspection import status
 from reliability.support import Paper, check_same, content, go, sweep_of
 

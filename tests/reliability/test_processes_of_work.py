@@ -7,9 +7,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as some
 
-from cspr_jax.arithmetic.batches import in_threads
-from cspr_jax.arithmetic.cores import SHARE, cores
 from cspr_jax.errors import ConfigError, ResourceError
+from cspr_jax.numerics.batches import in_threads
+from cspr_jax.numerics.cores import SHARE, cores
 from cspr_jax.runtime.processes import MOST, Spread, balanced, check_count, usual_count
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from cspr_jax.errors import StoppedError
 from cspr_jax.runtime.progress import Pace
-from cspr_jax.store.disk import Disk
+from cspr_jax.store.files.disk import Disk
 from cspr_jax.store.folder import RunFolder
 from cspr_jax.sweep import inspection
 from cspr_jax.sweep.engine import Hooks, Run

@@ -14,7 +14,7 @@ from pathlib import Path
 import jax
 import pytest
 
-from cspr_jax.api.pictures import plot
+from cspr_jax.api.files.pictures import plot
 from cspr_jax.cli import main
 from cspr_jax.errors import StoreError
 from cspr_jax.published import tables

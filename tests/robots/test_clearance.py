@@ -14,13 +14,14 @@ from pydantic import Field
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from cspr_jax.arithmetic.frames import Frame
-from cspr_jax.config.obstacles import Obstacles, PlatformShapeKeys
+from cspr_jax.config.keys.obstacles import Obstacles, PlatformShapeKeys
 from cspr_jax.config.reading import Table, checked
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.robots import clearance, clearance_lanes, shapes
-from cspr_jax.robots.platform import platform_robot
-from cspr_jax.robots.point_mass import point_mass_robot
+from cspr_jax.numerics.linear.frames import Frame
+from cspr_jax.robots.contacts import clearance, clearance_lanes
+from cspr_jax.robots.model import shapes
+from cspr_jax.robots.model.platform import platform_robot
+from cspr_jax.robots.model.point_mass import point_mass_robot
 
 MANY = pytest.mark.parametrize("count", [20_000, pytest.param(200_000, marks=pytest.mark.soak)])
 EXACT = 1e-12  # m, of lengths of some metres

@@ -11,15 +11,16 @@ from support.platforms import crossed_robot
 from support.splines import random_spline, states_of
 
 import cspr_jax
-from cspr_jax.arithmetic.affine_bounds import AffineBounds, constant
-from cspr_jax.arithmetic.batches import in_batches
-from cspr_jax.arithmetic.determinant_bounds import changes_sign, determinant, size_range
-from cspr_jax.robots import clearance, convex_gaps, shapes
-from cspr_jax.robots.clearance import clearances, scene
-from cspr_jax.robots.contact_bodies import bodies_of, meetings
-from cspr_jax.robots.contact_bounds import contact_bounds, corner_depths, passings
-from cspr_jax.robots.kernel_axes import prepared
-from cspr_jax.robots.state_bounds import StateBounds, cable_bounds
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, constant
+from cspr_jax.numerics.bounds.determinant_bounds import changes_sign, determinant, size_range
+from cspr_jax.robots.bounds.contact_bounds import contact_bounds, corner_depths, passings
+from cspr_jax.robots.bounds.state_bounds import StateBounds, cable_bounds
+from cspr_jax.robots.contacts import clearance, convex_gaps
+from cspr_jax.robots.contacts.clearance import clearances, scene
+from cspr_jax.robots.contacts.contact_bodies import bodies_of, meetings
+from cspr_jax.robots.model import shapes
+from cspr_jax.robots.statics.kernel_axes import prepared
 
 S = np.linspace(-1.0, 1.0, 21)
 # Rounding of clearances of lengths of some metres, m.

@@ -9,7 +9,8 @@ import pytest
 from conftest import equilateral
 from oracles import point_mass as oracle
 
-from cspr_jax.robots import force_balance, point_mass
+from cspr_jax.robots.model import point_mass
+from cspr_jax.robots.statics import force_balance
 
 N = 200
 TENSIONS, PSEUDO = jax.jit(jax.vmap(force_balance.tensions)), jax.jit(jax.vmap(force_balance.pseudotensions))

@@ -6,8 +6,8 @@ import jax
 import numpy as np
 import pytest
 
-from cspr_jax.robots.nearest_face import nearest_face
-from cspr_jax.robots.tension_distribution import centred
+from cspr_jax.robots.tensions.nearest_face import nearest_face
+from cspr_jax.robots.tensions.tension_distribution import centred
 
 COUNT = 60
 

@@ -17,12 +17,12 @@ import cspr_jax
 from cspr_jax.build.limits import build_limits
 from cspr_jax.config.catalogue import CATALOGUE
 from cspr_jax.config.equivalents import as_moved, no_equivalent
-from cspr_jax.config.limits import LimitTable
+from cspr_jax.config.keys.limits import LimitTable
 from cspr_jax.config.robot import RobotFile, read_robot
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.robots import force_balance, wrench_balance
-from cspr_jax.robots.parallel_pairs import parallel_pairs
-from cspr_jax.robots.state import State
+from cspr_jax.robots.model.parallel_pairs import parallel_pairs
+from cspr_jax.robots.model.state import State
+from cspr_jax.robots.statics import force_balance, wrench_balance
 from cspr_jax.schema.families import FAMILIES
 from cspr_jax.schema.map_kinds import MAP_KINDS
 

@@ -12,18 +12,18 @@ from oracles import platform as oracle
 from oracles.pulleys import length
 
 import cspr_jax
-from cspr_jax.arithmetic.elementary import double_precision
 from cspr_jax.build.robots import fault_at_rest
 from cspr_jax.cli import main
 from cspr_jax.config.robot import read_robot
 from cspr_jax.errors import InputError
-from cspr_jax.motions.given_limits import limits_over
-from cspr_jax.robots import pulleys
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.patterns import PATTERNS
-from cspr_jax.robots.platform import PlatformRobot, across_line, platform_robot
-from cspr_jax.robots.state import State
+from cspr_jax.motion.given_limits import limits_over
+from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.robots.model import pulleys
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.patterns import PATTERNS
+from cspr_jax.robots.model.platform import PlatformRobot, across_line, platform_robot
+from cspr_jax.robots.model.state import State
+from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.schema.families import FAMILIES
 from cspr_jax.schema.map_kinds import MAP_KINDS
 

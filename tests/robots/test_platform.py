@@ -24,20 +24,20 @@ from support.platforms import (
     states,
 )
 
-from cspr_jax.arithmetic import rotations
 from cspr_jax.build.robots import kernel_robot
 from cspr_jax.config.catalogue import CATALOGUE
+from cspr_jax.config.keys.trajectory import TrajectoryKeys
 from cspr_jax.config.robot import read_robot
-from cspr_jax.config.trajectory import TrajectoryKeys
 from cspr_jax.errors import InputError
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.platform_kind import USUAL, PlatformMotionKind
-from cspr_jax.platforms import platform_segment as segments
-from cspr_jax.platforms.end_acceleration import endpoint
-from cspr_jax.platforms.sieve import CHUNK, smallest_tensions
-from cspr_jax.robots.platform import pairs_apart, platform_robot
-from cspr_jax.robots.reference_pose import reference_pose
-from cspr_jax.robots.state import State
+from cspr_jax.families.platforms import platform_segment as segments
+from cspr_jax.families.platforms.end_acceleration import endpoint
+from cspr_jax.families.platforms.six_cable_proof.screen import CHUNK, smallest_tensions
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.platform_kind import USUAL, PlatformMotionKind
+from cspr_jax.numerics.linear import rotations
+from cspr_jax.robots.model.platform import pairs_apart, platform_robot
+from cspr_jax.robots.model.state import State
+from cspr_jax.robots.statics.reference_pose import reference_pose
 
 PLATFORMS = ("laval-mssm", "nist-robocrane", "fast", "greenline")
 AMPLITUDES = {

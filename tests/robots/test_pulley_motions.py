@@ -11,12 +11,13 @@ from scipy.interpolate import CubicSpline
 from support.splines import random_spline, spline_of
 
 import cspr_jax
-from cspr_jax.robots import cables, state_bounds
-from cspr_jax.robots.cable_lengths import moved_lengths
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.patterns import PATTERNS
-from cspr_jax.robots.pulleys import exits
-from cspr_jax.robots.state import State
+from cspr_jax.robots import cables
+from cspr_jax.robots.bounds import state_bounds
+from cspr_jax.robots.model.patterns import PATTERNS
+from cspr_jax.robots.model.pulleys import exits
+from cspr_jax.robots.model.state import State
+from cspr_jax.robots.statics.cable_lengths import moved_lengths
+from cspr_jax.robots.statics.kernel_axes import centred
 from robots.test_patterns import INERTIAL, MATRIX, made, state_of
 
 S = np.linspace(-1.0, 1.0, 17)

@@ -10,24 +10,25 @@ from conftest import TILTED, equilateral
 from oracles import platform as oracle
 
 import cspr_jax
-from cspr_jax.arithmetic import minima, rotations
 from cspr_jax.build.robots import fault_at_rest
 from cspr_jax.cli import main
 from cspr_jax.config.catalogue import CATALOGUE, FAULTS, catalogue_names
-from cspr_jax.config.limits import LimitKeys, LimitTable
+from cspr_jax.config.keys.limits import LimitKeys, LimitTable
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile, read_robot
 from cspr_jax.errors import InputError
-from cspr_jax.motions.limits import Values, scales, slack, values
-from cspr_jax.robots import force_balance, wrench_balance
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.limits import Limits, Uncertainty
-from cspr_jax.robots.platform import platform_robot
-from cspr_jax.robots.point_mass import planar_robot, plane_normal, point_mass_robot
-from cspr_jax.robots.robot import check_determined
-from cspr_jax.robots.state import State
+from cspr_jax.families.swings.proof import limit_slacks
+from cspr_jax.motion.limits import Values, scales, slack, values
+from cspr_jax.numerics.linear import rotations
+from cspr_jax.numerics.search import minima
+from cspr_jax.robots.model.limits import Limits, Uncertainty
+from cspr_jax.robots.model.platform import platform_robot
+from cspr_jax.robots.model.point_mass import planar_robot, plane_normal, point_mass_robot
+from cspr_jax.robots.model.robot import check_determined
+from cspr_jax.robots.model.state import State
+from cspr_jax.robots.statics import force_balance, wrench_balance
+from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES
-from cspr_jax.swings import limit_slacks
 
 RNG = np.random.default_rng(5)
 RING = np.array([[np.cos(a), np.sin(a), 0.1 * np.sin(3.0 * a)] for a in np.arange(8) * 0.7])

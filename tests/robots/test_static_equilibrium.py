@@ -7,9 +7,9 @@ from scipy.optimize import linprog
 from support import cable_robots
 from support.workspaces import made
 
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.static_equilibrium import DEPTHS, slack_at_rest
+from cspr_jax.robots.statics.kernel_axes import centred
 
 SIZES = [("2T", 4), ("1R2T", 4), *(pytest.param(*size, marks=pytest.mark.thorough) for size in (("1T", 3), ("3T", 5)))]
 SIZES += [pytest.param(*size, marks=pytest.mark.thorough) for size in (("2R3T", 7), ("3R3T", 8))]

@@ -9,10 +9,10 @@ from oracles import lines as oracle
 from scipy.optimize import linprog, minimize, nnls
 
 from cspr_jax.errors import InputError
-from cspr_jax.robots import tension_distribution
-from cspr_jax.robots.point_mass import PointMassRobot
-from cspr_jax.robots.state import State
-from cspr_jax.robots.tension_couples import is_rectangle, tension_couples
+from cspr_jax.robots.model.point_mass import PointMassRobot
+from cspr_jax.robots.model.state import State
+from cspr_jax.robots.tensions import tension_distribution
+from cspr_jax.robots.tensions.tension_couples import is_rectangle, tension_couples
 
 # Redundant by 0, 1, 2, more. The soak compiles the others as well.
 SHAPES = [

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog, minimize
 
 from cspr_jax.errors import InputError
-from cspr_jax.robots.tension_distribution_lanes import least_norms
-from cspr_jax.robots.tension_rules import RULES, distributions
+from cspr_jax.robots.tensions.tension_distribution_lanes import least_norms
+from cspr_jax.robots.tensions.tension_rules import RULES, distributions
 
 SHAPES = [(2, 4), pytest.param(3, 5, marks=pytest.mark.thorough), (6, 8)]
 COUNT = 48  # poses of a shape: one batch

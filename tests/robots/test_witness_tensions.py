@@ -9,13 +9,13 @@ from scipy.optimize import linprog
 from support.splines import random_spline
 
 import cspr_jax
-from cspr_jax.arithmetic.affine_bounds import AffineBounds
-from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.curves.several import SeveralSplines
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.bounds.affine_bounds import AffineBounds
 from cspr_jax.robots import cables
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.state_bounds import balance_bounds, cable_bounds
-from cspr_jax.robots.witness_tensions import witness_tensions
+from cspr_jax.robots.bounds.state_bounds import balance_bounds, cable_bounds
+from cspr_jax.robots.bounds.witness_tensions import witness_tensions
+from cspr_jax.robots.statics.kernel_axes import centred
 
 S = np.linspace(-1.0, 1.0, 9)
 # Of each robot a place and how far motions go from there, m, and the tilt.

@@ -13,9 +13,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.motions import amplitudes
-from cspr_jax.motions.platform_kind import PlatformMotionKind
+from cspr_jax.motion import amplitudes
+from cspr_jax.motion.platform_kind import PlatformMotionKind
+from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.runtime import compile_cache
 from cspr_jax.runtime import persistent_jit as programs
 from cspr_jax.runtime.compile_cache import PROGRAMS
@@ -50,8 +50,8 @@ import numpy as np
 from cspr_jax.runtime import xla
 xla.prepare("cpu", quick=True)
 if {off}: os.environ.pop(xla.compile_cache.PROGRAMS)
-from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.motions import amplitudes
+from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.motion import amplitudes
 traces, polynomial = [], amplitudes.polynomial
 amplitudes.polynomial = lambda *arguments: traces.append(1) or polynomial(*arguments)
 with double_precision():

@@ -17,10 +17,10 @@ import jax
 import numpy as np
 import pytest
 
-from cspr_jax.arithmetic import batches
-from cspr_jax.arithmetic.batches import in_batches
 from cspr_jax.cli import main
 from cspr_jax.errors import ConfigError
+from cspr_jax.numerics import batches
+from cspr_jax.numerics.batches import in_batches
 from cspr_jax.runtime import compile_cache, compile_options, packed, xla
 
 ROOT = Path(__file__).parents[2]

@@ -9,7 +9,7 @@ from support.commands import plan, planned
 
 import cspr_jax
 from cspr_jax.errors import ConfigError
-from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.schema.families import ANY_PATTERN
 
 POSES = """

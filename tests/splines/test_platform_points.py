@@ -13,7 +13,7 @@ from support.commands import cspr
 import cspr_jax
 from cspr_jax.config.catalogue import CATALOGUE
 from cspr_jax.config.robot import RobotFile
-from cspr_jax.outputs.plots.robot_along import moving
+from cspr_jax.outputs.plots.robots.robot_along import moving
 
 TIMES = np.linspace(0.0, 4.0, 9)
 # Axes of the platform in its file, from those in which it hangs level: the orientation at rest is not the identity.

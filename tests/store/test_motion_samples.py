@@ -10,7 +10,7 @@ from support.motions import states_along
 import cspr_jax
 from cspr_jax.curves.reading import spline_of
 from cspr_jax.errors import ConfigError
-from cspr_jax.store.motion_samples import motion_windows, read_motion
+from cspr_jax.store.reading.motion_samples import motion_windows, read_motion
 
 from .test_motion_table import PLATFORM
 

@@ -13,8 +13,8 @@ import cspr_jax
 from cspr_jax.cli import main
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.errors import StoreError
-from cspr_jax.outputs.plots.motion_source import robot_and_plan
-from cspr_jax.outputs.plots.robot_along import moving
+from cspr_jax.outputs.plots.motions.motion_source import robot_and_plan
+from cspr_jax.outputs.plots.robots.robot_along import moving
 from cspr_jax.schema.quantities import TRAJECTORY
 
 PLATFORM = """schema = 1

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from cspr_jax.motions.amplitudes import Amplitude
+from cspr_jax.motion.amplitudes import Amplitude
 
 COLUMNS = 10
 

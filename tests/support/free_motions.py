@@ -6,14 +6,14 @@ import numpy as np
 from oracles.sampled_motion import State
 from scipy.interpolate import PPoly
 
-from cspr_jax.arithmetic.elementary import double_precision, leaf
-from cspr_jax.free.free_motion import free_motion
-from cspr_jax.free.poses import FreePoses
-from cspr_jax.free.question import FreeSettings
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.problem import Problem
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.limits import Limits
+from cspr_jax.families.free.free_motion import free_motion
+from cspr_jax.families.free.poses import FreePoses
+from cspr_jax.families.free.problem import FreeSettings
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.elementary import double_precision, leaf
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.statics.kernel_axes import centred
 from support.least_time import robot_of
 
 # Quick tests look at few intervals.

@@ -8,18 +8,18 @@ import numpy as np
 from oracles.sampled_motion import State
 
 import cspr_jax
-from cspr_jax.arithmetic.elementary import double_precision, leaf
-from cspr_jax.arithmetic.piecewise_bounds import bernstein_of_powers
 from cspr_jax.curves.spline import Spline
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.motion import Placed
-from cspr_jax.motions.problem import Problem
-from cspr_jax.motions.proved_answers import proved_answers
-from cspr_jax.paths.least_time import least_time_motion
-from cspr_jax.paths.section import Section, SectionSettings
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.limits import Limits
+from cspr_jax.families.paths.geometry.section import Section, SectionSettings
+from cspr_jax.families.paths.least_time.least_time import least_time_motion
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.motion import Placed
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.bounds.piecewise_bounds import bernstein_of_powers
+from cspr_jax.numerics.elementary import double_precision, leaf
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.verification.proved_answers import proved_answers
 from support.motions import states_along
 
 

@@ -3,8 +3,8 @@
 import jax
 import numpy as np
 
-from cspr_jax.motions.motion import Motion, common_shape
-from cspr_jax.robots.state import State
+from cspr_jax.motion.motion import Motion, common_shape
+from cspr_jax.robots.model.state import State
 
 # Instants that are computed together.
 FEW, MANY = 64, 1024

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 from oracles import platform as oracle
 
-from cspr_jax.robots.limits import Uncertainty
+from cspr_jax.robots.model.limits import Uncertainty
 
 
 def uncertain(**numbers):

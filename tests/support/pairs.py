@@ -3,7 +3,7 @@
 import numpy as np
 
 import cspr_jax
-from cspr_jax.robots.platform import PlatformRobot
+from cspr_jax.robots.model.platform import PlatformRobot
 
 R, SMALL = 0.35, 0.09
 HIGH = np.sqrt(3.0)

@@ -12,16 +12,16 @@ import jax.numpy as jnp
 import numpy as np
 from oracles import platform as oracle
 
-from cspr_jax.api.motions import sampled_margin
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.platform_kind import USUAL, PlatformMotionKind
-from cspr_jax.motions.problem import Problem
-from cspr_jax.platforms import platform_segment as segments
-from cspr_jax.platforms.checker import PlatformChecker
-from cspr_jax.robots import wrench_balance
-from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.platform import platform_robot
-from cspr_jax.robots.state import State
+from cspr_jax.api.families.motions import sampled_margin
+from cspr_jax.families.platforms import platform_segment as segments
+from cspr_jax.families.platforms.six_cable_proof.checker import PlatformChecker
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.platform_kind import USUAL, PlatformMotionKind
+from cspr_jax.motion.problem import Problem
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.platform import platform_robot
+from cspr_jax.robots.model.state import State
+from cspr_jax.robots.statics import wrench_balance
 from cspr_jax.schema.limits import LIMITS
 
 MSSM = oracle.mssm()

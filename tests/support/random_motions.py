@@ -8,10 +8,10 @@ import dataclasses
 import numpy as np
 from oracles import platform as oracle
 
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.problem import Problem
-from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.reference_pose import aligned
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.problem import Problem
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.statics.reference_pose import aligned
 from support.platforms import MSSM, Z0, general, made, ours, random_pose, stacked
 
 QUINTIC = named("quintic")

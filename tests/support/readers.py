@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import pytest
 
 from cspr_jax.schema.quantities import from_outside
-from cspr_jax.store.isolated import Reader
+from cspr_jax.store.reading.isolated import Reader
 
 APART = ("reliability", "store", "sweep")
 _PARTS = ("_child", "_channel", "_pipe", "_idle")

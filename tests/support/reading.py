@@ -4,7 +4,7 @@ import io
 import json
 from pathlib import Path
 
-from cspr_jax.store import isolated, reader
+from cspr_jax.store.reading import isolated, reader
 
 
 def read_here(monkeypatch) -> None:

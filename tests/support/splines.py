@@ -3,9 +3,9 @@
 import numpy as np
 from scipy.interpolate import CubicSpline, PPoly, make_interp_spline
 
-from cspr_jax.arithmetic.piecewise_bounds import bernstein_of_powers
 from cspr_jax.curves.spline import Spline
-from cspr_jax.robots.state import State
+from cspr_jax.numerics.bounds.piecewise_bounds import bernstein_of_powers
+from cspr_jax.robots.model.state import State
 from support.motions import states_along
 
 

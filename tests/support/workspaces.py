@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from cspr_jax.robots.patterns import PATTERNS
-from cspr_jax.robots.platform import platform_robot
-from cspr_jax.robots.point_mass import point_mass_robot
+from cspr_jax.robots.model.patterns import PATTERNS
+from cspr_jax.robots.model.platform import platform_robot
+from cspr_jax.robots.model.point_mass import point_mass_robot
 from support.cable_robots import GRAVITY
 
 ROUND = np.diag([0.05, 0.05, 0.05])

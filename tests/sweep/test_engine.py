@@ -15,11 +15,11 @@ from support.commands import cspr
 
 import cspr_jax
 from cspr_jax.errors import SelfCheckError
+from cspr_jax.families.swings.arcs_map import MinimumArcsMap
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.schema.quantities import QUANTITIES as EVERY
 from cspr_jax.store import consolidation
 from cspr_jax.sweep.definition import read_sweep
-from cspr_jax.swings.arcs_map import MinimumArcsMap
 
 ROOT = Path(__file__).parents[2]
 START = [0.7, 0.7, 3.0]

@@ -1,1 +1,1 @@
-"""Tests of `cspr_jax.swings`."""
+"""Tests of `cspr_jax.families.swings`."""

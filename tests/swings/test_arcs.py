@@ -9,15 +9,15 @@ from conftest import TILTED, equilateral
 from oracles import point_mass as oracle
 
 from cspr_jax.errors import InputError
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.problem import Problem
-from cspr_jax.robots import point_mass
-from cspr_jax.robots.limits import Limits
+from cspr_jax.families.swings.arcs import minimum_arcs
+from cspr_jax.families.swings.proof import margins
+from cspr_jax.families.swings.proof.margins import smallest_values
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.problem import Problem
+from cspr_jax.robots.model import point_mass
+from cspr_jax.robots.model.limits import Limits
 from cspr_jax.schema.limits import LIMITS as ROWS
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.swings import margins
-from cspr_jax.swings.arcs import minimum_arcs
-from cspr_jax.swings.margins import smallest_values
 
 Z0 = 1.7
 BASE = equilateral(0.26)
@@ -246,7 +246,7 @@ def test_parts_are_put_together_in_order(monkeypatch):
         answer(starts[k : k + 100], ends[k : k + 100], z0=z0[k : k + 100], arcs=arcs[k : k + 100])
         for k in range(0, 500, 100)
     ]
-    monkeypatch.setattr("cspr_jax.swings.arcs.PART", 80)
+    monkeypatch.setattr("cspr_jax.families.swings.arcs.PART", 80)
     whole = answer(starts, ends, z0=z0, arcs=arcs)
     for name, values in vars(whole).items():
         np.testing.assert_array_equal(values, np.concatenate([getattr(piece, name) for piece in pieces]), err_msg=name)

@@ -8,7 +8,7 @@ from matplotlib.colors import to_hex
 
 import cspr_jax
 from cspr_jax.errors import ConfigError, CsprError
-from cspr_jax.outputs.plots.obstacles import COLOUR
+from cspr_jax.outputs.plots.robots.obstacles import COLOUR
 from cspr_jax.plans.cell_plan import cell_plan
 from cspr_jax.schema.verdicts import Verdict
 

@@ -8,7 +8,7 @@ from oracles import limits as oracle
 from oracles import point_mass as printed
 
 import cspr_jax
-from cspr_jax.motions.amplitudes import from_polynomial, named
+from cspr_jax.motion.amplitudes import from_polynomial, named
 
 LIMITS = (
     *("tension_min", "tension_max", "floor", "cable_length_max", "cable_speed_max", "cable_acceleration_max"),

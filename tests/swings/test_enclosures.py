@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from support.other_robots import on_balls, uncertain
 
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.problem import Problem
-from cspr_jax.platforms.motions import rows as some_of
-from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.point_mass import planar_robot, point_mass_robot
-from cspr_jax.swings.arcs import arcs_and_segments
-from cspr_jax.swings.enclosures import tolerated_by_point_masses
-from cspr_jax.swings.hypocycloid import motion as point_motion
-from cspr_jax.swings.oscillations import minimum_oscillations, transitions_to
-from cspr_jax.swings.transition import steady
+from cspr_jax.families.platforms.motions import rows as some_of
+from cspr_jax.families.swings.arcs import arcs_and_segments
+from cspr_jax.families.swings.hypocycloid import motion as point_motion
+from cspr_jax.families.swings.proof.enclosures import tolerated_by_point_masses
+from cspr_jax.families.swings.transitions.oscillations import minimum_oscillations, transitions_to
+from cspr_jax.families.swings.transitions.transition import steady
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.problem import Problem
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.point_mass import planar_robot, point_mass_robot
 
 TAUTEN = np.array([[0.5, 0.0, 0.0], [-0.3, 0.45, 0.0], [-0.2, -0.45, 0.0]])
 

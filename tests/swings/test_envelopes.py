@@ -11,16 +11,16 @@ from hypothesis import strategies as st
 from support.amplitudes import of_one_shape
 from support.commands import cspr
 
-from cspr_jax.motions.amplitudes import derivatives, named
-from cspr_jax.motions.problem import Problem
-from cspr_jax.robots.limits import Limits
-from cspr_jax.store.result import open_result
-from cspr_jax.swings import envelope_oscillations as counts
-from cspr_jax.swings import zero_tension
-from cspr_jax.swings.envelopes import lower_envelope, proved_envelope
-from cspr_jax.swings.margins import margins
-from cspr_jax.swings.oscillations import transitions_to
-from cspr_jax.swings.transition_margins import transition_margins
+from cspr_jax.families.swings.proof.margins import margins
+from cspr_jax.families.swings.transitions import envelope_oscillations as counts
+from cspr_jax.families.swings.transitions import zero_tension
+from cspr_jax.families.swings.transitions.envelopes import lower_envelope, proved_envelope
+from cspr_jax.families.swings.transitions.oscillations import transitions_to
+from cspr_jax.families.swings.transitions.transition_margins import transition_margins
+from cspr_jax.motion.amplitudes import derivatives, named
+from cspr_jax.motion.problem import Problem
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.store.reading.result import open_result
 
 CURVES = {"A1": (0, 0, 0, 4, -3), "A2": (0, 0, 0, 10, -15, 6), "A3": (0, 0, 0, 6, -7, 2)}
 SWEEP = """schema = 1

@@ -8,10 +8,10 @@ import pytest
 from conftest import TILTED, equilateral
 from oracles import point_mass as oracle
 
-from cspr_jax.motions.amplitudes import derivatives, from_polynomial, named
-from cspr_jax.robots import point_mass
-from cspr_jax.swings import hypocycloid
-from cspr_jax.swings.slacks import instant, normalised_pseudotensions
+from cspr_jax.families.swings import hypocycloid
+from cspr_jax.families.swings.proof.slacks import instant, normalised_pseudotensions
+from cspr_jax.motion.amplitudes import derivatives, from_polynomial, named
+from cspr_jax.robots.model import point_mass
 
 N = 120
 TAU = np.sort(np.r_[0.0, 1.0, np.random.default_rng(0).uniform(0.0, 1.0, 39)])

@@ -5,15 +5,15 @@ import numpy as np
 import pytest
 from conftest import TILTED, equilateral
 
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.fewest_limits import FewestLimits
-from cspr_jax.motions.problem import Problem
-from cspr_jax.robots import point_mass
-from cspr_jax.robots.limits import Limits
+from cspr_jax.families.swings.arcs import arcs_and_segments, segments_between
+from cspr_jax.families.swings.parities import pick
+from cspr_jax.families.swings.proof.verdicts import prove
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.problem import Problem
+from cspr_jax.robots.model import point_mass
+from cspr_jax.robots.model.limits import Limits
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.swings.arcs import arcs_and_segments, segments_between
-from cspr_jax.swings.parities import pick
-from cspr_jax.swings.proof import prove
+from cspr_jax.verification.fewest_limits import FewestLimits
 
 Z0, MAX_ARCS = 1.7, 10
 ROBOTS = {
@@ -47,7 +47,8 @@ def first_feasible(problem, parities, count):
 
 
 def limits_in_the_way(problem, parities, i):
-    """Number of arcs and limits that are named for a segment without an answer, as `motions.fewest_limits` says it."""
+    """Number of arcs and limits that are named for a segment without an answer, as `verification.fewest_limits` says
+    it."""
     least, shown, common = None, (0, set()), None
     for p in range(1, MAX_ARCS + 1):
         segment, arcs = pick(parities, np.array([i]), np.array([p])), np.array([p])

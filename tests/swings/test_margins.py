@@ -10,14 +10,15 @@ import pytest
 from conftest import TILTED, equilateral
 from oracles import point_mass as oracle
 
-from cspr_jax.arithmetic.elementary import vertex
-from cspr_jax.motions.amplitudes import from_pieces, named
-from cspr_jax.motions.problem import Problem
-from cspr_jax.robots import point_mass
-from cspr_jax.robots.limits import Limits
-from cspr_jax.swings import criteria, hypocycloid
-from cspr_jax.swings.margins import margins
-from cspr_jax.swings.proof import SMALL, prove
+from cspr_jax.families.swings import hypocycloid
+from cspr_jax.families.swings.proof import criteria
+from cspr_jax.families.swings.proof.margins import margins
+from cspr_jax.families.swings.proof.verdicts import SMALL, prove
+from cspr_jax.motion.amplitudes import from_pieces, named
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.elementary import vertex
+from cspr_jax.robots.model import point_mass
+from cspr_jax.robots.model.limits import Limits
 
 N, Z0 = 40, 1.7
 BASES = {"prototype": equilateral(0.26), "tilted": TILTED}

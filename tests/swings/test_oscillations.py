@@ -6,13 +6,13 @@ import pytest
 from conftest import equilateral
 from support.commands import cspr
 
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.problem import Problem
-from cspr_jax.robots import force_balance
-from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.point_mass import planar_robot, point_mass_robot
-from cspr_jax.store.result import open_result
-from cspr_jax.swings.oscillations import best_inclinations, minimum_oscillations, transitions_to
+from cspr_jax.families.swings.transitions.oscillations import best_inclinations, minimum_oscillations, transitions_to
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.problem import Problem
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.point_mass import planar_robot, point_mass_robot
+from cspr_jax.robots.statics import force_balance
+from cspr_jax.store.reading.result import open_result
 
 A1 = np.polynomial.Polynomial((0, 0, 0, 4, -3))
 SPATIAL = point_mass_robot(equilateral(0.693), mass=0.129)

@@ -12,15 +12,17 @@ from conftest import TILTED, equilateral
 from oracles import point_mass as oracle
 from support.amplitudes import of_one_shape
 
-from cspr_jax.motions.amplitudes import named
-from cspr_jax.motions.problem import Problem
-from cspr_jax.robots import point_mass
-from cspr_jax.robots.limits import NO_LIMITS, Limits
-from cspr_jax.swings import criteria, hypocycloid, margins, proof
-from cspr_jax.swings.blocks import blocks
-from cspr_jax.swings.limit_slacks import least_lengths, pace_bounds
-from cspr_jax.swings.proof import SMALL, SMALLEST_MARGIN, prove, tolerance
-from cspr_jax.swings.slacks import instant, row_bounds, stretch, taut_bounds
+from cspr_jax.families.swings import hypocycloid
+from cspr_jax.families.swings.proof import criteria, margins
+from cspr_jax.families.swings.proof import verdicts as proof
+from cspr_jax.families.swings.proof.blocks import blocks
+from cspr_jax.families.swings.proof.limit_slacks import least_lengths, pace_bounds
+from cspr_jax.families.swings.proof.slacks import instant, row_bounds, stretch, taut_bounds
+from cspr_jax.families.swings.proof.verdicts import SMALL, SMALLEST_MARGIN, prove, tolerance
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.problem import Problem
+from cspr_jax.robots.model import point_mass
+from cspr_jax.robots.model.limits import NO_LIMITS, Limits
 
 COUNT, SOAK_COUNT = 200, 20_000
 SAMPLES = 20_001

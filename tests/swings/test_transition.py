@@ -13,12 +13,13 @@ from hypothesis import strategies as st
 from support.amplitudes import of_one_shape
 
 from cspr_jax.cli import main
-from cspr_jax.motions.amplitudes import derivatives, from_polynomial, named
-from cspr_jax.robots import force_balance
-from cspr_jax.robots.point_mass import planar_robot, point_mass_robot
-from cspr_jax.swings import envelope_oscillations as counts
-from cspr_jax.swings import hypocycloid, zero_tension
-from cspr_jax.swings import transition as transitions
+from cspr_jax.families.swings import hypocycloid
+from cspr_jax.families.swings.transitions import envelope_oscillations as counts
+from cspr_jax.families.swings.transitions import transition as transitions
+from cspr_jax.families.swings.transitions import zero_tension
+from cspr_jax.motion.amplitudes import derivatives, from_polynomial, named
+from cspr_jax.robots.model.point_mass import planar_robot, point_mass_robot
+from cspr_jax.robots.statics import force_balance
 
 FUNCTIONS = {
     "A1": of_one_shape(named("A1")),

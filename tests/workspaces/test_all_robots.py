@@ -11,19 +11,19 @@ from scipy.spatial.transform import Rotation
 from support import cable_robots
 from support.workspaces import made
 
-from cspr_jax.arithmetic.elementary import double_precision
-from cspr_jax.robots.clearance import scene
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.limits import Limits, Uncertainty
-from cspr_jax.robots.shapes import Sphere
+from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.robots.contacts.clearance import scene
+from cspr_jax.robots.model.limits import Limits, Uncertainty
+from cspr_jax.robots.model.shapes import Sphere
+from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.workspaces.all_robots import AllRobots, mass_searches
-from cspr_jax.workspaces.geometry import mass_centres
-from cspr_jax.workspaces.questions import required_wrenches, requirement
-from cspr_jax.workspaces.rest_cells import RestCells
-from cspr_jax.workspaces.rest_poses import RestPoses
+from cspr_jax.workspaces.cells.speeds import cable_speeds
+from cspr_jax.workspaces.poses.geometry import mass_centres
+from cspr_jax.workspaces.requirements import required_wrenches, requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
-from cspr_jax.workspaces.speeds import cable_speeds
+from cspr_jax.workspaces.static_cells import RestCells
+from cspr_jax.workspaces.static_poses import RestPoses
 
 THICK = 0.02  # m, of cables
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from cspr_jax.workspaces.cells import cells_about
-from cspr_jax.workspaces.inside_cells import tension_bounds
-from cspr_jax.workspaces.outside_cells import are_beyond, least_slacks, products_of
+from cspr_jax.workspaces.cells.cells import cells_about
+from cspr_jax.workspaces.cells.inside_cells import tension_bounds
+from cspr_jax.workspaces.cells.outside_cells import are_beyond, least_slacks, products_of
 
 SIZES = [(1, 2), (3, 4), pytest.param(6, 6, marks=pytest.mark.soak), (6, 8)]
 CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])

@@ -13,16 +13,16 @@ from support.commands import cspr
 
 import cspr_jax
 from cspr_jax.robots.cables import with_cables
-from cspr_jax.robots.platform import platform_robot
-from cspr_jax.robots.point_mass import guided_robot, point_mass_robot
-from cspr_jax.robots.pulleys import exits
+from cspr_jax.robots.model.platform import platform_robot
+from cspr_jax.robots.model.point_mass import guided_robot, point_mass_robot
+from cspr_jax.robots.model.pulleys import exits
 from cspr_jax.schema.meanings import NEAREST_BODIES
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.sweep.definition import read_sweep
-from cspr_jax.workspaces import geometry
-from cspr_jax.workspaces.geometry import mass_centres
-from cspr_jax.workspaces.shifts import shifts
-from cspr_jax.workspaces.speeds import cable_speeds
+from cspr_jax.workspaces.cells.shifts import shifts
+from cspr_jax.workspaces.cells.speeds import cable_speeds
+from cspr_jax.workspaces.poses import geometry
+from cspr_jax.workspaces.poses.geometry import mass_centres
 
 ROOT = Path(__file__).parents[2]
 DIAMETER, CENTRE = 0.03, np.array([0.03, -0.02, 0.05])

@@ -11,7 +11,7 @@ from support.workspaces import made
 
 import cspr_jax
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.workspaces.cocircuits import base_order, choices_of
+from cspr_jax.workspaces.poses.facet_normals import base_order, choices_of
 
 G = cable_robots.GRAVITY
 UP = np.array([0.0, 0.0, 1.0])

@@ -6,14 +6,14 @@ from oracles import clearance as oracle
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.robots.cables import with_cables
-from cspr_jax.robots.clearance import clearances, scene
-from cspr_jax.robots.platform import platform_robot
-from cspr_jax.robots.pulleys import exits
-from cspr_jax.robots.shapes import Box, Cylinder, Sphere, hull
-from cspr_jax.workspaces.contact_cells import clearance_bounds
-from cspr_jax.workspaces.shifts import shifts
+from cspr_jax.robots.contacts.clearance import clearances, scene
+from cspr_jax.robots.model.platform import platform_robot
+from cspr_jax.robots.model.pulleys import exits
+from cspr_jax.robots.model.shapes import Box, Cylinder, Sphere, hull
+from cspr_jax.workspaces.cells.contact_cells import clearance_bounds
+from cspr_jax.workspaces.cells.shifts import shifts
 
 N_CABLES = 8
 

@@ -8,13 +8,13 @@ from support import cable_robots
 from support.workspaces import ROUND, made
 
 import cspr_jax
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.platform import platform_robot
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.platform import platform_robot
+from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.workspaces.exact import wrench_margin
-from cspr_jax.workspaces.questions import required_wrenches, requirement
-from cspr_jax.workspaces.required import RequiredWrenches
+from cspr_jax.workspaces.poses.exact import wrench_margin
+from cspr_jax.workspaces.required_wrenches import RequiredWrenches
+from cspr_jax.workspaces.requirements import required_wrenches, requirement
 from cspr_jax.workspaces.search import Poses, WorkspaceSearch
 
 G = cable_robots.GRAVITY

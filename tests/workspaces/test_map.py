@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 from support.commands import cspr
 
 import cspr_jax
-from cspr_jax.arithmetic.rotations import from_tilt_torsion
-from cspr_jax.robots.orientation_grids import cone_grid, planar_grid
+from cspr_jax.numerics.linear.rotations import from_tilt_torsion
+from cspr_jax.robots.model.orientation_grids import cone_grid, planar_grid
 from cspr_jax.schema.verdicts import Verdict
 
 SWEEP = """

@@ -6,7 +6,7 @@ from oracles import workspaces as oracle
 from scipy.spatial.transform import Rotation
 
 import cspr_jax
-from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.model.limits import Limits
 
 SQUARE = [[-2.0, -1.0, 3.0], [2.0, -1.0, 3.0], [2.0, 1.0, 3.0], [-2.0, 1.0, 3.0]]
 # Half sizes of where poses are drawn, their middle, and the largest turn.

@@ -8,10 +8,10 @@ from support.commands import cspr
 
 import cspr_jax
 from cspr_jax.outputs.plots.pages.maps import map_content
-from cspr_jax.outputs.plots.verdict_colours import reasons
+from cspr_jax.outputs.plots.style.verdict_colours import reasons
 from cspr_jax.schema.verdicts import Verdict, conjunction
-from cspr_jax.workspaces.rest_poses import MARGINS as COLUMNS
-from cspr_jax.workspaces.rest_poses import over_orientations
+from cspr_jax.workspaces.static_poses import MARGINS as COLUMNS
+from cspr_jax.workspaces.static_poses import over_orientations
 
 OUT, OPEN, NAN = Verdict.WRENCH_INFEASIBLE.value, Verdict.UNDECIDED.value, Verdict.NOT_FINITE.value
 AXES = {"x": np.linspace(-1.0, 1.0, 3), "y": np.linspace(-1.0, 1.0, 4), "z": [1.0]}

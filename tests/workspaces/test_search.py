@@ -10,18 +10,18 @@ from support import cable_robots
 from support.workspaces import ROUND, made
 
 import cspr_jax
-from cspr_jax.arithmetic.frames import frame_of
 from cspr_jax.build.surroundings import surroundings
 from cspr_jax.errors import InputError
-from cspr_jax.outputs.plots.verdict_colours import REASONS
+from cspr_jax.numerics.linear.frames import frame_of
+from cspr_jax.outputs.plots.style.verdict_colours import REASONS
 from cspr_jax.robots.cables import with_cables
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.limits import Limits
-from cspr_jax.robots.platform import platform_robot
-from cspr_jax.robots.pulleys import exits
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.platform import platform_robot
+from cspr_jax.robots.model.pulleys import exits
+from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.schema.verdicts import NO_REASON, Verdict
 from cspr_jax.workspaces.clearances import at_rest
-from cspr_jax.workspaces.questions import requirement
+from cspr_jax.workspaces.requirements import requirement
 from cspr_jax.workspaces.search import Poses, WorkspaceSearch
 
 G = cable_robots.GRAVITY

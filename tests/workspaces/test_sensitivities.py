@@ -13,8 +13,8 @@ from support.commands import cspr
 from support.pairs import made, random_pairs
 
 import cspr_jax
-from cspr_jax.arithmetic.rotations import matrix
 from cspr_jax.errors import InputError
+from cspr_jax.numerics.linear.rotations import matrix
 from cspr_jax.sweep.definition import read_sweep
 from cspr_jax.workspaces.sensitivity_map import SensitivityMap
 

@@ -10,19 +10,19 @@ from support import cable_robots
 from support.workspaces import made
 
 import cspr_jax
-from cspr_jax.arithmetic.elementary import double_precision
+from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.robots.cables import with_cables
-from cspr_jax.robots.kernel_axes import centred
-from cspr_jax.robots.limits import Limits
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.schema.verdicts import Verdict
-from cspr_jax.workspaces import geometry
-from cspr_jax.workspaces.cell_proofs import CellProofs
-from cspr_jax.workspaces.geometry import mass_centres
-from cspr_jax.workspaces.questions import CONDITIONS, required_wrenches, requirement
-from cspr_jax.workspaces.required import RequiredWrenches
-from cspr_jax.workspaces.rest_cells import RestCells
-from cspr_jax.workspaces.rest_poses import RestPoses
+from cspr_jax.workspaces.cells.cell_proofs import CellProofs
+from cspr_jax.workspaces.poses import geometry
+from cspr_jax.workspaces.poses.geometry import mass_centres
+from cspr_jax.workspaces.required_wrenches import RequiredWrenches
+from cspr_jax.workspaces.requirements import CONDITIONS, required_wrenches, requirement
 from cspr_jax.workspaces.search import WorkspaceSearch
+from cspr_jax.workspaces.static_cells import RestCells
+from cspr_jax.workspaces.static_poses import RestPoses
 
 NONE = np.array([1.0, 0.0, 0.0, 0.0])
 CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])

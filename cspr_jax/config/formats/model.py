@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cspr_jax.errors import ConfigError
-from cspr_jax.robots.patterns import PATTERNS
-from cspr_jax.robots.spool_plane import SMALLEST_AREA_RATIO
+from cspr_jax.robots.model.patterns import PATTERNS
+from cspr_jax.robots.model.spool_plane import SMALLEST_AREA_RATIO
 
 if TYPE_CHECKING:
     from jaxtyping import Float
@@ -58,7 +58,7 @@ class Body:
     Fields:
         file: that it was read from, named in errors.
         name: of the robot.
-        pattern: of its motion, a row of `robots.patterns`.
+        pattern: of its motion, a row of `robots.model.patterns`.
         cables: in their order.
         source: where the numbers come from.
         mass: kg; None: missing.

@@ -18,7 +18,7 @@ from cspr_jax.config.formats.model import SAME as UPRIGHT
 from cspr_jax.config.formats.xml_text import child, number, read_xml
 from cspr_jax.config.wording import either
 from cspr_jax.errors import ConfigError, shown
-from cspr_jax.robots.patterns import PATTERNS
+from cspr_jax.robots.model.patterns import PATTERNS
 
 VERSIONS = ("0.31", "0.32")
 _MASS, _CENTRE = 25.0, [0.0, 1.0, 0.2]  # kg, m

@@ -7,7 +7,7 @@ import numpy as np
 from cspr_jax.config.wording import either
 from cspr_jax.errors import InputError
 
-# Vectors between a file with z up and one with z down, by half a turn about x; see `arithmetic.frames`.
+# Vectors between a file with z up and one with z down, by half a turn about x; see `numerics.linear.frames`.
 _TURN = np.array([1.0, -1.0, -1.0])
 _TURN_QUATERNION = np.array([1.0, 1.0, -1.0, -1.0])
 Z_AXES = ("down", "up")

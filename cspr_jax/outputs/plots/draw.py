@@ -8,22 +8,28 @@ from matplotlib.figure import Figure
 
 from cspr_jax.errors import InputError
 from cspr_jax.errors.suggestions import one_of
-from cspr_jax.outputs.plots.comparison import Compared, comparison_figure
-from cspr_jax.outputs.plots.conditions import excluded, is_workspace, said, shown_first
-from cspr_jax.outputs.plots.envelope import AXES, envelope_figure
-from cspr_jax.outputs.plots.fixed_axes import first_of, notes
-from cspr_jax.outputs.plots.frequencies import SHOWN, frequencies_figure, has_frequencies, mark_ends, turns_in_words
-from cspr_jax.outputs.plots.labels import PANELS, chosen, heading, robot_name, values
-from cspr_jax.outputs.plots.lines import PlottedLine, line_figure, lines_of, names_of, overlaid
-from cspr_jax.outputs.plots.motion_comparison import motion_comparison_figure
-from cspr_jax.outputs.plots.motion_pictures import motion_picture
-from cspr_jax.outputs.plots.planes import in_order
-from cspr_jax.outputs.plots.ratio import ratio_of
-from cspr_jax.outputs.plots.sections import POLAR, PlaneSection, section_figure, tells
+from cspr_jax.outputs.plots.maps.comparison import Compared, comparison_figure
+from cspr_jax.outputs.plots.maps.conditions import excluded, is_workspace, said, shown_first
+from cspr_jax.outputs.plots.maps.envelope import AXES, envelope_figure
+from cspr_jax.outputs.plots.maps.frequencies import (
+    SHOWN,
+    frequencies_figure,
+    has_frequencies,
+    mark_ends,
+    turns_in_words,
+)
+from cspr_jax.outputs.plots.maps.lines import PlottedLine, line_figure, lines_of, names_of, overlaid
+from cspr_jax.outputs.plots.maps.planes import in_order
+from cspr_jax.outputs.plots.maps.ratio import ratio_of
+from cspr_jax.outputs.plots.maps.sections import POLAR, PlaneSection, section_figure, tells
+from cspr_jax.outputs.plots.maps.solid import SPACE, is_solid, solid_figure
+from cspr_jax.outputs.plots.motions.motion_comparison import motion_comparison_figure
+from cspr_jax.outputs.plots.motions.motion_pictures import motion_picture
 from cspr_jax.outputs.plots.selection import nearest
-from cspr_jax.outputs.plots.solid import SPACE, is_solid, solid_figure
+from cspr_jax.outputs.plots.style.fixed_axes import first_of, notes
+from cspr_jax.outputs.plots.style.labels import PANELS, chosen, heading, robot_name, values
 from cspr_jax.schema.quantities import RATIO, TILT_TORSION
-from cspr_jax.store.result import Result
+from cspr_jax.store.reading.result import Result
 
 
 class MapView(NamedTuple):

@@ -7,8 +7,8 @@ import numpy as np
 
 from cspr_jax.errors import ConfigError, InputError, shown
 from cspr_jax.errors.suggestions import one_of
-from cspr_jax.outputs.plots.labels import value
-from cspr_jax.store.result import Result
+from cspr_jax.outputs.plots.style.labels import value
+from cspr_jax.store.reading.result import Result
 
 # A value that is asked for and a point of an axis are the same but for rounding.
 SAME = 1e-9

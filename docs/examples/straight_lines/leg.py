@@ -4,8 +4,8 @@ import itertools
 
 import numpy as np
 
-from cspr_jax.motions.leg import Leg
-from cspr_jax.motions.sampled import sampled_answers
+from cspr_jax.motion.leg import Leg
+from cspr_jax.verification.sampled import sampled_answers
 from straight_lines.motion import Line
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from cspr_jax.maps.grid_map import PointMassMap
-from cspr_jax.robots.point_mass import rest_point
+from cspr_jax.robots.model.point_mass import rest_point
 from straight_lines.motion import SPEED
 
 

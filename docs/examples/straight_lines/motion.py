@@ -5,7 +5,7 @@ import dataclasses
 import jax
 import jax.numpy as jnp
 
-from cspr_jax.robots.state import State
+from cspr_jax.robots.model.state import State
 
 SPEED = 0.05
 

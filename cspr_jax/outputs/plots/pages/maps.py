@@ -7,19 +7,19 @@ from matplotlib.colors import BoundaryNorm, to_hex
 
 from cspr_jax.errors import InputError
 from cspr_jax.errors.suggestions import one_of
-from cspr_jax.outputs.plots.colours import Scale, scale_of
-from cspr_jax.outputs.plots.conditions import is_margin, said, shown_first
-from cspr_jax.outputs.plots.fixed_axes import notes
-from cspr_jax.outputs.plots.labels import WORDS, as_drawn, axis_label, label, unit, value
-from cspr_jax.outputs.plots.obstacles import COLOUR, obstacles, outline, section_of
+from cspr_jax.outputs.plots.maps.conditions import is_margin, said, shown_first
+from cspr_jax.outputs.plots.maps.planes import in_order
 from cspr_jax.outputs.plots.pages.packing import packed
-from cspr_jax.outputs.plots.planes import in_order
-from cspr_jax.outputs.plots.robot_at import robot_of, workspace_of
-from cspr_jax.outputs.plots.verdict_colours import FEASIBLE_COLOUR, REASONS
-from cspr_jax.outputs.plots.word_ticks import word_scale, worded
+from cspr_jax.outputs.plots.robots.obstacles import COLOUR, obstacles, outline, section_of
+from cspr_jax.outputs.plots.robots.robot_at import robot_of, workspace_of
+from cspr_jax.outputs.plots.style.colours import Scale, scale_of
+from cspr_jax.outputs.plots.style.fixed_axes import notes
+from cspr_jax.outputs.plots.style.labels import WORDS, as_drawn, axis_label, label, unit, value
+from cspr_jax.outputs.plots.style.verdict_colours import FEASIBLE_COLOUR, REASONS
+from cspr_jax.outputs.plots.style.word_ticks import word_scale, worded
 from cspr_jax.schema.map_kinds import MAP_KINDS, quantity_of
 from cspr_jax.schema.verdicts import SENTENCES, Verdict, conjunction
-from cspr_jax.store.result import Result
+from cspr_jax.store.reading.result import Result
 
 # Quantities that come first, and letters of all that a page may hold; the script of the charts has some five millions.
 FIRST = ("verdict", "duration", "margin")

@@ -7,18 +7,18 @@ import numpy as np
 
 from cspr_jax.config.plan import PlanFile
 from cspr_jax.config.robot import RobotFile
-from cspr_jax.outputs.plots.bodies_in_space import lines_on
-from cspr_jax.outputs.plots.failing import failing_in
-from cspr_jax.outputs.plots.fitting import shortened
-from cspr_jax.outputs.plots.labels import WRITTEN, cable_names, margin_unit
-from cspr_jax.outputs.plots.motion import point_words
-from cspr_jax.outputs.plots.obstacles import points_of
+from cspr_jax.outputs.plots.motions.failing import failing_in
+from cspr_jax.outputs.plots.motions.motion import point_words
 from cspr_jax.outputs.plots.pages.packing import packed
-from cspr_jax.outputs.plots.robot_along import limits_of, moving
-from cspr_jax.outputs.plots.robot_at import hull_of
-from cspr_jax.outputs.plots.verdict_colours import FEASIBLE_COLOUR, REASONS
+from cspr_jax.outputs.plots.robots.bodies_in_space import lines_on
+from cspr_jax.outputs.plots.robots.obstacles import points_of
+from cspr_jax.outputs.plots.robots.robot_along import limits_of, moving
+from cspr_jax.outputs.plots.robots.robot_at import hull_of
+from cspr_jax.outputs.plots.style.fitting import shortened
+from cspr_jax.outputs.plots.style.labels import WRITTEN, cable_names, margin_unit
+from cspr_jax.outputs.plots.style.verdict_colours import FEASIBLE_COLOUR, REASONS
 from cspr_jax.plans.causes import cause_text
-from cspr_jax.robots.shapes import Obstacle
+from cspr_jax.robots.model.shapes import Obstacle
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import Verdict, criterion_words
 

@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from cspr_jax.outputs.plots.boundary import boundary, sides_of
-from cspr_jax.outputs.plots.obstacles import faces_of, obstacles
+from cspr_jax.outputs.plots.maps.boundary import boundary, sides_of
+from cspr_jax.outputs.plots.maps.solid import SPACE, is_solid, middle_of, volume_words
 from cspr_jax.outputs.plots.pages.packing import packed
-from cspr_jax.outputs.plots.robot_at import posed
-from cspr_jax.outputs.plots.solid import SPACE, is_solid, middle_of, volume_words
-from cspr_jax.store.result import Result
+from cspr_jax.outputs.plots.robots.obstacles import faces_of, obstacles
+from cspr_jax.outputs.plots.robots.robot_at import posed
+from cspr_jax.store.reading.result import Result
 
 # A page holds so many boundaries at most: one for each point of the other axes, or else that of their first points.
 MOST = 16

@@ -1,0 +1,65 @@
+"""Keys of plans for robots and limits that are made in Python."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cspr_jax.config.keys.limits import LimitTable
+from cspr_jax.config.keys.obstacles import SurroundingsKeys
+from cspr_jax.config.mappings import plain
+from cspr_jax.errors import InputError, demand
+from cspr_jax.errors.suggestions import did_you_mean
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.patterns import PATTERNS
+from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES
+
+# Errors name this in place of a file where there is none.
+NAME = Path("motion")
+
+
+def robot_table(robot: AnyRobot) -> dict[str, Any]:
+    """Keys of a robot file for a robot made in Python."""
+    table: dict[str, Any] = {"name": robot.name or "robot", "pattern": robot.pattern, "z_axis": robot.z_axis}
+    table |= {name: getattr(robot, name) for name in ("base_points", "mass", "gravity", "cable_diameter")}
+    if isinstance(robot, PlatformRobot):
+        table |= {name: getattr(robot, name) for name in ("platform_points", "inertia", "centre_of_mass")}
+        if robot.centre_of_mass is not None and not PATTERNS[robot.pattern].is_jointed:
+            table["platform_points"] = np.asarray(robot.platform_points) + np.asarray(robot.centre_of_mass)
+    if robot.pulleys is not None:
+        table |= {"pulley_radius": robot.pulleys.radius, "pulley_axes": robot.pulleys.axes}
+    table |= {row.name: getattr(robot.limits, row.name) for row in LIMITS if row.per_cable}
+    return plain(
+        {
+            key: np.asarray(value) if hasattr(value, "shape") else value
+            for key, value in table.items()
+            if value is not None
+        }
+    )
+
+
+def check_keys(
+    robot: AnyRobot | str | Path, limits: Limits | Mapping[str, Any] | None, **settings: Any
+) -> dict[str, Any]:
+    """Keys of the plan of a motion that is checked."""
+    keys: dict[str, Any] = {"schema": 1, "family": "spline", "motion": str(NAME)}
+    keys["robot"] = str(robot) if isinstance(robot, str | Path) else robot_table(robot)
+    return keys | {name: value for name, value in settings.items() if value is not None} | _limit_keys(limits)
+
+
+def _limit_keys(limits: Limits | Mapping[str, Any] | None) -> dict[str, Any]:
+    if limits is None or isinstance(limits, Mapping):
+        known = [*LimitTable.model_fields, *SurroundingsKeys.model_fields]
+        for key in (key for key in limits or {} if key not in known):
+            allowed = demand("a key of [limits] of a plan, or of what surrounds the robot")
+            raise InputError(f"limits[{key!r}]", None, did_you_mean(str(key), known) + allowed, fault="unknown key")
+        return plain(dict(limits or {}))
+    values = {row.name: getattr(limits, row.name) for row in LIMITS}
+    numbers = {name: np.asarray(value) for name, value in values.items() if value is not None}
+    if limits.uncertainty is None:
+        return plain(numbers)
+    parts = {row.name: np.asarray(getattr(limits.uncertainty, row.name)) for row in UNCERTAINTIES}
+    return plain({"limits": numbers | {"uncertainty": parts}})

@@ -1,0 +1,1 @@
+"""Motions and searches of trajectory families from Python."""

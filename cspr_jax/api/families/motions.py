@@ -1,0 +1,296 @@
+"""One motion from Python: pure jax, in the axes of the robot, to be jitted, vmapped and differentiated.
+
+Motions and margins here have the precision that jax is set to: call `jax.config.update("jax_enable_x64", True)` for
+float64, as searches use whatever jax is set to.
+"""
+
+import dataclasses
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.api.arguments.checks import checked
+from cspr_jax.api.arguments.kernel_arguments import amplitude_of, kernel_problem, warn_of_rest
+from cspr_jax.curves.files import kept_to, placed_inward, reference_of, samples_of, source_spline
+from cspr_jax.curves.interpolation import linear_maps
+from cspr_jax.curves.spline import Spline
+from cspr_jax.errors import InputError
+from cspr_jax.errors.suggestions import one_of
+from cspr_jax.families.platforms.end_acceleration import AT_REST
+from cspr_jax.families.platforms.platform_segment import PlatformMotion, pose_segment
+from cspr_jax.families.swings.hypocycloid import Hypocycloid, segment
+from cspr_jax.families.swings.transitions import transition as transitions
+from cspr_jax.motion import slacks as motion_slacks
+from cspr_jax.motion.amplitudes import Amplitude, named
+from cspr_jax.motion.motion import Motion, Placed, inward
+from cspr_jax.motion.platform_kind import PlatformMotionKind
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.linear.frames import IDENTITY, Frame
+from cspr_jax.robots import cables
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.robots.model.point_mass import PointMassRobot, rest_point
+from cspr_jax.robots.model.state import State
+from cspr_jax.robots.model.tension_rule_table import CENTRED, TENSION_RULES
+from cspr_jax.robots.statics.kernel_axes import centred, prepared
+
+amplitude = checked(named, "amplitude", __name__)
+# Compiled whole: XLA would compile each of their operations by itself.
+_SLACKS = jax.jit(motion_slacks.slacks)
+_MARGIN = jax.jit(motion_slacks.sampled_margin, static_argnames="samples")
+
+
+@checked
+def make_problem(
+    robot: AnyRobot, *, amplitude: str | Amplitude = "quintic", limits: Limits | None = None
+) -> Problem[Any]:
+    """Problem for `slacks` and `sampled_margin`: robot, limits and amplitude function.
+
+    Args:
+        robot: a robot on as many cables as degrees of freedom.
+        amplitude: name of an amplitude function, or the function.
+        limits: override those of the robot, one by one; the floor is z in the robot's axes. None: those of the robot.
+
+    Returns:
+        the problem.
+
+    Raises:
+        InputError: limits that contradict each other, an unknown amplitude function, or too many cables.
+    """
+    return kernel_problem(robot, amplitude, limits, free_end=None)[0]
+
+
+@checked
+def hypocycloid(
+    robot: PointMassRobot, start, end, *, z0, arcs, amplitude: str | Amplitude = "quintic"
+) -> Placed[Hypocycloid]:
+    """Standard hypocycloid of a point mass between two points, thesis chapter 2.
+
+    Args:
+        robot: a point mass on three cables.
+        start: (3,) start point in the robot's axes, m; None: at rest in P0. Near P0 its direction from P0 decides the
+            motion, and gradients grow as one over the distance: unless jax traces it, a start within 1e-3 m or 1e-3 z0
+            of P0, but not at rest, gives a warning.
+        end: (3,) end point in the robot's axes, m.
+        z0: () depth of P0 below the centroid of the spools, m.
+        arcs: () number of arcs.
+        amplitude: name of an amplitude function, or the function; it must meet (2.49).
+
+    Returns:
+        the motion, in the robot's axes.
+
+    Raises:
+        InputError: the wrong kind of robot, or an amplitude function that breaks (2.49).
+    """
+    prepared_robot, frame = _prepared(robot, ("3T",), "a point mass on three cables")
+    function, p = amplitude_of(amplitude, free_end=False), jnp.asarray(arcs, float)
+    first, last = _places(robot, frame, start, end, z0)
+    geometry = segment(prepared_robot, first, last, jnp.asarray(z0, float), odd=jnp.mod(p, 2.0) == 1.0)
+    return Placed(Hypocycloid(geometry, function, p), frame)
+
+
+@checked
+def transition(
+    robot: PointMassRobot, target, *, z0, oscillations, amplitude: str | Amplitude = "quintic"
+) -> Placed[Hypocycloid]:
+    """Transition of a point mass from rest in P0 to a target, thesis chapter 1.
+
+    Args:
+        robot: a point mass on three cables, or on two in a plane.
+        target: (3,) target in the robot's axes, m.
+        z0: () depth of P0 below the centroid of the spools, m.
+        oscillations: () number n of oscillations.
+        amplitude: name of an amplitude function, or the function; it must meet (1.27) and (1.28).
+
+    Returns:
+        the motion, in the robot's axes.
+
+    Raises:
+        InputError: the wrong kind of robot, or an amplitude function that breaks (1.27) or (1.28).
+    """
+    prepared_robot, frame = _prepared(robot, ("2T", "3T"), "a point mass")
+    function = amplitude_of(amplitude, free_end=True)
+    end = jnp.asarray(frame.inward(target), float)
+    geometry = transitions.transition(prepared_robot, function, end, jnp.asarray(z0, float))
+    return Placed(Hypocycloid(geometry, function, 2.0 * jnp.asarray(oscillations, float)), frame)
+
+
+@checked
+def platform_motion(
+    robot: PlatformRobot,
+    start,
+    end,
+    *,
+    z0,
+    arcs,
+    orientations=(IDENTITY, IDENTITY),
+    beta_hat=(AT_REST, AT_REST),
+    amplitude: str | Amplitude = "quintic",
+    variable: bool = True,
+) -> Placed[PlatformMotion]:
+    """Motion of a platform between two poses, thesis chapter 3.
+
+    Args:
+        robot: a platform on six cables or more; jax may trace its spools, but not its platform points.
+        start: (3,) start of the mass centre in the robot's axes, m; None: P0. Near P0: as in `hypocycloid`.
+        end: (3,) end of the mass centre in the robot's axes, m.
+        z0: () depth of P0 below the centroid of the spools, m.
+        arcs: () number of arcs.
+        orientations: (2, 4) unit quaternions at start and end, scalar first, from the reference orientation.
+        beta_hat: (2,) beta-hat at start and end, (3.81); -1 at rest.
+        amplitude: name of an amplitude function, or the function; it must meet (2.49).
+        variable: whether the position is a hypocycloid of variable amplitude (3.44), or a standard one.
+
+    Returns:
+        the motion, in the robot's axes.
+
+    Raises:
+        InputError: the wrong kind of robot, or an amplitude function that breaks (2.49).
+    """
+    prepared_robot, frame = _prepared(robot, ("3R3T",), "a platform on six cables or more", any_cables=True)
+    function, p = amplitude_of(amplitude, free_end=False), jnp.asarray(arcs, float)
+    places = _places(robot, frame, start, end, z0)
+    quaternions = [jnp.asarray(frame.turned_quaternions(leaf(one)), float) for one in orientations]
+    beta_hats = (jnp.asarray(beta_hat[0], float), jnp.asarray(beta_hat[1], float))
+    first, last = zip(places, quaternions, strict=True)
+    geometry = pose_segment(prepared_robot, first, last, jnp.asarray(z0, float), beta_hats, odd=jnp.mod(p, 2.0) == 1.0)
+    return Placed(PlatformMotion(geometry, function, p, PlatformMotionKind(variable=variable)), frame)
+
+
+@checked
+def spline(
+    robot: AnyRobot,
+    times,
+    positions,
+    quaternions=None,
+    *,
+    velocities=None,
+    accelerations=None,
+    interpolation: str | None = None,
+    ends: str | None = None,
+) -> Placed[Spline]:
+    """Motion through samples, as a piecewise polynomial in time.
+
+    Args:
+        robot: a robot of any pattern, on any number of cables.
+        times: (n,) increasing, s; jax may trace positions, velocities and accelerations, but no other argument.
+        positions: (n, 3) of the mass centre, in the robot's axes, m.
+        quaternions: (n, 4) orientations of the platform, scalar first; None: its own axes.
+        velocities: (n, 3) m/s, for Hermite pieces.
+        accelerations: (n, 3) m/s^2, likewise.
+        interpolation: "cubic", "quintic" or "hermite"; None: "hermite" with velocities, "cubic" without.
+        ends: "rest", "natural" or "periodic"; None: "rest".
+
+    Returns:
+        the motion, in the robot's axes; orientations of its states count from the reference orientation.
+
+    Raises:
+        InputError: samples that make no motion.
+    """
+    samples = [array for array in (positions, velocities, accelerations) if array is not None]
+    options = {"interpolation": interpolation, "ends": ends}
+    if not any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(samples)):
+        return _spline(robot, times, quaternions, samples, **options)
+    # Orientations and knots do not depend on them; coefficients are linear in them.
+    arrays = [jnp.asarray(array, float) for array in samples]
+    placed = _spline(robot, times, quaternions, [np.zeros(array.shape) for array in arrays], **options)
+    kind = interpolation or ("cubic" if velocities is None else "hermite")
+    maps = linear_maps(np.asarray(times, float), kind, ends or "rest", len(arrays))
+    table = sum(jnp.einsum("pdn,nw->pdw", part, array) for part, array in zip(maps, arrays, strict=False))
+    moved = dataclasses.replace(placed.motion, position=jnp.asarray(placed.frame.inward(table)))
+    return dataclasses.replace(placed, motion=moved)
+
+
+def _spline(robot: AnyRobot, times, quaternions, arrays: list, **options: str | None) -> Placed[Spline]:
+    samples = samples_of(times, arrays[0], quaternions, *arrays[1:])
+    curve = source_spline(samples, z_axis=robot.z_axis, is_platform=isinstance(robot, PlatformRobot), **options)
+    curve, frame = kept_to(robot.pattern, curve, is_planar=False), centred(robot)[1]
+    return Placed(placed_inward(curve, frame, reference_of(robot)), frame)
+
+
+@checked
+def tensions(robot: AnyRobot, state: State, rule: str = CENTRED) -> Array:
+    """Tensions of the cables in a state of motion.
+
+    Args:
+        robot: a platform or a point mass.
+        state: state in the robot's axes, as motions give it.
+        rule: rule that chooses the tensions of redundant cables: "centred", "least-norm", "closed-form",
+            "improved-closed-form" or "p-norm".
+
+    Returns:
+        (n_cables,) in cable order, N; negative where a cable would have to push. The rule chooses the tensions of
+        redundant cables by the robot's limits; where it finds none within them, they are those of least norm.
+
+    Raises:
+        InputError: an unknown rule, or a rule that needs a largest tension of every cable, which the robot lacks.
+    """
+    prepared_robot, frame = prepared(robot, pulleys=True)
+    if rule not in TENSION_RULES:
+        raise InputError("rule", rule, one_of(rule, TENSION_RULES))
+    high = robot.limits.tension_max
+    if TENSION_RULES[rule].is_bounded and robot.n_cables > robot.dof and (high is None or not _is_finite(high)):
+        raise InputError("rule", rule, "another one without a largest tension of every cable")
+    return cables.tensions(prepared_robot, inward(frame, state), robot.limits, rule)
+
+
+def _is_finite(numbers: Array) -> bool:
+    # Numbers that jax traces count as finite.
+    return isinstance(numbers, jax.core.Tracer) or bool(np.isfinite(np.asarray(numbers)).all())
+
+
+@checked
+def slacks(problem: Problem, motion: Motion, tau) -> Array:
+    """Slacks of all criteria at one instant of a motion: taut cables, determinant, depth, limits.
+
+    Args:
+        problem: a problem of `make_problem`, with the motion's robot.
+        motion: a motion of `hypocycloid`, `transition`, `platform_motion`, a plan or answers.
+        tau: () normalised time in [0, 1].
+
+    Returns:
+        (n_slacks,) without a unit, in the order of `motion.slacks`; all positive while the motion is feasible.
+    """
+    return _SLACKS(problem, _inner(motion), jnp.asarray(tau, float))
+
+
+@checked
+def sampled_margin(problem: Problem, motion: Motion, samples: int = 64) -> Array:
+    """Smallest slack at equidistant instants of a motion; it can be differentiated.
+
+    If it is positive, no sample refutes the motion, but nothing is proved: searches prove feasibility.
+
+    Args:
+        problem: a problem of `make_problem`, with the motion's robot.
+        motion: as in `slacks`.
+        samples: number of intervals between instants, ends included.
+
+    Returns:
+        () without a unit.
+    """
+    return _MARGIN(problem, _inner(motion), samples=samples)
+
+
+def _places(robot: Any, frame: Frame, start, end, z0) -> tuple[Array, Array]:
+    # In the kernels' axes. Of what jax traces nobody knows where it is.
+    if not any(isinstance(x, jax.core.Tracer) for x in jax.tree.leaves((robot, start, end, z0))):
+        if start is not None:
+            warn_of_rest(robot, "start", start, z0, "start = None")
+        warn_of_rest(robot, "end", end, z0, "its coordinates in full")
+    first = rest_point(jnp.asarray(z0, float)) if start is None else jnp.asarray(frame.inward(start), float)
+    return first, jnp.asarray(frame.inward(end), float)
+
+
+def _inner(motion: Motion) -> Motion:
+    return motion.motion if isinstance(motion, Placed) else motion
+
+
+def _prepared(robot: Any, patterns: tuple[str, ...], allowed: str, *, any_cables: bool = False) -> tuple[Any, Any]:
+    if getattr(robot, "pattern", None) not in patterns or not (any_cables or robot.n_cables == robot.dof):
+        raise InputError("robot", getattr(robot, "name", robot), allowed)
+    return prepared(robot)

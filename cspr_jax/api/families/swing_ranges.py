@@ -1,0 +1,62 @@
+"""Launches from swings to many landing places, from Python."""
+
+from collections.abc import Sequence
+
+from numpy.typing import ArrayLike
+
+from cspr_jax.api.arguments.checks import checked
+from cspr_jax.api.arguments.kernel_arguments import release_ranges, starts_and_ends
+from cspr_jax.errors import InputError
+from cspr_jax.families.ellipses.swing_range import SwingRange, other_limit
+from cspr_jax.families.ellipses.swing_range import swing_range as slowest_releases
+from cspr_jax.maps.release_box import box_of
+from cspr_jax.motion.given_limits import limits_over
+from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.point_mass import PointMassRobot
+from cspr_jax.robots.statics.kernel_axes import prepared
+
+
+@checked
+def swing_range(
+    robot: PointMassRobot,
+    targets: ArrayLike,
+    *,
+    start: ArrayLike,
+    release_x: Sequence[float] | None = None,
+    release_y: Sequence[float] | None = None,
+    release_z: Sequence[float] | None = None,
+    limits: Limits | None = None,
+) -> SwingRange:
+    """Launches of least speed to landing places, from ellipses about places of rest at their natural frequencies.
+
+    Args:
+        robot: a point mass on spools in one plane, on any number of cables.
+        targets: (n, 3) landing places in the robot's axes, m.
+        start: (3,) or (n, 3) centres of the ellipses, where the robot rests before, in the robot's axes, m.
+        release_x: least and largest x of the release, m; None: twice the robot's size to each side of the centroid of
+            the spools.
+        release_y: least and largest y of the release, m; None: as for x.
+        release_z: least and largest z of the release, m; None: from the centroid down to four times the robot's size
+            below it.
+        limits: a floor, z in the robot's axes, and no other limit; None: those of the robot.
+
+    Returns:
+        the launches, in the robot's axes. Launches found are feasible, by a formula; that none is slower holds for
+        their times of flight, which are searched.
+
+    Raises:
+        InputError: the wrong kind of robot, spools in several planes, pulleys, limits other than a floor, shapes that
+            do not fit, values that are not finite, or bounds that leave no release.
+    """
+    starts, ends = starts_and_ends(robot, start, targets)
+    ranges = release_ranges(release_x, release_y, release_z)
+    with double_precision():
+        prepared_robot, frame = prepared(robot, pulleys=True)
+        known = limits_over(robot, limits)
+        if other_limit(known) is not None:
+            raise InputError("limits", other_limit(known), "a floor alone")
+        box = box_of(prepared_robot, frame, ranges)
+        floor = None if known.floor is None else float(known.floor)
+        releases = slowest_releases(prepared_robot, frame.inward(starts), frame.inward(ends), box, floor)
+        return releases.placed(frame)

@@ -1,0 +1,1 @@
+"""Files, lists, pictures and pages from Python."""

@@ -1,0 +1,83 @@
+"""Plans played in MuJoCo from Python, as `cspr replay` plays them."""
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from cspr_jax.api.arguments.checks import checked
+from cspr_jax.api.files.pictures import finished
+from cspr_jax.api.plans import NAME, Plan, plan
+from cspr_jax.errors import ConfigError
+from cspr_jax.errors.suggestions import with_suggestions
+from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.outputs.mujoco import replay as replays
+from cspr_jax.outputs.mujoco.module import need_mujoco
+from cspr_jax.outputs.mujoco.motion import STEP
+from cspr_jax.outputs.plots.films.replay import replay_figure
+from cspr_jax.outputs.plots.style.style import style_of
+
+
+@with_suggestions
+@dataclasses.dataclass(frozen=True)
+class Replay(replays.PlayedPlan):
+    """A plan, and its motion as MuJoCo plays it; see `cspr_jax.outputs.mujoco.replay.PlayedPlan` for the fields."""
+
+    @checked
+    def plot(
+        self,
+        *,
+        size: str | tuple[float, float] | None = None,
+        dpi: float | None = None,
+        font_size: float | None = None,
+        preset: str | None = None,
+        title: bool = True,
+        output: str | Path | None = None,
+    ) -> Figure:
+        """Draw planned and played path, and the deviations of path and tensions over time.
+
+        Args:
+            size: width and height, cm, as (16, 10) or "16x10"; None: the usual size of the picture.
+            dpi: pixels per inch of a file; None: 160.
+            font_size: size of the font, points; None: 10.
+            preset: width of a "column" or a "page" of a paper, as in `plot`; None: neither.
+            title: whether the title is drawn.
+            output: picture to write; its ending selects the format. None: nothing is written.
+
+        Returns:
+            the figure of matplotlib.
+
+        Raises:
+            ConfigError: a size out of bounds, or an unknown picture format.
+            StoreError: the picture cannot be written.
+        """
+        return finished(
+            lambda: replay_figure(self), self.robot, style_of(size, dpi, font_size, preset, title=title), output
+        )
+
+
+@checked
+def replay(given: str | Path | Mapping[str, Any] | Plan, *, step: float = STEP, anyway: bool = False) -> Replay:
+    """Play a plan in MuJoCo: the path that its tensions give, and the tensions that MuJoCo needs along its path.
+
+    Args:
+        given: a plan, its file, or a dictionary, as for `plan`.
+        step: the longest step of MuJoCo's integrator, RK4, s.
+        anyway: whether to play a plan that is not feasible, too; cables in MuJoCo never push.
+
+    Returns:
+        played and planned path and tensions, at the ends of the steps.
+
+    Raises:
+        ConfigError: MuJoCo is not installed, the plan has a mistake, is not feasible or has no finite motion, or the
+            step is no number > 0 or gives too many rows.
+    """
+    need_mujoco()
+    planned = given if isinstance(given, Plan) else plan(given)
+    if not (planned.feasible or anyway):
+        raise ConfigError(NAME, "not played, since a segment is not proved feasible (anyway=True plays it)")
+    with double_precision():
+        played = replays.replay(planned, step)
+    return Replay(**{field.name: getattr(played, field.name) for field in dataclasses.fields(played)})

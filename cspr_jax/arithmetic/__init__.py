@@ -1,1 +1,0 @@
-"""Elementary functions, bounds, lanes, rotations, frames, minima, and batches of one shape."""

@@ -1,0 +1,1 @@
+"""G-code: words, arcs, and the paths of a file."""

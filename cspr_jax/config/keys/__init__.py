@@ -1,0 +1,1 @@
+"""Keys of tables that plans, sweeps and robot files share."""

@@ -1,0 +1,148 @@
+"""Limits of robots, plans and sweeps, and the kinds of numbers that these files hold."""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Discriminator,
+    Field,
+    PlainSerializer,
+    Tag,
+    create_model,
+    model_validator,
+)
+
+from cspr_jax.config.reading import Table
+from cspr_jax.config.wording import fault
+from cspr_jax.schema.given_numbers import LARGEST, SMALLEST
+from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES
+
+# Beyond these bounds squares and cubes of numbers overflow; no robot is near them. As in `robots.model.point_mass`,
+# with jax.
+LARGEST_LENGTH = 1e6
+MOST_CABLES = 1000
+Coordinate = Annotated[float, Field(ge=-LARGEST_LENGTH, le=LARGEST_LENGTH)]
+Point = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
+Row = Annotated[list[Annotated[float, Field(ge=-1e18, le=1e18)]], Field(min_length=3, max_length=3)]
+
+
+def _not_tiny(value: float) -> float:
+    if 0.0 < abs(value) < SMALLEST:
+        raise fault("", value, f"at least {SMALLEST:g}")
+    return value
+
+
+NotTiny = AfterValidator(_not_tiny)
+Positive = Annotated[float, Field(gt=0, le=LARGEST), NotTiny]
+NotNegative = Annotated[float, Field(ge=0, le=LARGEST), NotTiny]
+
+
+def has_direction(vector: Sequence[float]) -> bool:
+    """Tell whether a vector is long enough to have a direction."""
+    return math.hypot(*vector) >= SMALLEST
+
+
+def _infinite(value: Any) -> Any:
+    # JSON has no infinity: results and lists keep the word.
+    return math.inf if value == "inf" else value
+
+
+def _bounded(value: float) -> float:
+    if value > 1e9 and not math.isinf(value):
+        raise ValueError("at most 1e9, or inf")
+    return value
+
+
+Bound = Annotated[
+    float,
+    Field(gt=0, allow_inf_nan=True),
+    BeforeValidator(_infinite),
+    AfterValidator(_bounded),
+    NotTiny,
+    PlainSerializer(lambda value: "inf" if math.isinf(value) else value, when_used="json"),
+]
+
+
+def _variant(value: Any) -> str:
+    return "~each" if isinstance(value, list) else "~one"
+
+
+def _variant_of_vectors(value: Any) -> str:
+    return "~each" if isinstance(value, list) and value and isinstance(value[0], list) else "~one"
+
+
+def _one_or_each(one: Any, each: Any, variant: Callable[[Any], str] = _variant) -> Any:
+    several = Annotated[list[each], Field(min_length=1, max_length=MOST_CABLES), Tag("~each")]
+    return Annotated[Annotated[one, Tag("~one")] | several, Discriminator(variant)]
+
+
+Direction = Annotated[list[Annotated[float, Field(ge=-1e9, le=1e9)]], Field(min_length=3, max_length=3)]
+# A function makes these types; they are Any to mypy, which does not check them.
+PerCable: Any = _one_or_each(Positive, Positive)
+NotNegativePerCable: Any = _one_or_each(NotNegative, NotNegative)
+TensionPerCable: Any = _one_or_each(Positive, Bound)
+PerCableDirection: Any = _one_or_each(Direction, Direction, _variant_of_vectors)
+
+
+def _limit_keys(*, per_cable: bool) -> dict[str, Any]:
+    keys: dict[str, Any] = {}
+    for row in LIMITS:
+        if row.per_cable == per_cable:
+            kind = Coordinate if row.is_height else NotNegativePerCable if row.from_zero else PerCable
+            kind = kind if per_cable or row.is_height else Positive
+            kind = TensionPerCable if row.name == "tension_max" else kind
+            text = f"{row.description}{', one number, or one per cable' * per_cable}, {row.unit}"
+            keys[row.name] = (kind | None, Field(None, description=text))
+    return keys
+
+
+# Their fields are rows of `schema.limits.LIMITS`; mypy asks nothing of a base that it does not know.
+_Cables: Any = create_model("_Cables", __base__=Table, **_limit_keys(per_cable=True))
+
+
+class LimitKeys(_Cables):
+    """Limits beyond taut cables; those of a plan or a sweep override those of the robot file."""
+
+
+def _uncertainty_keys() -> dict[str, Any]:
+    return {
+        row.name: (
+            Annotated[float, Field(ge=row.least, le=row.largest)],
+            Field(row.least, description=f"{row.description}, {row.unit}"),
+        )
+        for row in UNCERTAINTIES
+    }
+
+
+_Uncertainties: Any = create_model("_Uncertainties", __base__=Table, **_uncertainty_keys())
+_Heights: Any = create_model("_Heights", __base__=LimitKeys, **_limit_keys(per_cable=False))
+
+
+class UncertaintyTable(_Uncertainties):
+    """Uncertainty of the robot: motions must be feasible for every robot within it."""
+
+    @model_validator(mode="after")
+    def _beyond_least(self) -> "UncertaintyTable":
+        if all(getattr(self, row.name) == row.least for row in UNCERTAINTIES):
+            raise ValueError("at least one of its keys beyond its smallest value, else nothing is uncertain")
+        return self
+
+
+class LimitTable(_Heights):
+    """Limits of all motions of the file."""
+
+    uncertainty: UncertaintyTable | None = Field(
+        None,
+        description="hypocycloids, transitions, splines and workspaces: feasible then means feasible for every robot "
+        "within this uncertainty",
+    )
+
+    tension_margin: NotNegative | None = Field(
+        None, description="distance that tensions keep from both ends of their range, N"
+    )
+
+    if TYPE_CHECKING:
+        floor: float | None = None

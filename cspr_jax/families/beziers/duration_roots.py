@@ -1,0 +1,130 @@
+"""Durations at which the verdict of a Bezier segment can change: roots of polynomials in r = (T / pi)^2.
+
+Multiplied by r, the cubics of `margins` have coefficients that are polynomials in r, if the second control point is
+given or follows from an acceleration at the start, middle = start + r acceleration (15). Their smallest value on
+[-1, 1] can be zero only if the value at an end is, or if two roots in c meet: if the discriminant, of degree 8 in r at
+most, is zero.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from cspr_jax.families.beziers.motion import powers
+from cspr_jax.numerics.polynomials import product, total
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+
+class Ends(NamedTuple):
+    """Ends of n segments, and their second control points as functions of r.
+
+    Fields:
+        start: (n, 3) from the centroid of the spools, z down, m.
+        end: (n, 3) likewise.
+        middle: (n, 3) second control point for r = 0, m.
+        middle_change: (n, 3) change of the second control point with r: 0, or the acceleration at the start, m/s^2.
+    """
+
+    start: np.ndarray
+    end: np.ndarray
+    middle: np.ndarray
+    middle_change: np.ndarray
+
+    def middles(self, durations: Float[np.ndarray, "n ..."]) -> Float[np.ndarray, "n ... 3"]:
+        """Second control points of given durations."""
+        r = (np.asarray(durations) / np.pi) ** 2
+        more = (slice(None), *[None] * (r.ndim - 1))
+        return self.middle[more] + self.middle_change[more] * r[..., None]
+
+
+def critical_durations(
+    rows: Float[np.ndarray, "n_cables 3"],
+    arms: Float[np.ndarray, "n_cables 3"],
+    normal: Float[np.ndarray, "3"],
+    gravity: float,
+    ends: Ends,
+) -> list[np.ndarray]:
+    """Durations between which no cable tightens or falls slack, and no depth below the spools changes its sign."""
+    # In units in which r, and with it the coefficients, are about 1.
+    size = np.abs(ends.end - ends.start).sum(1) + np.abs(ends.start).sum(1)
+    unit = size / gravity
+    vectors = _vectors(ends, unit)
+    polynomials = [*_of_cables(rows, arms, gravity, unit, vectors), *_of_depth(normal, vectors)]
+    return [np.pi * np.sqrt(unit[i] * _positive_roots([table[i] for table in polynomials])) for i in range(len(unit))]
+
+
+def _vectors(ends: Ends, unit: np.ndarray) -> list[np.ndarray]:
+    # Return the coefficients A, B, C of (17): (n, 3, 2) each, by powers of r over its unit.
+    constant = powers(ends.start, ends.middle, ends.end)
+    nothing = np.zeros_like(ends.middle_change)
+    change = powers(nothing, ends.middle_change * unit[:, None], nothing)
+    return [np.stack(pair, axis=-1) for pair in zip(constant, change, strict=True)]
+
+
+def _of_cables(
+    rows: np.ndarray, arms: np.ndarray, gravity: float, unit: np.ndarray, vectors: list[np.ndarray]
+) -> list[np.ndarray]:
+    # Return pseudotensions times r at both ends, and the discriminants of the cubics.
+    square, slope, rest = vectors
+    # r g, z down.
+    fall = np.zeros((len(unit), 3, 2))
+    fall[:, 2, 1] = gravity * unit
+    first = total(2.0 * square, -fall)
+    moments = [
+        _cross(first, rest),
+        total(total(-_cross(slope, rest), 2.0 * _cross(square, slope)), -_cross(fall, slope)),
+        total(-4.0 * _cross(square, rest), -_cross(fall, square)),
+        -3.0 * _cross(square, slope),
+    ]
+    pulled = [first, -slope, -4.0 * square, 0.0 * square]
+    polynomials = []
+    for row, arm in zip(rows, arms, strict=True):
+        f = [total(_dot(row, p), _dot(arm, t)) for p, t in zip(pulled, moments, strict=True)]
+        scale = sum(np.abs(x).max(-1, keepdims=True) for x in f)
+        f = [x / np.where(scale > 0.0, scale, 1.0) for x in f]
+        even, odd = total(f[0], f[2]), total(f[1], f[3])
+        polynomials += [total(even, odd), total(even, -odd), _discriminant(f)]
+    return polynomials
+
+
+def _of_depth(normal: np.ndarray, vectors: list[np.ndarray]) -> list[np.ndarray]:
+    square, slope, rest = (_dot(normal, x) for x in vectors)
+    return [total(product(slope, slope), -4.0 * product(square, rest))]
+
+
+def _discriminant(f: list[np.ndarray]) -> np.ndarray:
+    # Return the discriminant of the cubic f0 + f1 c + f2 c^2 + f3 c^3.
+    f0, f1, f2, f3 = f
+    pairs = {"02": product(f0, f2), "13": product(f1, f3), "03": product(f0, f3), "11": product(f1, f1)}
+    terms = [
+        18.0 * product(product(f1, f2), pairs["03"]),
+        -4.0 * product(pairs["02"], product(f2, f2)),
+        product(pairs["11"], product(f2, f2)),
+        -4.0 * product(pairs["13"], pairs["11"]),
+        -27.0 * product(pairs["03"], pairs["03"]),
+    ]
+    discriminant = terms[0]
+    for term in terms[1:]:
+        discriminant = total(discriminant, term)
+    return discriminant
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    # (n, 3, d) of tables.
+    rows = [(1, 2), (2, 0), (0, 1)]
+    return np.stack([product(a[:, i], b[:, j]) - product(a[:, j], b[:, i]) for i, j in rows], axis=1)
+
+
+def _dot(vector: np.ndarray, table: np.ndarray) -> np.ndarray:
+    return np.einsum("i,nid->nd", vector, table)
+
+
+def _positive_roots(tables: list[np.ndarray]) -> np.ndarray:
+    # Roots that rounding has moved off the real axis count: durations between roots are tested anyway.
+    roots = np.concatenate([np.roots(table[::-1]) for table in tables if np.isfinite(table).all()])
+    near = np.abs(roots.imag) <= 1e-3 * np.abs(roots)
+    return np.unique(roots.real[near & (roots.real > 0.0) & np.isfinite(roots)])

@@ -1,0 +1,163 @@
+"""Range of launches: to each landing place the release, and the one Bezier segment from rest, that reach it.
+
+Unknowns are the place of the release, the time of the flight, the duration of the segment, and when the object is
+released on it. All else follows: the velocity of the release (26), the control point and the end of the segment (29).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.families.beziers.launches.release_bounds import ReleaseBounds
+from cspr_jax.families.beziers.launches.through_release import through
+from cspr_jax.families.beziers.margins import depths_of
+from cspr_jax.families.beziers.motion import Bezier
+from cspr_jax.families.beziers.sequences import margins_of
+from cspr_jax.families.beziers.verdicts import BATCH, smallest_slacks, verdicts
+from cspr_jax.launch.flight import aimed
+from cspr_jax.maps.releases import Releases
+from cspr_jax.motion.limits import limits_set
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.search.differential_evolution import evolved
+from cspr_jax.robots.model.point_mass import spool_radius
+from cspr_jax.schema.verdicts import FLAGS
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+UNKNOWNS, POPULATION = 6, 64
+# Margins that the launch of least speed must keep in the search: of taut cables they are exact; limits are sampled
+# there, and proved later.
+EXACT, SAMPLED, SAMPLES = (1e-6,), (1e-3, 1e-2), 33
+# Places at a time where the answers are made.
+TOGETHER = 512
+
+
+class LaunchRequirement(NamedTuple):
+    """Starts and targets of n launches, in the kernels' coordinates.
+
+    Fields:
+        start: (n, 3) where the segment starts at rest, m.
+        target: (n, 3) where the object is to land, m.
+        z0: (n,) depth at which slacks are normalised, m.
+    """
+
+    start: Any
+    target: Any
+    z0: Any
+
+
+class Shot(NamedTuple):
+    """A launch.
+
+    Fields:
+        position: (3,) of the release, m.
+        velocity: (3,) there, m/s.
+        flight_time: () s.
+        share: () time of the release over the duration of the segment.
+        motion: the segment.
+    """
+
+    position: Any
+    velocity: Any
+    flight_time: Any
+    share: Any
+    motion: Bezier
+
+
+@dataclasses.dataclass(frozen=True)
+class LaunchRange(Releases):
+    """Launches to n landing places by one Bezier segment each; see `Releases`.
+
+    A verdict of 0 says that the segment is proved feasible; else it is that of the segment with the largest margin
+    found, which does not say that there is no other. Margins are smallest slacks, of taut cables, depth and limits.
+
+    Fields:
+        duration: (n,) of the segment, s.
+        release_time: (n,) of the release, after the start of the segment, s.
+    """
+
+    duration: np.ndarray
+    release_time: np.ndarray
+
+
+def _shot(known: tuple[Problem, ReleaseBounds], question: LaunchRequirement, x: Array) -> Shot:
+    problem, bounds = known
+    unknowns = bounds.low + (bounds.high - bounds.low) * x
+    position, (flight, duration), share = unknowns[:3], jnp.exp(unknowns[3:5]), unknowns[5]
+    velocity = aimed(position, question.target, problem.robot.gravity, flight)
+    middle, end = through(question.start, position, velocity, share, duration)
+    return Shot(position, velocity, flight, share, Bezier(question.start, middle, end, duration, question.z0))
+
+
+def _energy(known: tuple[Problem, ReleaseBounds], question: LaunchRequirement, x: Array) -> tuple[Array, Array]:
+    # Kinetic energy at the release over weight and size of the robot, and the smallest margin.
+    robot, shot = known[0].robot, _shot(known, question, x)
+    margins = margins_of(known[0], jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], shot.motion), SAMPLES)
+    return 0.5 * jnp.sum(shot.velocity**2) / (robot.gravity * spool_radius(robot)), jnp.min(margins)
+
+
+@jax.jit
+def _shots(known: tuple[Problem, ReleaseBounds], cases: tuple[LaunchRequirement, Array]) -> Shot:
+    return jax.vmap(lambda question, x: _shot(known, question, x))(*cases)
+
+
+def launch_range(
+    problem: Problem,
+    starts: Float[np.ndarray, "n 3"],
+    targets: Float[np.ndarray, "n 3"],
+    bounds: ReleaseBounds,
+    population: int = POPULATION,
+) -> LaunchRange:
+    """Launches of least speed, and the largest margins, to landing places."""
+    question = LaunchRequirement(starts, targets, depths_of(problem.robot, starts))
+    margins = (np.inf, *(SAMPLED if limits_set(problem.limits) else EXACT))
+    places = evolved(_energy, (problem, bounds), question, unknowns=UNKNOWNS, margins=margins, population=population)
+    parts = [slice(i, i + TOGETHER) for i in range(0, len(starts), TOGETHER)]
+    answers = [
+        _answers((problem, bounds), jax.tree.map(lambda x, s=chunk: x[s], (question, places))) for chunk in parts
+    ]
+    return LaunchRange(**{name: np.concatenate([vars(part)[name] for part in answers]) for name in vars(answers[0])})
+
+
+def _answers(known: tuple[Problem, ReleaseBounds], cases: tuple[LaunchRequirement, np.ndarray]) -> LaunchRange:
+    # Put one candidate for every place and margin asked for into one row: the margins change fastest.
+    count, tracks, _ = cases[1].shape
+    question = jax.tree.map(lambda x: np.repeat(x, tracks, axis=0), cases[0])
+    shots = in_batches(lambda batch: _shots(known, batch), (question, cases[1].reshape(count * tracks, -1)), size=BATCH)
+    verdict, margin = _judged(known[0], shots.motion, (count, tracks))
+    speed = np.linalg.norm(shots.velocity, axis=1).reshape(count, tracks)
+    slowest = np.where(verdict == 0, speed, np.inf).argmin(1)
+    largest, each, is_found = margin.argmax(1), np.arange(count), (verdict == 0).any(1)
+
+    def shown(values: np.ndarray) -> np.ndarray:
+        return np.where(is_found, values.reshape(count, tracks)[each, slowest], np.nan)
+
+    x, y, z = (shown(axis) for axis in shots.position.T)
+    return LaunchRange(
+        verdict=np.where(is_found, FLAGS(0), verdict[each, largest]),
+        largest_margin=margin[each, largest],
+        release_speed=shown(speed),
+        flight_time=shown(shots.flight_time),
+        release_x=x,
+        release_y=y,
+        release_z=z,
+        duration=shown(shots.motion.time),
+        release_time=shown(shots.share * shots.motion.time),
+    )
+
+
+def _judged(problem: Problem, motions: Bezier, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    # Motions are judged together in batches of one length, whatever is asked for.
+    parts = [slice(i, i + BATCH) for i in range(0, len(motions.time), BATCH)]
+    judgements = [verdicts(problem, jax.tree.map(lambda x, s=chunk: x[s], motions)) for chunk in parts]
+    verdict = np.concatenate([x.verdict for x in judgements])
+    margin = np.concatenate([smallest_slacks(problem, x) for x in judgements])
+    return verdict.reshape(shape), margin.reshape(shape)

@@ -1,0 +1,124 @@
+"""Smallest pseudotensions and depth along Bezier segments, exact: nothing is sampled.
+
+Pseudotensions are (rows + p x arms) (p'' - g), bilinear in p and p'' - g, both of which are quadratic in c, the cosine
+of pi tau. The fourth power cancels, since its factors are parallel: what is left is a cubic in c for every triangle of
+spools (19), whose smallest value on [-1, 1] is at an end or where its slope is zero. The depth below the spools is a
+quadratic. All this holds for a point mass on two cables in a plane likewise.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+
+from cspr_jax.families.beziers.motion import Bezier, powers
+from cspr_jax.robots.model.point_mass import PointMassRobot, plane_normal, rest_point, spool_radius
+from cspr_jax.robots.statics.force_balance import adjugate, pseudotensions
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Rounding errors are below so many units of the sum of the sizes of all terms.
+ROUNDING = 64.0
+
+
+class Margins(NamedTuple):
+    """Smallest slacks of a segment.
+
+    Fields:
+        taut: (n_cables,) smallest pseudotension over its value at rest in P0.
+        below: () smallest depth below the spools over z0.
+        taut_rounding: (n_cables,) bound of the rounding error of `taut`.
+        below_rounding: () likewise of `below`.
+    """
+
+    taut: Array
+    below: Array
+    taut_rounding: Array
+    below_rounding: Array
+
+
+@jax.jit
+def cubics(robot: PointMassRobot, motion: Bezier) -> Float[Array, "n_cables 4"]:
+    """Pseudotensions over their value at rest in P0, by powers of c = cos(pi tau), (19) and (20)."""
+    rows, arms = adjugate(robot)
+    square, slope, rest = powers(motion.start, motion.middle, motion.end)
+    u = (np.pi / motion.time) ** 2
+    fall = jnp.zeros_like(square).at[2].set(robot.gravity)
+    first = 2.0 * u * square - fall
+    moments = jnp.stack(
+        [
+            jnp.cross(first, rest),
+            -u * jnp.cross(slope, rest) + 2.0 * u * jnp.cross(square, slope) - jnp.cross(fall, slope),
+            -4.0 * u * jnp.cross(square, rest) - jnp.cross(fall, square),
+            -3.0 * u * jnp.cross(square, slope),
+        ]
+    )
+    pulled = jnp.stack([first, -u * slope, -4.0 * u * square, jnp.zeros_like(square)])
+    return (rows @ pulled.T + arms @ moments.T) / _at_rest(robot, motion.z0)[:, None]
+
+
+@jax.jit
+def depth_quadratic(robot: PointMassRobot, motion: Bezier) -> Float[Array, "3"]:
+    """Depth below the spools over z0, by powers of c = cos(pi tau)."""
+    square, slope, rest = powers(motion.start, motion.middle, motion.end)
+    return jnp.stack([rest, slope, square]) @ plane_normal(robot) / motion.z0
+
+
+@jax.jit
+def smallest_margins(robot: PointMassRobot, motion: Bezier) -> Margins:
+    """Smallest pseudotensions and depth of a segment, (22) to (25); the last with "min" in place of "max"."""
+    rows, arms = adjugate(robot)
+    square, slope, rest = (jnp.sum(jnp.abs(x)) for x in powers(motion.start, motion.middle, motion.end))
+    place = square + slope + rest
+    force = (np.pi / motion.time) ** 2 * (6.0 * square + slope) + robot.gravity
+    terms = force * (jnp.sum(jnp.abs(rows), axis=1) + place * jnp.sum(jnp.abs(arms), axis=1))
+    epsilon = ROUNDING * jnp.finfo(place.dtype).eps
+    return Margins(
+        smallest_cubic(cubics(robot, motion).T),
+        smallest_quadratic(depth_quadratic(robot, motion)),
+        epsilon * terms / jnp.abs(_at_rest(robot, motion.z0)),
+        epsilon * place * jnp.sum(jnp.abs(plane_normal(robot))) / jnp.abs(motion.z0),
+    )
+
+
+def depths_of(robot: PointMassRobot, starts: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n"]:
+    """Depths by which slacks are normalised where there is no P0: those of the starts."""
+    depth = starts @ np.asarray(plane_normal(robot))
+    return np.where(depth > 0.0, depth, float(spool_radius(robot)))
+
+
+def smallest_cubic(powers_of_c: Float[Array, "4 ..."]) -> Float[Array, "..."]:
+    """Smallest value of cubics on [-1, 1].
+
+    The zeros of the slope are found without cancellation; where one is not in the interval, an end stands in for it.
+    """
+    f0, f1, f2, f3 = powers_of_c
+    discriminant = f2**2 - 3.0 * f3 * f1
+    root = f2 + jnp.where(f2 < 0.0, -1.0, 1.0) * jnp.sqrt(jnp.maximum(discriminant, 0.0))
+    at = [_inside(x) for x in (-root / (3.0 * f3), -f1 / root)]
+    values = [f0 + c * (f1 + c * (f2 + c * f3)) for c in at]
+    ends = jnp.minimum(f0 + f1 + f2 + f3, f0 - f1 + f2 - f3)
+    return jnp.minimum(ends, jnp.minimum(*values))
+
+
+def smallest_quadratic(powers_of_c: Float[Array, "3 ..."]) -> Float[Array, "..."]:
+    """Smallest value of quadratics on [-1, 1]."""
+    f0, f1, f2 = powers_of_c
+    at = _inside(-0.5 * f1 / f2)
+    ends = f0 + f2 - jnp.abs(f1)
+    return jnp.minimum(ends, f0 + at * (f1 + at * f2))
+
+
+def _inside(c: Array) -> Array:
+    # Derivatives of a smallest value do not see that its place moves: there the slope is zero.
+    return lax.stop_gradient(jnp.clip(jnp.where(c * 0.0 == 0.0, c, 1.0), -1.0, 1.0))
+
+
+def _at_rest(robot: PointMassRobot, z0: Array) -> Array:
+    hub = rest_point(z0)
+    return pseudotensions(robot, hub, jnp.zeros_like(hub))

@@ -1,0 +1,123 @@
+"""Durations of Bezier segments on more cables than degrees of freedom: looked for by samples, decided by proofs.
+
+Where the control points do not depend on the duration, what the cables must supply at each place is affine in
+u = (pi / T)^2. Tensions within limits for two values of u share out to tensions for those between them, and speeds and
+accelerations of cables fall as T grows: the feasible durations are one interval, and between two that are proved all
+are. Where the second control point follows from the acceleration at the start, (15), the curve changes with T, and
+only the durations that are tried are decided.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax.families.beziers.duration_roots import Ends
+from cspr_jax.families.beziers.motion import Bezier
+from cspr_jax.families.beziers.redundant_verdicts import instant_slacks, proofs, verdicts_and_proofs
+from cspr_jax.motion.amplitudes import named
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.robots.model.limits import NO_LIMITS
+from cspr_jax.robots.model.point_mass import PointMassRobot, spool_radius
+from cspr_jax.schema.verdicts import Verdict
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+BATCH, SAMPLES = 512, 65
+# Durations tried at first, in geometric progression from the shortest to the longest, over the time of a fall as far
+# as the way; and those of a finer look between the neighbours of the best one, as often as it takes, up to so often.
+TRIED, SHORTEST, LONGEST = 257, 1e-2, 100.0
+FINER, ROUNDS = 33, 4
+# Share of a duration to which ends of intervals are narrowed.
+CLOSE = 1e-9
+
+
+@jax.jit
+def _sampled(problem: Problem, motions: Bezier) -> jax.Array:
+    # Return the smallest slack of each segment, (n,).
+    tau = jnp.linspace(0.0, 1.0, SAMPLES)
+    least = jax.vmap(lambda motion: jax.vmap(lambda t: instant_slacks(problem, motion, t))(tau).min())(motions)
+    return jnp.where(jnp.isnan(least), -jnp.inf, least)
+
+
+class _Segment:
+    # A segment of which durations are tried.
+
+    def __init__(self, problem: Problem, ends: Ends, z0: float) -> None:
+        self._problem, self._ends, self._z0 = problem, ends, z0
+
+    def _motions(self, times: np.ndarray) -> Bezier:
+        start, end, *rest = (np.repeat(x, len(times), axis=0) for x in self._ends)
+        return Bezier(start, Ends(start, end, *rest).middles(times), end, times, np.full(len(times), self._z0))
+
+    def sampled(self, times: np.ndarray) -> np.ndarray:
+        return in_batches(partial(_sampled, self._problem), self._motions(times), size=BATCH)
+
+    def is_proved(self, time: float) -> bool:
+        return bool(verdicts_and_proofs(self._problem, self._motions(np.array([time])))[0].verdict[0] == 0)
+
+    def is_static(self) -> bool:
+        (proof,) = proofs(self._problem, self._motions(np.ones(1)), at_rest=True)
+        return proof.verdict == Verdict.FEASIBLE
+
+    def edge(self, good: float, bad: float) -> float:
+        # Return the duration that is proved next to one that is not.
+        while abs(bad - good) > CLOSE * good:
+            middle = 0.5 * (good + bad)
+            good, bad = (middle, bad) if self.is_proved(middle) else (good, middle)
+        return good
+
+
+def taut_durations(robot: PointMassRobot, ends: Ends, z0: float) -> Float[np.ndarray, "1 2"] | None:
+    """Durations that keep every cable taut."""
+    if ends.middle_change.any():
+        return None
+    segment = _Segment(Problem(robot, NO_LIMITS, named("quintic")), ends, z0)
+    times, values = _looked_at(segment, robot, ends, 0.0)
+    first = _first_proved(segment, times, values)
+    if first is None:
+        return np.empty((0, 2))
+    low = _least(segment, times, first)
+    if segment.is_static():
+        return np.array([[low, np.inf]])
+    positive = np.flatnonzero(values > 0.0).tolist()
+    last = next(i for i in reversed(positive) if i == first or segment.is_proved(times[i]))
+    return np.array([[low, segment.edge(times[last], times[last + 1]) if last + 1 < len(times) else times[last]]])
+
+
+def least_proved_duration(problem: Problem, ends: Ends, z0: float, slowest: float) -> float:
+    """Least feasible duration of a segment."""
+    segment = _Segment(problem, ends, z0)
+    times, values = _looked_at(segment, problem.robot, ends, slowest)
+    first = _first_proved(segment, times, values)
+    return float(times[values.argmax()]) if first is None else _least(segment, times, first)
+
+
+def _looked_at(segment: _Segment, robot: PointMassRobot, ends: Ends, slowest: float) -> tuple[np.ndarray, np.ndarray]:
+    # Return durations and their smallest sampled slacks: the finer look where the coarse one sees none above zero.
+    size, gravity = float(spool_radius(robot)), float(robot.gravity)
+    way = max(float(np.linalg.norm(ends.end - ends.start) + np.linalg.norm(ends.middle - ends.start)), 1e-9 * size)
+    longest = LONGEST * np.sqrt(max(way, size) / gravity)
+    times = np.geomspace(SHORTEST * np.sqrt(way / gravity), max(longest, slowest), TRIED)
+    values = segment.sampled(times)
+    for _ in range(ROUNDS):
+        if (values > 0.0).any():
+            break
+        best = int(values.argmax())
+        times = np.geomspace(times[max(best - 1, 0)], times[min(best + 1, len(times) - 1)], FINER)
+        values = segment.sampled(times)
+    return times, values
+
+
+def _first_proved(segment: _Segment, times: np.ndarray, values: np.ndarray) -> int | None:
+    return next((i for i in np.flatnonzero(values > 0.0).tolist() if segment.is_proved(times[i])), None)
+
+
+def _least(segment: _Segment, times: np.ndarray, first: int) -> float:
+    return segment.edge(float(times[first]), float(times[first - 1])) if first else 0.0

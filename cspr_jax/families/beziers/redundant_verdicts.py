@@ -1,0 +1,73 @@
+"""Verdicts of Bezier segments on more cables than degrees of freedom: proofs of any motion, and samples for searches.
+
+The motion determines no pseudotensions there. Tensions that balance it are enclosed over blocks of time instead
+(`verification.time_proof`); the margin is the largest distance that all tensions can keep from their limits, in
+newtons.
+"""
+
+from __future__ import annotations
+
+import itertools
+from functools import partial
+from typing import TYPE_CHECKING
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.families.beziers.motion import Bezier, many_bounds
+from cspr_jax.motion.limits import other_slacks
+from cspr_jax.motion.problem import Problem
+from cspr_jax.robots.bounds.state_bounds import StateBounds
+from cspr_jax.robots.statics.wrench_sets import tension_range
+from cspr_jax.robots.tensions.tension_distribution import centred
+from cspr_jax.schema.verdicts import FLAGS, Verdict
+from cspr_jax.verification.proved import summary
+from cspr_jax.verification.proved_answers import MotionProof, proofs_of
+from cspr_jax.verification.proved_verdicts import Verdicts
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Segments that are proved together, and the largest share of the weight a cable that counts for searches: on cables
+# that pull against each other without largest tensions it has no bound.
+TOGETHER, LARGEST = 64, 1e6
+
+
+def proofs(problem: Problem, motions: Bezier, *, at_rest: bool = False) -> list[MotionProof]:
+    """Proofs of segments."""
+
+    def bounds(first: int, motion: np.ndarray, start: np.ndarray, end: np.ndarray) -> StateBounds:
+        states = many_bounds(motions, motion + first, start, end)
+        still = jax.tree.map(np.zeros_like, states.velocity)
+        return states._replace(velocity=still, acceleration=still) if at_rest else states
+
+    firsts, times = range(0, len(motions.time), TOGETHER), np.asarray(motions.time)
+    parts = [proofs_of(problem, partial(bounds, i), times[i : i + TOGETHER]) for i in firsts]
+    return list(itertools.chain.from_iterable(parts))
+
+
+def verdicts_and_proofs(problem: Problem, motions: Bezier) -> tuple[Verdicts, Float[np.ndarray, "n"]]:
+    """Verdicts of segments, with their proofs."""
+    motions = jax.tree.map(np.asarray, motions)
+    count = len(motions.time)
+    leaves = np.concatenate([leaf.reshape(count, -1) for leaf in jax.tree.leaves(motions)], axis=1)
+    rows = np.flatnonzero(np.isfinite(leaves).all(1) & (motions.time > 0.0))
+    verdict = np.full(count, Verdict.NOT_FINITE.value, FLAGS)
+    margin, bound, room = (np.full(count, np.nan) for _ in range(3))
+    each = np.empty(count, object)
+    each[rows] = proofs(problem, jax.tree.map(lambda x: x[rows], motions))
+    for i in rows.tolist():
+        short = summary(each[i], float(motions.z0[i]))
+        verdict[i], margin[i], bound[i], room[i] = short.verdict, short.margin, short.bound, short.room
+    return Verdicts(verdict, margin, bound, room), each
+
+
+def instant_slacks(problem: Problem, motion: Bezier, tau: Float[Array, ""]) -> Float[Array, "n_slacks"]:
+    """Slacks at one instant, for searches."""
+    robot, state = problem.robot, motion.state(tau)
+    matrix, wrench = robot.wrench_matrix(state), robot.inertial_wrench(state)
+    margin = centred(matrix, wrench, *tension_range(robot, problem.limits))[1]
+    share = jnp.minimum(margin * robot.n_cables / (robot.mass * robot.gravity), LARGEST)
+    return jnp.stack([share, *other_slacks(robot, problem.limits, state, motion.z0)])

@@ -1,0 +1,143 @@
+"""Bezier segments, one after the other: durations that are given or the least, accelerations that go on, verdicts."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import jax
+import numpy as np
+
+from cspr_jax.families.beziers.duration_roots import Ends
+from cspr_jax.families.beziers.durations import feasible_durations, least_duration
+from cspr_jax.families.beziers.motion import Bezier, end_acceleration
+from cspr_jax.families.beziers.verdicts import verdicts
+from cspr_jax.motion.answers import Answers
+from cspr_jax.motion.cause import Cause
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.linear.frames import Frame
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+
+@dataclasses.dataclass(frozen=True)
+class BezierAnswers(Answers):
+    """Answers of Bezier segments, one each.
+
+    Fields:
+        control_points: (n, 3, 3) start, middle and end; m.
+        taut_durations: (n,) for each segment, the durations that keep every cable taut, with the segments before it
+            unchanged: [[least, largest], ...] in s, inf where any longer duration does; None where they are not known.
+        release: (n,) time of the release of an object, after the start of the segment, s; NaN without a release.
+        flight_time: (n,) time of the flight of the object, s; NaN likewise.
+    """
+
+    control_points: np.ndarray
+    taut_durations: np.ndarray
+    release: np.ndarray
+    flight_time: np.ndarray
+
+    @property
+    def feasible(self) -> np.ndarray:
+        """Tell whether each segment is proved feasible, (n,)."""
+        return self.verdict == 0
+
+    def details(self, i: int) -> dict[str, Any]:
+        """Details of a segment; see `Answers.details`."""
+        durations = None if self.taut_durations[i] is None else self.taut_durations[i].tolist()
+        return {
+            "control_points": self.control_points[i].tolist(),
+            "taut_durations": durations,
+            "least_duration": durations[0][0] if durations else None,
+            "arcs": None,
+            "tried_arcs": None,
+        }
+
+
+@dataclasses.dataclass(frozen=True)
+class RedundantBezierAnswers(BezierAnswers):
+    """Answers of Bezier segments on more cables than degrees of freedom; margins in N.
+
+    Fields:
+        proof: (n,) `verification.proved_answers.MotionProof` of each.
+    """
+
+    proof: np.ndarray
+
+    def details(self, i: int) -> dict[str, Any]:
+        """Details, the unit of the margin, and intervals of failure; see `Answers.details`."""
+        proof = self.proof[i]
+        return super().details(i) | {"margin_unit": "N", "failing": None if proof is None else proof.failing.tolist()}
+
+    def proved_causes(self, i: int, frame: Frame) -> tuple[Cause, ...] | None:
+        """The criteria that fail, else the one nearest to it; see `Answers.proved_causes`."""
+        return None if self.proof[i] is None else self.proof[i].causes(frame)
+
+
+class Joined(NamedTuple):
+    """Segments, each with the intervals from which its duration was chosen.
+
+    Fields:
+        motions: NumPy leaves with a leading dimension n.
+        taut_durations: (n_intervals, 2) s of each; see `BezierAnswers`.
+    """
+
+    motions: Bezier
+    taut_durations: list[np.ndarray | None]
+
+
+def joined_segments(
+    problem: Problem,
+    points: Float[np.ndarray, "n+1 3"],
+    durations: list[float | None],
+    first_control_point: Float[np.ndarray, "3"],
+    z0: float,
+) -> Joined:
+    """Segments through points, at rest in each, with accelerations that go on from one to the next (15)."""
+    motions, intervals, depth = [], [], np.array([z0])
+    # The first segment is given its control point, each of the next ones the acceleration at its start.
+    ends = Ends(points[:1], points[1:2], first_control_point[None], np.zeros((1, 3)))
+    for i, duration in enumerate(durations):
+        taut_durations = feasible_durations(problem.robot, ends, depth)[0]
+        time = least_duration(problem, ends, taut_durations, z0) if duration is None else duration
+        time = time if time > 0.0 else np.nan
+        middle = ends.middles(np.array([time]))
+        motions.append(Bezier(ends.start, middle, ends.end, np.array([time]), depth))
+        intervals.append(taut_durations)
+        if np.isnan(time):
+            break
+        if i + 1 < len(durations):
+            acceleration = end_acceleration(middle, ends.end, time)
+            ends = Ends(ends.end, points[i + 2 : i + 3], ends.end, acceleration)
+    return Joined(jax.tree.map(lambda *rows: np.concatenate(rows), *motions), intervals)
+
+
+def answers_of(problem: Problem, segments: Joined) -> BezierAnswers:
+    """Answers of segments."""
+    motions = segments.motions
+    count, proofs = len(motions.time), None
+    if problem.robot.n_cables > problem.robot.dof:
+        from cspr_jax.families.beziers.redundant_verdicts import verdicts_and_proofs
+
+        judgements, proofs = verdicts_and_proofs(problem, motions)
+    else:
+        judgements = verdicts(problem, motions)
+    none, nothing = np.zeros(count, int), np.full(count, np.nan)
+    intervals = np.empty(count, object)
+    for i, durations in enumerate(segments.taut_durations):
+        intervals[i] = durations
+    answers = BezierAnswers(
+        none,
+        none,
+        judgements.verdict,
+        motions.time,
+        judgements.margin,
+        judgements.bound,
+        judgements.room,
+        *(nothing, nothing, nothing),
+        np.stack([motions.start, motions.middle, motions.end], axis=1),
+        intervals,
+        *(np.full(count, np.nan) for _ in range(2)),
+    )
+    return answers if proofs is None else RedundantBezierAnswers(**vars(answers), proof=proofs)

@@ -1,0 +1,126 @@
+"""Durations of a sequence of Bezier segments whose sum is least; accelerations that go on couple them all.
+
+At the ends of segments the accelerations are affine in u = (pi / T)^2: each segment adds u (start - end) to the one
+before it, (15).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.families.beziers.durations import slowest
+from cspr_jax.families.beziers.margins import smallest_margins
+from cspr_jax.families.beziers.motion import Bezier
+from cspr_jax.families.beziers.verdicts import smallest_slacks, verdicts
+from cspr_jax.motion.limits import limits_set
+from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.slacks import slacks
+from cspr_jax.numerics.search.constrained_minima import Judged, least
+from cspr_jax.robots.model.point_mass import spool_radius
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Shortest and longest duration looked at, over that of a fall by the robot's size.
+SHORTEST, LONGEST = 0.1, 40.0
+# Instants of a segment at which limits are sampled; they are proved afterwards.
+SAMPLES = 65
+
+
+class Anchored(NamedTuple):
+    """Sequence of segments, one of whose second control points is known; numbers of NumPy or of jax.
+
+    Fields:
+        points: (n + 1, 3) from the centroid of the spools, z down, m.
+        segment: () number of the segment whose control point is known.
+        control_point: (3,) m.
+        z0: () depth at which slacks are normalised, m.
+    """
+
+    points: Any
+    segment: Any
+    control_point: Any
+    z0: Any
+
+
+@jax.jit
+def segments_of(sequence: Anchored, durations: Float[Array, "n"]) -> Bezier:
+    """Segments of given durations."""
+    starts, ends = sequence.points[:-1], sequence.points[1:]
+    r = (durations / np.pi) ** 2
+    added = (starts - ends) / r[:, None]
+    gained = jnp.cumsum(added, axis=0) - added
+    at = sequence.segment
+    known = (sequence.control_point - starts[at]) / r[at]
+    middles = starts + r[:, None] * (known[None] + gained - gained[at][None])
+    return Bezier(starts, middles, ends, durations, jnp.full_like(durations, sequence.z0))
+
+
+def margins_of(problem: Problem, segments: Bezier, samples: int = SAMPLES) -> Array:
+    """Margins of segments for a search: exact ones of taut cables and of the depth, sampled ones of limits.
+
+    On redundant cables those of tensions are sampled, too.
+    """
+    tau = jnp.linspace(0.0, 1.0, samples)
+    if problem.robot.n_cables > problem.robot.dof:
+        from cspr_jax.families.beziers.redundant_verdicts import instant_slacks
+
+        sampled = jax.vmap(lambda motion: jax.vmap(lambda t: instant_slacks(problem, motion, t))(tau).min(0))
+        return sampled(segments).ravel()
+
+    def one(motion):
+        exact = smallest_margins(problem.robot, motion)
+        margins = jnp.append(exact.taut, exact.below)
+        if not limits_set(problem.limits):
+            return margins
+        limits = jax.vmap(lambda t: slacks(problem, motion, t)[len(margins) :])(tau)
+        return jnp.append(margins, jnp.min(limits, axis=0))
+
+    return jax.vmap(one)(segments).ravel()
+
+
+def judged(problem: Problem, segments: Bezier) -> Judged:
+    """Judgement of a sequence, proved."""
+    judgements = verdicts(problem, jax.tree.map(np.asarray, segments))
+    worst = smallest_slacks(problem, judgements).min()
+    return Judged(bool((judgements.verdict == 0).all()), float(worst))
+
+
+def duration_bounds(problem: Problem, points: Float[np.ndarray, "n+1 3"]) -> tuple[float, float]:
+    """Logarithms of the shortest and of the longest duration that searches look at."""
+    unit = np.sqrt(float(spool_radius(problem.robot)) / float(problem.robot.gravity))
+    longest = max(LONGEST * unit, slowest(problem, points))
+    return float(np.log(SHORTEST * unit)), float(np.log(longest))
+
+
+def _parts(arguments, x: Array) -> tuple[Array, Array]:
+    problem, sequence, durations, free = arguments
+    times = durations.at[free].set(jnp.exp(x))
+    return jnp.sum(times), margins_of(problem, segments_of(sequence, times))
+
+
+def least_total(problem: Problem, sequence: Anchored, durations: list[float | None]) -> Float[np.ndarray, "n"]:
+    """Durations whose sum is least."""
+    known = np.array([1.0 if time is None else time for time in durations])
+    free = np.array([i for i, time in enumerate(durations) if time is None])
+
+    def times(x: np.ndarray) -> np.ndarray:
+        all_durations = known.copy()
+        all_durations[free] = np.exp(x)
+        return all_durations
+
+    bounds = duration_bounds(problem, np.asarray(sequence.points))
+    shortest, longest = (np.full(len(free), bound) for bound in bounds)
+    logarithms = least(
+        _parts,
+        (problem, sequence, jnp.asarray(known), free),
+        shortest,
+        longest,
+        lambda x: judged(problem, segments_of(sequence, jnp.asarray(times(x)))),
+    )
+    return times(logarithms)

@@ -1,0 +1,86 @@
+"""Verdicts of Bezier segments: exact for taut cables, proved for limits."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import jax
+import numpy as np
+
+from cspr_jax.families.beziers.limits import limit_slacks
+from cspr_jax.families.beziers.margins import cubics, smallest_margins
+from cspr_jax.families.beziers.motion import Bezier
+from cspr_jax.motion.limits import limits_set
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.robots.model.point_mass import rest_point
+from cspr_jax.robots.statics.force_balance import pseudotensions
+from cspr_jax.schema.verdicts import FLAGS, Verdict
+from cspr_jax.verification.proved_verdicts import SPEEDS, Verdicts, plain_slack
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Segments judged together: of a plan, and of arrays.
+BATCH, MANY = 256, 8192
+# Slacks of limits nearer to zero are undecided.
+TOLERANCE = 1e-12
+
+
+@jax.jit
+def _margins(robot, motions: Bezier):
+    return jax.vmap(lambda motion: smallest_margins(robot, motion))(motions)
+
+
+@jax.jit
+def _pseudotensions(robot, motions: Bezier):
+    def one(motion):
+        rest = pseudotensions(robot, rest_point(motion.z0), motion.start * 0.0)
+        return cubics(robot, motion) * rest[:, None]
+
+    return jax.vmap(one)(motions)
+
+
+def verdicts(problem: Problem, motions: Bezier) -> Verdicts:
+    """Verdicts of Bezier segments: exact for taut cables, proved for limits and on redundant cables."""
+    if problem.robot.n_cables > problem.robot.dof:
+        from cspr_jax.families.beziers.redundant_verdicts import verdicts_and_proofs
+
+        return verdicts_and_proofs(problem, motions)[0]
+    size = BATCH if len(motions.time) <= BATCH else MANY
+    margins = in_batches(partial(_margins, problem.robot), motions, size=size)
+    slack = np.concatenate([margins.taut, margins.below[:, None]], axis=1)
+    doubt = np.concatenate([margins.taut_rounding, margins.below_rounding[:, None]], axis=1)
+    flags = [Verdict.SLACK_CABLE.value] * margins.taut.shape[1] + [Verdict.ABOVE_SPOOLS.value]
+    bound, room = slack - doubt, np.full(len(slack), np.inf)
+    broken = np.bitwise_or.reduce(np.where(slack < -doubt, flags, 0), axis=1)
+    is_open = ~(bound > 0.0).all(1)
+    rows = limits_set(problem.limits)
+    finite = np.isfinite(slack).all(1)
+    if rows:
+        kappa = in_batches(partial(_pseudotensions, problem.robot), motions, size=size)
+        proved = limit_slacks(problem, motions, kappa, bound[:, -1] > 0.0)
+        known = np.isfinite(proved.attained)
+        broken |= np.bitwise_or.reduce(
+            np.where(known & (proved.attained < -TOLERANCE), [row.flag.value for row in rows], 0), axis=1
+        )
+        is_open |= ~(proved.bound > TOLERANCE).all(1)
+        shown = [
+            plain_slack(row.name, x, (*SPEEDS, "acceleration_max"))
+            for row, x in zip(rows, proved.attained.T, strict=True)
+        ]
+        room = np.min(shown, axis=0)
+    verdict = np.where(broken > 0, broken, np.where(is_open, Verdict.UNDECIDED.value, 0))
+    verdict = np.where(finite, verdict, Verdict.NOT_FINITE.value).astype(FLAGS)
+    return Verdicts(verdict, slack.min(1), bound.min(1), room)
+
+
+def smallest_slacks(problem: Problem, judgements: Verdicts) -> Float[np.ndarray, "n"]:
+    """Smallest slack of each segment, of tensions and limits, without a unit."""
+    robot, margin = problem.robot, judgements.margin
+    if robot.n_cables > robot.dof:
+        margin = margin * robot.n_cables / float(robot.mass * robot.gravity)
+    # Above the spools the room under limits of tensions is not known, and the depth decides.
+    least = np.where(np.isneginf(judgements.room), margin, np.minimum(margin, judgements.room))
+    return np.where(np.isnan(least), -np.inf, least)

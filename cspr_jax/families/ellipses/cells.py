@@ -1,0 +1,130 @@
+"""Answers of turns on many ellipses: frequencies and margins by formulas, limits by the proof for any motion."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cspr_jax.families.ellipses import harmonics
+from cspr_jax.families.ellipses.harmonics import Ellipse
+from cspr_jax.families.ellipses.hull import SpoolHull, edge_ends, formula_hull
+from cspr_jax.families.ellipses.turns import Turns, turn_proofs
+from cspr_jax.motion.limits import limits_set
+from cspr_jax.motion.problem import Problem
+from cspr_jax.robots.model.point_mass import PointMassRobot, plane_normal, spool_radius
+from cspr_jax.schema.columns import Columns
+from cspr_jax.schema.verdicts import FLAGS, Verdict
+from cspr_jax.verification.proved_answers import answers_of
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Roundings of a margin, in parts of the largest number in it, with room.
+ROUNDINGS = 256.0 * float(np.finfo(float).eps)
+
+
+@dataclasses.dataclass(frozen=True)
+class EllipseCells(Columns):
+    """Turns on n ellipses; rows of `schema.quantities` say what each field is.
+
+    Fields:
+        verdict: (n,) flags of `Verdict` at `used_frequency`.
+        margin: (n,) smallest normalised pseudotension or depth there; NaN where no formula holds.
+        used_frequency: (n,) rad/s.
+        lowest_frequency: (n,) rad/s.
+        highest_frequency: (n,) rad/s.
+        natural_frequency: (n,) rad/s.
+        binding_cable: (n,) words of `schema.meanings.slack_cables`.
+        duration: (n,) of a turn, s.
+        tension_margin: (n,) N; NaN where nothing is proved by bounds.
+        limit_margin: (n,) of other limits, likewise.
+    """
+
+    verdict: np.ndarray
+    margin: np.ndarray
+    used_frequency: np.ndarray
+    lowest_frequency: np.ndarray
+    highest_frequency: np.ndarray
+    natural_frequency: np.ndarray
+    binding_cable: np.ndarray
+    duration: np.ndarray
+    tension_margin: np.ndarray
+    limit_margin: np.ndarray
+
+
+def ellipse_cells(problem: Problem, ellipses: Ellipse, frequencies: Float[np.ndarray, "n"] | str) -> EllipseCells:
+    """Answers of turns on ellipses."""
+    robot, count = problem.robot, len(ellipses.centre)
+    depth = np.asarray(ellipses.centre) @ np.asarray(plane_normal(robot))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        natural = np.where(depth > 0.0, np.sqrt(float(robot.gravity) / depth), np.nan)
+    nothing = np.full(count, np.nan)
+    hull = formula_hull(robot)
+    low, high = (nothing, nothing) if hull is None else harmonics.of_many(harmonics.frequency_interval, hull, ellipses)
+    if not isinstance(frequencies, str):
+        used = np.asarray(frequencies, float)
+    elif hull is not None and frequencies == "best":
+        used = harmonics.of_many(harmonics.best_frequency, hull, ellipses)
+    else:
+        used = natural
+    has_frequency = np.isfinite(used)
+    if hull is None:
+        verdict = np.where(has_frequency, FLAGS(Verdict.UNDECIDED.value), FLAGS(Verdict.NOT_FINITE.value))
+        margin, binding = nothing, np.zeros(count, int)
+    else:
+        # Any frequency tells what is in the way where none is feasible.
+        margins, rounding = _margins(hull, robot, ellipses, np.where(has_frequency, used, np.nan_to_num(natural)))
+        verdict = _verdict(robot, margins, rounding)
+        margin = np.where(has_frequency, margins.min(1), np.nan)
+        binding = np.where(has_frequency, _binding(robot, margins, rounding), 0)
+    tension, other = nothing.copy(), nothing.copy()
+    if hull is None or limits_set(problem.limits):
+        open_cells = np.flatnonzero(has_frequency & ((verdict == 0) | (verdict == Verdict.UNDECIDED.value)))
+        chosen = Turns(Ellipse(*(np.asarray(leaf)[open_cells] for leaf in ellipses)), used[open_cells])
+        answers = answers_of(turn_proofs(problem, chosen), chosen.frequencies)
+        verdict[open_cells], tension[open_cells] = answers.verdict, answers.margin
+        other[open_cells] = answers.limit_margin
+    with np.errstate(divide="ignore"):
+        duration = 2.0 * np.pi / used
+    return EllipseCells(verdict, margin, used, low, high, natural, binding, duration, tension, other)
+
+
+def _margins(
+    hull: SpoolHull, robot: PointMassRobot, ellipses: Ellipse, frequencies: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    # Smallest values of the edges and of the depth, (n, n_edges + 1), and what rounding may be of each, (n, 1).
+    margins = harmonics.of_many(harmonics.harmonic_margins, hull, ellipses, frequencies)
+    centre, a, b = (np.linalg.norm(leaf, axis=1) for leaf in ellipses)
+    normal = np.asarray(hull.normal)
+    slope, steepest = float(np.linalg.norm(normal)), float(np.linalg.norm(np.asarray(hull.edges), axis=1).max())
+    depth = np.abs(np.asarray(ellipses.centre) @ normal)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        rise, far = slope * (a + b) / depth, 1.0 + slope * centre / depth
+        e = 1.0 + frequencies**2 * depth / float(hull.gravity)
+        size = (1.0 + steepest * centre) * (1.0 + rise * (1.0 + e)) + e * steepest * (a + b)
+        rounding = ROUNDINGS * far * (1.0 + steepest * float(spool_radius(robot))) * size
+    return margins, np.nan_to_num(rounding, nan=np.inf)[:, None]
+
+
+def _verdict(robot: PointMassRobot, margins: np.ndarray, rounding: np.ndarray) -> np.ndarray:
+    is_broken, is_open = margins < -rounding, ~(margins > rounding)
+    slack, above = (Verdict.SLACK_CABLE, Verdict.ABOVE_SPOOLS)
+    if robot.n_cables > robot.dof:
+        slack = above = Verdict.WRENCH_INFEASIBLE
+    flags = np.where(is_broken[:, :-1].any(1), slack.value, 0) | np.where(is_broken[:, -1], above.value, 0)
+    undecided = np.where(is_open.any(1), Verdict.UNDECIDED.value, 0)
+    return np.where(flags != 0, flags, undecided).astype(FLAGS)
+
+
+def _binding(robot: PointMassRobot, margins: np.ndarray, rounding: np.ndarray) -> np.ndarray:
+    # Among equals, as of symmetric robots, the first cable.
+    first = np.argmax(margins <= margins.min(1, keepdims=True) + rounding, axis=1)
+    if robot.n_cables == robot.dof:
+        return first + 1
+    pairs = list(itertools.combinations(range(robot.n_cables), robot.dof - 1))
+    ends = edge_ends(np.asarray(robot.base_points), robot.dof)
+    numbers = [pairs.index(tuple(sorted(pair))) + 1 for pair in ends.tolist()]
+    return np.array([*numbers, len(pairs) + 1])[first]

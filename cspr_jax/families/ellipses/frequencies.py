@@ -1,0 +1,157 @@
+"""Frequencies that a plan leaves open: natural, the best, the fastest and the slowest within all limits.
+
+What cables alone allow is a formula (`harmonics`). Limits, spools in several planes, pulleys and obstacles are asked by
+samples of one turn; a verdict is the proof of the motion that results.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.errors import InputError
+from cspr_jax.families.ellipses import harmonics
+from cspr_jax.families.ellipses.harmonics import Ellipse
+from cspr_jax.families.ellipses.hull import formula_hull
+from cspr_jax.families.ellipses.rotation import Rotation, rotation_state
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.bounds.affine_bounds import constant
+from cspr_jax.robots.bounds.state_bounds import StateBounds
+from cspr_jax.robots.contacts.clearance import Scene
+from cspr_jax.robots.model.point_mass import plane_normal
+from cspr_jax.runtime.persistent_jit import persistent_jit
+from cspr_jax.verification.bounds.block_slacks import block_slacks
+from cspr_jax.verification.criteria import criteria
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Angles of a turn where there are many frequencies, and for one alone; frequencies of a first look, halvings that
+# follow, and the share by which an end is kept off.
+ANGLES, FINE, LOOKS, HALVINGS, INSIDE = 128, 4096, 65, 40, 1e-5
+# Factors of the natural frequency between which a frequency is sought where no formula bounds it.
+WIDEST = 100.0
+SLOWER = "a number: the slower this ellipse, the larger the margin"
+
+
+def chosen_frequency(
+    problem: Problem, ellipse: Ellipse, rule: str, scene: Scene | None = None, rotation: Rotation | None = None
+) -> float:
+    """Frequency by a rule."""
+    natural, hull = natural_frequency(problem, ellipse, rule), formula_hull(problem.robot)
+    if rule == "natural":
+        return natural
+    if rule == "best" and hull is not None:
+        best = float(harmonics.of_many(harmonics.best_frequency, hull, _row(ellipse))[0])
+        if best == 0.0:
+            raise InputError("frequency", rule, SLOWER)
+        return natural if math.isnan(best) else best
+    low, high = natural / WIDEST, natural * WIDEST
+    if hull is not None:
+        first, last = (float(x[0]) for x in harmonics.of_many(harmonics.frequency_interval, hull, _row(ellipse)))
+        if math.isnan(first):
+            return natural
+        low, high = max(low, first), min(high, last)
+
+    def slack(frequencies: np.ndarray) -> np.ndarray:
+        return sampled_slacks(problem, ellipse, frequencies, scene, rotation)
+
+    return searched_frequency(slack, low, high, natural, rule)
+
+
+def searched_frequency(slack: Callable, low: float, high: float, natural: float, rule: str) -> float:
+    """Frequency by a rule, from slacks of frequencies."""
+    if rule == "best":
+        return _largest(slack, low, high, natural)
+    return _outermost(slack, low, high, natural, rule)
+
+
+def natural_frequency(problem: Problem, ellipse: Ellipse, rule: str = "natural") -> float:
+    """Natural frequency of a pendulum from the plane of the spools to the centre of an ellipse."""
+    depth = float(np.asarray(ellipse.centre) @ np.asarray(plane_normal(problem.robot)))
+    if not depth > 0.0:
+        raise InputError("frequency", rule, "a number: the centre is not below the spools")
+    return math.sqrt(float(problem.robot.gravity) / depth)
+
+
+def _row(ellipse: Ellipse) -> Ellipse:
+    return Ellipse(*(np.asarray(leaf)[None] for leaf in ellipse))
+
+
+def sampled_slacks(
+    problem: Problem,
+    ellipse: Ellipse,
+    frequencies: Float[np.ndarray, "n"],
+    scene: Scene | None,
+    rotation: Rotation | None = None,
+) -> Float[np.ndarray, "n"]:
+    """Smallest slacks at samples of one turn."""
+    count = ANGLES if len(frequencies) > 1 else FINE
+    angle = np.linspace(0.0, 2.0 * math.pi, count, endpoint=False)[:, None]
+    cosine, sine = np.cos(angle), np.sin(angle)
+    outward = ellipse.cosine * cosine + ellipse.sine * sine
+    forward = ellipse.sine * cosine - ellipse.cosine * sine
+    rate = frequencies[:, None, None]
+    place = np.broadcast_to(ellipse.centre + outward, (len(frequencies), count, 3))
+    states = [x.reshape(-1, 3) for x in np.broadcast_arrays(place, rate * forward, -(rate**2) * outward)]
+    if rotation is not None:
+        angles = np.tile(angle[:, 0], len(frequencies)), np.repeat(frequencies, count)
+        states += [np.asarray(x) for x in _rotations(rotation, *map(jnp.asarray, angles))]
+    bounds = StateBounds(*(constant(jnp.asarray(x)) for x in states))
+    tau = np.zeros(len(frequencies) * count)
+    high = block_slacks(problem.robot, problem.limits, lambda start, end: bounds, tau, tau, scene).high
+    least = high[:, -len(criteria(problem.robot, problem.limits, scene)) :].reshape(len(frequencies), count, -1)
+    return least.min((1, 2))
+
+
+@persistent_jit
+def _rotations(rotation: Rotation, angles: Array, rates: Array) -> tuple[Array, ...]:
+    # Rotations, angular velocities and accelerations at angles of turns with rates, leaves (n, ...).
+    still = (jnp.ones(()), jnp.zeros(()), jnp.zeros(()))
+
+    def one(angle: Array, rate: Array) -> tuple[Array, ...]:
+        p, q = rotation.last
+        cosine, sine = jnp.cos(angle), jnp.sin(angle)
+        psi = p * cosine + q * sine
+        return rotation_state(rotation, still, (psi, rate * (q * cosine - p * sine), -(rate**2) * psi))[:3]
+
+    return jax.vmap(one)(angles, rates)
+
+
+def _outermost(slack: Callable, low: float, high: float, natural: float, rule: str) -> float:
+    # The fastest, or the slowest, frequency whose samples are feasible.
+    looks = np.geomspace(max(low, natural / WIDEST), high, LOOKS)
+    order = looks[::-1] if rule == "fastest" else looks
+    feasible = np.flatnonzero(slack(order) > 0.0)
+    if not len(feasible):
+        return natural
+    first = int(feasible[0])
+    inside = float(order[first])
+    if first == 0 and ((high >= natural * WIDEST) if rule == "fastest" else (low <= natural / WIDEST)):
+        raise InputError("frequency", rule, "a number: nothing bounds the frequency")
+    outside = float(order[max(first - 1, 0)])
+    for _ in range(HALVINGS):
+        middle = 0.5 * (inside + outside)
+        inside, outside = (middle, outside) if slack(np.array([middle]))[0] > 0.0 else (inside, middle)
+    return inside * (1.0 - INSIDE if rule == "fastest" else 1.0 + INSIDE)
+
+
+def _largest(slack: Callable, low: float, high: float, natural: float) -> float:
+    # The frequency whose smallest sampled slack is the largest: a grid that is narrowed about its best point.
+    looks = np.geomspace(low, high, LOOKS)
+    values = slack(looks)
+    if not values.max() > 0.0:
+        return natural
+    if values.argmax() == 0 and low <= natural / WIDEST:
+        raise InputError("frequency", "best", SLOWER)
+    for _ in range(HALVINGS // 4):
+        best = int(values.argmax())
+        looks = np.linspace(looks[max(best - 1, 0)], looks[min(best + 1, LOOKS - 1)], LOOKS)
+        values = slack(looks)
+    return float(looks[values.argmax()])

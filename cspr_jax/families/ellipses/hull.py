@@ -1,0 +1,73 @@
+"""Hull of the spools seen from above, by affine functions that are 1 at the centroid and 0 on one edge each."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from jax import Array
+from scipy.spatial import ConvexHull
+
+from cspr_jax.errors import InputError
+from cspr_jax.numerics.elementary import leaf
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.model.point_mass import SPATIAL, PointMassRobot, plane_normal, spool_radius
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Spools count as in one plane within this part of the size of the robot.
+IN_PLANE = 1e-9
+
+
+class SpoolHull(NamedTuple):
+    """Hull of the spools, and the plane that they lie in.
+
+    Fields:
+        edges: (n_edges, 2) gradients over x and y of the functions, 1/m.
+        normal: (3,) of the plane, with third component 1.
+        gravity: () m/s^2.
+    """
+
+    edges: Array
+    normal: Array
+    gravity: Array
+
+
+def hull_of(robot: AnyRobot) -> SpoolHull:
+    """Hull of the spools of a robot."""
+    if not isinstance(robot, PointMassRobot):
+        raise InputError("robot", robot.name, "a point mass, for a formula of the frequencies")
+    normal, points = np.asarray(plane_normal(robot)), np.asarray(robot.base_points)
+    if robot.pulleys is not None:
+        raise InputError("pulley_radius", np.asarray(robot.pulleys.radius).tolist(), "absent: formulas know no pulleys")
+    if not np.abs(points @ normal).max() <= IN_PLANE * float(spool_radius(robot)):
+        allowed = "must lie in one plane, for a formula of the frequencies"
+        raise InputError("base_points", None, allowed, fault="spools in several planes")
+    edges = np.stack([_gradient(points[:, :2][ends], robot.dof) for ends in edge_ends(points, robot.dof)])
+    return SpoolHull(leaf(edges), leaf(normal), leaf(robot.gravity))
+
+
+def formula_hull(robot: AnyRobot) -> SpoolHull | None:
+    """Hull of the spools of a robot for which formulas hold."""
+    try:
+        return hull_of(robot)
+    except InputError:
+        return None
+
+
+def edge_ends(points: Float[np.ndarray, "n_cables 3"], dof: int) -> Float[np.ndarray, "n_edges dof-1"]:
+    """Spools at the ends of the edges of the hull."""
+    count = len(points)
+    if count == dof:
+        return np.array([[i for i in range(count) if i != cable] for cable in range(count)])
+    if dof < SPATIAL:
+        return np.array([[points[:, 0].argmin()], [points[:, 0].argmax()]])
+    return ConvexHull(points[:, :2]).simplices
+
+
+def _gradient(ends: np.ndarray, dof: int) -> np.ndarray:
+    # Gradient of the function that is 1 at the origin and 0 at the ends of an edge.
+    if dof < SPATIAL:
+        return np.array([-1.0 / ends[0, 0], 0.0])
+    return np.linalg.solve(ends, -np.ones(len(ends)))

@@ -1,0 +1,101 @@
+"""Orientations of platforms on ellipses: from one mean orientation to another, and an oscillation about one axis.
+
+    R = Q(axis, psi) S(s turn) R0,    psi = p cos(theta) + q sin(theta),
+
+with the law s of the way and the angle theta of the ellipse; p and q go from those of the first ellipse to those of the
+last one, as its half-axes do.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, cross, dot, turned
+from cspr_jax.numerics.bounds.function_bounds import sincospi
+from cspr_jax.numerics.bounds.rotation_bounds import RotationBounds
+from cspr_jax.numerics.elementary import leaf, length
+from cspr_jax.numerics.linear import rotations
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+
+class Rotation(NamedTuple):
+    """Rotation of a platform along a motion.
+
+    Fields:
+        start: (4,) first mean orientation, a unit quaternion, scalar first.
+        turn: (3,) from the first mean orientation to the last one, about its direction, fixed axes, rad.
+        axis: (3,) unit vector of the oscillation, fixed axes.
+        first: (2,) p and q on the first ellipse, rad.
+        last: (2,) on the last one, rad.
+    """
+
+    start: Any
+    turn: Any
+    axis: Any
+    first: Any
+    last: Any
+
+
+def turn_between(start: Float[np.ndarray, "4"], end: Float[np.ndarray, "4"]) -> Float[Array, "3"]:
+    """Shortest rotation from one orientation to another."""
+    quaternion = rotations.products(end[None], start[None] * np.array([1.0, -1.0, -1.0, -1.0]))[0]
+    quaternion = quaternion * (1.0 if quaternion[0] >= 0.0 else -1.0)
+    sine = float(np.linalg.norm(quaternion[1:]))
+    angle = 2.0 * math.atan2(sine, quaternion[0])
+    return leaf(quaternion[1:] * (angle / sine if sine > 0.0 else 2.0))
+
+
+def _quaternion(axis: Array, angle: Array) -> Array:
+    return jnp.concatenate([jnp.cos(0.5 * angle)[None], jnp.sin(0.5 * angle) * axis])
+
+
+def _direction(vector: Array) -> tuple[Array, Array]:
+    # Unit vector, any of a vector without a length, and the length.
+    size = length(vector)
+    return jnp.where(size > 0.0, vector / jnp.where(size > 0.0, size, 1.0), jnp.eye(3)[0]), size
+
+
+def rotation_state(
+    rotation: Rotation, s: tuple, psi: tuple
+) -> tuple[Float[Array, "3 3"], Float[Array, "3"], Float[Array, "3"], Float[Array, "4"]]:
+    """Rotation at one instant."""
+    way, angle = _direction(rotation.turn)
+    swing = _quaternion(rotation.axis, psi[0])
+    quaternion = rotations.product(swing, rotations.product(_quaternion(way, s[0] * angle), rotation.start))
+    outer = rotations.matrix(swing)
+    spin, bend = outer @ (s[1] * rotation.turn), outer @ (s[2] * rotation.turn)
+    beat = psi[1] * rotation.axis
+    rate = psi[2] * rotation.axis + bend + jnp.cross(beat, spin)
+    return rotations.matrix(quaternion), beat + spin, rate, quaternion
+
+
+def rotation_bounds(rotation: Rotation, s: tuple, psi: tuple) -> RotationBounds:
+    """Bounds of the rotation over a block; see `rotation_state`."""
+    way, angle = _direction(rotation.turn)
+    outer = _about(rotation.axis, psi[0])
+    inner = dot(_rows(_about(way, s[0] * angle)), rotations.matrix(rotation.start).T[None])
+    whole = dot(_rows(outer), inner.each(lambda x: x.T[None]))
+    spin, bend = turned(outer, s[1] * rotation.turn), turned(outer, s[2] * rotation.turn)
+    beat = psi[1] * rotation.axis
+    return RotationBounds(whole, beat + spin, psi[2] * rotation.axis + bend + cross(beat, spin))
+
+
+def _rows(matrix: AffineBounds) -> AffineBounds:
+    return matrix.each(lambda x: x[:, None])
+
+
+def _about(axis: Array, angle: AffineBounds) -> AffineBounds:
+    # Bounds (3, 3) of rotations about one axis, I + sin K + (1 - cos) K^2.
+    x, y, z = axis
+    zero = jnp.zeros_like(x)
+    skew: Any = jnp.stack([jnp.stack([zero, -z, y]), jnp.stack([z, zero, -x]), jnp.stack([-y, x, zero])])
+    sine, cosine = (f.each(lambda leaf: leaf[:, None]) for f in sincospi(angle * (1.0 / math.pi)))
+    square = jnp.outer(axis, axis) - jnp.eye(3)
+    return sine * skew + (1.0 - cosine) * square + jnp.eye(3)

@@ -1,0 +1,134 @@
+"""Ways between ellipses: the least number of arcs, half turns, whose motion is proved; samples refute most others."""
+
+import dataclasses
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.families.ellipses.harmonics import Ellipse
+from cspr_jax.families.ellipses.motion import EllipseMotion, integral, with_turns
+from cspr_jax.families.ellipses.rotation import Rotation, turn_between
+from cspr_jax.motion.amplitudes import Amplitude
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.elementary import leaf
+from cspr_jax.robots.contacts.clearance import Scene
+from cspr_jax.verification.proved_answers import MotionProof, proof_of, sampled_proof
+
+# Intervals of the samples that refute most motions before a proof is tried.
+FEW = 256
+# Angles that differ by less are the same, rad.
+SAME_ANGLE = 1e-9
+
+
+@dataclasses.dataclass(frozen=True)
+class Turning:
+    """Ellipse with a frequency and an angle, and the orientation of a platform on it.
+
+    Fields:
+        ellipse: leaves (3,); a rest has no axes.
+        frequency: rad/s; 0 for a rest, which takes that of the other end of a way.
+        phase: angle, rad.
+        quaternion: (4,) mean orientation; None for a point mass.
+        axis: (3,) unit vector of the oscillation.
+        oscillation: (2,) angles p and q of `rotation`, rad.
+    """
+
+    ellipse: Ellipse
+    frequency: float = 0.0
+    phase: float = 0.0
+    quaternion: np.ndarray | None = None
+    axis: np.ndarray = dataclasses.field(default_factory=lambda: np.eye(3)[0])
+    oscillation: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(2))
+
+    @property
+    def rests(self) -> bool:
+        """Tell whether it is a rest."""
+        return self.frequency == 0.0
+
+    def is_same(self, other: "Turning") -> bool:
+        """Tell whether another one is on the same ellipse at the same pace, at any angle."""
+        return all(np.array_equal(a, b) for a, b in zip(self._parts, other._parts, strict=True))
+
+    @property
+    def _parts(self) -> tuple:
+        turning = () if self.quaternion is None else (self.quaternion, self.axis, self.oscillation)
+        return (*self.ellipse, self.frequency, *turning)
+
+
+class Way(NamedTuple):
+    """Way that was tried.
+
+    Fields:
+        motion: with the turns behind it.
+        proof: of all of it.
+        arcs: number of half turns of the way.
+        fewer_undecided: whether a smaller number stayed undecided.
+    """
+
+    motion: EllipseMotion
+    proof: MotionProof
+    arcs: int
+    fewer_undecided: bool = False
+
+
+def step_of(first: Turning, last: Turning) -> int:
+    """Step between numbers of arcs of a way: 1 where the angle at a rest is free, else 2; 0 where there is no way."""
+    if first.is_same(last):
+        return 0
+    return 1 if first.rests or last.rests else 2
+
+
+def between(first: Turning, last: Turning) -> float:
+    """Angle from the one to the other, the shortest in the direction of the motion."""
+    full = 2.0 * math.pi
+    angle = (last.phase - first.phase) % full
+    return 0.0 if min(angle, full - angle) < SAME_ANGLE else angle
+
+
+def motion_between(amplitude: Amplitude, first: Turning, last: Turning, arcs: int, turns: float) -> EllipseMotion:
+    """Way from one ellipse to another one, and turns on that."""
+    step, full = step_of(first, last), 2.0 * math.pi
+    start, end = first.frequency or last.frequency, last.frequency or first.frequency
+    rest = between(first, last)
+    swept = (rest, math.pi * arcs, (rest or full) + math.pi * (arcs - 2))[step]
+    phase = last.phase - swept if first.rests else first.phase
+    mean = start + (end - start) * float(integral(amplitude).at(1.0))
+    way, after = (swept / mean if step else 0.0), turns * full / end + (0.0 if step else swept / end)
+    law = with_turns(amplitude, way / (way + after) if step else 0.0)
+    frequencies, whole = leaf([start, end]), leaf(way + after)
+    rotation = rotation_between(first, last)
+    return EllipseMotion(first.ellipse, last.ellipse, frequencies, leaf(phase), law, integral(law), whole, rotation)
+
+
+def rotation_between(first: Turning, last: Turning) -> Rotation | None:
+    """Rotation of a platform on the way from one ellipse to another."""
+    if first.quaternion is None or last.quaternion is None:
+        return None
+    axis = last.axis if last.oscillation.any() else first.axis
+    turn = turn_between(first.quaternion, last.quaternion)
+    return Rotation(leaf(first.quaternion), turn, leaf(axis), leaf(first.oscillation), leaf(last.oscillation))
+
+
+def least_way(
+    problem: Problem, first: Turning, last: Turning, turns: float, scene: Scene | None, *, arcs: int, max_arcs: int
+) -> Way:
+    """The way with the least number of arcs that is proved, with the turns behind it."""
+    step = step_of(first, last)
+    undecided: Way | None = None
+    refuted: list[tuple[float, Way]] = []
+    for number in [arcs] if arcs or not step else range(step, max_arcs + 1, step):
+        motion = motion_between(problem.amplitude, first, last, number, turns)
+        proof = sampled_proof(problem, motion, scene, FEW)
+        if not proof.broken.any():
+            proof = proof_of(problem, motion, scene)
+            if not proof.verdict:
+                return Way(motion, proof, number, undecided is not None)
+            if not proof.broken.any():
+                undecided = undecided or Way(motion, proof, number)
+        refuted.append((float((proof.proof.high / proof.scales).min()), Way(motion, proof, number)))
+    if undecided is not None:
+        return undecided
+    best = max(refuted, key=lambda each: each[0])[1]
+    # A motion that samples have refuted is bounded for its causes.
+    return best._replace(proof=proof_of(problem, best.motion, scene))

@@ -1,0 +1,168 @@
+"""The fastest motions of many pairs of poses: searched on few intervals, then on many, proved and tightened."""
+
+import dataclasses
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from cspr_jax.curves.several import SeveralSplines
+from cspr_jax.curves.spline import Spline
+from cspr_jax.families.free.free_motion import FEWEST, FINE
+from cspr_jax.families.free.neighbours import Neighbours
+from cspr_jax.families.free.poses import FreePoses, divided, motions_of
+from cspr_jax.families.free.problem import FreeQuestion, FreeSettings, planned_problem, slacks_of, tightened
+from cspr_jax.families.free.proofs import ON, ROUNDS, proved
+from cspr_jax.families.free.search.basis import DEGREE, Basis
+from cspr_jax.families.free.search.interior_point import again, optima, started
+from cspr_jax.families.free.search.tasks import Tasks, Unknowns
+from cspr_jax.maps.proved_map import CONTACTS
+from cspr_jax.motion.problem import Problem
+from cspr_jax.robots.contacts.clearance import Scene
+from cspr_jax.verification.proved_answers import MotionProof, ProvedAnswers, answers_of, judge_all_robots, proofs_of
+
+# Intervals of the first searches, and of the motions in the end, each for pairs for which the ones before led to no
+# proved motion: a search that gets stuck on some intervals does not on others. Splines of plans have more intervals,
+# and are some parts in a thousand faster. Instants of each interval.
+MESHES, INSTANTS = ((12, 32), (16, 28), (24, 36)), 4
+# Number of the ways in which searches of plans go on that are tried on one mesh.
+TRIED = 2
+
+
+class ManyFreeMotions(NamedTuple):
+    """The fastest motions that were found between pairs of poses.
+
+    Fields:
+        rows: (m,) numbers of the pairs for which the search met all limits at the instants that it looks at.
+        motions: m of them.
+        answers: of these: proved, refuted or undecided.
+    """
+
+    rows: np.ndarray
+    motions: list[Spline]
+    answers: ProvedAnswers
+
+
+def free_motions(
+    problem: Problem, scene: Scene | None, pairs: Sequence[FreePoses], meshes: Sequence[tuple[int, int]] = MESHES
+) -> ManyFreeMotions:
+    """Search for the fastest motions of many pairs of poses, and prove them."""
+    questions = [FreeQuestion.of(planned_problem(problem), scene, pair, FreeSettings()) for pair in pairs]
+    best = dict[int, tuple[Spline, MotionProof]]()
+    sought = [k for k, pair in enumerate(pairs) if not len(divided(problem, pair))]
+    for mesh in meshes:
+        left = [k for k in sought if k not in best or best[k][1].verdict]
+        for i, motion, proof in _on_mesh([questions[k] for k in left], mesh) if left else ():
+            if left[i] not in best or not proof.verdict:
+                best[left[i]] = motion, proof
+    rows = sorted(best)
+    motions = [best[k][0] for k in rows]
+    answers = answers_of([best[k][1] for k in rows], np.array([float(one.knots[-1]) for one in motions]))
+    judge_all_robots(problem, answers, motions, scene)
+    return ManyFreeMotions(np.array(rows, int), motions, answers)
+
+
+def _on_mesh(questions: Sequence[FreeQuestion], mesh: tuple[int, int]) -> Iterator[tuple[int, Spline, MotionProof]]:
+    # Numbers of pairs, and their motions with proofs.
+    coarse, fine = (
+        _stacked([question.tasks(intervals, instants) for question in questions])
+        for intervals, instants in zip(mesh, (FEWEST, INSTANTS), strict=True)
+    )
+    search = Neighbours(coarse, [question.poses.z0 for question in questions])
+    search.search()
+    rows = np.flatnonzero(np.isfinite(search.duration))
+    if not len(rows):
+        return
+    begun = _refined(coarse.basis, fine.taken(rows), search.controls[rows], search.duration[rows], FINE[0][0])
+    unknowns, is_optimal = _first_optima(fine.taken(rows), begun, FINE[:TRIED])
+    rows = rows[is_optimal]
+    yield from zip(rows.tolist(), *_proved(questions, rows, fine.taken(rows), unknowns.taken(is_optimal)), strict=True)
+
+
+def _stacked(tasks: Sequence[Tasks]) -> Tasks:
+    # Tasks of the same numbers of segments as one.
+    values = {field.name: getattr(tasks[0], field.name) for field in dataclasses.fields(Tasks)}
+    names = [name for name, value in values.items() if isinstance(value, np.ndarray) and value.ndim]
+    joined: dict[str, Any] = {name: np.concatenate([getattr(one, name) for one in tasks]) for name in names}
+    return dataclasses.replace(tasks[0], **joined)
+
+
+def _refined(source: Basis, tasks: Tasks, controls: np.ndarray, duration: np.ndarray, barrier: float) -> Unknowns:
+    # Motions on other intervals, (n, K, d), as the start of a search.
+    functions = BSpline(source.knots, np.eye(source.controls), DEGREE)(tasks.basis.averages)
+    fitted = np.einsum("kj,ji,nid->nkd", tasks.basis.fit, functions, controls, optimize=True)
+    return started(tasks, fitted[:, None], duration[:, None], barrier)
+
+
+def _first_optima(tasks: Tasks, start: Unknowns, levels: Iterable[tuple[float, float]]) -> tuple[Unknowns, np.ndarray]:
+    # For each task the optimum of the first search that converges, with its barrier and softness; whether there is one.
+    unknowns, is_optimal = Unknowns(*(leaf.copy() for leaf in start)), np.zeros(len(start.duration), bool)
+    for barrier, softness in levels:
+        rows = np.flatnonzero(~is_optimal)
+        if len(rows):
+            part = tasks.taken(rows)
+            result = optima(part, again(part, start.taken(rows), barrier), barrier, softness)
+            _put(unknowns, result.unknowns, result.is_optimal, rows, is_optimal)
+    return unknowns, is_optimal
+
+
+def _put(
+    unknowns: Unknowns, others: Unknowns, are_optimal: np.ndarray, rows: np.ndarray, is_optimal: np.ndarray
+) -> None:
+    # Replace the unknowns of some motions, in place.
+    for leaf, values in zip(unknowns, others, strict=True):
+        leaf[rows] = values
+    is_optimal[rows] = are_optimal
+
+
+def _proved(
+    questions: Sequence[FreeQuestion], rows: np.ndarray, tasks: Tasks, unknowns: Unknowns
+) -> tuple[list[Spline], list[MotionProof]]:
+    # Motions, tightened and searched again until all are proved, or no more helps.
+    problem, scene, depths = questions[0].problem, questions[0].scene, [questions[k].poses.z0 for k in rows.tolist()]
+
+    def motion(k: int) -> Spline:
+        one = np.array([k])
+        return motions_of(tasks.taken(one), unknowns.taken(one), depths[k])[0]
+
+    motions, proofs = [motion(k) for k in range(len(rows))], np.empty(len(rows), object)
+    left = np.arange(len(rows))
+    for number in range(1, ROUNDS + 1):
+        if len(left):
+            several = SeveralSplines([motions[k] for k in left.tolist()])
+            parts = several.bounds, several.durations, scene, several.jumps
+            proofs[left] = proofs_of(problem, *parts, intervals=False)
+        left = np.array([k for k in left.tolist() if proofs[k].verdict], int)
+        tighter = None
+        if len(left) and number < ROUNDS:
+            tighter = tightened(
+                questions[0], tasks.taken(left), slacks_of(questions[0], [motions[k] for k in left.tolist()]), number
+            )
+        if tighter is None:
+            break
+        further, is_optimal = _first_optima(tighter, unknowns.taken(left), ON[:TRIED])
+        left = left[is_optimal]
+        tasks.low[left], tasks.high[left] = tighter.low[is_optimal], tighter.high[is_optimal]
+        for leaf, values in zip(unknowns, further, strict=True):
+            leaf[left] = values[is_optimal]
+        for k in left.tolist():
+            motions[k] = motion(k)
+    for k in range(len(rows)):
+        if proofs[k].verdict & CONTACTS:
+            one = np.array([k])
+            clear = _clear(questions[rows[k]], tasks.taken(one), unknowns.taken(one))
+            motions[k], proofs[k] = clear or (motions[k], proofs[k])
+    return motions, proofs.tolist()
+
+
+def _clear(question: FreeQuestion, tasks: Tasks, unknowns: Unknowns) -> tuple[Spline, MotionProof] | None:
+    # The motion whose bodies are kept apart, one by one, since planes belong to one motion; None without a proof.
+    proof = proved(question, tasks, unknowns)
+    if proof.is_stopped:
+        raise KeyboardInterrupt
+    if not proof.answers.feasible.all():
+        return None
+    several = SeveralSplines(proof.motions)
+    parts = several.bounds, several.durations, question.scene, several.jumps
+    return proof.motions[0], proofs_of(question.problem, *parts, intervals=False)[0]

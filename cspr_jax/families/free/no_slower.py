@@ -1,0 +1,136 @@
+"""Motions of other families in place of what a search finds, where they are faster, or it finds nothing."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from cspr_jax.curves.spline import Spline
+from cspr_jax.families.free.closed_forms import NEAR, ClosedForm
+from cspr_jax.families.free.followed import energy_along, followed
+from cspr_jax.families.free.free_motion import FreeMotion
+from cspr_jax.families.free.poses import FreePoses, half_swing
+from cspr_jax.families.free.problem import FreeQuestion, FreeSettings
+from cspr_jax.families.free.search.starts import ARCS
+from cspr_jax.motion.answers import replaced
+from cspr_jax.motion.motion import Motion, states_at
+from cspr_jax.motion.problem import Problem
+from cspr_jax.robots.contacts.clearance import Scene
+from cspr_jax.verification.proved_answers import ProvedAnswers, proved_answers
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Intervals of each half swing of a spline that follows a closed form, at first, and how often they are doubled.
+INTERVALS, DOUBLINGS = 16, 3
+
+
+def can_be_faster(free: FreeMotion, problem: Problem, poses: FreePoses, settings: FreeSettings) -> bool:
+    """Tell whether closed forms may take the place of a motion: an arc takes about half a swing."""
+    if not free.answers.feasible.all():
+        return True
+    return settings.objective == "time" and free.duration > ARCS * len(free.motions) * half_swing(problem, poses)
+
+
+def no_slower(
+    free: FreeMotion,
+    problem: Problem,
+    scene: Scene | None,
+    poses: FreePoses,
+    settings: FreeSettings,
+    forms: Sequence[ClosedForm],
+) -> FreeMotion:
+    """A motion that is at most as slow as closed forms through the same poses."""
+    is_proved = bool(free.answers.feasible.all())
+    for form in sorted(forms, key=lambda one: float(one.duration.sum())):
+        whole = float(form.duration.sum())
+        is_better = not is_proved or (settings.objective == "time" and whole < free.duration)
+        is_short = settings.longest is None or bool((form.duration <= settings.longest).all())
+        if is_better and is_short and form.is_feasible.all():
+            spline = _followed(problem, scene, poses, settings, form)
+            if spline is not None:
+                return dataclasses.replace(spline, is_stopped=free.is_stopped, searched=free.searched)
+    return free
+
+
+def _followed(
+    problem: Problem, scene: Scene | None, poses: FreePoses, settings: FreeSettings, form: ClosedForm
+) -> FreeMotion | None:
+    # The spline of so many intervals that it is proved; at the poses it has the accelerations that these have.
+    question = FreeQuestion.of(problem, scene, poses, settings)
+    arcs = float(form.duration.max()) / half_swing(problem, poses)
+    intervals = max(settings.intervals, 2 * int(np.ceil(0.5 * INTERVALS * arcs)))
+    for doubling in range(DOUBLINGS):
+        tasks = question.tasks(intervals * 2**doubling, question.instants)
+        motions = followed(tasks, form.motions, form.duration, poses.z0)
+        answers = proved_answers(problem, motions, scene)
+        if answers.feasible.all():
+            energy, level = np.array([energy_along(tasks, motion) for motion in motions]), np.full(len(motions), np.nan)
+            families = (form.family,) * len(motions)
+            return FreeMotion(motions, answers, energy, level, True, False, np.nan, families=families)
+    return None
+
+
+def stood_in(
+    problem: Problem, scene: Scene | None, poses: FreePoses, settings: FreeSettings, line: ClosedForm
+) -> FreeMotion:
+    """Lines in place of a search that has been stopped before it has found anything."""
+    motions, answers = cast(list[Spline], line.motions), cast(ProvedAnswers, line.answers)
+    energy = _energies(FreeQuestion.of(problem, scene, poses, settings), line.motions)
+    families, level = (line.family,) * len(motions), np.full(len(motions), np.nan)
+    return FreeMotion(motions, answers, energy, level, False, True, np.nan, (), families)
+
+
+def no_slower_than_lines(
+    free: FreeMotion,
+    problem: Problem,
+    scene: Scene | None,
+    poses: FreePoses,
+    settings: FreeSettings,
+    lines: Sequence[ClosedForm],
+) -> FreeMotion:
+    """A motion of whose segments none is slower than a line between the same poses, or missing beside one."""
+    for line in lines:
+        is_better = ~free.answers.feasible
+        if settings.objective == "time":
+            is_better |= line.duration < free.answers.duration
+        indices = np.flatnonzero(is_better & fits(line, problem, poses, settings))
+        if len(indices):
+            free = _with(free, stood_in(problem, scene, poses, settings, line), indices)
+    return free
+
+
+def _with(free: FreeMotion, line: FreeMotion, indices: np.ndarray) -> FreeMotion:
+    # The segments of a motion, some of them along lines.
+    chosen, count = set(indices.tolist()), len(free.motions)
+    motions = [(line if k in chosen else free).motions[k] for k in range(count)]
+    families = tuple(line.families[k] if k in chosen else (free.families or [None] * count)[k] for k in range(count))
+    energy, level = free.energy.copy(), free.level.copy()
+    energy[indices], level[indices] = line.energy[indices], line.level[indices]
+    answers = replaced(free.answers, indices, line.answers, indices)
+    return dataclasses.replace(free, motions=motions, answers=answers, energy=energy, level=level, families=families)
+
+
+def fits(line: ClosedForm, problem: Problem, poses: FreePoses, settings: FreeSettings) -> Float[np.ndarray, "n"]:
+    """Tell whether lines are proved, short enough, and accelerate at the poses as is asked."""
+    is_short = line.duration <= (np.inf if settings.longest is None else settings.longest)
+    return line.is_feasible & is_short & (_accelerations_missed(line, poses) <= NEAR * float(problem.robot.gravity))
+
+
+def _accelerations_missed(line: ClosedForm, poses: FreePoses) -> np.ndarray:
+    # By how much accelerations differ from those that are asked for, at most, (n,) m/s^2 or rad/s^2.
+    missed = np.zeros(len(line.motions))
+    for k, motion in enumerate(line.motions):
+        state, requested = states_at(motion, np.array([0.0, 1.0])), poses.accelerations[k : k + 2]
+        parts = [state.acceleration, *([] if poses.quaternions is None else [state.angular_acceleration])]
+        away = np.abs(np.concatenate([np.asarray(part) for part in parts], axis=1) - requested)
+        missed[k] = np.max(away, initial=0.0, where=~np.isnan(requested))
+    return missed
+
+
+def _energies(question: FreeQuestion, motions: Sequence[Motion]) -> np.ndarray:
+    tasks = question.tasks(question.settings.intervals, question.instants)
+    return np.array([energy_along(tasks, motion) for motion in motions])

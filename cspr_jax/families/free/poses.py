@@ -1,0 +1,231 @@
+"""Poses between which free motions are sought, as tasks of the search, and motions from what it finds."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
+
+import jax
+import numpy as np
+from jax import Array
+
+from cspr_jax.curves.spline import Spline
+from cspr_jax.errors import InputError
+from cspr_jax.families.free.search.basis import Basis
+from cspr_jax.families.free.search.determinants import determinant
+from cspr_jax.families.free.search.instants import DEPTH, ValueBounds, coordinates
+from cspr_jax.families.free.search.objectives import Objective
+from cspr_jax.families.free.search.tasks import Tasks, Unknowns
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.linear import rotations
+from cspr_jax.numerics.linear.rotations import products
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.model.patterns import PATTERNS
+from cspr_jax.robots.model.point_mass import plane_normal, spool_radius
+from cspr_jax.robots.statics.wrench_balance import at_rest
+from cspr_jax.verification.criteria import judged_poses
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Int
+
+# Part of the smaller determinant of both ends that a motion keeps, and of the smaller depth below the spools.
+REGULAR, SHALLOW = 1e-2, 0.5
+BACK = np.array([1.0, -1.0, -1.0, -1.0])
+
+
+class FreePoses(NamedTuple):
+    """Poses through which a motion goes, in the axes of the kernels.
+
+    Fields:
+        positions: (k, 3) of the mass centre, m.
+        quaternions: (k, 4) orientations, unit, scalar first; None for a point mass.
+        velocities: (k, 3) m/s; platforms do not turn.
+        accelerations: (k, 3) m/s^2, of platforms (k, 6) with angular accelerations behind them, rad/s^2; a row with a
+            NaN: free.
+        z0: depth of P0, about which the motions swing from which searches begin, m.
+    """
+
+    positions: np.ndarray
+    quaternions: np.ndarray | None
+    velocities: np.ndarray
+    accelerations: np.ndarray
+    z0: float
+
+
+class _Joined(NamedTuple):
+    # Segments in coordinates: places and velocities (s, 2, d), references (s, 4), turns (s, 2, d, d), accelerations
+    # (s + 1, d).
+    places: np.ndarray
+    velocities: np.ndarray
+    references: np.ndarray
+    turns: np.ndarray
+    accelerations: np.ndarray
+
+
+def check_searched(problem: Problem) -> None:
+    """Refuse a problem for which no free motion is sought."""
+    robot, most = problem.robot, problem.limits.tension_max
+    row = PATTERNS[robot.pattern]
+    if row.is_jointed or row.along_line:
+        raise InputError("pattern", robot.pattern, '"1T", "2T", "3T", "1R2T" or "3R3T" for free motions')
+    if most is None or not np.isfinite(np.asarray(most)).all():
+        raise InputError("tension_max", None, "a number, N: without it the least time is that of impulses")
+
+
+def _joined(problem: Problem, poses: FreePoses) -> _Joined:
+    along, about = coordinates(problem.robot.pattern)
+    count, d = len(poses.positions) - 1, len(along) + len(about)
+    places = np.zeros((count, 2, d))
+    places[..., : len(along)] = np.stack([poses.positions[:-1], poses.positions[1:]], axis=1)[..., along]
+    turns, references = np.tile(np.eye(d), (count, 2, 1, 1)), np.tile([1.0, 0.0, 0.0, 0.0], (count, 1))
+    velocities, linear = np.zeros_like(places), poses.accelerations[:, along]
+    velocities[..., : len(along)] = np.stack([poses.velocities[:-1], poses.velocities[1:]], axis=1)[..., along]
+    if poses.quaternions is None:
+        return _Joined(places, velocities, references, turns, linear)
+    start, end = poses.quaternions[:-1], poses.quaternions[1:]
+    end = np.where(np.sum(start * end, axis=1, keepdims=True) < 0.0, -end, end)
+    # From half-way between, a Rodrigues vector is no longer than 1.
+    references = (start + end) / np.linalg.norm(start + end, axis=1, keepdims=True)
+    for side, quaternions in enumerate((start, end)):
+        turning = products(quaternions, references * BACK)
+        vector = turning[:, 1:] / turning[:, :1]
+        places[:, side, len(along) :] = vector[:, about]
+        for i, v in enumerate(vector):
+            across = np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+            spin = 2.0 / (1.0 + v @ v) * (np.eye(3) + across)
+            turns[i, side, len(along) :, len(along) :] = np.linalg.inv(spin[np.ix_(about, about)])
+    accelerations = np.concatenate([linear, poses.accelerations[:, 3 + about]], axis=1)
+    return _Joined(places, velocities, references, turns, accelerations)
+
+
+def determinants(problem: Problem, poses: FreePoses) -> Float[np.ndarray, "k"]:
+    """Determinants at poses of a platform with as many cables as degrees of freedom; see `determinants.determinant`."""
+    return np.asarray(_determinants(problem.robot, leaf(poses.positions), leaf(poses.quaternions)))
+
+
+@jax.jit
+def _determinants(robot: AnyRobot, positions: Array, quaternions: Array) -> Array:
+    states = jax.vmap(at_rest)(positions, jax.vmap(rotations.matrix)(quaternions))
+    return jax.vmap(partial(determinant, robot))(states)
+
+
+def half_swing(problem: Problem, poses: FreePoses) -> float:
+    """Duration of half a swing about P0, over which durations count."""
+    return float(np.pi * np.sqrt(poses.z0 / float(problem.robot.gravity)))
+
+
+def divided(problem: Problem, poses: FreePoses) -> Int[np.ndarray, "n 3"]:
+    """Segments whose ends lie on opposite sides of singular poses.
+
+    Every motion between them passes one, where the cables cannot carry every wrench, so that none is proved.
+    """
+    if not judged_poses(problem.robot)[0]:
+        return np.zeros((0, 3))
+    values = determinants(problem, poses)
+    rows = np.flatnonzero(values[:-1] * values[1:] < 0.0)
+    return np.stack([rows, values[rows], values[rows + 1]], axis=1)
+
+
+def _sides(values: np.ndarray, part: float, most: float = np.inf) -> np.ndarray:
+    # Bounds (2, s) of a value that is zero at singular poses, from values (k,) at the poses: motions stay on the side
+    # of both ends, by this part of the smaller value, or by so much.
+    ends = np.stack([values[:-1], values[1:]])
+    least = np.minimum(part * np.abs(ends).min(0), most)
+    return np.stack([np.where((ends > 0.0).all(0), least, -np.inf), np.where((ends < 0.0).all(0), -least, np.inf)])
+
+
+def _depths(problem: Problem, poses: FreePoses) -> np.ndarray:
+    # Depths (k,) of the poses below the plane of the spools, over the size of the robot.
+    return poses.positions @ np.asarray(plane_normal(problem.robot)) / float(spool_radius(problem.robot))
+
+
+def tasks_of(
+    problem: Problem, basis: Basis, bounds: ValueBounds, objective: Objective, poses: FreePoses, longest: float | None
+) -> Tasks:
+    """The task of moving through all poses."""
+    places, velocities, references, turns, accelerations = _joined(problem, poses)
+    is_free = np.isnan(accelerations).any(1)
+    shape = 1, len(places), *basis.tau.shape, len(bounds.low)
+    low, high = (np.broadcast_to(side, shape).copy() for side in (bounds.low, bounds.high))
+    if bounds.determinant is not None:
+        sides = _sides(determinants(problem, poses), REGULAR)
+        low[0, ..., bounds.determinant], high[0, ..., bounds.determinant] = sides[..., None, None]
+    if bounds.depth is not None:
+        sides = _sides(_depths(problem, poses), SHALLOW, DEPTH)
+        low[0, ..., bounds.depth], high[0, ..., bounds.depth] = sides[..., None, None]
+    return Tasks(
+        robot=problem.robot,
+        limits=problem.limits,
+        basis=basis,
+        places=places[None],
+        velocities=velocities[None],
+        references=references[None],
+        turns=turns[None],
+        accelerations=np.where(is_free[:, None], 0.0, accelerations)[None],
+        is_free=is_free[None],
+        low=low,
+        high=high,
+        scale=np.full(1, half_swing(problem, poses)),
+        objective=objective,
+        longest=None if longest is None else np.asarray(longest, float),
+    )
+
+
+def segments_of(tasks: Tasks) -> Tasks:
+    """Segments of tasks as tasks of their own, one behind another."""
+
+    def one(part: np.ndarray) -> np.ndarray:
+        return part.reshape(-1, 1, *part.shape[2:])
+
+    def ends(part: np.ndarray) -> np.ndarray:
+        pairs = np.stack([part[:, :-1], part[:, 1:]], axis=2)
+        return pairs.reshape(-1, *pairs.shape[2:])
+
+    count = tasks.places.shape[1]
+    return dataclasses.replace(
+        tasks,
+        places=one(tasks.places),
+        velocities=one(tasks.velocities),
+        references=one(tasks.references),
+        turns=one(tasks.turns),
+        accelerations=ends(tasks.accelerations),
+        is_free=ends(tasks.is_free),
+        low=one(tasks.low),
+        high=one(tasks.high),
+        scale=np.repeat(tasks.scale, count),
+    )
+
+
+def quaternions_of(tasks: Tasks, places: Float[np.ndarray, "l s ... d"]) -> Float[np.ndarray, "l s ... 4"] | None:
+    """Orientations of the platforms of tasks."""
+    along, about = coordinates(tasks.robot.pattern)
+    if not len(about):
+        return None
+    turning = np.zeros((*places.shape[:-1], 4))
+    turning[..., 0] = 1.0
+    turning[..., 1 + about] = places[..., len(along) :]
+    turning /= np.linalg.norm(turning, axis=-1, keepdims=True)
+    segments = zip(turning.reshape(-1, *turning.shape[2:]), tasks.references.reshape(-1, 4), strict=True)
+    return np.stack([products(one.reshape(-1, 4), at[None]) for one, at in segments]).reshape(turning.shape)
+
+
+def motions_of(tasks: Tasks, unknowns: Unknowns, z0: float) -> list[Spline]:
+    """Motions along all segments of a task."""
+    along, about = coordinates(tasks.robot.pattern)
+    controls = tasks.basis.in_intervals(tasks.controls(unknowns)[0])
+    tables = np.einsum("mbk,smkd->smbd", tasks.basis.pieces, controls)
+    motions = []
+    for table, reference, duration in zip(tables, tasks.references[0], unknowns.duration[0].tolist(), strict=True):
+        position = np.zeros((*table.shape[:2], 3))
+        position[..., along] = table[..., : len(along)]
+        quaternion = None
+        if len(about):
+            turning = np.zeros((*table.shape[:2], 4))
+            turning[..., 0] = 1.0
+            turning[..., 1 + about] = table[..., len(along) :]
+            quaternion = leaf(products(turning.reshape(-1, 4), reference[None]).reshape(turning.shape))
+        knots = np.linspace(0.0, duration, len(table) + 1)
+        motions.append(Spline(leaf(knots), leaf(position), quaternion, leaf(z0)))
+    return motions

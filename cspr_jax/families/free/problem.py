@@ -1,0 +1,134 @@
+"""The question of a search: poses, limits, and what the motion is to be the best in; bounds tighten after a proof."""
+
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.curves.spline import Spline, chained
+from cspr_jax.families.free.poses import FreePoses, check_searched, tasks_of
+from cspr_jax.families.free.search.basis import basis
+from cspr_jax.families.free.search.instants import ValueBounds, bounds, coordinates
+from cspr_jax.families.free.search.objectives import OBJECTIVES, Objective
+from cspr_jax.families.free.search.tasks import Tasks
+from cspr_jax.motion.problem import Problem
+from cspr_jax.robots.contacts.clearance import Scene
+from cspr_jax.verification.criteria import criteria
+from cspr_jax.verification.piece_slacks import PieceSlacks, piece_slacks
+
+# Slack that is left after tightening, in the units of values; by how much at least and at most bounds tighten, the most
+# times half their range where that is above 1; by what share of it those of the next pieces do.
+LEFT, STEP, MOST, BESIDE = 1e-7, 1e-6, 0.03, 0.5
+# By what more than is missed they tighten; from what time on by its powers, since some motions give way to each step.
+MORE, PATIENCE = 1.5, 4
+# Instants of each interval, of point masses and of platforms: between two of them, the tensions of platforms bend more.
+INSTANTS = 4, 8
+
+
+class FreeSettings(NamedTuple):
+    """Settings of a search.
+
+    Fields:
+        objective: row of `objectives.OBJECTIVES`.
+        longest: duration of a segment, s; None for any.
+        starts: number of motions from which the search of a segment begins; None for those of `starts.starts`.
+        until: time of `time.monotonic` at which all searches end, s.
+        intervals: of the spline of a segment, even.
+        instants: of each interval, at which the search looks; None for those of `INSTANTS`.
+    """
+
+    objective: str = "time"
+    longest: float | None = None
+    starts: int | None = None
+    until: float = np.inf
+    intervals: int = 48
+    instants: int | None = None
+
+
+def planned_problem(problem: Problem) -> Problem:
+    """A problem without uncertainty."""
+    return problem._replace(limits=dataclasses.replace(problem.limits, uncertainty=None))
+
+
+@dataclasses.dataclass(frozen=True)
+class FreeQuestion:
+    """The best motion through poses within limits is sought.
+
+    Fields:
+        limits: bounds of the values at each instant.
+    """
+
+    problem: Problem
+    scene: Scene | None
+    poses: FreePoses
+    limits: ValueBounds
+    objective: Objective
+    settings: FreeSettings
+
+    @classmethod
+    def of(cls, problem: Problem, scene: Scene | None, poses: FreePoses, settings: FreeSettings) -> "FreeQuestion":
+        """Take limits from the robot, and the objective from the settings."""
+        check_searched(problem)
+        robot = problem.robot
+        limits = bounds(robot, problem.limits, criteria(robot, problem.limits, scene), settings.longest is not None)
+        objective, limits = OBJECTIVES[settings.objective](limits, robot.n_cables)
+        return cls(problem, scene, poses, limits, objective, settings)
+
+    @property
+    def is_planned(self) -> bool:
+        """Tell whether it is about the planned robot alone, and not about all within an uncertainty."""
+        return self.problem.limits.uncertainty is None
+
+    @property
+    def planned(self) -> Problem:
+        """The problem of the planned robot alone."""
+        return planned_problem(self.problem)
+
+    @property
+    def instants(self) -> int:
+        """Instants of each interval at which the search looks in the end."""
+        turns = len(coordinates(self.problem.robot.pattern)[1]) > 0
+        return self.settings.instants or INSTANTS[turns]
+
+    def tasks(self, intervals: int, instants: int) -> Tasks:
+        """The question on some intervals."""
+        numbers = basis(intervals, instants)
+        return tasks_of(self.problem, numbers, self.limits, self.objective, self.poses, self.settings.longest)
+
+
+def more(number: int) -> float:
+    """By what more than is missed bounds tighten."""
+    return MORE ** max(1, number - PATIENCE + 1)
+
+
+def slacks_of(question: FreeQuestion, motions: list[Spline]) -> PieceSlacks:
+    """Slacks of motions, one behind the other, over their pieces."""
+    whole = chained(motions)
+    return piece_slacks(question.problem, whole, np.asarray(whole.knots), question.scene)
+
+
+def tightened(question: FreeQuestion, tasks: Tasks, slacks: PieceSlacks, number: int) -> Tasks | None:
+    """Tighter bounds where the proof finds less slack than is needed."""
+    limits = question.limits
+    changes = np.abs(limits.rises) + np.abs(limits.falls)
+    unit = changes.max(1)
+    missed = np.where(unit > 0.0, LEFT - slacks.low * unit, 0.0)
+    if not (missed > 0.0).any():
+        return None
+    half = 0.5 * (limits.high - limits.low)
+    size = np.max(np.where((changes > 0.0) & np.isfinite(half), half, 1.0), axis=1, initial=1.0)
+    steps = np.where(missed > 0.0, np.minimum(more(number) * missed + STEP, MOST * size), 0.0) / np.where(
+        unit > 0.0, unit, 1.0
+    )
+    # A slack that is smallest beside a border depends on the bounds of the next piece as much.
+    steps = steps.reshape(len(tasks.low), -1, len(unit))
+    near = steps.copy()
+    near[:, 1:] = np.maximum(near[:, 1:], BESIDE * steps[:, :-1])
+    near[:, :-1] = np.maximum(near[:, :-1], BESIDE * steps[:, 1:])
+    shape = *tasks.low.shape[:3], 1, -1
+    rise, fall = ((near[..., None] * side).max(2).reshape(shape) for side in (limits.rises, limits.falls))
+    count = tasks.n_limited
+    tighter = dataclasses.replace(tasks, low=tasks.low.copy(), high=tasks.high.copy())
+    tighter.low[..., :count] += rise
+    tighter.high[..., :count] -= fall
+    return tighter

@@ -1,0 +1,203 @@
+"""Search for the best motions: a primal-dual interior-point method for many motions at once.
+
+Bounds are kept by barriers. Equations may be missed at a price, whose multipliers are those of the last optimum
+(an augmented Lagrangian), so that every start has a way down to a motion that meets them; barriers and what may be
+missed fall together. Steps are Newton's, no longer than the merit falls.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from cspr_jax.families.free.search.condensation import Softness, times, transposed
+from cspr_jax.families.free.search.descent import descended
+from cspr_jax.families.free.search.newton import newton_step
+from cspr_jax.families.free.search.points import REGULAR, Levels, SearchPoints
+from cspr_jax.families.free.search.tasks import OUTER, Tasks, Unknowns, wide
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Weight of the barriers and softness of the equations: at the start, at the end, and by what they fall.
+BARRIERS, BARRIER_FALL, BARRIER_POWER = (1e-1, 3e-8), 0.2, 1.5
+SOFTNESS, SOFTNESS_FALL = (1.0, 1e-6), 0.2
+# Errors of Newton's equations, over the weight of the barriers, with which these fall; by how much equations are missed
+# in the end.
+CLOSE, MISSED = 10.0, 1e-6
+# Steps, all and for one weight of the barriers.
+STEPS, PATIENCE = 250, 80
+# Part of the range by which values are inside their bounds at the start, at least, and at most.
+INSIDE, AWAY = 0.1, 1e-2
+# By how much multipliers of bounds and barriers over gaps may differ.
+APART = 1e10
+
+
+class OutOfTime(Exception):
+    """The time of a search has ended before it has converged."""
+
+
+class Ending(NamedTuple):
+    """When searches end that have not converged, by `time.monotonic`.
+
+    Fields:
+        until: s.
+        enough: from then on one optimum of each task is enough, s.
+        of_task: (l,) numbers of the tasks; () where nothing is enough.
+    """
+
+    until: float = np.inf
+    enough: float = np.inf
+    of_task: np.ndarray = np.zeros(0, int)
+
+    def is_over(self, is_optimal: Float[np.ndarray, "l"]) -> bool:
+        """Tell whether searches end now."""
+        instant = time.monotonic()
+        return instant > self.until or (
+            instant > self.enough and bool(np.isin(self.of_task, self.of_task[is_optimal]).all())
+        )
+
+
+NEVER = Ending()
+
+
+class Optima(NamedTuple):
+    """Results.
+
+    Fields:
+        unknowns: of all motions.
+        is_optimal: (l,) whether the search has converged.
+        steps: (l,) number of steps.
+        is_stopped: whether Ctrl-C, or the time, has ended it.
+    """
+
+    unknowns: Unknowns
+    is_optimal: np.ndarray
+    steps: np.ndarray
+    is_stopped: bool = False
+
+
+def _sharpened(points: SearchPoints, levels: Levels) -> tuple[Levels, np.ndarray]:
+    # Weights and softness, smaller where their optimum is reached; errors.
+    barrier, (size, metric, level) = levels
+    while True:
+        levels = Levels(barrier, Softness(size, metric, level))
+        errors = points.errors(levels)
+        is_close = errors < CLOSE * barrier
+        level = np.where(_wide(is_close, level), points.unknowns.multipliers, level)
+        size = np.where(is_close, np.maximum(SOFTNESS[1], SOFTNESS_FALL * size), size)
+        metric = np.where(_wide(is_close, metric), points.metric(), metric)
+        is_close &= barrier > BARRIERS[1]
+        if not is_close.any():
+            return Levels(barrier, Softness(size, metric, level)), errors
+        smaller = np.minimum(BARRIER_FALL * barrier, barrier**BARRIER_POWER)
+        barrier = np.where(is_close, np.maximum(BARRIERS[1], smaller), barrier)
+
+
+def _wide(flags: np.ndarray, leaf: np.ndarray) -> np.ndarray:
+    return flags.reshape(-1, *[1] * (leaf.ndim - 1))
+
+
+def optima(
+    tasks: Tasks,
+    start: Unknowns,
+    barrier: float = BARRIERS[0],
+    softness: float = SOFTNESS[0],
+    ending: Ending = NEVER,
+    *,
+    keeps: bool = False,
+) -> Optima:
+    """Search for the best motions."""
+    count, points = len(start.duration), SearchPoints.of(tasks, start)
+    soft = Softness(np.full(count, softness), points.metric(), start.multipliers.copy())
+    result = Optima(Unknowns(*(leaf.copy() for leaf in start)), np.zeros(count, bool), np.zeros(count, int))
+    try:
+        is_stopped = not _sought(points, Levels(np.full(count, barrier), soft), result, ending)
+    except KeyboardInterrupt:
+        if not keeps:
+            raise
+        is_stopped = True
+    if is_stopped and not keeps:
+        raise OutOfTime
+    return result._replace(is_stopped=is_stopped)
+
+
+def _sought(points: SearchPoints, levels: Levels, result: Optima, ending: Ending) -> bool:
+    # Puts motions into the result as their searches end; whether all have ended in time.
+    rows = np.arange(len(result.steps))
+    curved, waited = np.zeros(len(rows)), np.zeros(len(rows))
+    for number in range(STEPS + 1):
+        before = levels.barrier
+        levels, errors = _sharpened(points, levels)
+        waited = np.where(levels.barrier < before, 0, waited + 1)
+        is_optimal = (levels.barrier <= BARRIERS[1]) & (errors < CLOSE * BARRIERS[1]) & (points.missed() < MISSED)
+        is_late = ending.is_over(result.is_optimal)
+        is_over = is_optimal | (number == STEPS) | (waited > PATIENCE) | is_late
+        for leaf, values in zip(result.unknowns, points.unknowns.taken(is_over), strict=True):
+            leaf[rows[is_over]] = values
+        result.is_optimal[rows[is_over]], result.steps[rows[is_over]] = is_optimal[is_over], number
+        if is_over.all():
+            return not is_late
+        if is_over.any():
+            rows, curved, waited = rows[~is_over], curved[~is_over], waited[~is_over]
+            points, levels = points.taken(~is_over), levels.taken(~is_over)
+        step = newton_step(
+            points.tasks, points.unknowns, points.equations, points.residual, levels.barrier, levels.soft, curved
+        )
+        curved = np.where(step.curved > 0.0, step.curved, curved)
+        points = _safeguarded(descended(points, step, levels), levels.barrier)
+    return True
+
+
+def _safeguarded(points: SearchPoints, barrier: np.ndarray) -> SearchPoints:
+    # Multipliers of bounds not too far from barriers over gaps.
+    unknowns, pushes = points.unknowns, []
+    for push, gap in zip((unknowns.low_push, unknowns.high_push), points.tasks.gaps(unknowns), strict=True):
+        near = wide(barrier) / gap
+        pushes.append(np.where(np.isfinite(gap), np.clip(push, near / APART, near * APART), 0.0))
+    return dataclasses.replace(points, unknowns=unknowns._replace(low_push=pushes[0], high_push=pushes[1]))
+
+
+def again(tasks: Tasks, unknowns: Unknowns, barrier: float) -> Unknowns:
+    """Unknowns of motions found before, from which a search within other bounds begins."""
+    low, high = tasks.bounds(unknowns.level)
+    inside = np.minimum(np.sqrt(barrier), INSIDE * (high - low))
+    return _pushed(tasks, unknowns._replace(values=np.clip(unknowns.values, low + inside, high - inside)), barrier)
+
+
+def _pushed(tasks: Tasks, unknowns: Unknowns, barrier: float) -> Unknowns:
+    low, high = (np.where(np.isfinite(gap), barrier / gap, 0.0) for gap in tasks.gaps(unknowns))
+    return unknowns._replace(low_push=low, high_push=high)
+
+
+def started(
+    tasks: Tasks, controls: np.ndarray, duration: Float[np.ndarray, "l s"], barrier: float = BARRIERS[0]
+) -> Unknowns:
+    """Unknowns of motions from which a search begins."""
+    count, cables, dof = duration.shape[1], tasks.robot.n_cables, tasks.robot.dof
+    acceleration = tasks.accelerations.copy()
+    for side, index, sign in ((0, OUTER - 1, 3.0), (1, -OUTER, -3.0)):
+        step = controls[:, :, index] - tasks.places[:, :, side]
+        step = step - sign * tasks.basis.end_slope * duration[..., None] * tasks.velocities[:, :, side]
+        second = step / (tasks.basis.end_bend * duration[..., None] ** 2)
+        near = np.linalg.solve(tasks.turns[:, :, side], second[..., None])[..., 0]
+        is_free = tasks.is_free[:, side : count + side, None]
+        acceleration[:, side : count + side] = np.where(is_free, near, acceleration[:, side : count + side])
+    shape = tasks.low.shape
+    values, empty = np.zeros(shape), np.zeros((*shape[:-1], shape[-1] - cables + dof))
+    level, inner = np.full(duration.shape, tasks.objective.start), controls[:, :, OUTER:-OUTER].copy()
+    unknowns = Unknowns(inner, duration.copy(), acceleration, level, values, empty, values, values)
+    equations, residual = tasks.equations(unknowns)
+    # Tensions nearest to the middle of their range that balance the motion.
+    low, high = tasks.bounds(level)
+    middle = 0.5 * (low[..., :cables] + high[..., :cables])
+    matrix = equations.matrix
+    lacking = -residual[..., :dof] - times(matrix, middle)
+    metric = matrix @ transposed(matrix) + REGULAR * np.eye(dof)
+    tensions = middle + times(transposed(matrix), np.linalg.solve(metric, lacking[..., None])[..., 0])
+    values = np.concatenate([tensions, -residual[..., dof:]], axis=-1)
+    inside = np.minimum(AWAY, INSIDE * (high - low))
+    return _pushed(tasks, unknowns._replace(values=np.clip(values, low + inside, high - inside)), barrier)

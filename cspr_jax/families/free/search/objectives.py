@@ -1,0 +1,78 @@
+"""Objectives of free motions: time, energy, the largest tension, or the margin of the tensions.
+
+Time and energy are sums over the motion. The largest tension and the margin are levels: unknowns by which the bounds of
+all tensions move, together. Between motions with the same level, time decides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from cspr_jax.families.free.search.instants import ValueBounds
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Share of the time in objectives that are levels, in half swings: a hundredth of it costs a millionth of the weight.
+LITTLE = 1e-4
+
+
+class Objective(NamedTuple):
+    """An objective, as a search has it.
+
+    Fields:
+        time: share of the durations, over half a swing.
+        energy: share of the integral of the squares of the tensions over the weight, in half swings.
+        level: share of the level; 0 without one.
+        low_lift: (n_values,) by how much lower bounds rise with the level.
+        high_lift: (n_values,) by how much upper bounds do.
+        start: level from which a search begins.
+        largest: level up to which all limits are kept.
+    """
+
+    time: float
+    energy: float
+    level: float
+    low_lift: np.ndarray
+    high_lift: np.ndarray
+    start: float = 0.0
+    largest: float = np.inf
+
+    def keeps_limits(self, level: Float[np.ndarray, "l s"]) -> Float[np.ndarray, "l"]:
+        """Tell whether motions with these levels keep the limits of the tensions."""
+        return np.all(level <= self.largest, axis=1)
+
+
+def _time(bounds: ValueBounds, n_cables: int) -> tuple[Objective, ValueBounds]:
+    still = np.zeros(len(bounds.low))
+    return Objective(1.0, 0.0, 0.0, still, still), bounds
+
+
+def _energy(bounds: ValueBounds, n_cables: int) -> tuple[Objective, ValueBounds]:
+    still = np.zeros(len(bounds.low))
+    return Objective(0.0, 1.0, 0.0, still, still), bounds
+
+
+def _tension(bounds: ValueBounds, n_cables: int) -> tuple[Objective, ValueBounds]:
+    # The level is the largest tension as a share of the one that is allowed.
+    high, lift = bounds.high.copy(), np.zeros(len(bounds.low))
+    high[:n_cables], lift[:n_cables] = 0.0, bounds.high[:n_cables]
+    return Objective(LITTLE, 0.0, 1.0, np.zeros(len(lift)), lift, 1.0, 1.0), bounds._replace(high=high)
+
+
+def _margin(bounds: ValueBounds, n_cables: int) -> tuple[Objective, ValueBounds]:
+    # The level is the margin with its sign turned, over the weight.
+    lift = np.zeros(len(bounds.low))
+    lift[:n_cables] = 1.0
+    return Objective(LITTLE, 0.0, 1.0, -lift, lift, 0.0, 0.0), bounds
+
+
+OBJECTIVES: dict[str, Callable[[ValueBounds, int], tuple[Objective, ValueBounds]]] = {
+    "time": _time,
+    "energy": _energy,
+    "tension": _tension,
+    "margin": _margin,
+}

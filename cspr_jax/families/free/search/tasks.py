@@ -1,0 +1,283 @@
+"""Motions that are sought together, and their unknowns: control points, durations, accelerations at poses, levels.
+
+A motion is at a pose at each end of its segments, with a given velocity there, and an acceleration that the segments at
+both sides share. So the outer three control points at each end follow from the duration and the acceleration.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from cspr_jax.families.free.search.basis import Basis
+from cspr_jax.families.free.search.derivatives import InstantValues, instant_values, residuals
+from cspr_jax.families.free.search.objectives import Objective
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.model.limits import Limits
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Control points at each end that follow from the others.
+OUTER = 3
+
+
+def wide(numbers: np.ndarray) -> np.ndarray:
+    """Numbers of motions, or of their segments, beside their values at instants."""
+    return numbers.reshape(*numbers.shape, *[1] * (5 - numbers.ndim))
+
+
+class Unknowns(NamedTuple):
+    """Unknowns of l motions of s segments, with K control points, m intervals and n instants; or changes of them.
+
+    Fields:
+        inner: (l, s, K - 6, d) control points between the outer ones.
+        duration: (l, s) s.
+        acceleration: (l, s + 1, d) at the poses, m/s^2, rad/s^2.
+        level: (l, s) of the objective, by which bounds of tensions move.
+        values: (l, s, m, n, n_values) as of `instants`.
+        multipliers: (l, s, m, n, n_equations).
+        low_push: (l, s, m, n, n_values) multipliers of lower bounds, at least 0.
+        high_push: (l, s, m, n, n_values) of upper bounds.
+    """
+
+    inner: np.ndarray
+    duration: np.ndarray
+    acceleration: np.ndarray
+    level: np.ndarray
+    values: np.ndarray
+    multipliers: np.ndarray
+    low_push: np.ndarray
+    high_push: np.ndarray
+
+    def taken(self, rows: np.ndarray) -> "Unknowns":
+        """Unknowns of some of the motions."""
+        return Unknowns(*(leaf[rows] for leaf in self))
+
+
+class ClearancePlanes(NamedTuple):
+    """Values at + slope . coordinates of instants that have lower bounds beside those of limits, K at each.
+
+    Fields:
+        slope: (l, s, m, n, K, d).
+        at: (l, s, m, n, K).
+        least: of each its number among the meetings of bodies, and the clearance that it stands for, m.
+    """
+
+    slope: np.ndarray
+    at: np.ndarray
+    least: tuple[tuple[int, float], ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class Tasks:
+    """l motions of s segments each, of d coordinates.
+
+    Fields:
+        robot: centred, z down.
+        limits: of it.
+        basis: of all segments.
+        places: (l, s, 2, d) coordinates at start and end of each segment, m; Rodrigues vectors.
+        velocities: (l, s, 2, d) there, m/s, rad/s.
+        references: (l, s, 4) orientations from which Rodrigues vectors count.
+        turns: (l, s, 2, d, d) second derivatives of the coordinates from accelerations.
+        accelerations: (l, s + 1, d) at the poses, m/s^2, rad/s^2, where they are given.
+        is_free: (l, s + 1) whether they are not.
+        low: (l, s, m, n, n_values) lower bounds at level 0, -inf for none.
+        high: (l, s, m, n, n_values) upper bounds at level 0, inf for none.
+        scale: (l,) half a swing, s, over which durations count.
+        objective: what is to be least.
+        longest: () longest duration of a segment, s; None for any.
+        planes: their values are the last ones; None without any.
+    """
+
+    robot: AnyRobot
+    limits: Limits
+    basis: Basis
+    places: np.ndarray
+    velocities: np.ndarray
+    references: np.ndarray
+    turns: np.ndarray
+    accelerations: np.ndarray
+    is_free: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    scale: np.ndarray
+    objective: Objective
+    longest: np.ndarray | None = None
+    planes: ClearancePlanes | None = None
+
+    def taken(self, rows: np.ndarray) -> "Tasks":
+        """Some of the motions."""
+        names = ("places", "velocities", "references", "turns", "accelerations", "is_free", "low", "high", "scale")
+        planes = self.planes
+        if planes is not None:
+            planes = planes._replace(slope=planes.slope[rows], at=planes.at[rows])
+        return dataclasses.replace(self, **{name: getattr(self, name)[rows] for name in names}, planes=planes)
+
+    @property
+    def n_limited(self) -> int:
+        """Number of the values that limits bound: those before planes."""
+        return self.low.shape[-1] - (0 if self.planes is None else self.planes.at.shape[-1])
+
+    def within(self, planes: ClearancePlanes, low: np.ndarray) -> "Tasks":
+        """Tasks with other planes."""
+        count, none, objective = self.n_limited, np.full(low.shape, np.inf), self.objective
+        low_lift, high_lift = (
+            np.pad(lift[:count], (0, low.shape[-1])) for lift in (objective.low_lift, objective.high_lift)
+        )
+        return dataclasses.replace(
+            self,
+            low=np.concatenate([self.low[..., :count], low], axis=-1),
+            high=np.concatenate([self.high[..., :count], none], axis=-1),
+            objective=objective._replace(low_lift=low_lift, high_lift=high_lift),
+            planes=planes,
+        )
+
+    def beside(self, unknowns: Unknowns, values: np.ndarray) -> Unknowns:
+        """Unknowns of these tasks as those of tasks with other planes."""
+        old, new = self.low.shape[-1] - self.n_limited, values.shape[-1]
+
+        def changed(leaf: np.ndarray) -> np.ndarray:
+            return np.concatenate([leaf[..., : leaf.shape[-1] - old], np.zeros((*leaf.shape[:-1], new))], axis=-1)
+
+        names = "values", "multipliers", "low_push", "high_push"
+        unknowns = unknowns._replace(**{name: changed(getattr(unknowns, name)) for name in names})
+        unknowns.values[..., self.n_limited :] = values
+        return unknowns
+
+    def bounds(self, level: Float[np.ndarray, "l s"]) -> tuple[np.ndarray, np.ndarray]:
+        """Bounds of the values."""
+        level = wide(level)
+        return self.low + level * self.objective.low_lift, self.high + level * self.objective.high_lift
+
+    def gaps(self, unknowns: Unknowns) -> tuple[np.ndarray, np.ndarray]:
+        """Distances of the values from their bounds."""
+        low, high = self.bounds(unknowns.level)
+        return unknowns.values - low, high - unknowns.values
+
+    def gap_changes(self, change: Unknowns) -> tuple[np.ndarray, np.ndarray]:
+        """Changes of the distances of the values from their bounds."""
+        level = wide(change.level)
+        low, high = level * self.objective.low_lift, level * self.objective.high_lift
+        return change.values - low, high - change.values
+
+    @property
+    def energy_shares(self) -> np.ndarray:
+        """Shares of the instants in the objective, of the squares of tensions times the duration, (l, 1, m, n, 1)."""
+        return self.objective.energy / wide(self.scale) * self.basis.shares[..., None]
+
+    def cost(self, unknowns: Unknowns) -> Float[np.ndarray, "l"]:
+        """The objective."""
+        time = self.objective.time * unknowns.duration.sum(1) / self.scale
+        squares = unknowns.values[..., : self.robot.n_cables] ** 2 * wide(unknowns.duration)
+        energy = np.sum(self.energy_shares * squares, axis=(1, 2, 3, 4))
+        return time + energy + self.objective.level * unknowns.level.sum(1)
+
+    def energies(self, unknowns: Unknowns) -> Float[np.ndarray, "l s"]:
+        """Integrals of the sum of the squares of the tensions."""
+        squares = np.sum(unknowns.values[..., : self.robot.n_cables] ** 2, axis=-1)
+        weight = float(self.robot.mass * self.robot.gravity)
+        return weight**2 * unknowns.duration * np.sum(self.basis.shares * squares, axis=(2, 3))
+
+    def cost_change(self, unknowns: Unknowns, change: Unknowns) -> Float[np.ndarray, "l"]:
+        """Slope of the objective along a change."""
+        cables = self.robot.n_cables
+        tensions, duration = unknowns.values[..., :cables], wide(unknowns.duration)
+        squares = wide(change.duration) * tensions**2
+        squares = squares + 2.0 * duration * tensions * change.values[..., :cables]
+        energy = np.sum(self.energy_shares * squares, axis=(1, 2, 3, 4))
+        time = self.objective.time * change.duration.sum(1) / self.scale
+        return time + energy + self.objective.level * change.level.sum(1)
+
+    @property
+    def border(self) -> np.ndarray:
+        """Numbers of the outer coordinates that move, of all K d of a segment, (4 d,)."""
+        d, last = self.places.shape[-1], self.basis.controls * self.places.shape[-1]
+        return np.concatenate([np.arange(d, 3 * d), np.arange(last - 3 * d, last - d)])
+
+    def controls(self, unknowns: Unknowns) -> np.ndarray:
+        """All control points."""
+        shape = *unknowns.duration.shape, self.basis.controls, self.places.shape[-1]
+        controls, time = np.empty(shape), unknowns.duration[..., None]
+        controls[:, :, OUTER:-OUTER] = unknowns.inner
+        for side, sign in ((0, 1.0), (1, -1.0)):
+            place, step = self.places[:, :, side], sign * self.basis.end_slope * time * self.velocities[:, :, side]
+            bend = self.basis.end_bend * time**2 * self._second(unknowns, side)
+            steps = (place, place + step, place + 3.0 * step + bend)
+            for k, value in enumerate(steps):
+                controls[:, :, k if side == 0 else -1 - k] = value
+        return controls
+
+    def _second(self, unknowns: Unknowns, side: int) -> np.ndarray:
+        # Second derivatives in time of the coordinates at the start or end of each segment, (l, s, d).
+        count = self.places.shape[1]
+        acceleration = unknowns.acceleration[:, side : count + side]
+        return (self.turns[:, :, side] @ acceleration[..., None])[..., 0]
+
+    def border_slopes(self, unknowns: Unknowns) -> np.ndarray:
+        """Derivatives of the outer coordinates that move, by what moves them."""
+        d, time, basis = self.places.shape[-1], unknowns.duration[..., None], self.basis
+        slopes = np.zeros((*unknowns.duration.shape, 4 * d, 1 + 2 * d))
+        for side, sign in ((0, 1.0), (1, -1.0)):
+            near = slice(0, d) if side == 0 else slice(3 * d, 4 * d)
+            far = slice((1 + side) * d, (2 + side) * d)
+            step = sign * basis.end_slope * self.velocities[:, :, side]
+            slopes[:, :, near, 0] = step
+            slopes[:, :, far, 0] = 3.0 * step + 2.0 * basis.end_bend * time * self._second(unknowns, side)
+            columns = slice(1 + side * d, 1 + (1 + side) * d)
+            slopes[:, :, far, columns] = basis.end_bend * time[..., None] ** 2 * self.turns[:, :, side]
+        return slopes
+
+    def border_bends(self, unknowns: Unknowns, push: np.ndarray) -> np.ndarray:
+        """Second derivatives of the outer coordinates, times multipliers."""
+        d, twice = self.places.shape[-1], 2.0 * self.basis.end_bend
+        bends = np.zeros((*unknowns.duration.shape, 1 + 2 * d, 1 + 2 * d))
+        for side in (0, 1):
+            along = push[:, :, (1 + side) * d : (2 + side) * d]
+            bends[:, :, 0, 0] += twice * np.sum(along * self._second(unknowns, side), axis=-1)
+            mixed = twice * unknowns.duration[..., None] * (along[..., None, :] @ self.turns[:, :, side])[..., 0, :]
+            columns = slice(1 + side * d, 1 + (1 + side) * d)
+            bends[:, :, 0, columns] += mixed
+            bends[:, :, columns, 0] += mixed
+        return bends
+
+    def equations(self, unknowns: Unknowns) -> tuple[InstantValues, np.ndarray]:
+        """Equations at all instants."""
+        planes = self.planes
+        count = unknowns.multipliers.shape[-1] - (0 if planes is None else planes.at.shape[-1])
+        equations = instant_values(*self._instants(unknowns), unknowns.multipliers[..., :count])
+        if planes is not None:
+            others = equations.slope.shape[-1] - self.places.shape[-1]
+            slope = np.concatenate([equations.slope, np.pad(-planes.slope, [*[(0, 0)] * 5, (0, others)])], axis=-2)
+            residual = self._with_planes(equations.residual, planes, unknowns)
+            equations = equations._replace(residual=residual, slope=slope)
+        return equations, self._with_values(equations.residual.copy(), unknowns)
+
+    def residual(self, unknowns: Unknowns) -> Float[np.ndarray, "l s m n n_equations"]:
+        """Residuals of the equations at all instants, with all values."""
+        missed, planes = residuals(*self._instants(unknowns)), self.planes
+        return self._with_values(missed if planes is None else self._with_planes(missed, planes, unknowns), unknowns)
+
+    def _with_planes(self, residual: np.ndarray, planes: ClearancePlanes, unknowns: Unknowns) -> np.ndarray:
+        places = self.basis.places(self.controls(unknowns))[..., 0, :]
+        return np.concatenate([residual, -planes.at - np.sum(planes.slope * places[..., None, :], axis=-1)], axis=-1)
+
+    def _instants(self, unknowns: Unknowns) -> tuple[Any, ...]:
+        # Arguments of the equations at all instants, but multipliers.
+        shape = unknowns.values.shape[:-1]
+        return (
+            self.robot,
+            self.limits,
+            self.longest,
+            np.broadcast_to(self.references[:, :, None, None], (*shape, 4)),
+            self.basis.places(self.controls(unknowns)),
+            np.broadcast_to(unknowns.duration[:, :, None, None], shape),
+            unknowns.values[..., : self.robot.n_cables],
+        )
+
+    def _with_values(self, residual: np.ndarray, unknowns: Unknowns) -> np.ndarray:
+        residual[..., self.robot.dof :] += unknowns.values[..., self.robot.n_cables :]
+        return residual

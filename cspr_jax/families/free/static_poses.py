@@ -1,0 +1,40 @@
+"""Poses that no motion can have, whatever leads to them: refused at once, and not searched for."""
+
+import dataclasses
+import functools
+import operator
+
+import numpy as np
+
+from cspr_jax.curves.spline import Spline
+from cspr_jax.families.free.poses import FreePoses
+from cspr_jax.families.free.problem import planned_problem
+from cspr_jax.maps.proved_map import CONTACTS
+from cspr_jax.motion.cause import Cause
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.linear.frames import Frame
+from cspr_jax.robots.contacts.clearance import Scene
+from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.verification.proved_answers import proved_answers
+
+# Criteria of a place alone, which no motion to it meets where it does not; where a robot is to rest, all are.
+_OF_PLACES = (CONTACTS, Verdict.ABOVE_SPOOLS, Verdict.BELOW_FLOOR, Verdict.CABLE_TOO_LONG)
+OF_PLACES = functools.reduce(operator.or_, _OF_PLACES)
+
+
+def first_refused(problem: Problem, scene: Scene | None, poses: FreePoses, frame: Frame) -> tuple[int, Cause] | None:
+    """The first pose that no motion can have."""
+    units = [None] * len(poses.positions) if poses.quaternions is None else list(poses.quaternions)
+    at_rest = [
+        Spline(leaf(np.array([0.0, 1.0])), leaf(position[None, None]), None if unit is None else leaf(unit[None, None]))
+        for position, unit in zip(poses.positions, units, strict=True)
+    ]
+    answers = proved_answers(planned_problem(problem), at_rest, scene)
+    for i in range(len(at_rest)):
+        rests = not (poses.accelerations[i].any() or poses.velocities[i].any())
+        causes = answers.proved_causes(i, frame) if answers.proof[i].broken.any() else ()
+        for cause in causes:
+            if rests or Verdict[cause.criterion.upper()] & OF_PLACES:
+                return i, dataclasses.replace(cause, t=np.nan)
+    return None

@@ -1,0 +1,189 @@
+"""Durations of lines before their proof: by formulas where these hold, by search elsewhere."""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import partial
+from typing import TYPE_CHECKING, Literal
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax.families.lines import s_model as fastest
+from cspr_jax.families.lines.any_limits import least_by_search
+from cspr_jax.families.lines.faces import line_faces, sides
+from cspr_jax.families.lines.lower_bounds import least_durations
+from cspr_jax.families.lines.motion import fixed_law
+from cspr_jax.families.lines.slacks import LineSlacks, line_slacks
+from cspr_jax.motion.amplitudes import Amplitude
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.point_mass import PointMassRobot, in_one_plane, plane_normal
+from cspr_jax.robots.statics.wrench_sets import spanning
+from cspr_jax.schema.limits import LIMITS
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float
+
+BATCH, BATCH_OF_SEARCH = 4096, 16
+Rule = Literal["optimum", "thesis"]
+# Limits that depend on how the effector moves.
+MOVING = tuple(row.name for row in LIMITS if row.of_motion)
+
+
+@dataclasses.dataclass(frozen=True)
+class Durations:
+    """Durations of n lines, (n,) each.
+
+    Fields:
+        duration: T, s; not finite where there is no motion.
+        ratio: p / T.
+        least: no motion along the line is faster, s; 0 where nothing is known.
+        rest: smaller margin of rest of the two ends, m/s^2.
+        depth: smaller depth of the two ends below the plane of the spools, m; inf if the spools have no common plane.
+        is_bounded: whether anything bounds the acceleration.
+        up: number of the bound that holds back the acceleration, in the order of `names_of`.
+        down: likewise of the braking.
+    """
+
+    duration: np.ndarray
+    ratio: np.ndarray
+    least: np.ndarray
+    rest: np.ndarray
+    depth: np.ndarray
+    is_bounded: np.ndarray
+    up: np.ndarray
+    down: np.ndarray
+
+    def part(self, rows: Bool[np.ndarray, "n"]) -> "Durations":
+        """Durations of some of the lines."""
+        return Durations(**{name: value[rows] for name, value in vars(self).items()})
+
+    def replace(self, rows: np.ndarray, part: "Durations") -> None:
+        """Replace the durations of some of the lines."""
+        for name, values in vars(part).items():
+            getattr(self, name)[rows] = values
+
+
+def moving(limits: Limits) -> tuple[str, ...]:
+    """Limits that depend on how the effector moves."""
+    known = [name for name in MOVING if getattr(limits, name) is not None]
+    return tuple(name for name in known if name != "tension_min" or np.asarray(limits.tension_min).any())
+
+
+def names_of(robot: PointMassRobot, limits: Limits) -> tuple[str, ...]:
+    """Names of the bounds along a line."""
+    chosen = spanning(robot.n_cables, robot.dof) + 1
+    cables = ("cables " + ", ".join(map(str, row)) for row in chosen.tolist())
+    return (*cables, "max_acceleration", *moving(limits))
+
+
+def by_formula(
+    robot: PointMassRobot,
+    starts: Float[np.ndarray, "n 3"],
+    ends: Float[np.ndarray, "n 3"],
+    *,
+    law: str,
+    rule: Rule,
+    max_acceleration: float,
+) -> Durations:
+    """Least durations along straight lines under taut cables and the largest acceleration alone."""
+    in_plane, largest = in_one_plane(robot), np.full(len(starts), float(max_acceleration))
+    kernel = partial(_by_formula, robot, law=law, rule=rule, in_plane=in_plane)
+    least, bound, rest, depth, is_bounded = in_batches(kernel, (starts, ends, largest), size=BATCH)
+    duration = least.duration * (1.0 + fastest.LONGER) if in_plane else np.full(len(starts), np.nan)
+    fields = (duration, least.ratio, bound, rest, depth, is_bounded, least.up, least.down)
+    return Durations(*(np.array(x) for x in fields))
+
+
+@jax.jit
+def _lines(problem: Problem, arguments) -> LineSlacks:
+    return jax.vmap(partial(line_slacks, problem))(*arguments)
+
+
+def lines_of(problem: Problem, starts: Float[np.ndarray, "n 3"], ends: Float[np.ndarray, "n 3"]) -> LineSlacks:
+    """Return the coefficients that slacks along lines depend on."""
+    return in_batches(partial(_lines, problem), (starts, ends), size=BATCH)
+
+
+def by_cells(
+    problem: Problem, starts: Float[np.ndarray, "n 3"], ends: Float[np.ndarray, "n 3"], max_acceleration: float
+) -> Float[np.ndarray, "n"]:
+    """Lower bounds of the duration of any motion along lines, under limits of tensions and cables too."""
+    largest = max_acceleration / np.linalg.norm(ends - starts, axis=1)
+    return least_durations(lines_of(problem, starts, ends), largest)
+
+
+def by_search(
+    problem: Problem,
+    starts: Float[np.ndarray, "n 3"],
+    ends: Float[np.ndarray, "n 3"],
+    timings: Durations,
+    *,
+    law: str,
+    max_acceleration: float,
+) -> Durations:
+    """Least durations along straight lines under any limits, of spools in any layout."""
+    moving_problem = problem._replace(
+        limits=Limits(**{name: getattr(problem.limits, name) for name in moving(problem.limits)})
+    )
+    largest = np.full(len(starts), float(max_acceleration))
+    least = in_batches(partial(_by_search, moving_problem, law=law), (starts, ends, largest), size=BATCH_OF_SEARCH)
+    rows = _bounds_of_rows(moving_problem)
+    return dataclasses.replace(
+        timings, duration=least.duration, ratio=least.ratio, up=rows[least.up], down=rows[least.down]
+    )
+
+
+@partial(jax.jit, static_argnames=("rule", "law", "in_plane"))
+def _by_formula(robot: PointMassRobot, arguments, *, law: str, rule: str, in_plane: bool):
+    def one(start, end, largest):
+        faces = line_faces(robot, start, end, in_plane=in_plane)
+        bounds = sides(faces, largest / jnp.linalg.norm(end - start))
+        if law != "s-curve":
+            least = fastest.least_of_law(fixed_law(law), bounds)
+        elif rule == "optimum":
+            least = fastest.least_s_curve(bounds)
+        else:
+            least = fastest.thesis_s_curve(bounds)
+        sizes = jnp.stack([jnp.linalg.norm(faces.normal + t * faces.normal_change, axis=1) for t in (0.0, 1.0)])
+        resting = -jnp.stack([faces.offset, faces.offset + faces.slope]) / jnp.where(sizes > 0.0, sizes, 1.0)
+        there = faces.bounds[None] & jnp.stack([faces.first <= 0.0, faces.last >= 1.0])
+        rest = jnp.min(jnp.where(there, resting, jnp.inf))
+        is_bounded = jnp.isfinite(bounds.up).any() & jnp.isfinite(bounds.down).any()
+        if not in_plane:
+            return least, fastest.least_time(bounds, everywhere=False), rest, jnp.asarray(jnp.inf), is_bounded
+        depth = jnp.minimum(plane_normal(robot) @ start, plane_normal(robot) @ end)
+        return least, fastest.least_time(bounds), rest, depth, is_bounded & faces.bounds.any()
+
+    return jax.vmap(one)(*arguments)
+
+
+def _fixed(law: str) -> Amplitude | None:
+    return None if law == "s-curve" else fixed_law(law)
+
+
+@partial(jax.jit, static_argnames=("law",))
+def _by_search(problem: Problem, arguments, *, law: str):
+    def one(start, end, largest):
+        line = line_slacks(problem, start, end)
+        return least_by_search(line, largest / jnp.linalg.norm(end - start), _fixed(law))
+
+    return jax.vmap(one)(*arguments)
+
+
+def _bounds_of_rows(problem: Problem) -> np.ndarray:
+    # Return the number in `names_of` of each row that can bound a search, see `any_limits.Gain`; faces have two sides.
+    robot, names = problem.robot, names_of(problem.robot, problem.limits)
+    faces, limit_names = 2 * len(spanning(robot.n_cables, robot.dof)), moving(problem.limits)
+    counts = {"tension_min": faces, "tension_max": faces, "cable_speed_max": robot.n_cables}
+    counts |= {"cable_acceleration_max": 2 * robot.n_cables, "speed_max": 1, "acceleration_max": 2}
+    rows = [np.tile(np.arange(faces // 2), 2)]
+    for name, count in counts.items():
+        if name in limit_names:
+            rows.append(np.full(count, names.index(name)))
+        elif name.startswith("tension"):
+            rows.append(np.full(count, -1))  # no face is shifted by a tension without a limit
+    return np.concatenate([*rows, [names.index("max_acceleration")]])

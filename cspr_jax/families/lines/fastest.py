@@ -1,0 +1,188 @@
+"""Fastest motions along straight lines with their verdicts: formulas first, a search where these break a limit."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+
+import numpy as np
+
+from cspr_jax.families.lines.any_limits import LONGER
+from cspr_jax.families.lines.durations import Durations, Rule, by_cells, by_formula, by_search, moving
+from cspr_jax.families.lines.verdicts import TOLERANCE, acceleration_slack, limits_at_rest, verdicts
+from cspr_jax.motion.limits import limits_set
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.batches import in_parts
+from cspr_jax.robots.model.point_mass import in_one_plane, spool_radius
+from cspr_jax.schema.limits import LIMITS
+from cspr_jax.schema.verdicts import FLAGS, Verdict
+from cspr_jax.verification.proved_verdicts import Verdicts
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Lines that a thread works on at a time, where there is something to search or to prove.
+PART = 256
+Rows = TypeVar("Rows", Durations, Verdicts)
+# Ends nearer to each other than this, over the size of the robot, are one place.
+SAME_PLACE = 1e-12
+# Lines that pass a spool nearer than this, over the size of the robot, go through it.
+THROUGH = 1e-9
+# Flags that rest at an end raises: no motion avoids `OF_PLACES` there, and no motion starts with `NO_MOTION`.
+OF_PLACES = sum({row.flag.value for row in LIMITS if not row.of_motion})
+NO_MOTION = (Verdict.SLACK_CABLE | Verdict.OVER_TENSION | Verdict.SINGULAR).value
+# Duration from which on a motion counts as standing still, over the time of a fall by the size of the robot.
+STILL = 1e4
+# Shares of a duration below which the formulas lose the digits of these shares.
+SHORT = 1e-6
+
+
+class Fastest(NamedTuple):
+    """Fastest motions along n lines, (n,) each.
+
+    Fields:
+        durations: finite where there is a motion; 0 where both ends are one place.
+        verdicts: of the motions, or why there is none.
+        moves: whether there is a motion between two places.
+    """
+
+    durations: Durations
+    verdicts: Verdicts
+    moves: np.ndarray
+
+
+def fastest(
+    problem: Problem,
+    starts: Float[np.ndarray, "n 3"],
+    ends: Float[np.ndarray, "n 3"],
+    *,
+    law: str,
+    rule: Rule,
+    max_acceleration: float,
+    sharp: bool,
+) -> Fastest:
+    """Fastest motions along straight lines."""
+    how: dict[str, Any] = {"law": law, "rule": rule, "max_acceleration": max_acceleration, "sharp": sharp}
+    if len(starts) <= PART or (in_one_plane(problem.robot) and not moving(problem.limits)):
+        return _fastest(problem, starts, ends, **how)
+    parts = in_parts(lambda part: _fastest(problem, starts[part], ends[part], **how), len(starts), PART)
+    durations, judgements, moves = zip(*parts, strict=True)
+    return Fastest(_joined(Durations, durations), _joined(Verdicts, judgements), np.concatenate(moves))
+
+
+def _joined(kind: type[Rows], parts: Sequence[Rows]) -> Rows:
+    return kind(*(np.concatenate(columns) for columns in zip(*(vars(part).values() for part in parts), strict=True)))
+
+
+def _fastest(
+    problem: Problem,
+    starts: np.ndarray,
+    ends: np.ndarray,
+    *,
+    law: str,
+    rule: Rule,
+    max_acceleration: float,
+    sharp: bool,
+) -> Fastest:
+    robot, in_plane = problem.robot, in_one_plane(problem.robot)
+    timings = by_formula(robot, starts, ends, law=law, rule=rule, max_acceleration=max_acceleration)
+    judgements, may_move, in_place = _at_rest(problem, starts, ends, timings)
+    judged = partial(verdicts, problem, law=law, max_acceleration=max_acceleration, sharp=sharp)
+    if in_plane:
+        # The durations that the formulas promise without limits need no proof, but where the digits of p or T - p are
+        # lost, or the peak of the acceleration may lie beyond its limit.
+        is_short = (np.minimum(timings.ratio, 1.0 - timings.ratio) < SHORT) & (law == "s-curve")
+        is_within = acceleration_slack(starts, ends, timings, law=law, max_acceleration=max_acceleration) > 0.0
+        rows = np.flatnonzero(may_move & (sharp | bool(limits_set(problem.limits)) | is_short | ~is_within))
+        if len(rows) > 0:
+            judgements.replace(rows, judged(starts[rows], ends[rows], timings.part(rows)))
+    # If a place breaks a limit, no other motion mends it.
+    rows = np.flatnonzero(may_move & in_place & ((judgements.verdict != 0) | ~in_plane))
+    if (moving(problem.limits) or not in_plane) and rule == "optimum" and len(rows) > 0:
+        before, places = timings.part(rows), (starts[rows], ends[rows])
+        searched = by_search(problem, *places, before, law=law, max_acceleration=max_acceleration)
+        reasons = _without_motion(problem, judged, *places, searched, judgements.verdict[rows])
+        durations, part = _proved(judged, *places, searched, reasons)
+        judgements.replace(rows, part)
+        timings.replace(rows, durations)
+    moves = may_move & np.isfinite(timings.duration)
+    rows = np.flatnonzero(moves & (bool(moving(problem.limits)) | (timings.least == 0.0)))
+    if len(rows) > 0:
+        cells = by_cells(problem, starts[rows], ends[rows], max_acceleration)
+        timings.least[rows] = np.maximum(timings.least[rows], cells)
+    return Fastest(timings, judgements, moves)
+
+
+def _at_rest(
+    problem: Problem, starts: np.ndarray, ends: np.ndarray, timings: Durations
+) -> tuple[Verdicts, np.ndarray, np.ndarray]:
+    # Tell why there can be no motion, where there can be one, and where both ends keep the limits on places.
+    doubt = TOLERANCE * float(np.asarray(problem.robot.gravity))
+    size = float(np.abs(np.asarray(problem.robot.base_points)).max())
+    is_same = np.linalg.norm(ends - starts, axis=1) <= SAME_PLACE * size
+    above, slack = ~(timings.depth > 0.0), timings.rest < -doubt
+    flags = np.where(above, Verdict.ABOVE_SPOOLS.value, 0) | np.where(above | slack, Verdict.SLACK_CABLE.value, 0)
+    # If cables are slack, limits of their tensions say nothing more.
+    flags |= limits_at_rest(problem, starts, ends) & np.where(flags == 0, ~0, OF_PLACES)
+    flags |= np.where(_touches(problem, starts, ends), Verdict.SINGULAR.value, 0)
+    rests = (flags == 0) & (timings.rest > doubt)
+    open_ended = np.where(timings.is_bounded, Verdict.UNDECIDED.value, Verdict.NOT_FINITE.value)
+    # With limits on places alone the motion of the formulas is shown all the same.
+    no_motion = NO_MOTION if in_one_plane(problem.robot) else ~0
+    may_move = ~above & (timings.rest > doubt) & ~is_same & timings.is_bounded & ((flags & no_motion) == 0)
+    verdict = np.where(may_move | (rests & is_same), 0, np.where(flags > 0, flags, open_ended)).astype(FLAGS)
+    nothing = np.full(len(starts), np.nan)
+    margin = np.minimum(np.where(above, np.nan, timings.rest), 0.0)
+    return Verdicts(verdict, margin, nothing.copy(), np.full(len(starts), np.inf)), may_move, flags == 0
+
+
+def _touches(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    # Tell whether lines pass through a spool, where a cable has no direction.
+    spools, way = np.asarray(problem.robot.base_points), (ends - starts)[:, None]
+    rays, square = spools[None] - starts[:, None], (way**2).sum(2)
+    part = np.clip((rays * way).sum(2) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
+    apart = np.linalg.norm(rays - part[..., None] * way, axis=2)
+    return (apart <= THROUGH * np.abs(spools).max()).any(1)
+
+
+def _without_motion(
+    problem: Problem,
+    judged: Callable[..., Verdicts],
+    starts: np.ndarray,
+    ends: np.ndarray,
+    timings: Durations,
+    before: np.ndarray,
+) -> np.ndarray:
+    # Return the flags of lines along which a search finds no motion: those of a motion that nearly stands still, else
+    # those of the motion by formulas.
+    flags, rows = before.copy(), np.flatnonzero(~np.isfinite(timings.duration))
+    if len(rows):
+        long = np.linalg.norm(ends - starts, axis=1) + float(spool_radius(problem.robot))
+        still = np.sqrt(long / float(np.asarray(problem.robot.gravity))) * STILL
+        slow = dataclasses.replace(timings, duration=still, ratio=np.full(len(still), 0.5)).part(rows)
+        slower = judged(starts[rows], ends[rows], slow).verdict
+        is_telling = (slower != 0) & (slower != Verdict.UNDECIDED.value)
+        flags[rows] = np.where(is_telling, slower, flags[rows])
+    return flags
+
+
+def _proved(
+    judged: Callable[..., Verdicts], starts: np.ndarray, ends: np.ndarray, timings: Durations, before: np.ndarray
+) -> tuple[Durations, Verdicts]:
+    # Make the durations of a search longer until they are proved; without a motion, the flags from before stand.
+    nothing = np.full(len(starts), np.nan)
+    flags = np.where(before > 0, before, Verdict.UNDECIDED.value).astype(FLAGS)
+    judgements = Verdicts(flags, nothing.copy(), nothing.copy(), np.full(len(starts), np.inf))
+    durations = timings.part(np.arange(len(starts)))
+    durations.duration[~np.isfinite(timings.duration)] = np.nan
+    rows = np.flatnonzero(np.isfinite(timings.duration))
+    for longer in LONGER:
+        if len(rows) == 0:
+            break
+        durations.duration[rows] = timings.duration[rows] * (1.0 + longer)
+        part = judged(starts[rows], ends[rows], durations.part(rows))
+        judgements.replace(rows, part)
+        rows = rows[part.verdict != 0]
+    return durations, judgements

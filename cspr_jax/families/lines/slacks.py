@@ -1,0 +1,200 @@
+"""Slacks of taut cables and of limits along a straight line, as functions of s, s'^2 and s''.
+
+On the line a cable has the length l = sqrt(|D|^2 (s - c)^2 + h^2), the rate |D|^2 (s - c) / l times s', and a second
+derivative with h^2 / l^3. Every slack here is affine in s'^2 and s'', so that for one law it is affine in 1 / T^2. The
+formulas are written once: arrays go in where a motion is searched, interval jets where it is proved.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.families.lines.faces import line_faces
+from cspr_jax.motion.limits import limits_set
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.bounds.interval_jets import Jet
+from cspr_jax.robots.statics.wrench_sets import tension_range
+from cspr_jax.schema.limits import LIMITS
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float
+
+TAUT = "taut"
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class LineSlacks:
+    """Coefficients that slacks along a line depend on.
+
+    Fields:
+        square: () |D|^2, m^2.
+        nearest: (n_cables,) s at which each cable is shortest, beyond the ends too.
+        apart: (n_cables,) square of its length there, m^2.
+        steepness: (n_faces,) n . D of the faces of both sides, over the size of n at its smallest on the line.
+        offset: (n_faces,) n . g at the start, likewise; -inf of what bounds nothing.
+        slope: (n_faces,) change of n . g, likewise.
+        along: (n_faces, n_cables) n . r of the rays at the start, likewise.
+        along_change: (n_faces, n_cables) its change, likewise.
+        normal_change_square: (n_faces,) square of the size of the change of n, likewise.
+        narrowest: (n_faces,) s at which n is smallest, beyond the ends too.
+        least_size: (n_faces,) square of the size of n there, likewise.
+        spans: (n_faces,) whether the cables of the face span it.
+        low: smallest tensions over the mass by group of faces, (n_cables,) m/s^2 each.
+        high: likewise the largest, inf for none.
+        largest: of the limits that depend on how the effector moves, by name; (n_cables,) of cables, else (1,).
+    """
+
+    square: Array
+    nearest: Array
+    apart: Array
+    steepness: Array
+    offset: Array
+    slope: Array
+    along: Array
+    along_change: Array
+    normal_change_square: Array
+    narrowest: Array
+    least_size: Array
+    spans: Array
+    low: dict[str, Array]
+    high: dict[str, Array]
+    largest: dict[str, Array]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Groups of slacks: taut cables, and the limits in their order."""
+        known = {*self.low, *self.largest}
+        return tuple(name for name in (TAUT, *(row.name for row in LIMITS)) if name in known)
+
+    @property
+    def tightest(self) -> str:
+        """Group of faces inside which all the others lie."""
+        return [name for name in self.names if name in self.low][-1]
+
+
+def line_slacks(problem: Problem, start: Float[Array, "3"], end: Float[Array, "3"]) -> LineSlacks:
+    """Return the coefficients that slacks along a line depend on."""
+    robot, direction = problem.robot, end - start
+    faces = line_faces(robot, start, end, in_plane=False)
+    square = direction @ direction
+    rays = robot.base_points - start[None]
+    nearest = rays @ direction / square
+    apart = jnp.sum((rays - nearest[:, None] * direction[None]) ** 2, axis=1)
+    change = jnp.sum(faces.normal_change**2, axis=1)
+    narrowest = -jnp.sum(faces.normal * faces.normal_change, axis=1) / jnp.where(change > 0.0, change, 1.0)
+    least = jnp.sum((faces.normal + narrowest[:, None] * faces.normal_change) ** 2, axis=1)
+    at = jnp.clip(narrowest, 0.0, 1.0)
+    size = jnp.linalg.norm(faces.normal + at[:, None] * faces.normal_change, axis=1)
+    spans = (size > 0.0) & ((faces.along != 0.0) | (faces.along_change != 0.0)).any(1)
+    over = jnp.where(spans, size, 1.0)
+    low, high = _tensions(problem)
+    return LineSlacks(
+        square=square,
+        nearest=nearest,
+        apart=apart,
+        steepness=faces.steepness / over,
+        offset=jnp.where(spans, faces.offset / over, -jnp.inf),
+        slope=faces.slope / over,
+        along=faces.along / over[:, None],
+        along_change=faces.along_change / over[:, None],
+        normal_change_square=change / over**2,
+        narrowest=narrowest,
+        least_size=least / over**2,
+        spans=spans,
+        low=low,
+        high=high,
+        largest={
+            row.name: jnp.broadcast_to(getattr(problem.limits, row.name), (robot.n_cables if row.per_cable else 1,))
+            for row in limits_set(problem.limits)
+            if row.of_motion and row.quantity != "tension"
+        },
+    )
+
+
+def _tensions(problem: Problem) -> tuple[dict[str, Array], dict[str, Array]]:
+    # The group of the largest tension keeps the smallest tension too.
+    robot, none = problem.robot, jnp.zeros(problem.robot.n_cables)
+    least, most = tension_range(robot, problem.limits)
+    low, high = {TAUT: none}, {TAUT: none + jnp.inf}
+    if problem.limits.tension_min is not None:
+        low["tension_min"], high["tension_min"] = least / robot.mass, none + jnp.inf
+    if problem.limits.tension_max is not None:
+        low["tension_max"], high["tension_max"] = least / robot.mass, most / robot.mass
+    return low, high
+
+
+class Instants(NamedTuple):
+    """State of a motion along a line: arrays, or jets over blocks; their last dimension has length 1.
+
+    Fields:
+        s: path coordinate.
+        speed: s'^2, 1/s^2.
+        bend: s'', 1/s^2.
+    """
+
+    s: Any
+    speed: Any
+    bend: Any
+
+
+def slacks(line: LineSlacks, name: str, at: Instants, tensions: Any = None) -> Any:
+    """Slacks of a group at instants, or a lower bound of them."""
+    if name == "speed_max":
+        return 1.0 - at.speed * (line.square[..., None] / line.largest[name] ** 2)
+    if name == "acceleration_max":
+        share = at.bend * (line.square[..., None] ** 0.5 / line.largest[name])
+        return joined(1.0 - share, 1.0 + share)
+    away = at.s - line.nearest
+    square = line.square[..., None]
+    length2 = away**2 * square + line.apart
+    if name == "cable_speed_max":
+        return 1.0 - away**2 * length2**-1.0 * at.speed * (square / line.largest[name]) ** 2
+    if name == "cable_acceleration_max":
+        second = length2**-1.5 * at.speed * (square * line.apart) + away * length2**-0.5 * at.bend * square
+        return joined(1.0 - second / line.largest[name], 1.0 + second / line.largest[name])
+    slack = at.bend * line.steepness - at.s * line.slope - line.offset
+    if tensions is not None:
+        slack = slack - _pulled(line, at.s, length2**-0.5, tensions)
+    size2 = (at.s - line.narrowest) ** 2 * line.normal_change_square + line.least_size
+    return slack * size2**-0.5
+
+
+def _pulled(line: LineSlacks, s: Any, shortness: Any, tensions: Any) -> Any:
+    # Return the pull of the cables towards the inside of each face, over the mass.
+    if isinstance(s, Jet):
+        return ((s.expanded(-1) * line.along_change + line.along) * shortness.expanded(-2) * tensions).summed()
+    return ((line.along + line.along_change * s[..., None]) * tensions * shortness[..., None, :]).sum(-1)
+
+
+def tensions_at(line: LineSlacks, name: str, s: Any) -> Any:
+    """Tensions within their limits that pull least towards the inside of each face."""
+    xp = np if isinstance(s, np.ndarray) else jnp
+    low, high = line.low[name][..., None, :], line.high[name][..., None, :]
+    along = line.along + line.along_change * s[..., None]
+    return xp.where(along > 0.0, low, xp.where(along < 0.0, high, 0.0))
+
+
+def tensions_over(
+    line: LineSlacks, name: str, first: Float[np.ndarray, "n 1"], last: Float[np.ndarray, "n 1"]
+) -> tuple[Float[np.ndarray, "n n_faces n_cables"], Bool[np.ndarray, "n n_faces"]]:
+    """One choice of tensions for all of a stretch, with which slacks are bounded from below."""
+    low, high = line.low[name][:, None, :], line.high[name][:, None, :]
+    ends = [line.along + line.along_change * s[..., None] for s in (first, last)]
+    endless = ~np.isfinite(high)
+    beyond = ((ends[0] < 0.0) & (ends[1] < 0.0) & endless).any(-1)
+    return np.where((ends[0] + ends[1] < 0.0) & ~endless, high, low), np.asarray(beyond | ~line.spans)
+
+
+def joined(first: Any, second: Any) -> Any:
+    """Rows of two groups in one."""
+    if isinstance(first, Jet):
+        return first.joined(second)
+    xp = np if isinstance(first, np.ndarray) else jnp
+    return xp.concatenate([first, second], axis=-1)

@@ -1,0 +1,95 @@
+"""Straight lines from rest to rest in the least time: arrays of ends in, answers out."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+import jax
+import numpy as np
+
+from cspr_jax.families.lines.durations import Rule, names_of
+from cspr_jax.families.lines.fastest import fastest
+from cspr_jax.families.lines.motion import TimedLine
+from cspr_jax.families.lines.verdicts import laws_of
+from cspr_jax.motion.answers import Answers
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.elementary import leaf
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+
+@dataclasses.dataclass(frozen=True)
+class LineAnswers(Answers):
+    """Answers of straight lines, one each.
+
+    Fields:
+        acceleration_time: (n,) p, s.
+        least_duration: (n,) no motion along the line is faster, s.
+        active: (n, 2) numbers, from 1 on, of the bounds that hold back the acceleration and the braking; 0: none.
+        names: of the bounds, in the order of their numbers.
+    """
+
+    acceleration_time: np.ndarray
+    least_duration: np.ndarray
+    active: np.ndarray
+    names: tuple[str, ...] = ()
+
+    @property
+    def feasible(self) -> np.ndarray:
+        """Tell whether each line is proved feasible, (n,)."""
+        return self.verdict == 0
+
+    def details(self, i: int) -> dict[str, Any]:
+        """Details of a segment; see `Answers.details`."""
+        active = dict.fromkeys(self.names[k - 1] for k in self.active[i] if k > 0)
+        return {
+            "acceleration_time": float(self.acceleration_time[i]),
+            "active": list(active),
+            "least_duration": float(self.least_duration[i]),
+            "arcs": None,
+            "tried_arcs": None,
+        }
+
+
+def timed_lines(
+    problem: Problem,
+    starts: Float[np.ndarray, "n 3"],
+    ends: Float[np.ndarray, "n 3"],
+    *,
+    law: str = "s-curve",
+    rule: Rule = "optimum",
+    max_acceleration: float = np.inf,
+) -> LineAnswers:
+    """The fastest motions along straight lines by a law of time, proved."""
+    timings, judgements, moves = fastest(
+        problem, starts, ends, law=law, rule=rule, max_acceleration=max_acceleration, sharp=True
+    )
+    none, nothing = np.zeros(len(starts), int), np.full(len(starts), np.nan)
+    duration = np.where(moves, timings.duration, np.nan)
+    return LineAnswers(
+        none,
+        none,
+        judgements.verdict,
+        duration,
+        judgements.margin,
+        judgements.bound,
+        judgements.room,
+        *(nothing, nothing, nothing),
+        np.where(moves, timings.ratio, 0.5) * duration,
+        np.where(moves, timings.least, np.nan),
+        np.stack([np.where(moves, x + 1, 0) for x in (timings.up, timings.down)], axis=1),
+        names_of(problem.robot, problem.limits),
+    )
+
+
+def motions_of(
+    answers: LineAnswers, starts: Float[np.ndarray, "n 3"], ends: Float[np.ndarray, "n 3"], *, law: str
+) -> list[TimedLine]:
+    """Motions along straight lines."""
+    with np.errstate(invalid="ignore"):
+        ratios = answers.acceleration_time / answers.duration
+    laws = laws_of(law, np.where(np.isfinite(ratios), ratios, 0.5))
+    rows = (starts, ends - starts, laws, answers.duration)
+    return [TimedLine(*jax.tree.map(lambda x, i=i: leaf(x[i]), rows)) for i in range(len(starts))]

@@ -1,0 +1,132 @@
+"""Verdicts of motions along straight lines: proved where every slack has a bound above zero, refuted by one below."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax.families.lines.durations import BATCH, Durations, lines_of
+from cspr_jax.families.lines.motion import fixed_law, largest_bend, s_curve
+from cspr_jax.families.lines.proof import smallest_slacks
+from cspr_jax.families.lines.slacks import TAUT
+from cspr_jax.motion.acceleration_sets import faces_at
+from cspr_jax.motion.amplitudes import Amplitude
+from cspr_jax.motion.limits import limits_set, scales, slack
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.point_mass import spool_radius
+from cspr_jax.schema.limits import LIMITS
+from cspr_jax.schema.verdicts import FLAGS, Verdict
+from cspr_jax.verification.proved_verdicts import Verdicts, plain_slack
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Margins nearer to zero, over gravity or a limit's size, are undecided; rest with a smaller margin does not count.
+TOLERANCE = 1e-12
+
+
+@jax.jit
+def _s_curves(ratios) -> Amplitude:
+    return jax.vmap(s_curve)(ratios)
+
+
+def laws_of(law: str, ratios: Float[np.ndarray, "n"]) -> Amplitude:
+    """Laws of time."""
+    if law == "s-curve":
+        return in_batches(_s_curves, ratios, size=BATCH)
+    one = jax.tree.map(np.asarray, fixed_law(law))
+    return jax.tree.map(lambda x: np.broadcast_to(x, (len(ratios), *x.shape)), one)
+
+
+def acceleration_slack(
+    starts: Float[np.ndarray, "n 3"],
+    ends: Float[np.ndarray, "n 3"],
+    timings: Durations,
+    *,
+    law: str,
+    max_acceleration: float,
+) -> Float[np.ndarray, "n"]:
+    """Slack of the largest acceleration along lines: a closed form, since the peak of s'' of each law is known."""
+    largest = np.linalg.norm(ends - starts, axis=1) * largest_bend(law, timings.ratio)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return 1.0 - largest / timings.duration**2 / max_acceleration
+
+
+def verdicts(
+    problem: Problem,
+    starts: Float[np.ndarray, "n 3"],
+    ends: Float[np.ndarray, "n 3"],
+    timings: Durations,
+    *,
+    law: str,
+    max_acceleration: float,
+    sharp: bool,
+) -> Verdicts:
+    """Verdicts of motions whose durations are known."""
+    gravity = float(np.asarray(problem.robot.gravity))
+    lines = lines_of(problem, starts, ends)
+    enough = np.inf if sharp else TOLERANCE
+    proved = smallest_slacks(lines, laws_of(law, timings.ratio), timings.duration, gravity, enough=enough)
+    doubt = TOLERANCE * np.array([gravity if name in lines.low else 1.0 for name in lines.names])
+    own_flags = {row.name: row.flag.value for row in LIMITS} | {TAUT: Verdict.SLACK_CABLE.value}
+    flags = np.where(proved.attained < -doubt, [own_flags[name] for name in lines.names], 0)
+    room, broken, doubtful = _at_ends(problem, starts, ends)
+    for name, values in zip(lines.names[1:], proved.attained.T[1:], strict=True):
+        room = np.minimum(room, plain_slack(name, values / gravity if name.startswith("tension") else values))
+    broken |= np.bitwise_or.reduce(flags, axis=1)
+    is_within = acceleration_slack(starts, ends, timings, law=law, max_acceleration=max_acceleration) > TOLERANCE
+    is_open = ~(proved.bound > doubt).all(1) | doubtful | ~is_within
+    verdict = np.where(broken > 0, broken, np.where(is_open, Verdict.UNDECIDED.value, 0)).astype(FLAGS)
+    return Verdicts(verdict, proved.attained[:, 0], proved.bound[:, 0], room)
+
+
+def _at_ends(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    # Return smallest slacks, flags and doubts, (n,) each, of limits on places, which the ends decide: lengths are
+    # convex in s, depths linear.
+    robot, places = problem.robot, np.stack([starts, ends], axis=1)
+    lengths = np.linalg.norm(places[:, :, None] - np.asarray(robot.base_points), axis=3)
+    each: dict[str, Any] = {"depth": places[..., 2:], "length": lengths}
+    scale: Any = scales(robot.n_cables, robot.mass * robot.gravity, spool_radius(robot))
+    room, flags = np.full(len(starts), np.inf), np.zeros(len(starts), int)
+    for row in limits_set(problem.limits):
+        if not row.of_motion:
+            limit: Any = np.asarray(getattr(problem.limits, row.name))
+            smallest = np.asarray(slack(row, limit, each[row.quantity], scale)).min((1, 2))
+            room, flags = np.minimum(room, smallest), flags | np.where(smallest < -TOLERANCE, row.flag.value, 0)
+    return room, flags, ~(room > TOLERANCE)
+
+
+def limits_at_rest(
+    problem: Problem, starts: Float[np.ndarray, "n 3"], ends: Float[np.ndarray, "n 3"]
+) -> Float[np.ndarray, "n"]:
+    """Limits that rest at either end breaks."""
+    _, flags, _ = _at_ends(problem, starts, ends)
+    limits = {
+        row.name: getattr(problem.limits, row.name) for row in limits_set(problem.limits) if row.quantity == "tension"
+    }
+    fails = partial(_fails_at_rest, problem, starts, ends)
+    alone = {name: fails({name: limit}) for name, limit in limits.items()}
+    for row in limits_set(problem.limits):
+        flags |= np.where(alone.get(row.name, False), row.flag.value, 0)
+    if len(limits) > 1:  # of two limits that fail only together, the largest is named
+        together = fails(limits) & ~np.any(list(alone.values()), axis=0)
+        flags |= np.where(together, Verdict.OVER_TENSION.value, 0)
+    return flags
+
+
+def _fails_at_rest(problem: Problem, starts: np.ndarray, ends: np.ndarray, limits: dict[str, Any]) -> np.ndarray:
+    # Tell whether rest at either end breaks limits of the tensions, or taut cables, (n,).
+    limited = problem._replace(limits=Limits(**limits))
+    margins = [in_batches(partial(_at_rest, limited), places, size=BATCH) for places in (starts, ends)]
+    return np.min(margins, axis=0) < -TOLERANCE * float(np.asarray(problem.robot.gravity))
+
+
+@jax.jit
+def _at_rest(problem: Problem, places):
+    return jax.vmap(lambda x: faces_at(problem.robot, problem.limits, x).margin(jnp.zeros_like(x)))(places)

@@ -1,0 +1,255 @@
+"""Answers of segments of paths: durations beside lower bounds, what binds, and where no motion passes."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+import operator
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from cspr_jax.families.paths.least_time.least_time import LeastTime
+from cspr_jax.families.paths.least_time.refusals import NoMotion
+from cspr_jax.families.paths.least_time.static_tension import StaticTension
+from cspr_jax.families.paths.least_time.tightening import BindingName
+from cspr_jax.motion.cause import Cause
+from cspr_jax.numerics.linear.frames import Frame
+from cspr_jax.schema.limits import LIMITS
+from cspr_jax.schema.verdicts import Verdict, criterion_words
+from cspr_jax.verification.proved_answers import ProvedAnswers
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# An acceleration jumps where it changes by more than this part of the largest one; digits of numbers in lines, and
+# decimals of places, m.
+JUMP, DIGITS, PLACES = 0.01, 4, 5
+# Criteria that are named at most for what binds.
+MOST_BINDING = 10
+# Flags of what a slower motion may mend.
+OF_SPEED = functools.reduce(operator.or_, (row.flag for row in LIMITS if row.of_motion), Verdict.WRENCH_INFEASIBLE)
+
+
+class SectionAnswer(NamedTuple):
+    """Section of a leg with its motion.
+
+    Fields:
+        least: its motion.
+        segments: (n_cells,) number of the segment in which each cell lies.
+        ramp_time: of the plan, s.
+        before: number of segments of the plan before the leg.
+    """
+
+    least: LeastTime
+    segments: np.ndarray
+    ramp_time: float
+    before: int = 0
+
+    def times(self, segment: int) -> Float[np.ndarray, "n_cells"]:
+        """Times that its cells take in a segment."""
+        return np.where(self.segments == segment, np.diff(np.asarray(self.least.motion.knots)), 0.0)
+
+    @property
+    def ends(self) -> tuple[int, int]:
+        """Numbers of the segments in which it begins and ends."""
+        return int(self.segments[0]), int(self.segments[-1])
+
+    @property
+    def jumps(self) -> int:
+        """Number of instants at which the acceleration jumps, those where it sets off from rest or stops included."""
+        motion, width = self.least.motion, np.diff(np.asarray(self.least.motion.knots))
+        points = np.asarray(motion.position)
+        bends = np.linalg.norm(np.diff(points, 2, axis=1), axis=2) / width[:, None] ** 2
+        slopes = np.linalg.norm(np.diff(points, axis=1), axis=2)
+        at_rest = slopes[[0, -1], [0, -1]] <= JUMP * slopes.max()
+        at_ends = at_rest & (bends[[0, -1], [0, -1]] > JUMP * bends.max())
+        return len(motion.jumps(JUMP)) + int(at_ends.sum())
+
+    def to_dict(self) -> dict[str, Any]:
+        """The section as a plan's JSON has it."""
+        least = self.least
+        points = np.asarray(least.motion.position)
+        nodes = np.concatenate([points[:, 0], points[-1:, -1]])
+        lowest = float(np.nanmax(least.plane.low, initial=0.0))
+        return {
+            "segments": [self.before + segment for segment in self.ends],
+            "length": float(np.linalg.norm(np.diff(nodes, axis=0), axis=1).sum()),
+            "duration": least.duration,
+            "lower_bound": least.lower_bound,
+            "gap": 1.0 - least.lower_bound / least.duration,
+            "ramp_time": least.ramp_time,
+            "ramp_cost": least.duration / least.jumping - 1.0 if least.ramp_time else math.nan,
+            "path_deviation": least.deviation,
+            "least_speed": lowest or None,
+            "binding": _binding([(least, np.diff(np.asarray(least.motion.knots)))]),
+            "jumps": self.jumps,
+        }
+
+
+def _binding(parts: Iterable[tuple[LeastTime, np.ndarray]]) -> list[dict[str, Any]]:
+    # Tell what binds, the longest first, over cells that take these times.
+    shares, total = dict[BindingName, float](), 0.0
+    for least, times in parts:
+        total += float(times.sum())
+        for k, name in enumerate(least.names):
+            shares[name] = shares.get(name, 0.0) + float(times[least.binds == k].sum())
+    order = sorted((name for name in shares if shares[name] > 0.0), key=lambda name: -shares[name])
+    return [
+        {"criterion": name.criterion, "cable": name.cable, "words": name.words, "share": shares[name] / total}
+        | ({"feed": name.feed} if name.feed else {})
+        for name in order[:MOST_BINDING]
+    ]
+
+
+def feeds_of(sections: Iterable[SectionAnswer], segment: int) -> Float[np.ndarray, "pieces"]:
+    """Feeds of the pieces of a segment's motion."""
+    return np.concatenate([section.least.feed[section.segments == segment] for section in sections])
+
+
+@dataclasses.dataclass(frozen=True)
+class PathCause(Cause):
+    """A place that no path speed passes, or an end whose speed is not possible.
+
+    Fields:
+        s: of the place, from the start of its section, m.
+        position: the place, in the axes of the robot file, m.
+        needs: whether the criterion needs the acceleration, and the other one forbids it.
+        against: flag and cable of the other one; None: the speeds from which the rest of the path can be run along.
+        end: "start" or "end" of the section, else "".
+        speeds: smallest and largest possible speed of such an end, m/s.
+        static_tension: tension that keeps the robot from standing still there; None: it can.
+    """
+
+    s: float = math.nan
+    position: tuple[float, ...] = ()
+    needs: bool = True
+    against: tuple[str, int | None] | None = None
+    end: str = ""
+    speeds: tuple[float, float] = (math.nan, math.nan)
+    static_tension: StaticTension | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """The cause as a plan's JSON has it; see `Cause.to_dict`."""
+        table = super().to_dict() | {"s": self.s, "position": list(self.position)}
+        table["still"] = None if self.static_tension is None else self.static_tension.to_dict()
+        if self.end:
+            return table | {"end": self.end, "speeds": list(self.speeds)}
+        criterion, cable = self.against or (None, None)
+        return table | {"needs": self.needs, "against": {"criterion": criterion, "cable": cable}}
+
+    @property
+    def text(self) -> str:
+        """The cause in words, in one line."""
+        position, static, line = _coordinates(self.position), self.static_tension, ""
+        if static is not None:
+            line = f"cannot stand still at ({_coordinates(static.position.tolist())}): {static.text}; "
+        if self.end:
+            low, high = (_shown(speed) for speed in self.speeds)
+            speed = f"{self.end}_speed = {_shown(self.needed)} m/s"
+            return f"{line}{speed} is not possible at ({position}): from {low} to {high} m/s are"
+        one = _limit(self.criterion, self.cables[0] if self.cables else None)
+        line += f"no path speed passes s = {_shown(self.s)} m at ({position})"
+        if not math.isfinite(self.needed):
+            return f"{line}: {one} cannot be kept there"
+        other = "the way on" if self.against is None else _limit(*self.against)
+        needing, allowing = (one, other) if self.needs else (other, one)
+        return (
+            f"{line}: {needing} needs {_shown(self.needed)} m/s² or more along the path, {allowing} allows "
+            f"{_shown(self.allowed)} or less"
+        )
+
+
+def _limit(criterion: str, cable: int | None) -> str:
+    return f"the {criterion_words(Verdict[criterion.upper()], cable)}"
+
+
+def _coordinates(position: Iterable[float]) -> str:
+    return ", ".join(_shown(round(value, PLACES)) for value in position)
+
+
+def _shown(value: float) -> str:
+    return f"{round(value, 9) + 0.0:.{DIGITS}g}"
+
+
+@dataclasses.dataclass(frozen=True)
+class PathAnswers(ProvedAnswers):
+    """Answers of segments of paths.
+
+    Fields:
+        sections: (n,) for each segment all sections that run through it.
+    """
+
+    sections: np.ndarray
+
+    def details(self, i: int) -> dict[str, Any]:
+        """Bounds of the least time, what binds, and details of proofs; see `Answers.details`."""
+        through = self.sections[i]
+        is_whole = all(section.ends == (i, i) for section in through)
+        bound = sum(section.least.lower_bound for section in through) if is_whole else math.nan
+        return super().details(i) | {
+            "lower_bound": bound,
+            "gap": 1.0 - bound / float(self.duration[i]),
+            "binding": _binding((section.least, section.times(i)) for section in through),
+            "sections": [section.to_dict() for section in through if section.ends[1] == i],
+        }
+
+    def every_section(self) -> list[SectionAnswer]:
+        """All sections; see `Answers.every_section`."""
+        return [section for i, through in enumerate(self.sections) for section in through if section.ends[0] == i]
+
+    def notes(self, key: str = "path.ramp_time") -> list[str]:
+        """Say in one line where ramps are shorter than they are to be."""
+        known = self.every_section()
+        missing = [s for s in known if s.least.failure is None and s.least.ramp_time < (1.0 - JUMP) * s.ramp_time]
+        if not missing:
+            return []
+        jumping = sum(section.least.ramp_time == 0.0 for section in missing)
+        shortest = min((s.least.ramp_time for s in missing if s.least.ramp_time > 0.0), default=0.0)
+        where = f" in {len(missing)} of {len(known)} sections" if len(known) > 1 else ""
+        words = [f"shorter ones, of {_shown(shortest)} s or more, stand in for them"] if shortest else []
+        words += ["accelerations jump" + (f" in {jumping}" if jumping < len(missing) else "")] if jumping else []
+        return [
+            f"{key} = {_shown(missing[0].ramp_time)} s: no ramps of that length were found{where}: {'; '.join(words)}"
+        ]
+
+    def proved_causes(self, i: int, frame: Frame) -> tuple[Cause, ...]:
+        """Places that no path speed passes, then what no other speed mends; see `Answers.proved_causes`."""
+        usual, places, before = super().proved_causes(i, frame), list[Cause](), 0.0
+        for section in self.sections[i]:
+            times, failure = section.times(i), section.least.failure
+            if failure is not None:
+                node = int(np.argmin(np.abs(section.least.coordinate - failure.coordinate)))
+                is_inside = section.segments[min(node, len(times) - 1)] == i
+                t = before + float(times[:node].sum()) if is_inside else math.nan
+                places.append(_cause_of(failure, t, usual[0], frame))
+            before += float(times.sum())
+        if not places:
+            return usual
+        return (*places, *(cause for cause in usual if not Verdict[cause.criterion.upper()] & OF_SPEED))
+
+
+def _cause_of(failure: NoMotion, t: float, usual: Cause, frame: Frame) -> PathCause:
+    # An end whose speed is refused has the criterion of the slow motion.
+    names = failure.names or ((Verdict[usual.criterion.upper()], None),)
+    needs = names[0] is not None
+    (criterion, cable), *others = [name for name in names if name is not None]
+    against = (others[0][0].text, others[0][1]) if others else None
+    static = failure.static_tension
+    return PathCause(
+        criterion=criterion.text,
+        cables=() if cable is None else (cable,),
+        t=t,
+        needed=failure.needed,
+        allowed=failure.allowed,
+        unit="m/s" if failure.end else "m/s^2",
+        s=failure.coordinate,
+        position=tuple(frame.outward(failure.position).tolist()),
+        needs=needs,
+        against=against,
+        end=failure.end,
+        speeds=failure.speeds,
+        static_tension=None if static is None else static._replace(position=frame.outward(static.position)),
+    )

@@ -1,0 +1,140 @@
+"""Sections of paths: curves over the path coordinate s, without corners, made of quintic Hermite pieces."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from scipy.interpolate import BPoly
+
+from cspr_jax.curves.interpolation import continuous, hermite, interpolated
+from cspr_jax.curves.spline import Spline
+from cspr_jax.numerics.elementary import leaf
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Orientations that differ by less are one orientation; half of the angle, rad.
+SAME_ORIENTATION = 1e-12
+# Largest half of an angle by which a piece turns, rad; a quintic misses a turn at a constant rate by 4e-7 of it.
+LARGEST_TURN = 0.5
+
+
+class Section(NamedTuple):
+    """Part of a path without corners, along which a motion need not stop.
+
+    Fields:
+        curve: positions and orientations over s, m, in place of time; continuous, with its first derivative; NumPy
+            leaves. Its second derivative may jump between pieces.
+        speed: (pieces,) largest speed that is allowed there, m/s; inf without one.
+        marks: (k,) values of s at which it passes its points, the first 0, the last its length; each is a knot.
+        feeds: such speeds as G-code has them, by their values in m/s.
+    """
+
+    curve: Spline
+    speed: np.ndarray
+    marks: np.ndarray
+    feeds: Mapping[float, str] = MappingProxyType({})
+
+
+class SectionSettings(NamedTuple):
+    """SectionSettings of the motion along a section.
+
+    Fields:
+        grid: number of cells.
+        ramp_time: time in which accelerations rise and fall, s; 0: they jump.
+        start_speed: speed at its start, that of the place and not of s, m/s.
+        end_speed: speed at its end, likewise, m/s.
+    """
+
+    grid: int
+    ramp_time: float
+    start_speed: float = 0.0
+    end_speed: float = 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Track:
+    """Places of a section, as nodes of Hermite pieces.
+
+    Fields:
+        s: (n,) increasing, from 0; two nodes at one s where the second derivative jumps.
+        place: (n, 3) m.
+        first: (n, 3) derivative with respect to s.
+        second: (n, 3) second derivative, 1/m.
+        speed: (n - 1,) largest speed of each piece, m/s; also of the empty ones.
+        marks: (k,) s of its points, each one of `s`.
+    """
+
+    s: np.ndarray
+    place: np.ndarray
+    first: np.ndarray
+    second: np.ndarray
+    speed: np.ndarray
+    marks: np.ndarray
+
+    def table(self) -> Float[np.ndarray, "m 6 3"]:
+        """Bernstein coefficients of the pieces that are not empty."""
+        return hermite(self.s, [self.place, self.first, self.second])
+
+    def refined(self, s: Float[np.ndarray, "k"]) -> "Track":
+        """The same track with more nodes."""
+        knots, behind = np.unique(self.s), np.searchsorted(self.s, s)
+        curve = BPoly(np.moveaxis(self.table(), 1, 0), knots)
+        added = {
+            name: np.insert(getattr(self, name), behind, curve(s, order), axis=0)
+            for order, name in enumerate(("place", "first", "second"))
+        }
+        speed = np.insert(self.speed, behind - 1, self.speed[behind - 1])
+        return dataclasses.replace(self, s=np.insert(self.s, behind, s), speed=speed, **added)
+
+
+def section_of(track: Track, quaternions: Float[np.ndarray, "k 4"] | None = None) -> Section:
+    """Section of a track and of orientations at its marks.
+
+    Between two marks the orientation turns at a constant rate, about one axis; through more it is a C2 spline.
+    """
+    turning = None
+    if quaternions is not None:
+        units = continuous(quaternions)
+        halves = half_angles(units)
+        steady = len(units) == 2
+        if steady:
+            track = track.refined(_between(track.s, LARGEST_TURN * track.s[-1] / max(halves[0], LARGEST_TURN)))
+        if halves.max() <= SAME_ORIENTATION:
+            turning = np.broadcast_to(units[0], (int((np.diff(track.s) > 0.0).sum()), 6, 4))
+        elif steady:
+            turning = hermite(track.s, turn(units, track.s / track.s[-1], track.s[-1]))
+        else:
+            rates = interpolated(track.marks, np.zeros((len(units), 3)), units, ends="natural")
+            curve = BPoly(np.moveaxis(np.asarray(rates.quaternion), 1, 0), track.marks)
+            turning = hermite(track.s, [curve(track.s, order) for order in range(3)])
+    curve = Spline(leaf(np.unique(track.s)), leaf(track.table()), None if turning is None else leaf(turning))
+    return Section(curve, track.speed[np.diff(track.s) > 0.0], track.marks)
+
+
+def _between(s: np.ndarray, width: float) -> np.ndarray:
+    # Places that cut intervals wider than a width.
+    counts = np.ceil(np.diff(s) / width).astype(int)
+    cuts = [np.linspace(a, b, count + 1)[1:-1] for a, b, count in zip(s[:-1], s[1:], counts, strict=True)]
+    return np.concatenate(cuts)
+
+
+def half_angles(units: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n-1"]:
+    """Halves of the angles between consecutive orientations."""
+    apart, together = (np.linalg.norm(units[1:] + sign * units[:-1], axis=1) for sign in (-1.0, 1.0))
+    return 2.0 * np.arctan2(apart, together)
+
+
+def turn(units: Float[np.ndarray, "2 4"], share: Float[np.ndarray, "n"], length: float = 1.0) -> list[np.ndarray]:
+    """Orientations at a constant rate from one to another, and their derivatives."""
+    half = float(half_angles(units)[0])
+    across = units[1] - (units[1] @ units[0]) * units[0]
+    across /= np.linalg.norm(across) or 1.0
+    rate = half / length
+    cosine, sine = np.cos(half * share)[:, None], np.sin(half * share)[:, None]
+    value = cosine * units[0] + sine * across
+    return [value, rate * (cosine * across - sine * units[0]), -(rate**2) * value]

@@ -1,0 +1,71 @@
+"""Paths through points: straight lines between them, or C2 and C4 splines over the lengths of their chords."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.interpolate import BPoly
+
+from cspr_jax.curves.interpolation import continuous, interpolated
+from cspr_jax.errors import InputError
+from cspr_jax.families.paths.geometry.corners import Corners, tracks_of
+from cspr_jax.families.paths.geometry.elements import SAME_PLACE, Straight
+from cspr_jax.families.paths.geometry.section import SAME_ORIENTATION, Track, half_angles
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Part of the speed along the chords below which a spline stands still, and samples of each of its pieces.
+STANDING, SAMPLES = 1e-6, 32
+# Shortest chord of a spline over its longest one: the digits of its pieces are lost below.
+SMALLEST_CHORD = 1e-6
+
+
+def chords(
+    points: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"] | None = None
+) -> Float[np.ndarray, "n-1"]:
+    """Distances between consecutive points; where only the orientation changes, the angle."""
+    if len(points) < 2:
+        raise InputError("points", None, "must be two or more", fault=f"{len(points)} of them")
+    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    if quaternions is not None:
+        halves = half_angles(continuous(quaternions))
+        lengths = np.where((lengths <= SAME_PLACE) & (halves > SAME_ORIENTATION), 2.0 * halves, lengths)
+    same = np.flatnonzero(lengths <= SAME_PLACE)
+    if len(same):
+        raise InputError("points", points[same[0] + 1].tolist(), "another place than the point before it")
+    return lengths
+
+
+def through_points(
+    kind: str,
+    points: Float[np.ndarray, "n 3"],
+    quaternions: Float[np.ndarray, "n 4"] | None = None,
+    *,
+    corner: str = "stop",
+    tolerance: float = 0.0,
+    closed: bool = False,
+) -> list[Track]:
+    """Tracks through points; each mark is at one of them, or at the corner that is blended there."""
+    lengths = chords(points, quaternions)
+    if kind in ("line", "polyline") or len(points) == 2:
+        lines = [Straight(a, b, turn) for a, b, turn in zip(points, points[1:], lengths.tolist(), strict=False)]
+        rule: Corners = "every" if kind == "line" else "blend" if corner == "blend" else "stop"
+        return tracks_of(lines, rule, tolerance)
+    close = np.flatnonzero(lengths < SMALLEST_CHORD * lengths.max())
+    if len(close):
+        allowed = f"at least {SMALLEST_CHORD:g} of the longest step from the point before it, {lengths.max():.3g} m"
+        raise InputError(f"points[{close[0] + 1}]", points[close[0] + 1].tolist(), allowed)
+    s = np.concatenate([[0.0], np.cumsum(lengths)])
+    curve = interpolated(s, points, interpolation=kind, ends="periodic" if closed else "natural")
+    values = BPoly(np.moveaxis(np.asarray(curve.position), 1, 0), s)
+    place, first, second = (values(s, order) for order in range(3))
+    # The last value comes from the last piece, so nothing is lost where ends are natural.
+    fine = np.concatenate([np.linspace(*ends, SAMPLES, endpoint=False) for ends in itertools.pairwise(s)])
+    speeds = np.linalg.norm(values(fine, 1), axis=1)
+    if speeds.min() <= STANDING and (np.diff(points, axis=0) != 0.0).any():
+        i = int(np.argmin(speeds)) // SAMPLES
+        raise InputError("points", None, "must make a curve that turns back nowhere", fault=f"behind points[{i}]")
+    return [Track(s, place, first, second, np.full(len(lengths), np.inf), s)]

@@ -1,0 +1,81 @@
+"""Lower bound of the time along a section, from the multipliers of its grid."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.families.paths.least_time.constraints import TINY, tangent_directions, tension_faces, unit_wrenches
+from cspr_jax.families.paths.least_time.discrete import Discrete
+from cspr_jax.families.paths.least_time.duality import Multipliers, SpeedMultipliers, lower_bound
+from cspr_jax.families.paths.least_time.multipliers import dual_multipliers
+from cspr_jax.families.paths.least_time.nodes import BATCH, Places, places_on, state_at
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.robots.bounds.witness_tensions import right_inverse
+from cspr_jax.robots.cables import AnyRobot, cable_motion
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.runtime import compile_options
+from cspr_jax.runtime.persistent_jit import persistent_jit
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# x at which the search for multipliers begins, at least, over its largest value.
+LEAST = 1e-9
+
+
+def path_bound(problem: Problem, path: Discrete, x: Float[np.ndarray, "n_nodes"]) -> float:
+    """Rigorous lower bound of the time of any motion that goes forward along a section."""
+    robot, limits, curve, grid = problem.robot, problem.limits, path.section.curve, path.grid
+    middles = np.maximum(0.5 * (x[1:] + x[:-1]), LEAST * x.max())
+    of_nodes, of_cells = dual_multipliers(path.dual_rows(), path.ends, middles)
+    nodes = places_on(curve, grid.nodes, ahead=True)
+    values = in_batches(partial(_of_nodes, robot, limits), (nodes, of_nodes.T), size=BATCH)
+    centres = places_on(curve, 0.5 * (grid.nodes[1:] + grid.nodes[:-1]), ahead=True)
+    rates = in_batches(partial(_of_cells, robot, limits), (centres, grid.speed, of_cells), size=BATCH)
+    return lower_bound(robot, limits, path, Multipliers(*values), SpeedMultipliers(*rates))
+
+
+@persistent_jit(compiler_options=compile_options.least())
+def _of_nodes(robot: AnyRobot, limits: Limits, nodes: tuple[Places, Array]) -> tuple[Array, Array, Array]:
+    # Multipliers of what the half-planes are made of, from those of the half-planes.
+    def one(place: Places, pressures: Array) -> tuple[Array, Array, Array]:
+        state = state_at(place)
+        matrix = unit_wrenches(robot, state).matrix
+        along = tension_faces(robot, limits, matrix).along
+        count, n_cables = along.shape
+        wrench = -(pressures[:count] @ along @ right_inverse(matrix)) / (robot.mass * robot.gravity)
+        bend, turn, rest = jnp.zeros(n_cables), jnp.zeros(3), pressures[count:]
+        if limits.cable_acceleration_max is not None:
+            bend, rest = rest[:n_cables] - rest[n_cables : 2 * n_cables], rest[2 * n_cables :]
+        if limits.acceleration_max is not None:
+            turn = rest @ tangent_directions(state.velocity, state.acceleration)
+        return wrench, bend, turn
+
+    return jax.vmap(one)(*nodes)
+
+
+@persistent_jit(compiler_options=compile_options.least())
+def _of_cells(robot: AnyRobot, limits: Limits, cells: tuple[Places, Array, Array]) -> tuple[Array, Array]:
+    # The cap of a cell is that of the cable, or of the mass centre, whose limit is nearest in its middle.
+    def one(place: Places, most: Array, pressure: Array) -> tuple[Array, Array]:
+        state = state_at(place)
+        none, square = jnp.zeros(robot.n_cables), jnp.maximum(jnp.sum(state.velocity**2), TINY)
+        if limits.cable_speed_max is None:
+            return none, pressure / square
+        rates = jnp.square(cable_motion(robot, state)[1])
+        shares = rates / jnp.square(limits.cable_speed_max)
+        nearest = jnp.argmax(shares)
+        is_cable = shares[nearest] >= square / jnp.square(most)
+        of_cables = jnp.where(
+            is_cable & (jnp.arange(robot.n_cables) == nearest), pressure / jnp.maximum(rates, TINY), none
+        )
+        return of_cables, jnp.where(is_cable, 0.0, pressure / square)
+
+    return jax.vmap(one)(*cells)

@@ -1,0 +1,141 @@
+"""A section of a path on its grid: half-planes at both sides of all cells, with margins, as solvers take them."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from cspr_jax.curves.spline import Spline
+from cspr_jax.families.paths.geometry.section import Section, SectionSettings
+from cspr_jax.families.paths.least_time.constraints import Rows, face_count
+from cspr_jax.families.paths.least_time.multipliers import SideRows
+from cspr_jax.families.paths.least_time.nodes import PathGrid, grid_of, side_rows
+from cspr_jax.families.paths.least_time.smooth import NodeRows
+from cspr_jax.motion.problem import Problem
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Path speeds are taken to be no larger than so many times that of a fall along the path.
+FASTER = 1e2
+# Shares of x that differ by less at both sides of a node are the same.
+SAME = 1e-6
+
+
+class GridMargins(NamedTuple):
+    """Margins that half-planes keep in each cell, (n_cells,) each.
+
+    Fields:
+        tension: from both ends of the range of every tension, N.
+        acceleration: part of each limit of an acceleration.
+        speed: part of each limit of a speed.
+    """
+
+    tension: np.ndarray
+    acceleration: np.ndarray
+    speed: np.ndarray
+
+    def at_nodes(self) -> "GridMargins":
+        """At each node the larger of the margins of both cells."""
+        return GridMargins(*(np.fmax(np.append(x, x[-1]), np.insert(x, 0, x[0])) for x in self))
+
+
+@dataclasses.dataclass(frozen=True)
+class Discrete:
+    """Section on its grid.
+
+    Fields:
+        section: NumPy leaves.
+        grid: nodes and speed limits.
+        start: half-planes at the starts of the cells, (n_cells, n_rows).
+        end: at their ends.
+        n_faces: number of half-planes that bound tensions.
+        ends: x at the start and at the end.
+        largest: x that is taken to be larger than any.
+    """
+
+    section: Section
+    grid: PathGrid
+    start: Rows
+    end: Rows
+    n_faces: int
+    ends: tuple[float, float]
+    largest: float
+
+    @property
+    def no_margins(self) -> GridMargins:
+        """Margins of zero."""
+        return GridMargins(*np.zeros((3, len(self.grid.width))))
+
+    def can_rest(self) -> tuple[bool, bool]:
+        """Tell whether tensions within their limits hold the effector at rest."""
+        first, last = ((rows.most[k] >= 0.0).all() for rows, k in ((self.start, 0), (self.end, -1)))
+        return bool(first), bool(last)
+
+    def with_margins(self, margins: GridMargins) -> "Discrete":
+        """The same with tighter half-planes and caps."""
+        nodes = margins.at_nodes()
+        shares = np.arange(self.start.most.shape[1]) < self.n_faces
+
+        def tighter(rows: Rows, places: slice) -> Rows:
+            lost = np.where(shares, nodes.tension[places, None], nodes.acceleration[places, None])
+            return rows._replace(most=rows.most - rows.size * lost, cap=rows.cap * (1.0 - nodes.speed[places]) ** 2)
+
+        first, last = tighter(self.start, slice(None, -1)), tighter(self.end, slice(1, None))
+        return dataclasses.replace(self, start=first, end=last)
+
+    def cap(self) -> Float[np.ndarray, "n_cells+1"]:
+        """Largest x at the nodes."""
+        both = np.append(self.start.cap, np.inf), np.insert(self.end.cap, 0, np.inf)
+        return np.minimum(np.minimum(*both), self.largest)
+
+    def node_rows(self) -> NodeRows:
+        """Half-planes at the nodes; where those of both sides differ, all of them."""
+        sides = [np.concatenate([s, e[-1:]]).T for s, e in zip(self.start[:3], self.end[:3], strict=True)]
+        jump = np.abs(self.start.x[1:] - self.end.x[:-1]).max(initial=0.0)
+        if jump > SAME * np.abs(self.start.x).max():
+            before = [np.concatenate([s[:1], e]).T for s, e in zip(self.start[:3], self.end[:3], strict=True)]
+            sides = [np.concatenate(pair) for pair in zip(sides, before, strict=True)]
+        u, x, most = sides
+        return NodeRows(u, x, most, self.cap(), self.grid.width)
+
+    def dual_rows(self) -> SideRows:
+        """Half-planes of the dual problem."""
+        start, end = self.start, self.end
+        return SideRows(
+            u=np.concatenate([start.u, end.u[-1:]]).T,
+            before=np.concatenate([start.x[:1], end.x]).T,
+            after=np.concatenate([start.x, end.x[-1:]]).T,
+            most=np.concatenate([start.most, end.most[-1:]]).T,
+            cap=np.minimum(0.5 * (start.cap + end.cap), self.largest),
+            width=self.grid.width,
+        )
+
+
+def discretes(problem: Problem, sections: Sequence[Section], settings: Sequence[SectionSettings]) -> list[Discrete]:
+    """Sections on their grids."""
+    robot = problem.robot
+    speed_max = np.inf if problem.limits.speed_max is None else float(problem.limits.speed_max)
+    grids = [
+        grid_of(section, each.grid, (each.start_speed == 0.0, each.end_speed == 0.0), speed_max)
+        for section, each in zip(sections, settings, strict=True)
+    ]
+    sides = side_rows(robot, problem.limits, [section.curve for section in sections], grids)
+    paths = []
+    for section, each, grid, (start, end) in zip(sections, settings, grids, sides, strict=True):
+        speeds = zip((each.start_speed, each.end_speed), _steepness(section.curve), strict=True)
+        first, last = ((speed / slope) ** 2 if speed else 0.0 for speed, slope in speeds)
+        largest = FASTER**2 * float(robot.gravity) * float(section.curve.knots[-1])
+        paths.append(Discrete(section, grid, start, end, face_count(robot), (first, last), largest))
+    return paths
+
+
+def _steepness(curve: Spline) -> tuple[float, float]:
+    # Lengths of the path a unit of s, at both ends.
+    points, knots = np.asarray(curve.position), np.asarray(curve.knots)
+    steps = (points[0, 1] - points[0, 0], knots[1] - knots[0]), (points[-1, -1] - points[-1, -2], knots[-1] - knots[-2])
+    first, last = ((points.shape[1] - 1) * float(np.linalg.norm(step)) / float(width) for step, width in steps)
+    return first, last

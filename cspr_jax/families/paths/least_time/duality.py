@@ -1,0 +1,239 @@
+"""Rigorous lower bound of the least time along a path, by weak duality.
+
+A motion along a path that never turns back obeys d(a s')/dt + r in K(s): a(s) is the momentum of a unit path speed, r
+the weight, K the wrenches that the cables can give. With u = s'' and x = s'^2, that is a u + a' x + r in K. For any
+continuous y(s), with S(y, s) the largest product of y with a wrench of K,
+
+    0 <= integral of S - y . (a u + a' x + r) = integral of S - y . r - (y . a' - y' . a) x / 2, less [y . a x / 2],
+
+by parts, since u is half of the derivative of x along the path. The time is the integral of 1 / sqrt x, and 1 / sqrt x
++ g x is at least 1.5 (2 g)^(1/3), whatever x, so that
+
+    T >= [y . a x / 2] + integral of 1.5 (y . a' - y' . a)^(1/3) + y . r - S(y, s).
+
+The limits of cables' accelerations (a = l') and of the Cartesian one (a = p') are of the same form; a limit of speed
+adds a multiplier times what it leaves. The multipliers of `families.paths.least_time.multipliers` make the bound close;
+any others leave it true. Over each cell all functions lie in bands around lines (`numerics.bounds.affine_bounds`).
+"""
+
+import dataclasses
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.families.paths.least_time.constraints import still, unit_wrenches
+from cspr_jax.families.paths.least_time.discrete import Discrete
+from cspr_jax.families.paths.least_time.nodes import Places, places_on, state_at
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.bounds.affine_bounds import ROUNDING, AffineBounds, cross, dot, norm_squared, squared, turned
+from cspr_jax.robots.bounds.state_bounds import CableBounds, StateBounds, balance_bounds, balanced_part, cable_bounds
+from cspr_jax.robots.cables import AnyRobot, cable_motion, wrench_units
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.patterns import PATTERNS
+from cspr_jax.robots.model.platform import RIGID
+from cspr_jax.robots.statics.wrench_sets import tension_range
+from cspr_jax.runtime import compile_options
+from cspr_jax.runtime.persistent_jit import persistent_jit
+
+BATCH = 64
+# Part of the sums by which the bound is lowered: more than the rounding of what is summed here.
+SAFE = 1e-10
+# Times that multipliers are mended; cells on each side of one from which it takes what it lacks, and by how much more.
+REPAIRS, REACH, SPARE = 12, 20, 1.5
+# Axis of forces along gravity; by what more than is lacking weight is added.
+DOWN, MORE = 2, 1.01
+
+
+class Multipliers(NamedTuple):
+    """Multipliers at nodes, linear between them, a metre of path.
+
+    Fields:
+        wrench: (n_nodes, dof) of the wrench balance, over the units of wrenches, s / N.
+        bend: (n_nodes, n_cables) of the cables' accelerations, s^3 / m; zeros without a limit.
+        turn: (n_nodes, 3) of the Cartesian acceleration, likewise.
+    """
+
+    wrench: Any
+    bend: Any
+    turn: Any
+
+
+class SpeedMultipliers(NamedTuple):
+    """Multipliers of squared speeds, one a cell, a metre of path; none is negative.
+
+    Fields:
+        cable: (n_cells, n_cables) s^3 / m^2.
+        mass_centre: (n_cells,) likewise; of no account where its speed is not limited.
+    """
+
+    cable: np.ndarray
+    mass_centre: np.ndarray
+
+
+class _Cell(NamedTuple):
+    # Multipliers at both ends of one cell, its width, and its largest Cartesian speed.
+    start: Multipliers
+    end: Multipliers
+    rates: SpeedMultipliers
+    width: Any
+    most: Any
+
+
+def lower_bound(
+    robot: AnyRobot, limits: Limits, path: Discrete, multipliers: Multipliers, rates: SpeedMultipliers
+) -> float:
+    """Lower bound of the time of all motions that go forward along a section, with its speeds at the ends."""
+    nodes, curve, speed = path.grid.nodes, path.section.curve, path.grid.speed
+    states = curve.bounds(nodes[:-1], nodes[1:])
+    width = np.diff(nodes)
+    for _ in range(REPAIRS):
+        start, end = (Multipliers(*(leaf[side] for leaf in multipliers)) for side in (slice(None, -1), slice(1, None)))
+        cells = _Cell(start, end, rates, width, speed)
+        gains, losses, lacks, short = in_batches(partial(_kernel, robot, limits), (states, cells), size=BATCH)
+        if (lacks > 0.0).any():
+            multipliers = _pulled_down(robot, multipliers, lacks)
+            continue
+        total = float(np.sum(gains) - np.sum(losses))
+        if np.isfinite(total):
+            total += _boundary(robot, path, multipliers)
+            return total - SAFE * float(np.sum(np.abs(gains)) + np.sum(np.abs(losses)))
+        if not np.isfinite(losses + short).all():
+            break
+        multipliers = _evened(robot, path, multipliers, width * short)
+    return -np.inf
+
+
+def _pulled_down(robot: AnyRobot, multipliers: Multipliers, lacks: np.ndarray) -> Multipliers:
+    # With a share of weight in y, no cable without a largest tension gains by pulling.
+    wrench = multipliers.wrench.copy()
+    lacks = MORE * np.fmax(lacks, 0.0)
+    wrench[:, PATTERNS[robot.pattern].forces.index(DOWN)] += np.fmax(np.append(lacks, 0.0), np.insert(lacks, 0, 0.0))
+    return multipliers._replace(wrench=wrench)
+
+
+def _boundary(robot: AnyRobot, path: Discrete, multipliers: Multipliers) -> float:
+    # [y . a x / 2], of all that is of the form of the wrench balance.
+    total = 0.0
+    for place, sign, x in ((0, -1.0, path.ends[0]), (-1, 1.0, path.ends[1])):
+        if x > 0.0:
+            node = places_on(path.section.curve, path.grid.nodes[[place]], ahead=place == 0)
+            state = state_at(jax.tree.map(lambda leaf: leaf[0], node))
+            along = multipliers.wrench[place] @ unit_wrenches(robot, state).momentum
+            along += multipliers.bend[place] @ cable_motion(robot, state)[1] + multipliers.turn[place] @ state.velocity
+            total += 0.5 * sign * x * float(along)
+    return total
+
+
+def _evened(robot: AnyRobot, path: Discrete, multipliers: Multipliers, short: np.ndarray) -> Multipliers:
+    # Let y fall more along a where it changes so fast that y . a' - y' . a is negative, and less in cells beside.
+    nodes = np.arange(len(short) + 1)
+    share = np.zeros(len(nodes))
+    for cell in np.flatnonzero(short > 0.0):
+        rise = np.clip(1.0 - (cell - nodes) / REACH, 0.0, 1.0) * (nodes <= cell)
+        fall = np.clip(1.0 - (nodes - cell - 1) / REACH, 0.0, 1.0) * (nodes > cell)
+        share += 0.5 * SPARE * short[cell] * (rise - fall)
+    momentum = in_batches(
+        partial(_momentum, robot), (places_on(path.section.curve, path.grid.nodes, ahead=True),), size=BATCH
+    )
+    square = np.sum(momentum**2, axis=1)
+    change = np.where(square > 0.0, share / np.where(square > 0.0, square, 1.0), 0.0)[:, None] * momentum
+    return multipliers._replace(wrench=multipliers.wrench + change)
+
+
+@persistent_jit(compiler_options=compile_options.least())
+def _momentum(robot: AnyRobot, nodes: tuple[Places]) -> Array:
+    return jax.vmap(lambda place: unit_wrenches(robot, state_at(place)).momentum)(*nodes)
+
+
+def _line(start: Array, end: Array) -> AffineBounds:
+    return AffineBounds(0.5 * (start + end), 0.5 * (end - start), jnp.zeros_like(start))
+
+
+def _steep(start: Array, end: Array, width: Array) -> AffineBounds:
+    # The derivative of the line between both.
+    change = (end - start) / width
+    return AffineBounds(change, jnp.zeros_like(change), ROUNDING * jnp.abs(change))
+
+
+def _ends(bounds: AffineBounds, sign: float) -> tuple[Array, Array]:
+    # Values at both ends of the line below (-1), or above (1), a function.
+    side = bounds.middle + sign * bounds.radius
+    return side - bounds.slope, side + bounds.slope
+
+
+def _along(start: Array, end: Array, width: Array, momentum: AffineBounds, bend: AffineBounds) -> AffineBounds:
+    # y . a' - y' . a.
+    return dot(_line(start, end), bend) - dot(_steep(start, end, width), momentum)
+
+
+@persistent_jit(compiler_options=compile_options.least())
+def _kernel(robot: AnyRobot, limits: Limits, blocks: tuple[StateBounds, _Cell]) -> tuple[Array, Array, Array, Array]:
+    # Tell what each cell adds to the bound, what it takes from it, how much weight its multipliers lack, and by how
+    # much y . a' - y' . a is negative.
+    def one(state: StateBounds, cell: _Cell) -> tuple[Array, Array, Array, Array]:
+        twice, lost, lack = _of_wrenches(robot, limits, state, cell)
+        cables = cable_bounds(robot, state)
+        if limits.cable_acceleration_max is not None:
+            ends = cell.start.bend, cell.end.bend
+            twice = twice + _along(*ends, cell.width, cables.rate, cables.acceleration)
+            lost += jnp.sum(limits.cable_acceleration_max * 0.5 * (jnp.abs(ends[0]) + jnp.abs(ends[1])))
+        if limits.acceleration_max is not None:
+            ends = cell.start.turn, cell.end.turn
+            twice = twice + _along(*ends, cell.width, state.velocity, state.acceleration)
+            lost += limits.acceleration_max * 0.5 * (jnp.linalg.norm(ends[0]) + jnp.linalg.norm(ends[1]))
+        if limits.cable_speed_max is not None:
+            twice = twice + (2.0 * cell.rates.cable * squared(cables.rate)).total()
+            lost += jnp.sum(jnp.square(limits.cable_speed_max) * cell.rates.cable)
+        rate = jnp.where(jnp.isfinite(cell.most), cell.rates.mass_centre, 0.0)
+        twice = twice + 2.0 * rate * norm_squared(state.velocity)
+        lost += rate * jnp.square(jnp.where(jnp.isfinite(cell.most), cell.most, 0.0))
+        # A concave function of a line is above the line between its values at both ends.
+        low, high = _ends(twice, -1.0)
+        values = [1.5 * jnp.where(side >= 0.0, jnp.cbrt(side), -jnp.inf) for side in (low, high)]
+        short = jnp.maximum(0.0, -jnp.minimum(low, high))
+        return cell.width * 0.5 * (values[0] + values[1]), cell.width * lost, lack, short
+
+    return jax.vmap(one)(*blocks)
+
+
+def _of_wrenches(robot: AnyRobot, limits: Limits, state: StateBounds, cell: _Cell) -> tuple[AffineBounds, Array, Array]:
+    # y . a' - y' . a of the wrench balance, the mean of S - y . r over the cell, and what y lacks of weight.
+    unit = 1.0 / wrench_units(robot)
+    rest, pushed = still(state, pushed=False), still(state, pushed=True)
+    cables = cable_bounds(robot, rest)
+    matrix, weight = balance_bounds(robot, rest, cables)
+    momentum = balance_bounds(robot, pushed, cables)[1] - weight
+    bend = balance_bounds(robot, state, cables)[1] - weight
+    matrix, weight, momentum, bend = matrix * unit[:, None], weight * unit, momentum * unit, bend * unit
+    ends = cell.start.wrench, cell.end.wrench
+    line = _line(*ends)
+    pulls = turned(matrix.each(jnp.transpose), line)
+    low, high = tension_range(robot, limits)
+    is_bounded = jnp.isfinite(high)
+
+    def most(value: Array) -> Array:
+        return jnp.where(value > 0.0, value * jnp.where(is_bounded, high, 0.0), value * low)
+
+    # A convex function of a line is below the line between its values at both ends.
+    sides = [jnp.maximum(most(up), most(down)) for up, down in zip(_ends(pulls, 1.0), _ends(pulls, -1.0), strict=True)]
+    support = 0.5 * jnp.sum(sides[0] + sides[1])
+    held = dot(line, weight)
+    lack = jnp.zeros(())
+    if DOWN in PATTERNS[robot.pattern].forces:
+        upward = -matrix.high()[PATTERNS[robot.pattern].forces.index(DOWN)]
+        gains = jnp.where(is_bounded, 0.0, pulls.high())
+        lack = jnp.max(jnp.where(gains > 0.0, gains / jnp.maximum(upward, 0.0), 0.0))
+    if PATTERNS[robot.pattern].along_line:
+        bend = bend - _turning_axes(robot, pushed, cables) * unit
+    return _along(*ends, cell.width, momentum, bend), support - (held.middle - held.radius), lack
+
+
+def _turning_axes(robot: Any, pushed: StateBounds, cables: CableBounds) -> AffineBounds:
+    # Bound what axes that turn with the platform add to the momentum's derivative: e' . L = e . (L x omega).
+    whole = balance_bounds(dataclasses.replace(robot, pattern=RIGID), pushed, cables)[1].each(lambda x: x[3:])
+    moment = cross(whole, pushed.angular_acceleration).each(lambda x: x[:, None])
+    return balanced_part(robot, pushed.rotation, moment * 0.0, moment).each(lambda x: x[:, 0])

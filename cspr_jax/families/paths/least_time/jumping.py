@@ -1,0 +1,131 @@
+"""The fastest motions along sections, whose accelerations jump: of several sections together."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import jax
+import numpy as np
+
+from cspr_jax.families.paths.least_time.controllable import GridSolution, fastest, smallest_of_slopes
+from cspr_jax.families.paths.least_time.discrete import Discrete
+from cspr_jax.families.paths.least_time.timed import PathSpeeds, moving
+from cspr_jax.numerics.batches import padded, room
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Sections that are solved together, beside one alone; how often changes of u within cells are taken from the solution.
+TOGETHER, BENT = 32, 2
+# Width of a cell over that of all below which u changes within it as it is known to.
+NARROW = 0.5
+
+
+class PathPace(NamedTuple):
+    """PathPace of a feasible motion along a section, near which a faster one is sought where it is hard to find.
+
+    Fields:
+        coordinate: (k,) s, increasing, m.
+        acceleration: (k,) path acceleration, m/s^2.
+    """
+
+    coordinate: np.ndarray
+    acceleration: np.ndarray
+
+    def bend(self, nodes: Float[np.ndarray, "n_cells+1"]) -> Float[np.ndarray, "n_cells"]:
+        """Changes of the path acceleration within cells, over their widths."""
+        return np.diff(np.interp(nodes, *self)) / np.diff(nodes)
+
+
+class Jumping(NamedTuple):
+    """The fastest motion along a section.
+
+    Fields:
+        run: path speeds and accelerations; None if there is no motion.
+        bend: (n_cells,) change of u along each cell, over its width.
+        first: solution with u constant in each cell.
+    """
+
+    run: PathSpeeds | None
+    bend: np.ndarray
+    first: GridSolution
+
+
+def solved_together(paths: Sequence[Discrete], bends: Sequence[np.ndarray]) -> list[GridSolution]:
+    """Solutions on the grids of sections."""
+    solutions: dict[int, GridSolution] = {}
+    groups = defaultdict(list)
+    for k, path in enumerate(paths):
+        groups[path.start.u.shape].append(k)
+    for members in groups.values():
+        size = room(TOGETHER)
+        for first in range(0, len(members), size):
+            chosen = members[first : first + size]
+            columns = [
+                ((p.start, p.end), p.grid.width, bends[k], p.cap(), tuple(np.asarray(x) for x in p.ends))
+                for k, p in ((k, paths[k]) for k in chosen)
+            ]
+            rows = jax.tree.map(lambda *leaves: np.stack(leaves), *columns)
+            rows = rows if len(chosen) == 1 else padded(rows, size)
+            answer = fastest(*jax.tree.map(lambda leaf: np.moveaxis(leaf, 0, -1), rows))
+            answer = jax.tree.map(np.asarray, answer)
+            for i, k in enumerate(chosen):
+                solutions[k] = jax.tree.map(lambda leaf, i=i: leaf[..., i], answer)
+    return [solutions[k] for k in range(len(paths))]
+
+
+def run_of(solution: GridSolution, path: Discrete, bend: Float[np.ndarray, "n_cells"]) -> PathSpeeds | None:
+    """Path speeds and accelerations of a solution."""
+    if not _is_passable(solution):
+        return None
+    half = 0.5 * bend * path.grid.width
+    u = np.asarray(solution.u)
+    return moving(PathSpeeds(np.asarray(solution.x), u - half, u + half), path.grid.width)
+
+
+def jumping_motions(paths: Sequence[Discrete], paces: Sequence[PathPace | None] = ()) -> list[Jumping]:
+    """The fastest motions along sections.
+
+    Within cells u changes as it does from cell to cell, where there is a motion that does.
+    """
+    bends = [np.zeros_like(path.grid.width) for path in paths]
+    solutions = solved_together(paths, bends)
+    known = {
+        k: pace.bend(paths[k].grid.nodes)
+        for k, pace in enumerate(paces)
+        if pace is not None and not _is_passable(solutions[k])
+    }
+    for k, solution in zip(known, solved_together([paths[k] for k in known], list(known.values())), strict=True):
+        solutions[k], bends[k] = solution, known[k]
+    motions = [
+        Jumping(run_of(solution, path, bend), bend, solution)
+        for solution, path, bend in zip(solutions, paths, bends, strict=True)
+    ]
+    going = [k for k, motion in enumerate(motions) if motion.run is not None]
+    for _ in range(BENT):
+        changes = [_changes(solutions[k], paths[k].grid.width, known.get(k)) for k in going]
+        following = solved_together([paths[k] for k in going], changes)
+        better = [run_of(s, paths[k], change) for k, s, change in zip(going, following, changes, strict=True)]
+        for k, solution, change, run in zip(going, following, changes, better, strict=True):
+            if run is not None:
+                solutions[k], motions[k] = solution, motions[k]._replace(run=run, bend=change)
+        going = [k for k, run in zip(going, better, strict=True) if run is not None]
+    return motions
+
+
+def _is_passable(solution: GridSolution) -> bool:
+    return bool(solution.empty < 0 and solution.is_start)
+
+
+def _changes(solution: GridSolution, width: np.ndarray, known: np.ndarray | None) -> np.ndarray:
+    # In cells that are narrow since the path all but turns back there, u changes as it is known to.
+    change = smallest_of_slopes(np.asarray(solution.u), width)
+    return change if known is None else np.where(width < NARROW * width.mean(), known, change)
+
+
+def again(paths: Sequence[Discrete], bends: Sequence[np.ndarray]) -> list[PathSpeeds | None]:
+    """The fastest motions with changes of u within cells that are known."""
+    solutions = solved_together(paths, bends)
+    return [run_of(*case) for case in zip(solutions, paths, bends, strict=True)]

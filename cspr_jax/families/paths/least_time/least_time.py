@@ -1,0 +1,251 @@
+"""Least time along one section of a path: the fastest motion, proved, and a lower bound of all motions' time."""
+
+import dataclasses
+import itertools
+from collections.abc import Generator, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.curves.spline import Spline
+from cspr_jax.families.paths.geometry.section import Section, SectionSettings
+from cspr_jax.families.paths.least_time.bound import path_bound
+from cspr_jax.families.paths.least_time.controllable import GridSolution
+from cspr_jax.families.paths.least_time.discrete import FASTER, Discrete, discretes
+from cspr_jax.families.paths.least_time.jumping import Jumping, PathPace, again, jumping_motions
+from cspr_jax.families.paths.least_time.refusals import NoMotion, refusal
+from cspr_jax.families.paths.least_time.smooth import SectionEnds, Smooth, below_ramps, smooth
+from cspr_jax.families.paths.least_time.tightening import BindingName, CellSlacks, Trial, together
+from cspr_jax.families.paths.least_time.timed import PathSpeeds, cell_times, distance_from_path, moving, timed
+from cspr_jax.motion.problem import Problem
+from cspr_jax.runtime.progress import Pace
+from cspr_jax.runtime.stages import within
+
+# Rounds of proof and tightening; how often ramps are shortened by half where none of their length exist.
+ROUNDS, SHORTER = 8, 4
+# Speed of a motion that counts as slow, over that of a fall along the path.
+SLOW = 0.01
+# How many times as fine grids are for motions that are not proved, and for lower bounds that are further below the
+# duration than this part of it.
+FINER, APART = (2, 4), 0.002
+# Shares of x of the motion without ramps from which the search for one with ramps begins; optima, each with tangents
+# at the one before.
+STARTS, TANGENTS = (0.8, 0.4), 3
+# Sections that are solved together.
+TOGETHER = 64
+
+
+class PhasePlane(NamedTuple):
+    """Path speeds of a section, (n_nodes,) each, m/s.
+
+    Fields:
+        coordinate: s, m.
+        low: smallest path speed from which the end can be reached; NaN where there is none.
+        high: largest such path speed.
+        cap: largest path speed that limits of speeds allow.
+        speed: of the motion; NaN without one.
+    """
+
+    coordinate: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    cap: np.ndarray
+    speed: np.ndarray
+
+
+@dataclasses.dataclass(frozen=True)
+class LeastTime:
+    """The fastest motion along a section.
+
+    Fields:
+        motion: over time; its knots are those of the grid; a slow one if none is feasible.
+        coordinate: (n_nodes,) s at these knots, m.
+        duration: of it, s.
+        lower_bound: rigorous lower bound of the time of any motion that goes forward along the section, s; NaN where
+            none is known.
+        jumping: duration of the fastest motion without ramps on the same grid, before margins, s.
+        ramp_time: of the motion, s; 0 where its accelerations jump.
+        deviation: largest distance of the motion from the path at samples, m.
+        names: of the criteria that can bind.
+        binds: (n_cells,) number of the one that binds in each cell; -1: none.
+        feed: (n_cells,) largest speed that the section itself allows, m/s, inf for none.
+        plane: path speeds.
+        failure: why there is no motion, or None.
+    """
+
+    motion: Spline
+    coordinate: np.ndarray
+    duration: float
+    lower_bound: float
+    jumping: float
+    ramp_time: float
+    deviation: float
+    names: tuple[BindingName, ...]
+    binds: np.ndarray
+    feed: np.ndarray
+    plane: PhasePlane
+    failure: NoMotion | None
+
+
+def least_time_motion(
+    problem: Problem, section: Section, settings: SectionSettings, pace: PathPace | None = None
+) -> LeastTime:
+    """Find the fastest motion along a section."""
+    return least_time_motions(problem, [section], [settings], [pace])[0]
+
+
+def least_times_along(
+    problem: Problem, sections: Sequence[Section], settings: Sequence[SectionSettings], batch: int = TOGETHER
+) -> Iterator[LeastTime]:
+    """Find the fastest motions along sections, however many, and announce how far that is."""
+    count, pace = len(sections), Pace()
+    for first in range(0, count, batch):
+        pace.advance(first, count)
+        part, left = slice(first, first + batch), pace.left()
+        with within(f"least time, section {first + 1} of {count}" + f", {left}" * bool(left)):
+            motions = least_time_motions(problem, sections[part], settings[part])
+        yield from motions
+
+
+def least_time_motions(
+    problem: Problem,
+    sections: Sequence[Section],
+    settings: Sequence[SectionSettings],
+    paces: Sequence[PathPace | None] = (),
+) -> list[LeastTime]:
+    """Find the fastest motions along sections."""
+    paths = discretes(problem, sections, settings)
+    paces = paces or [None] * len(sections)
+    cases = zip(paths, jumping_motions(paths, paces), settings, strict=True)
+    answers = together(problem, [_proved(problem, *case) for case in cases])
+    for finer in FINER:
+        # A motion that is not proved on its grid, or not found, may be on a finer one.
+        rows = [k for k, (_, is_met) in enumerate(answers) if not is_met]
+        if not rows:
+            break
+        closer = [settings[k]._replace(grid=finer * settings[k].grid) for k in rows]
+        paths = discretes(problem, [sections[k] for k in rows], closer)
+        cases = zip(paths, jumping_motions(paths, [paces[k] for k in rows]), closer, strict=True)
+        for k, answer in zip(rows, together(problem, [_proved(problem, *case) for case in cases]), strict=True):
+            answers[k] = answer
+    return [answer for answer, _ in answers]
+
+
+def _proved(
+    problem: Problem, path: Discrete, start: Jumping, settings: SectionSettings
+) -> Generator[Trial, CellSlacks, tuple[LeastTime, bool]]:
+    # Tighten the limits on the grid until the motion keeps them everywhere, and tell whether it does. It yields motions
+    # and receives the bounds of their slacks.
+    jumping, bend, first = start
+    if jumping is None:
+        return _without_motion(problem, path, first), False
+    section = path.section
+    fastest_time = float(cell_times(jumping, path.grid.width).sum())
+    bound = _bound(problem, path, settings, jumping.x, fastest_time)
+    run, jerk = _ramped(path, jumping, settings.ramp_time)
+    margins, weight = path.no_margins, float(problem.robot.mass * problem.robot.gravity)
+    slower: PathSpeeds | None = run
+    for _ in range(ROUNDS):
+        if slower is None:
+            break
+        run = slower
+        motion = timed(section, path.grid, run)
+        slacks = yield Trial(motion, path.grid.feed)
+        margins = slacks.grown(margins, weight)
+        slower = None if slacks.is_met else _slower(path.with_margins(margins), run, bend, jerk)
+    times = np.diff(np.asarray(motion.knots))
+    speed = np.sqrt(run.x)
+    names, binds = slacks.binding(path.grid.feed, section.feeds)
+    answer = LeastTime(
+        motion=motion,
+        coordinate=path.grid.nodes,
+        duration=float(times.sum()),
+        lower_bound=bound if np.isfinite(bound) else np.nan,
+        jumping=fastest_time,
+        ramp_time=float(np.ptp(np.concatenate([jumping.before, jumping.after])) / jerk),
+        deviation=distance_from_path(section, path.grid, run, motion),
+        names=names,
+        binds=binds,
+        feed=path.grid.feed,
+        plane=_plane(path, first, speed),
+        failure=None,
+    )
+    return answer, slacks.is_met
+
+
+def _bound(problem: Problem, path: Discrete, settings: SectionSettings, x: np.ndarray, duration: float) -> float:
+    # From finer grids where the lower bound is not close to the duration.
+    bound = path_bound(problem, path, x)
+    for finer in FINER:
+        if bound >= (1.0 - APART) * duration:
+            break
+        other = discretes(problem, [path.section], [settings._replace(grid=finer * settings.grid)])[0]
+        bound = max(bound, path_bound(problem, other, np.interp(other.grid.nodes, path.grid.nodes, x)))
+    return bound
+
+
+def _plane(path: Discrete, solution: GridSolution, speed: np.ndarray) -> PhasePlane:
+    with np.errstate(invalid="ignore"):  # of the square roots of unknown speeds
+        low, high = np.sqrt(solution.low), np.sqrt(solution.high)
+    cap = path.cap()
+    return PhasePlane(path.grid.nodes, low, high, np.where(cap < path.largest, np.sqrt(cap), np.inf), speed)
+
+
+def _without_motion(problem: Problem, path: Discrete, solution: GridSolution) -> LeastTime:
+    run = _slow(path)
+    motion = timed(path.section, path.grid, run)
+    return LeastTime(
+        motion=motion,
+        coordinate=path.grid.nodes,
+        duration=float(motion.knots[-1]),
+        lower_bound=np.nan,
+        jumping=np.nan,
+        ramp_time=np.nan,
+        deviation=distance_from_path(path.section, path.grid, run, motion),
+        names=(),
+        binds=np.full(len(path.grid.width), -1),
+        feed=path.grid.feed,
+        plane=_plane(path, solution, np.full(len(path.grid.nodes), np.nan)),
+        failure=refusal(problem, path, solution),
+    )
+
+
+def _slow(path: Discrete) -> PathSpeeds:
+    # A slow motion, whose tensions are about those at rest, to be shown where none is feasible.
+    share = path.grid.nodes / path.grid.nodes[-1]
+    bump = 4.0 * SLOW**2 * path.largest / FASTER**2
+    x = (1.0 - share) * path.ends[0] + share * path.ends[1] + bump * share * (1.0 - share)
+    x[[0, -1]] = path.ends
+    u = 0.5 * np.diff(x) / path.grid.width
+    return PathSpeeds(x, u, u)
+
+
+def _ramped(path: Discrete, jumping: PathSpeeds, ramp_time: float) -> tuple[PathSpeeds, float]:
+    # The fastest motion with ramps, half as long where there is none, and the largest path jerk.
+    if ramp_time > 0.0:
+        rests = path.can_rest()
+        ends = SectionEnds(path.ends, (rests[0] and path.ends[0] == 0.0, rests[1] and path.ends[1] == 0.0))
+        for time, slower in itertools.product(0.5 ** np.arange(SHORTER) * ramp_time, STARTS):
+            jerk = float(np.ptp(np.concatenate([jumping.before, jumping.after])) / time)
+            start = below_ramps(slower * jumping.x, path.grid.width, jerk, ends)
+            run = _smoothed(path, start, ends, jerk, TANGENTS)
+            if run is not None:
+                return run, jerk
+    return jumping, np.inf
+
+
+def _smoothed(path: Discrete, start: Smooth, ends: SectionEnds, jerk: float, times: int) -> PathSpeeds | None:
+    motion = smooth(path.node_rows(), ends, start, jerk, times)
+    return (
+        None
+        if motion is None
+        else moving(PathSpeeds(motion.x, motion.u[:-1], motion.u[1:], ends.rests), path.grid.width)
+    )
+
+
+def _slower(path: Discrete, run: PathSpeeds, bend: np.ndarray, jerk: float) -> PathSpeeds | None:
+    # The fastest motion within tighter limits.
+    if not np.isfinite(jerk):
+        return again([path], [bend])[0]
+    start = Smooth(run.x, np.append(run.before, run.after[-1]))
+    return _smoothed(path, start, SectionEnds(path.ends, run.rests), jerk, 1)

@@ -1,0 +1,101 @@
+"""Multipliers that make the lower bound of the least time close: those of a discrete problem whose dual is the bound.
+
+With multipliers that are linear between nodes, the bound of `families.paths.least_time.duality` is the dual of a
+problem in which x = s'^2 is constant in each cell, and half-planes hold at the nodes, where u is the difference of both
+cells' x over their widths, and x their mean. Its only unknowns are the cells' x: an interior-point method with a
+tridiagonal matrix.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from scipy.linalg import solveh_banded
+
+from cspr_jax.families.paths.least_time.interior_point import interior_point
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Shares of the x of a motion from which the search begins, one after the other: next to limits it may come to a halt.
+STARTS = (0.8, 0.4, 1.0)
+
+
+class SideRows(NamedTuple):
+    """Half-planes at the nodes, of both sides where they differ: u_share u + x_share x <= most, and caps of the cells.
+
+    Fields:
+        u: (n_rows, n_nodes).
+        before: (n_rows, n_nodes) share of x at the end of the cell before.
+        after: likewise, at the start of the cell after.
+        most: (n_rows, n_nodes).
+        cap: (n_nodes - 1,) largest x.
+        width: (n_nodes - 1,) m.
+    """
+
+    u: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    most: np.ndarray
+    cap: np.ndarray
+    width: np.ndarray
+
+
+def dual_multipliers(
+    rows: SideRows, ends: tuple[float, float], start: Float[np.ndarray, "n_nodes-1"]
+) -> tuple[Float[np.ndarray, "n_rows n_nodes"], Float[np.ndarray, "n_nodes-1"]]:
+    """Multipliers of the half-planes, and of the caps."""
+    problem = _Staggered(rows, ends)
+    for share in STARTS:
+        optimum = interior_point(problem, share * start)
+        if optimum.is_optimal:
+            break
+    of_nodes, of_cells = problem.parts(optimum.pressures)
+    return of_nodes / problem.weights, of_cells / (rows.cap * rows.width)
+
+
+class _Staggered:
+    # Constraints at nodes are of the x before and after: before x0 + after x1 <= most; those of cells x / cap <= 1.
+    def __init__(self, rows: SideRows, ends: tuple[float, float]) -> None:
+        self.width, self.cap = rows.width, rows.cap
+        sides = np.concatenate([[0.0], self.width]), np.concatenate([self.width, [0.0]])
+        both = sides[0] + sides[1]
+        self.weights = 0.5 * both
+        self.before, self.after = (-rows.u + rows.before * sides[0]) / both, (rows.u + rows.after * sides[1]) / both
+        self.most = rows.most.copy()
+        self.most[:, 0] += rows.u[:, 0] * ends[0] / self.width[0]
+        self.most[:, -1] -= rows.u[:, -1] * ends[1] / self.width[-1]
+
+    def parts(self, constraints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return constraints[: self.most.size].reshape(self.most.shape), constraints[self.most.size :]
+
+    def value(self, z: np.ndarray) -> float:
+        return float(np.sum(self.width / np.sqrt(z)))
+
+    def positive(self, z: np.ndarray) -> np.ndarray:
+        return z
+
+    def slacks(self, z: np.ndarray) -> np.ndarray:
+        return np.append(self.most, np.ones_like(z)) + self.change(z, z)
+
+    def change(self, z: np.ndarray, step: np.ndarray) -> np.ndarray:
+        total = np.zeros_like(self.most)
+        total[:, 1:] -= self.before[:, 1:] * step
+        total[:, :-1] -= self.after[:, :-1] * step
+        return np.append(total, -step / self.cap)
+
+    def pushed(self, z: np.ndarray, pressures: np.ndarray) -> np.ndarray:
+        rows, caps = self.parts(pressures)
+        return np.sum((self.before * rows)[:, 1:] + (self.after * rows)[:, :-1], axis=0) + caps / self.cap
+
+    def residual(self, z: np.ndarray, pressures: np.ndarray) -> np.ndarray:
+        return self.pushed(z, pressures) - 0.5 * self.width * z**-1.5
+
+    def solved(self, z: np.ndarray, weights: np.ndarray, right: np.ndarray) -> np.ndarray:
+        rows, caps = self.parts(weights)
+        bands = np.zeros((2, len(z)))
+        bands[1] = 0.75 * self.width * z**-2.5 + caps / self.cap**2
+        bands[1] += np.sum((rows * self.before**2)[:, 1:] + (rows * self.after**2)[:, :-1], axis=0)
+        bands[0, 1:] = np.sum((rows * self.before * self.after)[:, 1:-1], axis=0)
+        return solveh_banded(bands, right, check_finite=False)

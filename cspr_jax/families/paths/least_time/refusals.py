@@ -1,0 +1,101 @@
+"""Why no motion runs along a section: the place that no path speed passes, or the end whose speed is not possible."""
+
+from typing import NamedTuple
+
+import jax
+import numpy as np
+from scipy.optimize import linprog
+
+from cspr_jax.families.paths.least_time.constraint_names import RowName, row_names
+from cspr_jax.families.paths.least_time.controllable import FLAT, GridSolution
+from cspr_jax.families.paths.least_time.discrete import Discrete
+from cspr_jax.families.paths.least_time.nodes import places_on, state_at
+from cspr_jax.families.paths.least_time.static_tension import StaticTension, static_tension
+from cspr_jax.motion.problem import Problem
+from cspr_jax.robots.model.state import State
+
+# Names of what no half-plane of a place is: speeds from which the rest of the path can be run along.
+WAY_ON = None
+
+
+class NoMotion(NamedTuple):
+    """Why a section cannot be run along.
+
+    Fields:
+        coordinate: s of the place at which it fails, m.
+        position: (3,) the place, in the axes of the kernels, m.
+        names: what needs a path acceleration there, and what forbids it: flags and cables; None for the speeds from
+            which the rest of the path can be run along; () where the speed at an end is refused.
+        needed: this acceleration, m/s^2; at an end the speed that is refused, m/s.
+        allowed: the largest acceleration that the other one leaves, m/s^2; at an end the possible speed that is
+            nearest, m/s.
+        end: "start" or "end" where the speed there is not possible, else "".
+        speeds: smallest and largest possible speed of such an end, m/s.
+        static_tension: tension that keeps the robot from standing still there; None: it can.
+    """
+
+    coordinate: float
+    position: np.ndarray
+    names: tuple[RowName | None, ...]
+    needed: float
+    allowed: float
+    end: str = ""
+    speeds: tuple[float, float] = (np.nan, np.nan)
+    static_tension: StaticTension | None = None
+
+
+def refusal(problem: Problem, path: Discrete, solution: GridSolution) -> NoMotion:
+    """Tell why there is no motion."""
+    cell, n_cells = int(solution.empty), len(path.grid.width)
+    node = max(cell, 0)
+    state = _state(path, node)
+    position = np.asarray(state.position)
+    # A body that turns on the spot has no acceleration along its path in m/s^2.
+    slope, coordinate = float(np.linalg.norm(state.velocity)) or np.nan, float(path.grid.nodes[node])
+    static = _static_tension(problem, path, node)
+    if 0 <= cell < n_cells:
+        needed, allowed, rows = _meeting(path, solution, cell)
+        known = row_names(problem, state, *(np.asarray(share[cell]) for share in path.start[:2]))
+        # Half-planes of both ends of a cell follow each other; those beyond lead into the next set.
+        names = tuple(known[row % len(known)] if row < 2 * len(known) else WAY_ON for row in rows)
+        return NoMotion(coordinate, position, names, slope * needed, slope * allowed, static_tension=static)
+    is_start = cell < 0
+    ends = (solution.low[0], solution.high[0]) if is_start else (0.0, path.cap()[-1])
+    low, high = (slope * float(np.sqrt(max(x, 0.0))) for x in ends)
+    speed = slope * float(np.sqrt(path.ends[0 if is_start else 1]))
+    nearest = low if speed < low else high
+    return NoMotion(coordinate, position, (), speed, nearest, "start" if is_start else "end", (low, high), static)
+
+
+def _state(path: Discrete, node: int) -> State:
+    places = places_on(path.section.curve, path.grid.nodes[[node]], ahead=node < len(path.grid.width))
+    return state_at(jax.tree.map(lambda leaf: leaf[0], places))
+
+
+def _static_tension(problem: Problem, path: Discrete, node: int) -> StaticTension | None:
+    # The tension at the place itself, or else at an end at which the motion is to rest.
+    ends = [end for end, x in zip((0, len(path.grid.width)), path.ends, strict=True) if x == 0.0]
+    tensions = (static_tension(problem, _state(path, each)) for each in (node, *ends))
+    return next((tension for tension in tensions if tension is not None), None)
+
+
+def _meeting(path: Discrete, solution: GridSolution, cell: int) -> tuple[float, float, tuple[int, ...]]:
+    # The path speed that is nearest to possible: the path acceleration that one half-plane needs there, the largest
+    # one that another leaves, and their numbers.
+    start, end, twice = path.start, path.end, 2.0 * float(path.grid.width[cell])
+    u = np.concatenate([start.u[cell], end.u[cell] + twice * end.x[cell], [twice, -twice]])
+    x = np.concatenate([start.x[cell], end.x[cell], [1.0, -1.0]])
+    ahead = [solution.high[cell + 1], -solution.low[cell + 1]]
+    most = np.concatenate([start.most[cell], end.most[cell], ahead])
+    table = np.stack([np.where(u > FLAT, u, 0.0), np.where(u < -FLAT, u, 0.0), x], axis=1)
+    bounds = [(None, None), (None, None), (0.0, float(path.cap()[cell]))]
+    optimum = linprog([-1.0, 1.0, 0.0], table, most, bounds=bounds)
+    best = 0.0 if optimum.x is None else optimum.x[2]
+    over = np.where(np.abs(u) > FLAT, u, 1.0)
+    values = (most - x * best) / over
+    upper, lower = np.where(u > FLAT, values, np.inf), np.where(u < -FLAT, values, -np.inf)
+    least, largest = int(lower.argmax()), int(upper.argmin())
+    if upper[largest] >= lower[least]:  # a half-plane that does not bound the path acceleration forbids the place
+        alone = int(np.where(np.abs(u) > FLAT, np.inf, most - x * best).argmin())
+        return np.nan, np.nan, (alone,)
+    return float(lower[least]), float(upper[largest]), (least, largest)

@@ -1,0 +1,272 @@
+"""Least time along a path with a path acceleration that is continuous, and whose changes take their time.
+
+Between nodes u = s'' changes at a constant rate along the path, so that x = s'^2 is quadratic there. The time is a
+convex function of x, and the half-planes at the nodes are linear in u and x (Verscheure et al. 2009): an interior-point
+method finds the optimum, with a banded matrix a step. The limit |du/ds| sqrt(x) <= J of the path jerk is not convex; it
+is replaced by its tangents at a known motion, which lie inside, and the optimum is that of the next tangents.
+
+From rest and to rest, s is the cube of time over the first and the last cell: a constant jerk.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from scipy.linalg import solve_banded
+
+from cspr_jax.families.paths.least_time.interior_point import interior_point
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Bands below and above the diagonal, with three unknowns a node; what keeps the matrix regular; smallest x over the
+# largest from which the search starts.
+BANDS, REGULAR, LEAST = 4, 1e-14, 1e-12
+# Half-planes of each side that count about a motion, at its x and at a share of it; whose share of u is no smaller; by
+# how much others may be missed; how often these are added.
+NEAREST, SLOWER, FLAT, MISSED, MORE_ROWS = 6, 0.8, 1e-12, 1e-9, 4
+
+
+class SectionEnds(NamedTuple):
+    """Start and end of a section.
+
+    Fields:
+        speeds: squared path speeds, (m/s)^2.
+        rests: whether the path acceleration vanishes too.
+    """
+
+    speeds: tuple[float, float]
+    rests: tuple[bool, bool]
+
+
+class NodeRows(NamedTuple):
+    """Half-planes at the nodes, as `constraints.Rows` has them: u_share u + x_share x <= most, and x <= cap.
+
+    Fields:
+        u: (n_rows, n_nodes).
+        x: (n_rows, n_nodes).
+        most: (n_rows, n_nodes).
+        cap: (n_nodes,) finite.
+        width: (n_nodes - 1,) m.
+    """
+
+    u: np.ndarray
+    x: np.ndarray
+    most: np.ndarray
+    cap: np.ndarray
+    width: np.ndarray
+
+    def nearest(self, x: Float[np.ndarray, "n_nodes"]) -> "NodeRows":
+        """The half-planes that bound u most, from either side, about a motion; duplicates among them."""
+        if len(self.u) <= 4 * NEAREST:
+            return self
+        chosen = []
+        over = np.where(np.abs(self.u) > FLAT, self.u, 1.0)
+        for share in (1.0, SLOWER):
+            value = (self.most - share * self.x * x) / over
+            for sign in (1.0, -1.0):
+                bounds = np.where(sign * self.u > FLAT, sign * value, np.inf)
+                chosen.append(np.argpartition(bounds, NEAREST, axis=0)[:NEAREST])
+        places = np.concatenate(chosen)
+        u, x, most = (np.take_along_axis(side, places, axis=0) for side in (self.u, self.x, self.most))
+        return NodeRows(u, x, most, self.cap, self.width)
+
+    def beside(self, others: "NodeRows") -> "NodeRows":
+        """These half-planes and others."""
+        u, x, most = (np.concatenate(pair) for pair in zip(self[:3], others[:3], strict=True))
+        return NodeRows(u, x, most, self.cap, self.width)
+
+    def with_cap(
+        self,
+    ) -> tuple[
+        Float[np.ndarray, "n_rows+1 n_nodes"],
+        Float[np.ndarray, "n_rows+1 n_nodes"],
+        Float[np.ndarray, "n_rows+1 n_nodes"],
+    ]:
+        """Half-planes with the cap as the last one."""
+        ones = np.ones((1, len(self.cap)))
+        pairs = (self.u, 0.0 * ones), (self.x, ones / self.cap), (self.most, ones)
+        u, x, most = (np.concatenate(pair) for pair in pairs)
+        return u, x, most
+
+
+class Smooth(NamedTuple):
+    """Motion on the grid.
+
+    Fields:
+        x: (n_nodes,) squared path speeds.
+        u: (n_nodes,) path accelerations.
+    """
+
+    x: np.ndarray
+    u: np.ndarray
+
+
+def smooth(rows: NodeRows, ends: SectionEnds, start: Smooth, jerk: float, times: int = 1) -> Smooth | None:
+    """Least time with a continuous path acceleration."""
+    near, motion = rows.nearest(start.x), start
+    for time in range(times + MORE_ROWS):
+        problem = _Problem(near, ends, jerk, motion.x)
+        z, _, is_optimal = interior_point(problem, problem.start(motion))
+        if not is_optimal:
+            return None
+        motion = Smooth(z[:, 0], z[:, 1])
+        if time >= times - 1:
+            if (rows.most - rows.u * motion.u - rows.x * motion.x).min() > -MISSED:
+                return motion
+            near = near.beside(rows.nearest(motion.x))
+    return None
+
+
+def below_ramps(
+    x: Float[np.ndarray, "n_nodes"], width: Float[np.ndarray, "n_nodes-1"], jerk: float, ends: SectionEnds
+) -> Smooth:
+    """Motion that is no faster than another one, nor than ramps from rest and to rest are."""
+    s = np.concatenate([[0.0], np.cumsum(width)])
+    x = x.copy()
+    for way, rest in zip((s, s[-1] - s), ends.rests, strict=True):
+        # s = J t^3 / 6
+        x = np.minimum(x, (0.5 * jerk) ** 2 * (6.0 * way / jerk) ** (4.0 / 3.0)) if rest else x
+    x[1:-1] = np.maximum(x[1:-1], LEAST * x.max())
+    x[[0, -1]] = ends.speeds
+    return Smooth(x, 0.5 * np.gradient(x, s))
+
+
+class _Time(NamedTuple):
+    # The duration, its gradient in x, and the bands of its Hessian: of x with itself, and with the next x.
+    value: float
+    gradient: np.ndarray
+    bend: np.ndarray
+    coupling: np.ndarray
+
+
+def _time(x: np.ndarray, width: np.ndarray, rests: tuple[bool, bool]) -> _Time:
+    # Cells take 2 D / (sqrt x0 + sqrt x1), one at rest 3 D / sqrt x. An x of zero is fixed.
+    moves = x > 0.0
+    speed = np.sqrt(np.where(moves, x, 1.0))
+    both = np.where(moves, speed, 0.0)[1:] + np.where(moves, speed, 0.0)[:-1]
+    scaled = 2.0 * width
+    scaled[0], scaled[-1] = ((3.0 if rest else 2.0) * width[end] for end, rest in zip((0, -1), rests, strict=True))
+    gradient, bend = np.zeros(len(x)), np.zeros(len(x))
+    for near in (slice(None, -1), slice(1, None)):
+        gradient[near] -= 0.5 * scaled / (both**2 * speed[near])
+        bend[near] += 0.5 * scaled * (1.0 / (both**3 * speed[near] ** 2) + 0.5 / (both**2 * speed[near] ** 3))
+    coupling = np.where(moves[1:] & moves[:-1], 0.5 * scaled / (both**3 * speed[1:] * speed[:-1]), 0.0)
+    return _Time(float(np.sum(scaled / both)), np.where(moves, gradient, 0.0), np.where(moves, bend, 1.0), coupling)
+
+
+class _Tangents(NamedTuple):
+    # Tangents of the limit of the path jerk: +-(u1 - u0) share + (x0 + x1) level <= 1, (n_cells,).
+    share: np.ndarray
+    level: np.ndarray
+
+
+def _tangents(x: np.ndarray, width: np.ndarray, jerk: float, rests: tuple[bool, bool]) -> _Tangents:
+    middle = 0.5 * (x[1:] + x[:-1])
+    # 1 / sqrt x is above its tangent 1.5 / sqrt m - 0.5 x / m^1.5.
+    share, level = middle**0.5 / (1.5 * jerk * width), 1.0 / (6.0 * middle)
+    for end, rest in zip((0, -1), rests, strict=True):
+        if rest:  # the jerk of the cell is 2 x^1.5 / 9 D^2
+            share[end], level[end] = 0.0, (4.5 * width[end] ** 2 * jerk) ** (-2.0 / 3.0)
+    return _Tangents(share, level)
+
+
+class _Problem:
+    # Unknowns are x, u, and the multiplier of the equation of the cell that follows, (n_nodes, 3).
+    def __init__(self, rows: NodeRows, ends: SectionEnds, jerk: float, x: np.ndarray) -> None:
+        self.ends, self.width = ends, rows.width
+        self.tangents = _tangents(x, rows.width, jerk, ends.rests)
+        self.u, self.x, self.most = rows.with_cap()
+        count = len(rows.cap)
+        self.free = np.ones((count, 3), bool)
+        self.free[[0, -1], 0] = False
+        self.free[[0, -1], 1] = ~np.array(ends.rests)
+        # Equations of the cells: shares of x and u at the start, then at the end, (2, 2, n_cells).
+        one = np.ones(count - 1)
+        self.cells = np.array([[-one, -rows.width], [one, -rows.width]])
+        for end, rest in zip((0, -1), ends.rests, strict=True):
+            if rest:  # u D is 2/3 x towards rest
+                self.cells[:, :, end] = 0.0
+                self.cells[1 + end, :, end] = 2.0 / 3.0, -rows.width[end] * (1.0 + 2.0 * end)
+
+    def start(self, motion: Smooth) -> np.ndarray:
+        return np.stack([motion.x, np.where(self.free[:, 1], motion.u, 0.0), np.zeros(len(motion.x))], axis=1)
+
+    def value(self, z: np.ndarray) -> float:
+        return _time(z[:, 0], self.width, self.ends.rests).value
+
+    def positive(self, z: np.ndarray) -> np.ndarray:
+        return z[1:-1, 0]
+
+    def slacks(self, z: np.ndarray) -> np.ndarray:
+        slacks = self.most - self.u * z[:, 1] - self.x * z[:, 0]
+        return np.concatenate([slacks.ravel(), *(1.0 - side for side in self._turned(z))])
+
+    def change(self, z: np.ndarray, step: np.ndarray) -> np.ndarray:
+        slacks = -self.u * step[:, 1] - self.x * step[:, 0]
+        return np.concatenate([slacks.ravel(), *(-side for side in self._turned(step))])
+
+    def _turned(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        change, total = self.tangents.share * np.diff(z[:, 1]), self.tangents.level * (z[1:, 0] + z[:-1, 0])
+        return total + change, total - change
+
+    def pushed(self, z: np.ndarray, pressures: np.ndarray) -> np.ndarray:
+        of_rows = pressures[: self.u.size].reshape(self.u.shape)
+        pushed = np.zeros_like(z)
+        pushed[:, 0], pushed[:, 1] = np.sum(self.x * of_rows, axis=0), np.sum(self.u * of_rows, axis=0)
+        up, down = pressures[self.u.size :].reshape(2, -1)
+        total, difference = (up + down) * self.tangents.level, (up - down) * self.tangents.share
+        pushed[:-1, 0] += total
+        pushed[1:, 0] += total
+        pushed[:-1, 1] -= difference
+        pushed[1:, 1] += difference
+        return np.where(self.free, pushed, 0.0)
+
+    def residual(self, z: np.ndarray, pressures: np.ndarray) -> np.ndarray:
+        residual = self.pushed(z, pressures)
+        residual[:, 0] += _time(z[:, 0], self.width, self.ends.rests).gradient
+        for side, nodes in enumerate((slice(None, -1), slice(1, None))):
+            for column in (0, 1):
+                residual[nodes, column] += self.cells[side, column] * z[:-1, 2]
+                residual[:-1, 2] += self.cells[side, column] * z[nodes, column]
+        return np.where(self.free, residual, 0.0)
+
+    def solved(self, z: np.ndarray, weights: np.ndarray, right: np.ndarray) -> np.ndarray:
+        # Matrix of neighbouring nodes: (row, column) of one node, and (row of one, column of the next).
+        count, of_rows = len(z), weights[: self.u.size].reshape(self.u.shape)
+        here, ahead = np.zeros((3, 3, count)), np.zeros((3, 3, count - 1))
+        time = _time(z[:, 0], self.width, self.ends.rests)
+        here[0, 0] = time.bend + np.sum(of_rows * self.x**2, axis=0)
+        here[0, 1] = np.sum(of_rows * self.x * self.u, axis=0)
+        here[1, 1] = np.sum(of_rows * self.u**2, axis=0) + REGULAR
+        ahead[0, 0] = time.coupling
+        up, down = weights[self.u.size :].reshape(2, -1)
+        share, level = self.tangents
+        of_level, of_share, mixed = (up + down) * level**2, (up + down) * share**2, (up - down) * level * share
+        for near, sign in ((slice(None, -1), -1.0), (slice(1, None), 1.0)):
+            here[0, 0, near] += of_level
+            here[1, 1, near] += of_share
+            here[0, 1, near] += sign * mixed
+        ahead[:2, :2] += np.array([[of_level, mixed], [-mixed, -of_share]])
+        here[1, 0] = here[0, 1]
+        here[2, :2, :-1] = here[:2, 2, :-1] = self.cells[0]
+        here[2, 2, -1] = 1.0
+        ahead[2, :2] = self.cells[1]
+        return solve_banded((BANDS, BANDS), self._bands(here, ahead), right.ravel(), check_finite=False).reshape(
+            z.shape
+        )
+
+    def _bands(self, here: np.ndarray, ahead: np.ndarray) -> np.ndarray:
+        # Bands as SciPy takes them: row 4 + i - j, column j. Rows and columns of fixed unknowns are those of 1.
+        free = self.free.T
+        here = np.where(free[:, None] & free[None], here, np.eye(3)[:, :, None])
+        ahead = np.where(free[:, None, :-1] & free[None, :, 1:], ahead, 0.0)
+        bands = np.zeros((2 * BANDS + 1, here.shape[2], 3))
+        for row in range(3):
+            for column in range(3):
+                bands[BANDS + row - column, :, column] += here[row, column]
+                if column < 2:  # nothing depends on the multiplier of the cell after next
+                    bands[BANDS + row - column - 3, 1:, column] += ahead[row, column]
+                    bands[BANDS + column + 3 - row, :-1, row] += ahead[row, column]
+        return bands.reshape(2 * BANDS + 1, -1)

@@ -1,0 +1,68 @@
+"""Tension that keeps a robot from standing still at a place."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.optimize import linprog
+
+from cspr_jax.families.paths.least_time.constraints import unit_wrenches
+from cspr_jax.motion.problem import Problem
+from cspr_jax.robots.model.state import State
+from cspr_jax.robots.statics.wrench_sets import tension_range
+
+# Part of the weight by which tensions miss their limits at least, and digits of numbers in words.
+MISSED, DIGITS = 1e-9, 4
+
+
+class StaticTension(NamedTuple):
+    """Tension that static equilibrium needs, of those that come nearest to their limits.
+
+    Fields:
+        cable: from 0 on.
+        needed: N.
+        allowed: N.
+        is_largest: whether it is above the largest tension, and not below the smallest one.
+        position: (3,) the place, m.
+    """
+
+    cable: int
+    needed: float
+    allowed: float
+    is_largest: bool
+    position: np.ndarray
+
+    @property
+    def text(self) -> str:
+        """The tension in words."""
+        needed, allowed = (f"{value:.{DIGITS}g}" for value in (self.needed, self.allowed))
+        if self.is_largest:
+            return f"a tension of {needed} N is needed in cable {self.cable + 1}, {allowed} allowed"
+        return f"cable {self.cable + 1} has a tension of {needed} N, at least {allowed} needed"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The tension as a plan's JSON has it."""
+        return self._asdict() | {"position": self.position.tolist(), "unit": "N"}
+
+
+def static_tension(problem: Problem, state: State) -> StaticTension | None:
+    """The tension that misses its limits by most at rest, where all tensions together miss them by least."""
+    robot = problem.robot
+    wrenches, count = unit_wrenches(robot, state), robot.n_cables
+    low, high = (np.broadcast_to(side, count) for side in tension_range(robot, problem.limits))
+    matrix, rest = np.asarray(wrenches.matrix, float), np.asarray(wrenches.rest, float)
+    # Tensions, and by how much they may miss their limits.
+    has_high = np.isfinite(high)
+    sides = np.vstack([-np.eye(count), np.eye(count)[has_high]])
+    table = np.hstack([sides, -np.ones((len(sides), 1))])
+    bounds = np.concatenate([-np.where(np.isfinite(low), low, 0.0), high[has_high]])
+    balance = np.hstack([matrix, np.zeros((len(matrix), 1))])
+    cost = np.append(np.zeros(count), 1.0)
+    optimum = linprog(cost, table, bounds, balance, rest, bounds=[(None, None)] * (count + 1))
+    if optimum.x is None or optimum.x[-1] <= MISSED * float(robot.mass * robot.gravity):
+        return None
+    tensions = optimum.x[:count]
+    over = np.where(has_high, tensions - high, -np.inf)
+    cable = int(np.maximum(over, low - tensions).argmax())
+    is_largest = bool(over[cable] > low[cable] - tensions[cable])
+    allowed = float(high[cable] if is_largest else low[cable])
+    return StaticTension(cable, float(tensions[cable]), allowed, is_largest, np.asarray(state.position))

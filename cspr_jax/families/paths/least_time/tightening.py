@@ -1,0 +1,165 @@
+"""Limits that a motion along a path misses between the nodes, by proof, and those that bind it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+from cspr_jax.curves.several import SeveralSplines
+from cspr_jax.curves.spline import Spline
+from cspr_jax.families.paths.least_time.discrete import GridMargins
+from cspr_jax.motion.problem import Problem
+from cspr_jax.runtime.stages import stage
+from cspr_jax.schema.verdicts import Verdict, criterion_words
+from cspr_jax.verification.bounds.block_slacks import rate_slacks, speed_slacks
+from cspr_jax.verification.criteria import Criterion, criteria
+from cspr_jax.verification.piece_slacks import Sides, close_bounds
+from cspr_jax.verification.proved_answers import TENSIONS
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Int
+
+# Slack, over its scale, that is left where a limit is met; by what more than is missed, and by how
+# much at least, margins grow; below which a criterion binds.
+LEFT, MORE, STEP, BINDING = 1e-7, 1.3, 1e-5, 0.01
+# Cells on each side in which margins grow with those of a cell, after the first time: one for so many of the grid.
+SPREAD = 150
+# Times that a cell is halved.
+HALVINGS = 3
+# Criteria that faster or slower motion changes, by their units.
+SPEEDS, ACCELERATIONS = "m/s", "m/s^2"
+Answer = TypeVar("Answer")
+
+
+class Trial(NamedTuple):
+    """Motion whose slacks are asked for.
+
+    Fields:
+        motion: with a piece a cell.
+        feed: (n_cells,) largest speed that the section itself allows, m/s, inf for none.
+    """
+
+    motion: Spline
+    feed: np.ndarray
+
+
+class BindingName(NamedTuple):
+    """Name of a criterion that can bind.
+
+    Fields:
+        criterion: name of its flag.
+        cable: from 0 on; None: of no single cable.
+        feed: as G-code has it, such as "F6000"; "" of other criteria.
+    """
+
+    criterion: str
+    cable: int | None
+    feed: str = ""
+
+    @property
+    def words(self) -> str:
+        """The criterion in words."""
+        return criterion_words(Verdict[self.criterion.upper()], self.cable, self.feed)
+
+
+class CellSlacks(NamedTuple):
+    """Bounds of the slacks of criteria over the cells of a motion, over their scales.
+
+    Fields:
+        rows: criteria of tensions, speeds and accelerations.
+        low: (n_cells, n_rows) lower bounds; of tensions over the weight, of others over what is allowed.
+        high: (n_cells, n_rows) upper bounds of the smallest slacks.
+    """
+
+    rows: list[Criterion]
+    low: np.ndarray
+    high: np.ndarray
+
+    @property
+    def is_met(self) -> bool:
+        """Tell whether all criteria are met in all cells."""
+        return bool((self.low > 0.0).all())
+
+    def grown(self, margins: GridMargins, weight: float) -> GridMargins:
+        """Margins with which what is missed will be met."""
+        # A miss that is left when other cells became tighter moves on from cell to cell: margins grow around it, too.
+        reach = len(self.low) // SPREAD if any(side.any() for side in margins) else 0
+
+        def lacking(chosen: list[bool]) -> np.ndarray:
+            missed = LEFT - self.low[:, chosen].min(1, initial=np.inf)
+            more = np.where(missed > 0.0, MORE * missed + STEP, 0.0)
+            return maximum_filter1d(more, 2 * reach + 1, mode="nearest")
+
+        tension = weight * lacking([bool(row.flag & TENSIONS) for row in self.rows])
+        others = (lacking([row.unit == unit for row in self.rows]) for unit in (ACCELERATIONS, SPEEDS))
+        return GridMargins(*(old + more for old, more in zip(margins, (tension, *others), strict=True)))
+
+    def binding(
+        self, feed: Float[np.ndarray, "n_cells"], words: Mapping[float, str]
+    ) -> tuple[tuple[BindingName, ...], Int[np.ndarray, "n_cells"]]:
+        """The criterion that binds in each cell."""
+        nearest = self.high.argmin(1)
+        names = [BindingName(row.flag.text, row.cables[0] if row.cables else None) for row in self.rows]
+        binds = np.where(self.high[np.arange(len(nearest)), nearest] < BINDING, nearest, -1)
+        if self.rows[-1].flag == Verdict.OVER_FEED:
+            last, (feeds, number) = names.pop(), np.unique(feed, return_inverse=True)
+            binds = np.where(binds == len(names), len(names) + number, binds)
+            names += [last._replace(feed=words.get(speed, f"{speed:g} m/s")) for speed in feeds.tolist()]
+        return tuple(names), binds
+
+
+def cell_slacks(problem: Problem, trials: Sequence[Trial]) -> list[CellSlacks]:
+    """Bounds of slacks that depend on how fast motions are, over each of their pieces; the last is that of feeds."""
+    motions = [trial.motion for trial in trials]
+    robot, limits, several = problem.robot, problem.limits, SeveralSplines(motions)
+    rows = criteria(robot, limits)
+    weight = float(robot.mass * robot.gravity)
+    chosen = [k for k, row in enumerate(rows) if row.flag & TENSIONS or row.unit in (SPEEDS, ACCELERATIONS)]
+    scales = np.array([weight if rows[k].flag & TENSIONS else rows[k].allowed for k in chosen])
+    knots = [np.asarray(motion.knots) for motion in motions]
+    counts = [len(each) - 1 for each in knots]
+    start, end = (np.concatenate([each[side] for each in knots]) for side in (slice(None, -1), slice(1, None)))
+    motion = np.repeat(np.arange(len(motions)), counts)
+    feed = np.concatenate([trial.feed for trial in trials])
+    has_feed = bool(np.isfinite(feed).any())
+
+    def bounded(cell: np.ndarray, start: np.ndarray, end: np.ndarray) -> Sides:
+        states = several.bounds(motion[cell], start, end, parabolas=robot.pulleys is None)
+        below, above = (side[:, chosen] / scales for side in rate_slacks(robot, limits, states))
+        if not has_feed:
+            return below, above
+        # The lower end of a line above a slack is above its smallest value.
+        speeds, scale = speed_slacks(states), feed[cell, None]
+        sides = 1.0 + speeds.low / scale, 1.0 + (speeds.high - np.abs(speeds.high_rise)) / scale
+        return np.hstack([below, sides[0]]), np.hstack([above, sides[1]])
+
+    low, high = close_bounds(bounded, (start, end), STEP, HALVINGS)
+    parts = (np.split(side, np.cumsum(counts)[:-1]) for side in (low, high))
+    named = [rows[k] for k in chosen] + [Criterion(Verdict.OVER_FEED, (), SPEEDS, sense="most")] * has_feed
+    return [CellSlacks(named, *sides) for sides in zip(*parts, strict=True)]
+
+
+def together(problem: Problem, searches: Sequence[Generator[Trial, CellSlacks, Answer]]) -> list[Answer]:
+    """Results of searches that continue with bounds of their motions' slacks, bounded together round by round."""
+    answers: dict[int, Answer] = {}
+    trials: dict[int, Trial] = {}
+
+    def resumed(k: int, following: Callable[[], Trial]) -> None:
+        try:
+            trials[k] = following()
+        except StopIteration as end:
+            answers[k] = end.value
+
+    for k, search in enumerate(searches):
+        resumed(k, partial(next, search))
+    number = 0
+    while trials:
+        number, going = number + 1, list(trials)
+        stage(f"proof {number}")
+        for k, slacks in zip(going, cell_slacks(problem, [trials.pop(k) for k in going]), strict=True):
+            resumed(k, partial(searches[k].send, slacks))
+    return [answers[k] for k in range(len(searches))]

@@ -1,0 +1,118 @@
+"""Motion along a path in time: quintic pieces through positions, velocities and accelerations at the nodes.
+
+The motion that controllers play, and that is proved, is this one. It meets the path at the nodes; between them it is
+off by what a quintic piece misses, which is told.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from cspr_jax.curves.spline import Spline
+from cspr_jax.families.paths.geometry.section import Section
+from cspr_jax.families.paths.least_time.nodes import PathGrid, derivatives, places_on
+from cspr_jax.numerics.elementary import leaf
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Instants in a cell at which the distance from the path is taken.
+SHARES = (0.25, 0.5, 0.75)
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(12)
+
+
+class PathSpeeds(NamedTuple):
+    """How fast a section is run along.
+
+    Fields:
+        x: (n_nodes,) squared path speeds.
+        before: (n_cells,) path accelerations at the starts of the cells.
+        after: (n_cells,) at their ends.
+        rests: whether start and end are at rest: s is the cube of time over the cell there.
+    """
+
+    x: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    rests: tuple[bool, bool] = (False, False)
+
+
+def cell_times(run: PathSpeeds, width: Float[np.ndarray, "n_cells"]) -> Float[np.ndarray, "n_cells"]:
+    """Times that the cells take, where the path acceleration changes at a constant rate along each."""
+    # With s - s0 = D r^2 at a start from zero speed, and D (1 - (1 - r)^2) at an end, nothing is singular.
+    r, weights = 0.5 * (_POINTS + 1.0), 0.5 * _WEIGHTS
+    starts, ends = (run.x[:-1] == 0.0)[:, None], (run.x[1:] == 0.0)[:, None]
+    share = np.where(starts, r**2, np.where(ends, 1.0 - (1.0 - r) ** 2, r))
+    stretch = np.where(starts, 2.0 * r, np.where(ends, 2.0 * (1.0 - r), 1.0))
+    bend = (run.after - run.before)[:, None]
+    x = run.x[:-1, None] + 2.0 * width[:, None] * (run.before[:, None] * share + 0.5 * bend * share**2)
+    with np.errstate(invalid="ignore", divide="ignore"):  # of cells that no motion runs through
+        times = width * np.sum(weights * stretch / np.sqrt(x), axis=1)
+    for end, rest in zip((0, -1), run.rests, strict=True):
+        if rest:
+            times[end] = 3.0 * width[end] / np.sqrt(run.x[1 + 3 * end])
+    return times
+
+
+def moving(run: PathSpeeds, width: Float[np.ndarray, "n_cells"]) -> PathSpeeds | None:
+    """Path speeds that run through all cells."""
+    return run if np.isfinite(cell_times(run, width)).all() else None
+
+
+def timed(section: Section, grid: PathGrid, run: PathSpeeds) -> Spline:
+    """The motion."""
+    times = cell_times(run, grid.width)
+    speeds = np.sqrt(run.x)
+    sides = [
+        derivatives(places_on(section.curve, grid.nodes[:-1], ahead=True)),
+        derivatives(places_on(section.curve, grid.nodes[1:], ahead=False)),
+    ]
+    tables = []
+    for start, end in zip(*sides, strict=True):
+        rates = [
+            (value, first * speed[:, None], first * u[:, None] + second * (speed**2)[:, None])
+            for (value, first, second), speed, u in (
+                (start, speeds[:-1], run.before),
+                (end, speeds[1:], run.after),
+            )
+        ]
+        tables.append(_quintic(rates[0], rates[1], times[:, None]))
+    position, quaternion = tables[0], tables[1] if len(tables) > 1 else None
+    knots = np.concatenate([[0.0], np.cumsum(times)])
+    turning = None if quaternion is None else leaf(quaternion)
+    return dataclasses.replace(section.curve, knots=leaf(knots), position=leaf(position), quaternion=turning)
+
+
+def _quintic(start: tuple, end: tuple, width: np.ndarray) -> np.ndarray:
+    # Bernstein coefficients (n_cells, 6, k) from values and two derivatives at both ends.
+    (p, v, a), (q, w, b) = start, end
+    one, two = width / 5.0, width**2 / 20.0
+    return np.stack([p, p + one * v, p + 2.0 * one * v + two * a, q - 2.0 * one * w + two * b, q - one * w, q], axis=1)
+
+
+def distance_from_path(section: Section, grid: PathGrid, run: PathSpeeds, motion: Spline) -> float:
+    """Largest distance of the motion from the path, at some instants of each cell."""
+    times, speeds = np.diff(motion.knots), np.sqrt(run.x)
+    # The path coordinate as a quintic in time too; across the path its error is of no account.
+    ends = (grid.nodes[:-1], speeds[:-1], run.before), (grid.nodes[1:], speeds[1:], run.after)
+    first, last = (tuple(x[:, None] for x in end) for end in ends)
+    way = _quintic(first, last, times[:, None])
+    largest = 0.0
+    for share in SHARES:
+        values = [_at(table, share) for table in (way, np.asarray(motion.position))]
+        place, ahead, _ = derivatives(places_on(section.curve, values[0][:, 0], ahead=True))[0]
+        # A body that turns on the spot has no direction.
+        slopes = np.linalg.norm(ahead, axis=1, keepdims=True)
+        off, along = values[1] - place, ahead / np.where(slopes > 0.0, slopes, 1.0)
+        off = off - np.sum(off * along, axis=1, keepdims=True) * along
+        largest = max(largest, float(np.linalg.norm(off, axis=1).max()))
+    return largest
+
+
+def _at(table: np.ndarray, share: float) -> np.ndarray:
+    while table.shape[1] > 1:
+        table = (1.0 - share) * table[:, :-1] + share * table[:, 1:]
+    return table[:, 0]

@@ -1,0 +1,274 @@
+"""Leg of paths: poses joined by the fastest motion along lines, splines, arcs and files of points or G-code."""
+
+import dataclasses
+import itertools
+from typing import NamedTuple
+
+import numpy as np
+
+from cspr_jax.build.orientations import pose_quaternions
+from cspr_jax.build.robots import build_robot
+from cspr_jax.build.scenes import scene_of
+from cspr_jax.config.keys.path import GRID, RAMP_TIME, PathTable
+from cspr_jax.curves.files import BACK, kept_to, placed_inward, reference_of
+from cspr_jax.curves.spline import Spline, chained, part
+from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.families.paths.answers import PathAnswers, SectionAnswer, feeds_of
+from cspr_jax.families.paths.fastest_lines import FastestLines
+from cspr_jax.families.paths.geometry.path_specs import Course, CourseEnds, FileAxes, course_of, course_through
+from cspr_jax.families.paths.geometry.section import Section, SectionSettings
+from cspr_jax.families.paths.least_time.least_time import TOGETHER, LeastTime, least_times_along
+from cspr_jax.motion.answers import Answers
+from cspr_jax.motion.leg import Leg
+from cspr_jax.motion.motion import Motion
+from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.waypoints import Waypoints
+from cspr_jax.numerics.linear.frames import IDENTITY
+from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.runtime.stages import amount, stage
+from cspr_jax.verification.proved_answers import proved_answers
+
+# Directions of a motion that runs on through a pose differ by no more.
+SAME_DIRECTION = 1e-6
+# Sections that are solved one by one, at most; more are solved together.
+FEW = 16
+# Cells of the grids of all sections: a proof looks at no more blocks.
+MOST_CELLS = 100_000
+# Cells above which their number is said before the work begins.
+MANY_CELLS = 10_000
+
+
+class CourseRun(NamedTuple):
+    """Poses that one course joins.
+
+    Fields:
+        first: number of the first pose, among those of the leg.
+        last: number of the last one.
+        table: how they are joined.
+    """
+
+    first: int
+    last: int
+    table: PathTable
+
+
+class Ride(NamedTuple):
+    """Section of a run, and what its motion needs.
+
+    Fields:
+        section: in the axes of the kernels.
+        settings: of its motion.
+        segments: (k - 1,) numbers of the segments between its k marks.
+    """
+
+    section: Section
+    settings: SectionSettings
+    segments: np.ndarray
+
+
+class Paths(Leg):
+    """Poses joined along paths in the least time; see `Leg`."""
+
+    def __init__(self, stops: Waypoints) -> None:
+        """Refuse keys of other families, and what a path and its poses say twice."""
+        super().__init__(stops)
+        self._notes: list[str] = []
+        self._refuse("arcs", "beta_hat")
+        for i, pose in enumerate(stops.poses):
+            if i and pose.path is not None and not stops.keys.is_one_path:
+                self._check_path(i, pose.path)
+
+    @classmethod
+    def for_searches(cls, stops: Waypoints) -> Leg:
+        """Lines between the poses, whatever the plan says of paths; see `Leg.for_searches`."""
+        return FastestLines(stops)
+
+    def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
+        """Join the poses; see `Leg.join`."""
+        stops = self.stops
+        scene = scene_of(problem.robot, stops.robot_file, stops.frame, stops.keys, stops.path, trajectory=stops.keys)
+        parts: list[list[Spline]] = [[] for _ in range(len(self))]
+        through = np.empty(len(self), object)
+        through[:] = [[] for _ in range(len(self))]
+        rides = self._rides(problem, z0)
+        sections, settings = [ride.section for ride in rides], [ride.settings for ride in rides]
+        along = least_times_along(problem, sections, settings, TOGETHER if len(rides) > FEW else 1)
+        for ride, fastest in zip(rides, along, strict=True):
+            for segment, motion in cut(fastest, ride):
+                parts[segment].append(motion)
+            section = section_answer(fastest, ride, stops.first)
+            for segment in range(section.ends[0], section.ends[1] + 1):
+                through[segment].append(section)
+        motions = [chained(splines) for splines in parts]
+        feeds = [feeds_of(sections, segment) for segment, sections in enumerate(through)]
+        stage("proof of all sections")
+        answers = proved_answers(problem, motions, scene, feeds)
+        columns = {field.name: getattr(answers, field.name) for field in dataclasses.fields(answers)}
+        paths = PathAnswers(**columns, sections=through)
+        self._notes = [*self._notes, *paths.notes()]
+        return paths, list(motions)
+
+    def warnings(self, problem: Problem) -> list[str]:
+        """Notes of files, ramps that are shorter than asked for; see `Leg.warnings`."""
+        return self._notes
+
+    def _rides(self, problem: Problem, z0: float) -> list[Ride]:
+        # Sections of all runs, in the axes of the kernels; notes of their files.
+        stops, rides = self.stops, list[Ride]()
+        self._notes, cells = [], 0
+        places = np.array(stops.frame.outward(stops.points(z0)))
+        units = None
+        if isinstance(problem.robot, PlatformRobot):
+            units = stops.frame.turned_quaternions(pose_quaternions(stops, stops.points(z0)))
+        for run in self._runs:
+            try:
+                course = self._course(run, places, units)
+                cells += _cells(course, GRID if run.table.grid is None else run.table.grid)
+                sections = [self._placed(section, course) for section in course.sections()]
+            except InputError as error:
+                raise ConfigError(stops.path, f"{self._key(run)}.{error}") from error
+            self._notes += course.notes
+            places[run.last] = course.tracks[-1].place[-1]
+            if units is not None:
+                units[run.last] = course.quaternions[-1][-1]
+            count = sum(len(section.marks) - 1 for section in sections)
+            segments = np.full(count, run.first) if run.table.is_whole else np.arange(run.first, run.last)
+            rides += _settled(run, sections, segments)
+        self._check_going_on(rides)
+        if cells > MANY_CELLS:
+            amount(f"{_parts(len(rides))} with {cells:,} cells of their grids: their least times and proofs begin")
+        return rides
+
+    @property
+    def _runs(self) -> list[CourseRun]:
+        # A course ends where a pose has a path of its own, before one, and at rest.
+        poses, keys, first, runs = self.stops.poses, self.stops.keys, 0, list[CourseRun]()
+        usual = PathTable() if keys.path is None or keys.is_one_path else keys.path
+        for i, pose in enumerate(poses[1:], start=1):
+            following = poses[i + 1] if i < len(self) else None
+            ends = following is None or following.path is not None or pose.rest
+            if pose.path is not None:
+                runs.append(CourseRun(i - 1, i, pose.path.beside(keys.path)))
+            elif ends:
+                # The speeds are those at the ends of the leg.
+                inner = ["start_speed"] * (first > 0) + ["end_speed"] * (i < len(self))
+                runs.append(CourseRun(first, i, usual.model_copy(update=dict.fromkeys(inner))))
+            if pose.path is not None or ends:
+                first = i
+        return runs
+
+    def _key(self, run: CourseRun) -> str:
+        return (
+            "path"
+            if self.stops.poses[run.last].path is None or self.stops.keys.is_one_path
+            else (f"{self.stops.name(run.last)}.path")
+        )
+
+    def _course(self, run: CourseRun, places: np.ndarray, units: np.ndarray | None) -> Course:
+        # Course of a run, in the axes of the robot file.
+        stops, table = self.stops, run.table
+        if not table.is_whole:
+            chosen = slice(run.first, run.last + 1)
+            return course_through(table, places[chosen], None if units is None else units[chosen])
+        robot_file = stops.robot_file
+        if table.orientations is not None and units is None:
+            raise InputError("orientations", None, "must be absent for a point mass", fault="given")
+        has_start = not stops.keys.is_one_path and not (
+            run.first == 0 and table.has_start and stops.poses[0].position is None and not stops.poses[0].rest
+        )
+        ends = CourseEnds(
+            places[run.first] if has_start else None,
+            None if stops.keys.is_one_path or table.has_end else places[run.last],
+            *(() if units is None else (units[run.first], units[run.last])),
+        )
+        if has_start and table.start is not None:
+            raise InputError("start", table.start, f"absent: the path begins at {stops.name(run.first)}")
+        turning = np.array(IDENTITY)
+        if table.kind == "csv" and units is not None:
+            reference = reference_of(build_robot(robot_file, stops.keys, stops.path))
+            turning = stops.frame.turned_quaternions(reference * BACK)
+        axes = FileAxes(robot_file.z_axis, np.eye(3)[1 if robot_file.is_planar else 2], turning)
+        return course_of(table, ends, stops.path.parent, axes)
+
+    def _placed(self, section: Section, course: Course) -> Section:
+        # The section in the axes of the kernels, on the plane or the guide of the robot.
+        curve = kept_to(self.stops.robot_file.own_pattern, section.curve, is_planar=course.is_planar)
+        return section._replace(curve=placed_inward(curve, self.stops.frame, np.array(IDENTITY)))
+
+    def _check_path(self, i: int, table: PathTable) -> None:
+        stops, pose, name = self.stops, self.stops.poses[i], self.stops.name(i)
+        has_orientation = pose.quaternion is not None or pose.tilt_torsion is not None
+        if table.has_end and (pose.position is not None or pose.rest):
+            key = "rest" if pose.position is None else "position"
+            raise ConfigError(stops.path, f"{name}.{key}: must be absent: {name}.path decides where it ends")
+        if table.kind == "gcode" and has_orientation:
+            raise ConfigError(stops.path, f"{name}: must have no orientation: that of the pose before stays")
+        if table.orientations is not None and table.points is None:
+            raise ConfigError(stops.path, f"{name}.path.orientations: must be absent: the poses have them")
+
+    def _check_going_on(self, rides: list[Ride]) -> None:
+        # A motion that does not stop goes on at its speed and in its direction.
+        for before, after in itertools.pairwise(rides):
+            one, other = before.settings.end_speed, after.settings.start_speed
+            name = f"{self.stops.name(int(after.segments[0]))}"
+            if one != other:
+                raise ConfigError(
+                    self.stops.path, f"path.start_speed = {other:g} at {name}: must be {one:g}, the end_speed before it"
+                )
+            directions = [_direction(before.section.curve, -1), _direction(after.section.curve, 0)]
+            if one and np.abs(directions[1] - directions[0]).max() > SAME_DIRECTION:
+                raise ConfigError(
+                    self.stops.path, f"path.end_speed = {one:g} at {name}: must be 0: the direction changes there"
+                )
+
+
+def _parts(count: int) -> str:
+    return f"{count:,} {'part' if count == 1 else 'parts'} between stops"
+
+
+def _cells(course: Course, grid: int) -> int:
+    # Cells of the grids of a course; what would not be proved is refused before it takes hours.
+    cells = sum(max(grid, len(track.s) - 1) for track in course.tracks)
+    if cells > MOST_CELLS:
+        fault = f"{_parts(len(course.tracks))}: {cells:,} cells"
+        allowed = f'must be {MOST_CELLS:,} at most: blend corners (corner = "blend"), a smaller grid, or several plans'
+        raise InputError("grid", None, allowed, fault=fault)
+    return cells
+
+
+def _direction(curve: Spline, piece: int) -> np.ndarray:
+    # Unit vector of the direction at the start of the first piece, or at the end of the last one.
+    step = np.diff(np.asarray(curve.position)[piece], axis=0)[piece]
+    return step / (np.linalg.norm(step) or 1.0)
+
+
+def _settled(run: CourseRun, sections: list[Section], segments: np.ndarray) -> list[Ride]:
+    # Sections of a run with their settings; the motion is at rest between them.
+    table, rides, first = run.table, list[Ride](), 0
+    grid = GRID if table.grid is None else table.grid
+    ramp_time = RAMP_TIME if table.ramp_time is None else table.ramp_time
+    for i, section in enumerate(sections):
+        start = (table.start_speed or 0.0) * (i == 0)
+        end = (table.end_speed or 0.0) * (i == len(sections) - 1)
+        last = first + len(section.marks) - 1
+        rides.append(Ride(section, SectionSettings(grid, ramp_time, start, end), segments[first:last]))
+        first = last
+    return rides
+
+
+def section_answer(fastest: LeastTime, ride: Ride, before: int = 0) -> SectionAnswer:
+    """Motion of a ride, with the segments in which its cells lie."""
+    middles = 0.5 * (fastest.coordinate[1:] + fastest.coordinate[:-1])
+    parts = np.clip(np.searchsorted(ride.section.marks, middles) - 1, 0, len(ride.segments) - 1)
+    return SectionAnswer(fastest, ride.segments[parts], ride.settings.ramp_time, before)
+
+
+def cut(fastest: LeastTime, ride: Ride) -> list[tuple[int, Spline]]:
+    """Parts of a motion between poses."""
+    changes = np.flatnonzero(np.diff(ride.segments)) + 1
+    marks = [0.0, *ride.section.marks[changes].tolist(), float(ride.section.marks[-1])]
+    knots = [int(np.argmin(np.abs(fastest.coordinate - mark))) for mark in marks]
+    numbers = ride.segments[[0, *changes.tolist()]].tolist()
+    return [
+        (number, part(fastest.motion, *pair)) for number, pair in zip(numbers, itertools.pairwise(knots), strict=True)
+    ]

@@ -1,0 +1,31 @@
+"""Platforms that move and turn: hypocycloids of position with oscillating SLERP of orientation.
+
+Position and orientation swing together, so that the cables of a robot that is in equilibrium at P0 stay taut while its
+platform goes to poses far from it. Tensions, determinant, limits on the pose and contacts are proved on blocks of time:
+they are analytic functions of complex time, so that the error of polynomials through their values at Chebyshev nodes
+can be bounded. On more than six cables searches look at samples, and what they choose is proved by tensions that
+balance it throughout blocks.
+
+Source: Dion-Gauvin's thesis, chapter 3 (sections 3.7 to 3.13: oscillating SLERP, beta-hat, accessible and attainable
+orientations).
+
+Files, each importing only from those above it:
+
+    oscillating_slerp        rotation that swings, section 3.7
+    slerp_bounds             bounds of it over a block of time
+    platform_segment         segment between two poses, (3.42) to (3.66)
+    platform_segment_lanes   the same, one lane a segment
+    from_rest_lanes          the same from rest, with the fewest operations
+    end_acceleration         angular acceleration at the end of a segment, section 3.8
+    beta_hat                 values of beta-hat to try, and whether motions can end at poses
+    motions                  many motions in one record, and selections from it
+    motion_checker           what searches ask of a checker, whatever the number of cables
+    six_cable_proof          the fast proof of motions on six cables
+    redundant                motions on more cables
+    checkers                 the checker for a number of cables
+    arcs                     smallest numbers of arcs between pairs of poses
+    answers                  answers for known numbers of arcs
+    pose_targets             smallest numbers of arcs to many poses
+    orientations             orientations of places, section 3.10
+    leg                      platform motions in a plan
+"""

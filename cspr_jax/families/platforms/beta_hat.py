@@ -1,0 +1,94 @@
+"""Values of beta-hat to try at the ends of segments, poses where none can end, and the choice along a sequence."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import jax
+import numpy as np
+
+from cspr_jax.families.platforms.end_acceleration import endpoint
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.linear import rotations
+from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.robots.model.point_mass import plane_normal
+from cspr_jax.robots.statics.wrench_balance import determinant_share, is_regular
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float
+
+# Larger values of beta-hat have never gained anything, docs/theory.md.
+LARGEST = 12.0
+OPTIONS = 11
+# Poses that are computed in one call.
+BATCH = 1024
+# Arcs tried beyond the first number that some values allow: more are rarely better.
+BEYOND = 4
+
+
+def options(
+    preferred: Float[np.ndarray, "n"],
+    lowest: Float[np.ndarray, "n"],
+    highest: Float[np.ndarray, "n"],
+    count: int = OPTIONS,
+) -> Float[np.ndarray, "n count"]:
+    """Values of beta-hat in the order in which they are tried.
+
+    First the preferred one of (3.91), if it keeps every cable taut, else the middle of the interval (3.92); then
+    values that divide the interval evenly, the nearest to the first one first. The interval is cut at +-12.
+    """
+    preferred, lowest, highest = (np.asarray(x, float) for x in (preferred, lowest, highest))
+    low, high = np.maximum(lowest, -LARGEST)[:, None], np.minimum(highest, LARGEST)[:, None]
+    is_inside = ((lowest < preferred) & (preferred < highest))[:, None]
+    first = np.where(is_inside, preferred[:, None], np.where(low < high, 0.5 * (low + high), np.nan))
+    others = low + (high - low) * (np.arange(count - 1) + 0.5) / max(count - 1, 1)
+    nearest = np.argsort(np.abs(others - first), axis=1, kind="stable")
+    others = np.where(low < high, np.take_along_axis(others, nearest, axis=1), np.nan)
+    return np.concatenate([first, others], axis=1)
+
+
+@jax.jit
+def _ends(robot: PlatformRobot, poses) -> tuple[jax.Array, ...]:
+    # Return for each pose (3.91), the interval (3.92), the determinant over its value at the same depth in the middle,
+    # and the depth.
+    def one(position, quaternion, z0):
+        end, depth = endpoint(robot, position, quaternion, z0), plane_normal(robot) @ position
+        share = determinant_share(robot, position, rotations.matrix(quaternion))
+        return end.preferred, end.lowest, end.highest, share, depth
+
+    return jax.vmap(one)(*poses)
+
+
+def end_options(
+    robot: PlatformRobot,
+    positions: Float[np.ndarray, "n 3"],
+    quaternions: Float[np.ndarray, "n 4"],
+    z0: Float[np.ndarray, "n"],
+    count: int,
+) -> tuple[Float[np.ndarray, "n count"], Bool[np.ndarray, "n"]]:
+    """Values of beta-hat to try at poses."""
+    preferred, lowest, highest, share, depth = in_batches(
+        partial(_ends, robot), (positions, quaternions, z0), size=BATCH
+    )
+    return options(preferred, lowest, highest, count), (depth > 0.0) & is_regular(share)
+
+
+def cheapest_path(costs: list[np.ndarray]) -> list[int]:
+    """Choose an option for each pose of a sequence, so that the segments cost least in sum.
+
+    Among equal sums the options that are tried first win; where no path is feasible, the path with the fewest
+    infeasible segments.
+    """
+    # An infeasible segment costs more than everything else together.
+    finite = [c[np.isfinite(c)] for c in costs]
+    wall = 1.0 + 10.0 * sum(float(c.max()) if c.size else 0.0 for c in finite)
+    total, back = np.arange(costs[0].shape[0]) * 1e-9, []
+    for cost in costs:
+        through = total[:, None] + np.where(np.isfinite(cost), cost, wall) + np.arange(cost.shape[1]) * 1e-9
+        back.append(through.argmin(0))
+        total = through.min(0)
+    path = [int(total.argmin())]
+    for choice in reversed(back):
+        path.append(int(choice[path[-1]]))
+    return path[::-1]

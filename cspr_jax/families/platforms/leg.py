@@ -1,0 +1,273 @@
+"""Leg of poses of a platform, chapter 3: orientations, values of beta-hat, and the search along the leg."""
+
+import itertools
+from pathlib import Path
+from typing import ClassVar
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.build.orientations import given_quaternion, orientations
+from cspr_jax.config.hints import plan_hints
+from cspr_jax.config.keys.pose import Pose
+from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.families.platforms.answers import PlatformMotionAnswers, settled
+from cspr_jax.families.platforms.arcs import Candidates, FewestArcs, refused_by_limits, smallest_arcs
+from cspr_jax.families.platforms.beta_hat import BEYOND, cheapest_path, options
+from cspr_jax.families.platforms.checkers import pose_checker
+from cspr_jax.families.platforms.end_acceleration import AT_REST
+from cspr_jax.families.platforms.motion_checker import FEW, MANY, TOUCH, MotionChecker
+from cspr_jax.families.platforms.platform_segment import PlatformMotion, PlatformSegment
+from cspr_jax.motion.amplitudes import Amplitude, derivatives
+from cspr_jax.motion.leg import Leg, each
+from cspr_jax.motion.motion import Motion
+from cspr_jax.motion.platform_kind import PlatformMotionKind
+from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.waypoints import Waypoints
+from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.linear import rotations
+from cspr_jax.numerics.linear.frames import IDENTITY
+from cspr_jax.robots.contacts.interference import contacts, gaps
+from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.robots.model.point_mass import plane_normal
+from cspr_jax.robots.statics.reference_pose import reference_pose
+from cspr_jax.robots.statics.wrench_balance import determinant_share, is_regular
+from cspr_jax.runtime.persistent_jit import persistent_jit
+from cspr_jax.schema.families import WITHOUT_BETA_HAT
+from cspr_jax.verification.fewest_limits import Refused
+
+# Tensions jump where the third derivative of the amplitude function changes across a knot by more than this part of its
+# largest value; and the distance from a knot at which it is compared.
+JUMP, NEAR_KNOT = 1e-6, 1e-12
+_JUMPS = 'amplitude {}: accelerations and tensions jump where its third derivative does; "effective-c3" has no jump'
+# A motion that only limits refuse counts as having so many more arcs: more than any sequence of feasible motions has.
+REFUSED = 100_000
+# Up to so many segments, compiling for large batches takes longer than it saves.
+FEW_SEGMENTS = 1000
+
+
+class _Poses(Leg):
+    # Poses of a platform, joined by hypocycloids of variable amplitude or by standard ones, as `variable` says.
+
+    step = 1
+    variable: ClassVar[bool]
+
+    def __init__(self, stops: Waypoints) -> None:
+        """Refuse keys of other families and quaternions that are no orientations."""
+        keys, path = stops.keys, stops.path
+        if keys.inclination is not None:
+            raise ConfigError(path, 'inclination: must be absent unless family = "transition"')
+        if keys.beat in WITHOUT_BETA_HAT:
+            for i, pose in enumerate(stops.poses):
+                if pose.beta_hat is not None:
+                    raise ConfigError(path, f'{stops.name(i)}.beta_hat: must be absent with beat = "{keys.beat}"')
+        super().__init__(stops)
+        self._kind = PlatformMotionKind(variable=self.variable, plain=keys.beat == "beta_1")
+        self._given = np.array([_orientation(stops.name(i), pose, path) for i, pose in enumerate(stops.poses)])
+
+    def _quaternions(self, points: np.ndarray) -> np.ndarray:
+        # Return orientations (n_poses, 4) in the kernels' axes; azimuths of tilts are relative to the vertical plane
+        # through the centroid and the point.
+        poses, frame = self.stops.poses, self.stops.frame
+        angles = np.array([[0.0] * 3 if p.rest else p.tilt_torsion or [0.0] * 3 for p in poses])
+        is_given = np.array([pose.rest or pose.tilt_torsion is None for pose in poses])
+        return np.where(is_given[:, None], frame.turned_quaternions(self._given), orientations(frame, points, angles))
+
+    def check(self, problem: Problem) -> None:
+        """Refuse poses at which no motion can begin or end; see `Leg.check`."""
+        stops = self.stops
+        points = stops.points(1.0)
+        hint = "".join(f" ({line})" for line in plan_hints(stops.keys, stops.robot_file))
+        for i, (position, quaternion) in enumerate(zip(points, self._quaternions(points), strict=True)):
+            # On more than six cables poses are judged by the margin of their tensions alone.
+            if not stops.poses[i].rest and _is_determined(problem):
+                _check_pose(problem.robot, stops.name(i), position, quaternion, stops.path, hint)
+
+    def join(self, problem: Problem, z0: float) -> tuple[PlatformMotionAnswers, list[Motion]]:
+        """Join the poses; see `Leg.join`."""
+        try:
+            if _is_determined(problem):
+                reference_pose(problem.robot, z0)
+        except InputError as error:
+            raise ConfigError(self.stops.path, self.stops.robot_file.typed(error)) from error
+        answers, segments = self._search(problem, np.array([z0]), is_final=True)
+        pairs = zip(each(segments, len(self)), answers.tried_arcs, strict=True)
+        return answers, [PlatformMotion(segment, problem.amplitude, leaf(arcs), self._kind) for segment, arcs in pairs]
+
+    def answers(self, problem: Problem, depths: np.ndarray) -> PlatformMotionAnswers:
+        """Answers for several depths; see `Leg.answers`."""
+        return self._search(problem, depths, is_final=False)[0]
+
+    def warnings(self, problem: Problem) -> list[str]:
+        """Tensions that jump; see `Leg.warnings`."""
+        return [_JUMPS.format(problem.amplitude.name)] if self.variable and _jumps(problem.amplitude) else []
+
+    def _search(
+        self, problem: Problem, depths: np.ndarray, *, is_final: bool
+    ) -> tuple[PlatformMotionAnswers, PlatformSegment]:
+        # Choose the values of beta-hat that give the fewest arcs in sum.
+        count, z0 = len(self), np.repeat(depths, len(self))
+        points = self.stops.points(depths)
+        quaternions = self._quaternions(points[0])
+        checker = pose_checker(problem, self._kind, batch=FEW if len(z0) <= FEW_SEGMENTS else MANY)
+        beta_hats = [
+            self._beta_hats(checker, places, quaternions, float(depth))
+            for places, depth in zip(points, depths, strict=True)
+        ]
+        if len(depths) == 1:
+            self._refuse_slack(beta_hats[0])
+        # Try every pair of values at the ends of every segment, for every depth.
+        pairs = [[self._pairs(i, values[i], values[i + 1]) for i in range(count)] for values in beta_hats]
+        motion = np.repeat(np.arange(len(z0)), [pair[0].size for of_depth in pairs for pair in of_depth])
+        first, last = (np.concatenate([pair[k].ravel() for of_depth in pairs for pair in of_depth]) for k in (0, 1))
+        trial = self._candidates(points, quaternions, z0, motion, (first, last))
+        fixed, largest = np.tile(self.stops.arcs, len(depths)), self.stops.max_arcs
+        of_trials = smallest_arcs(checker, trial, max_arcs=largest, fixed=fixed, beyond=BEYOND)
+        refused = self._refused(checker, trial, of_trials, fixed)
+        path = _best_paths(of_trials.arcs, refused.arcs, pairs)
+        best = FewestArcs(of_trials.arcs[path], of_trials.undecided[path], of_trials.checks.rows(path))
+        why = Refused(refused.arcs[path], refused.broken[path])
+        chosen = trial.rows(path)
+        return settled(checker, chosen, best, refused=why, max_arcs=largest, fixed=fixed, is_final=is_final)
+
+    def _refused(self, checker: MotionChecker, trial: Candidates, of_trials: FewestArcs, fixed: np.ndarray) -> Refused:
+        # Find the candidates that only limits refuse, in segments where no candidate is feasible, or nearly so.
+        is_open = np.ones(len(trial.z0), bool)
+        is_open[trial.motion[(of_trials.arcs > 0) | (of_trials.undecided > 0)]] = False
+        rows, count = np.flatnonzero(is_open[trial.motion]), len(trial.motion)
+        part = refused_by_limits(checker, trial.rows(rows), max_arcs=self.stops.max_arcs, fixed=fixed)
+        refused = Refused(np.zeros(count, int), np.zeros((count, len(checker.flags)), bool))
+        refused.arcs[rows], refused.broken[rows] = part.arcs, part.broken
+        return refused
+
+    def _pairs(self, i: int, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        # Return the values at both ends of segment i, (n_first, n_last) each.
+        starts, ends = np.meshgrid(first, last, indexing="ij")
+        if self.stops.keys.beat == "beta_f":
+            return (starts, starts) if self.stops.poses[i + 1].rest else (ends, ends)
+        return starts, ends
+
+    def _candidates(
+        self, points: np.ndarray, quaternions: np.ndarray, z0: np.ndarray, motion: np.ndarray, beta_hats: tuple
+    ) -> Candidates:
+        # The motions are the segments, counted over all depths.
+        depth, i = np.divmod(np.arange(len(z0)), len(self))
+        start, end = ((points[depth, i + k], quaternions[i + k]) for k in (0, 1))
+        return Candidates(start, end, z0, motion, beta_hats)
+
+    def _beta_hats(
+        self, checker: MotionChecker, points: np.ndarray, quaternions: np.ndarray, z0: float
+    ) -> list[np.ndarray]:
+        # Return the values of beta-hat to try at each pose; NaN where none keeps every cable taut.
+        tries: list[np.ndarray] = []
+        stops, changes = self.stops, self._changes()
+        for i, (pose, position, quaternion) in enumerate(zip(stops.poses, points, quaternions, strict=True)):
+            if stops.keys.beat in WITHOUT_BETA_HAT:
+                tries.append(np.zeros(1))
+                continue
+            if pose.beta_hat is not None or pose.rest:
+                tries.append(np.array([AT_REST if pose.beta_hat is None else pose.beta_hat]))
+                continue
+            end = checker.end_interval(position, quaternion, z0)
+            preferred, lowest, highest = (np.atleast_1d(x) for x in end)
+            values = options(preferred, lowest, highest)[0]
+            if np.isnan(values[0]) and not _is_determined(checker.problem):
+                values[0] = end[0]  # the verdict says what is wrong
+            is_one = np.isnan(values[0]) or i in changes
+            tries.append(values[:1] if is_one else values[~np.isnan(values)])
+        return tries
+
+    def _changes(self) -> set[int]:
+        # Return the poses where the family changes: both families take the value that is tried first there, so that
+        # accelerations are continuous.
+        ends = {0: self.stops.first > 0, len(self): self.stops.last < len(self.stops.keys.pose) - 1}
+        return {i for i, changes in ends.items() if changes}
+
+    def _refuse_slack(self, beta_hats: list[np.ndarray]) -> None:
+        for i, values in enumerate(beta_hats):
+            if np.isnan(values).any():
+                name = self.stops.name(i)
+                raise ConfigError(
+                    self.stops.path, f"{name}: must be another pose, or z0: no beta_hat keeps every cable taut there"
+                )
+
+
+class StandardPoses(_Poses):
+    """Poses of a platform, joined by standard hypocycloids; see `Leg`."""
+
+    variable = False
+
+
+class VariablePoses(_Poses):
+    """Poses of a platform, joined by hypocycloids of variable amplitude; see `Leg`."""
+
+    variable = True
+
+
+def _best_paths(arcs: np.ndarray, refused: np.ndarray, pairs: list) -> np.ndarray:
+    # Choose a candidate of each segment of each depth, (n_depths * n_segments,). Among candidates that fail, those that
+    # only limits refuse come first.
+    arcs = np.where(arcs > 0, arcs, np.where(refused > 0, refused + REFUSED, 0))
+    places, last = [], 0
+    for of_depth in pairs:
+        costs, starts = [], []
+        for first, _ in of_depth:
+            starts.append(last)
+            last += first.size
+            counts = arcs[starts[-1] : last].reshape(first.shape)
+            costs.append(np.where(counts > 0, counts, np.inf))
+        steps = itertools.pairwise(cheapest_path(costs))
+        for start, cost, step in zip(starts, costs, steps, strict=True):
+            places.append(start + int(np.ravel_multi_index(step, cost.shape)))
+    return np.array(places)
+
+
+def _orientation(name: str, pose: Pose, path: Path) -> np.ndarray:
+    # Return the orientation of a pose in the file's axes; an orientation by tilt and torsion follows from the place.
+    reference = np.array(IDENTITY)
+    if pose.tilt_torsion is not None and pose.quaternion is not None:
+        raise ConfigError(path, f"{name}.quaternion: cannot be combined with tilt_torsion")
+    if pose.rest:
+        turned = pose.quaternion is not None and np.abs(np.asarray(pose.quaternion) - reference).max() > 1e-9
+        if turned or (pose.tilt_torsion is not None and (pose.tilt_torsion[1] != 0.0 or pose.tilt_torsion[2] != 0.0)):
+            raise ConfigError(path, f"{name}: must have the reference orientation at rest")
+        return reference
+    return given_quaternion(pose.quaternion, f"{name}.quaternion", path)
+
+
+def _is_determined(problem: Problem) -> bool:
+    # Tell whether the motion determines the tensions, and a reference pose says what is singular.
+    return problem.robot.n_cables == problem.robot.dof
+
+
+@persistent_jit
+def _standing(robot: PlatformRobot, position: Array, quaternion: Array, pairs: Array):
+    # Return the depth below the spool plane, the determinant over that of the reference orientation in the middle at
+    # the same depth, and the distances between cables.
+    where = (position, rotations.matrix(quaternion))
+    depth = plane_normal(robot) @ position
+    apart = jnp.linalg.norm(gaps(robot, pairs, *where), axis=1)
+    return depth, determinant_share(robot, *where), apart
+
+
+def _check_pose(
+    robot: PlatformRobot, name: str, position: np.ndarray, quaternion: np.ndarray, path: Path, hint: str
+) -> None:
+    depth, share, apart = map(np.asarray, _standing(robot, position, quaternion, contacts(robot).pairs))
+    if not depth > 0.0:
+        raise ConfigError(path, f"{name}.position: must be below the spool plane{hint}")
+    if not is_regular(abs(share)):
+        raise ConfigError(
+            path, f"{name}: must be another orientation: singular there (relative determinant {share:.1g})"
+        )
+    if apart.min(initial=np.inf) < TOUCH * float(np.linalg.norm(np.asarray(robot.platform_points), axis=1).max()):
+        raise ConfigError(path, f"{name}: must be another orientation: two cables touch there")
+
+
+def _jumps(amplitude: Amplitude) -> bool:
+    # Tell whether A''' jumps between pieces.
+    # Sums of a few numbers by jax would be programs of their own.
+    knots = np.asarray(amplitude.knots)
+    before, after = (np.asarray(derivatives(amplitude, knots + s, order=3)[3]) for s in (-NEAR_KNOT, NEAR_KNOT))
+    return bool((np.abs(after - before) > JUMP * float(amplitude.largest[3])).any())

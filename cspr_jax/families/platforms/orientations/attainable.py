@@ -1,0 +1,114 @@
+"""Accessible orientations of a place that a horizontal transition from rest attains, thesis section 3.12.3."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cspr_jax.families.platforms.answers import PlatformMotionAnswers, reached, trials
+from cspr_jax.families.platforms.arcs import CANDIDATES, Candidates, smallest_arcs
+from cspr_jax.families.platforms.end_acceleration import AT_REST
+from cspr_jax.families.platforms.motion_checker import MotionChecker
+from cspr_jax.motion.answers import joined
+from cspr_jax.numerics.batches import in_parts
+from cspr_jax.numerics.linear.frames import IDENTITY
+from cspr_jax.numerics.linear.rotations import cylindrical_frames, from_tilt_torsion
+from cspr_jax.robots.model.point_mass import rest_point
+from cspr_jax.robots.statics.symmetries import NONE, Symmetries, alike
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Int
+
+# Values of beta-hat tried at the target.
+VALUES = 20
+# The preferred value is tried first, then every fifth of the others, then the rest.
+FEWER = 5
+# Sizes of parts, large enough to fill batches: candidates of a search for the smallest numbers of arcs; motions of a
+# search that only tells whether there is one; and the stride by which the latter are mixed.
+LARGE, PART, MIXED = 4 * CANDIDATES, CANDIDATES // 4, 16
+
+
+def attainable(
+    checker: MotionChecker,
+    places: Float[np.ndarray, "n 3"],
+    angles: Float[np.ndarray, "n 3"],
+    z0: Float[np.ndarray, "n"],
+    *,
+    max_arcs: int,
+    values: int = VALUES,
+    symmetry: Symmetries = NONE,
+    margins: bool = True,
+) -> PlatformMotionAnswers:
+    """Smallest numbers of arcs from rest to orientations of places."""
+    representatives, inverse = _once(checker, places, angles, z0, symmetry)
+
+    def part(rows):
+        rows = representatives[rows]
+        motions, beta_hats = _motions(checker, places[rows], angles[rows], z0[rows], values)
+        return reached(checker, motions, beta_hats, max_arcs=max_arcs, margins=margins)
+
+    return joined(in_parts(part, len(representatives), LARGE // values)).rows(inverse)
+
+
+def attained(
+    checker: MotionChecker,
+    places: Float[np.ndarray, "n 3"],
+    angles: Float[np.ndarray, "n 3"],
+    z0: Float[np.ndarray, "n"],
+    *,
+    max_arcs: int,
+    values: int = VALUES,
+    tried: Int[np.ndarray, "k"] | None = None,
+    symmetry: Symmetries = NONE,
+) -> Float[np.ndarray, "n"]:
+    """Orientations of places that some number of arcs and some value of beta-hat attains.
+
+    `attainable` also tells how, or why not; this function does half of the work.
+    """
+    representatives, inverse = _once(checker, places, angles, z0, symmetry)
+    each = rounds(values) if tried is None else (tried,)
+
+    def part(rows):
+        rows = representatives[rows]
+        motions, beta_hats = _motions(checker, places[rows], angles[rows], z0[rows], values)
+        is_attained = np.zeros(len(rows), bool)
+        for numbers in each:
+            left, options = np.flatnonzero(~is_attained), beta_hats[:, numbers]
+            size = max(CANDIDATES // max(options.shape[1], 1), 1)
+            for piece in (left[k : k + size] for k in range(0, len(left), size)):
+                cell, trial = trials(motions.motions(piece), options[piece])
+                arcs = smallest_arcs(checker, trial, max_arcs=max_arcs, margins=False).arcs
+                is_attained[piece[cell[arcs > 0]]] = True
+        return is_attained
+
+    # Places differ in how long they take: each part gets some of all.
+    mixed = np.argsort(np.arange(len(representatives)) % MIXED, kind="stable")
+    flags = np.empty(len(representatives), bool)
+    representatives[:] = representatives[mixed]
+    flags[mixed] = np.concatenate(in_parts(part, len(representatives), PART))
+    return flags[inverse]
+
+
+def rounds(values: int = VALUES) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Rounds in which values of beta-hat are tried, each with every number of arcs, where the one before fails."""
+    numbers = np.arange(1, values)
+    return np.array([0]), numbers[numbers % FEWER == 0], numbers[numbers % FEWER != 0]
+
+
+def _once(checker: MotionChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, symmetry: Symmetries):
+    # Find the orientations that represent all, and the place of each orientation's representative among them.
+    representatives, inverse = np.unique(alike(symmetry, np.c_[places, z0], angles), return_inverse=True)
+    return representatives, inverse.ravel()
+
+
+def _motions(
+    checker: MotionChecker, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, values: int
+) -> tuple[Candidates, np.ndarray]:
+    # Return transitions from rest, and values (n, n_values) of beta-hat at their ends.
+    count = len(angles)
+    ends = (places, from_tilt_torsion(angles + cylindrical_frames(places)))
+    beta_hats, can_end = checker.end_options(*ends, z0, values)
+    start = (rest_point(z0), np.tile(IDENTITY, (count, 1)))
+    rest = np.full(count, AT_REST)
+    return Candidates(start, ends, z0, np.arange(count), (rest, rest)), np.where(can_end[:, None], beta_hats, np.nan)

@@ -1,0 +1,103 @@
+"""Maps of smallest numbers of arcs of platforms to poses."""
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from cspr_jax.build.orientations import given_quaternion, orientations
+from cspr_jax.build.problems import motion_kind
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.config.sweep import SweepFile
+from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.families.platforms.answers import PlatformMotionAnswers
+from cspr_jax.families.platforms.arcs import Candidates, segments_with
+from cspr_jax.families.platforms.checkers import pose_checker
+from cspr_jax.families.platforms.end_acceleration import AT_REST
+from cspr_jax.families.platforms.motion_checker import MANY
+from cspr_jax.families.platforms.platform_segment import PlatformMotion, several_bounds
+from cspr_jax.families.platforms.pose_targets import Poses, pose_arcs, rest_poses, start_beta_hat
+from cspr_jax.maps.grid_map import PlatformMap
+from cspr_jax.numerics.elementary import leaf
+from cspr_jax.robots.statics.reference_pose import reference_pose
+from cspr_jax.schema.quantities import TILT_TORSION
+from cspr_jax.schema.tiles import Grid
+
+
+class PosesMap(PlatformMap):
+    """The smallest number of arcs to each pose; see `GridMap`."""
+
+    proves = True
+    any_cables = True
+
+    def __init__(self, robot_file: RobotFile, keys: SweepFile, file: object) -> None:
+        """Refuse a start whose quaternion is no orientation."""
+        super().__init__(robot_file, keys, file)
+        start = keys.trajectory.start
+        self._quaternion = given_quaternion(
+            None if start is None else start.quaternion, "trajectory.from.quaternion", file
+        )
+        from_rest = start is None or start.rest
+        self._checker = pose_checker(self._problem, motion_kind(keys.trajectory, from_rest=from_rest), batch=MANY)
+        self._scene = self._surroundings(robot_file)
+
+    def __call__(self, cells: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Answers of the cells of a tile; see `GridMap.__call__`."""
+        z0, targets = np.asarray(cells["z0"], float), self._targets(cells)
+        angles = np.stack([cells.get(name, np.zeros(len(z0))) for name in TILT_TORSION], axis=1)
+        starts, beta_hats = self._starts(z0)
+        ends = (targets, orientations(self._frame, targets, angles))
+        cell = np.arange(len(z0))
+        motions = Candidates(starts, ends, z0, cell, (beta_hats, beta_hats))
+        columns = vars(self._answers(motions)) if self._scene is None else self._clear(motions)
+        return columns | {"beta_hat": columns["beta_hat"][:, 1]}
+
+    def _answers(self, motions: Candidates, arcs: np.ndarray | None = None) -> PlatformMotionAnswers:
+        trajectory = self._keys.trajectory
+        how: dict[str, Any] = {name: getattr(trajectory, name) for name in ("beta_hat", "beat", "max_arcs")}
+        return pose_arcs(self._checker, motions, fixed=arcs, **how)
+
+    def _clear(self, motions: Candidates) -> dict[str, np.ndarray]:
+        # Return the columns among obstacles, by which a motion is proved as its plan is.
+        from cspr_jax.maps.clear_motions import clear_motions  # with the proofs of any motion, which others need not
+        from cspr_jax.verification.bounds.batch import SeveralMotions
+
+        kind = self._checker.kind._replace(from_rest=False)
+
+        def join(rows: np.ndarray, arcs: np.ndarray) -> tuple[PlatformMotionAnswers, SeveralMotions]:
+            cases = motions.motions(rows)
+            answers = self._answers(cases, arcs)
+            chosen = cases._replace(beta_hats=(answers.beta_hat[:, 0], answers.beta_hat[:, 1]))
+            segments = segments_with(self._problem.robot, chosen, answers.tried_arcs)
+            each = PlatformMotion(segments, self._problem.amplitude, leaf(answers.tried_arcs), kind)
+            return answers, SeveralMotions(each, answers.duration, partial(several_bounds, kind=kind), orders=4)
+
+        most = self._keys.trajectory.max_arcs
+        return clear_motions(self._problem, self._scene, join, len(motions.z0), max_arcs=most)
+
+    def _starts(self, z0: np.ndarray) -> tuple[Poses, np.ndarray]:
+        # Return the poses at the starts, and the values of beta-hat there.
+        start, count = self._keys.trajectory.start, len(z0)
+        if start is None or start.position is None:
+            return rest_poses(z0), np.full(count, AT_REST)
+        place = np.tile(self._frame.inward(start.position), (count, 1))
+        turned = np.tile(self._frame.turned_quaternions(self._quaternion), (count, 1))
+        if start.tilt_torsion is not None:
+            turned = orientations(self._frame, place, np.tile(start.tilt_torsion, (count, 1)))
+        beta_hat = start.beta_hat
+        beta_hats = start_beta_hat(self._checker, (place, turned), z0) if beta_hat is None else np.full(count, beta_hat)
+        return (place, turned), beta_hats
+
+    def refuse_hopeless(self, grid: Grid) -> None:
+        """Refuse targets that are all out of reach, and a robot that hangs nowhere; see `GridMap.refuse_hopeless`."""
+        if self._is_redundant:  # neither the side of the spools nor a singular reference matters
+            return
+        super().refuse_hopeless(grid)
+        errors = []
+        for z0 in grid.axes["z0"]:
+            try:
+                reference_pose(self._problem.robot, float(z0))
+            except InputError as error:
+                errors.append(error)
+        if len(errors) == len(grid.axes["z0"]):
+            raise ConfigError(self._file, f"robot.{errors[0]}") from errors[0]

@@ -1,0 +1,250 @@
+"""Point-to-point motions of a platform, thesis chapter 3: position and orientation together.
+
+The position is a hypocycloid of variable amplitude (3.44), or the standard one of chapter 2; the orientation an
+oscillating SLERP in step with it. In the precessing frame of `hypocycloid`, with s the sense, nu the ratio of the
+ellipse's axes, S = theta_h^2 (n_h - 1) = T^2 lambda, C and S_ the cosine and sine of Phi = s pi p tau,
+
+    c  = (r C - s r' S_ / (pi p)) e_r + nu r S_ e_t
+    c' = S_ [-(r S + r'') s / (pi p) e_r + 2 nu r' e_t]
+
+so that the platform stands still at every cusp, not only at the ends as with the standard hypocycloid.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from functools import partial
+from typing import TYPE_CHECKING
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.families.platforms.oscillating_slerp import Slerp, beat, orientation, rates, slerp_between
+from cspr_jax.families.platforms.slerp_bounds import beat_bounds, orientation_bounds
+from cspr_jax.motion.amplitudes import Amplitude, derivatives
+from cspr_jax.motion.platform_kind import USUAL, PlatformMotionKind
+from cspr_jax.motion.swing_plane import swing_plane
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.bounds.rotation_bounds import unit_rotation_bounds
+from cspr_jax.numerics.elementary import sincospi
+from cspr_jax.numerics.linear import rotations
+from cspr_jax.robots.bounds.state_bounds import StateBounds
+from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.robots.model.point_mass import rest_point, spool_radius
+from cspr_jax.robots.model.state import State
+from cspr_jax.robots.statics.wrench_balance import normalised_determinant
+from cspr_jax.runtime import compile_options
+from cspr_jax.runtime.persistent_jit import persistent_jit
+from cspr_jax.verification.bounds.amplitude_bounds import TimeBounds, time_bounds
+from cspr_jax.verification.bounds.swing_bounds import swing_bounds
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float, Num
+
+# Blocks of which bounds are computed at a time.
+BATCH = 64
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class PlatformSegment:
+    """Parameters of one segment between two poses, for one parity of the number of arcs.
+
+    Fields:
+        plane: (3, 2) q_h1 and q_h2 of (3.42), as columns.
+        hub: (3,) the point p0, m.
+        start_radius: () r1 of (3.46), m.
+        end_radius: () r2, m.
+        precession: () of the ellipse, in half turns, in [0, 1].
+        sense: () +1 (p odd) or -1 (p even).
+        rate: () lambda of (3.50), 1/s^2.
+        slerp: of the orientation.
+        regular: () determinant (`wrench_balance.normalised_determinant`) at rest in P0, whose sign must not change; 1
+            for a robot on more than six cables, which has no determinant.
+    """
+
+    plane: Array
+    hub: Array
+    start_radius: Array
+    end_radius: Array
+    precession: Array
+    sense: Array
+    rate: Array
+    slerp: Slerp
+    regular: Array
+
+
+def pose_segment(
+    robot: PlatformRobot,
+    start: tuple[Float[Array, "3"], Float[Array, "4"]],
+    end: tuple[Float[Array, "3"], Float[Array, "4"]],
+    z0: Float[Array, ""],
+    beta_hats: tuple[Float[Array, ""], Float[Array, ""]],
+    *,
+    odd: Bool[Array, ""],
+) -> PlatformSegment:
+    """The segment from one pose to another."""
+    hub = rest_point(z0)
+    upright = jnp.zeros_like(hub).at[2].set(1.0)
+    plane, r1, r2, precession = swing_plane(start[0] - hub, end[0] - hub, spool_radius(robot), upright, odd)
+    sense = jnp.where(odd, 1.0, -1.0).astype(r1.dtype)
+    slerp = slerp_between(start[1], end[1], *beta_hats, odd=odd)
+    is_determined = robot.n_cables == robot.dof
+    one = jnp.eye(3, dtype=hub.dtype)
+    regular = normalised_determinant(robot, hub, one) if is_determined else one[0, 0]
+    return PlatformSegment(plane, hub, r1, r2, precession, sense, robot.gravity / z0, slerp, regular)
+
+
+def duration(segment: PlatformSegment, arcs: Num[Array, ""]) -> Float[Array, ""]:
+    """Duration T of a segment, (3.77)."""
+    return math.pi * arcs * jnp.sqrt(_share(segment, arcs) / segment.rate)
+
+
+def _share(segment: PlatformSegment, arcs: Array) -> Array:
+    # Return theta_h^2 (n_h - 1) over (pi p)^2. For p = 1 and psi -> 0 the factor 1 - ratio vanishes.
+    ratio = segment.precession / arcs
+    return (1.0 - ratio) * (1.0 + ratio)
+
+
+@persistent_jit(static_argnames="kind")
+def motion(
+    segment: PlatformSegment,
+    amplitude: Amplitude,
+    arcs: Num[Array, ""],
+    tau: Float[Array, ""],
+    *,
+    kind: PlatformMotionKind = USUAL,
+) -> State:
+    """The state of the platform at one instant."""
+    values = derivatives(amplitude, tau, order=3)
+    time = duration(segment, arcs)
+    c, c1, c2 = _swing(segment, values, arcs, tau, variable=kind.variable)
+    quaternions = _quaternions(segment, values, arcs, tau, kind)
+    omega, omega1 = rates(quaternions)
+    return State(
+        segment.hub + segment.plane @ c,  # (3.43)
+        segment.plane @ c1 / time,
+        segment.plane @ c2 / time**2,
+        rotations.matrix(quaternions[0]),
+        omega / time,
+        omega1 / time**2,
+    )
+
+
+def quaternion_at(
+    segment: PlatformSegment,
+    amplitude: Amplitude,
+    arcs: Num[Array, ""],
+    tau: Float[Array, ""],
+    *,
+    kind: PlatformMotionKind = USUAL,
+) -> Float[Array, "4"]:
+    """The orientation at one instant."""
+    return _quaternions(segment, derivatives(amplitude, tau, order=3), arcs, tau, kind)[0]
+
+
+def _quaternions(
+    segment: PlatformSegment, values: tuple[Array, ...], arcs: Array, tau: Array, kind: PlatformMotionKind
+) -> tuple[Array, Array, Array]:
+    share = _share(segment, arcs)
+    return orientation(segment.slerp, values, beat(*_beta_hats(segment, share, kind), share, arcs, tau))
+
+
+def _beta_hats(segment: PlatformSegment, share: Array, kind: PlatformMotionKind) -> tuple[Array, Array]:
+    slerp = segment.slerp
+    return (-1.0 / share, -1.0 / share) if kind.plain else (slerp.start_beta_hat, slerp.end_beta_hat)
+
+
+def _swing(
+    segment: PlatformSegment, values: tuple[Array, ...], arcs: Array, tau: Array, *, variable: bool
+) -> tuple[Array, Array, Array]:
+    # Return c, c' and c'' in the plane of the segment, derivatives by tau.
+    span = segment.end_radius - segment.start_radius
+    r, r1, r2, r3 = segment.start_radius + span * values[0], span * values[1], span * values[2], span * values[3]
+    omega, nu = segment.sense * math.pi * arcs, segment.precession / arcs
+    steady = (math.pi * arcs) ** 2 * _share(segment, arcs)
+    sine, cosine = sincospi(segment.sense * arcs * tau)
+    lateral, axial = sincospi(segment.sense * segment.precession * tau)
+    if variable:
+        place = (r * cosine - r1 * sine / omega, nu * r * sine)
+        w = (-(r * steady + r2) / omega, 2.0 * nu * r1)
+        w1 = (2.0 * nu**2 * r1 * omega - (r1 * steady + r3) / omega, nu * (r * steady + 3.0 * r2))
+        pace = (sine * w[0], sine * w[1])
+        bend = (omega * cosine * w[0] + sine * w1[0], omega * cosine * w[1] + sine * w1[1])
+    else:
+        place = (r * cosine, nu * r * sine)
+        pace = (r1 * cosine - r * steady / omega * sine, nu * r1 * sine)
+        bend = (
+            (r2 - r * steady) * cosine - 2.0 * r1 * steady / omega * sine,
+            nu * (r2 + r * steady) * sine,
+        )
+
+    def turned(vector):
+        return jnp.stack([axial * vector[0] + lateral * vector[1], axial * vector[1] - lateral * vector[0]])
+
+    return turned(place), turned(pace), turned(bend)
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class PlatformMotion:
+    """Motion of a platform between two poses; see `Motion`.
+
+    Fields:
+        segment: of the parity of `arcs`.
+        amplitude: A.
+        arcs: () number of arcs, a float.
+        kind: of the motion; known when a function is compiled.
+    """
+
+    segment: PlatformSegment
+    amplitude: Amplitude
+    arcs: Array
+    kind: PlatformMotionKind = dataclasses.field(default=USUAL, metadata={"static": True})
+
+    @property
+    def z0(self) -> Array:
+        """Depth of P0 below the centroid of the spools, () m."""
+        return self.segment.hub[..., 2]
+
+    def duration(self) -> Array:
+        """Duration; see `Motion.duration`."""
+        return duration(self.segment, self.arcs)
+
+    def state(self, tau: Array) -> State:
+        """State; see `Motion.state`."""
+        tau = jnp.asarray(tau, float)
+        quaternion = quaternion_at(self.segment, self.amplitude, self.arcs, tau, kind=self.kind)
+        state = motion(self.segment, self.amplitude, self.arcs, tau, kind=self.kind)
+        return state._replace(quaternion=quaternion)
+
+    def breaks(self) -> Array:
+        """Knots of the amplitude function; see `Motion.breaks`."""
+        return self.amplitude.knots
+
+    def bounds(self, start: np.ndarray, end: np.ndarray) -> StateBounds:
+        """Bounds of the states; see `BoundedMotion.bounds`."""
+        blocks = time_bounds(self.amplitude, self.duration(), start, end, orders=4)
+        return in_batches(partial(_bounds, self.segment, self.arcs, kind=self.kind), blocks, size=BATCH)
+
+
+@persistent_jit(static_argnames="kind", compiler_options=compile_options.least())
+def _bounds(segment: PlatformSegment, arcs: Array, blocks: TimeBounds, *, kind: PlatformMotionKind) -> StateBounds:
+    return jax.vmap(partial(_block_bounds, kind, segment, arcs))(blocks)
+
+
+@persistent_jit(static_argnames="kind")
+def several_bounds(cases: tuple[PlatformSegment, Array, TimeBounds], *, kind: PlatformMotionKind) -> StateBounds:
+    """Bounds of the states of several motions, over one block of each."""
+    return jax.vmap(partial(_block_bounds, kind))(*cases)
+
+
+def _block_bounds(kind: PlatformMotionKind, segment: PlatformSegment, arcs: Array, block: TimeBounds) -> StateBounds:
+    time, share = duration(segment, arcs), _share(segment, arcs)
+    translation = swing_bounds(segment, arcs, time, block, variable=kind.variable)
+    beats = beat_bounds(*_beta_hats(segment, share, kind), share, arcs, block.tau)
+    q, q1, q2 = orientation_bounds(segment.slerp, block.values, beats)
+    return StateBounds(*translation, *unit_rotation_bounds(q, q1 * (1.0 / time), q2 * (1.0 / time**2)))

@@ -1,0 +1,290 @@
+"""Feasibility of motions of a platform on more than six cables, with margins: samples first, a proof at the end.
+
+Motion and limits leave a choice of tensions. The margin of an instant is the margin of a workspace (`workspaces`) at
+its pose, for the wrench that the motion needs: the largest s such that tensions between f_min + s and f_max - s supply
+the wrench. Neither the determinant nor the side of the spools on which the platform is matters: where the cables cannot
+supply the wrench there is no s. Searches look at samples, finer where it matters; what they choose is then proved, by
+tensions that balance the motion throughout blocks of time (`verification.proved`), and so is that cables, thick ones
+too, do not touch each other. Contacts with the platform are judged where its attachment points lie in a plane, or a
+plan gives its shape.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import jax
+import numpy as np
+
+from cspr_jax.families.platforms.beta_hat import LARGEST, options
+from cspr_jax.families.platforms.end_acceleration import AT_REST
+from cspr_jax.families.platforms.motion_checker import (
+    BASIC,
+    BESIDE_KNOT,
+    FEW,
+    TOLERANCE,
+    TOUCH,
+    MotionChecker,
+    PlatformChecks,
+)
+from cspr_jax.families.platforms.motions import Motions, rows
+from cspr_jax.families.platforms.platform_segment import PlatformMotion, PlatformSegment
+from cspr_jax.families.platforms.redundant.crossings import CableVectors, passed_over
+from cspr_jax.families.platforms.redundant.redundant_kernels import cable_vectors, end_wrenches, instants
+from cspr_jax.motion.limits import other_limits
+from cspr_jax.motion.platform_kind import USUAL, PlatformMotionKind
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.search.minima import narrowed_places
+from cspr_jax.robots.model.platform import pairs_apart
+from cspr_jax.schema.verdicts import Verdict, conjunction
+from cspr_jax.verification.proved import proved
+from cspr_jax.workspaces.poses import exact
+from cspr_jax.workspaces.requirements import FEASIBLE, requirement
+from cspr_jax.workspaces.search import WorkspaceSearch
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Number of samples that are held at a time, and of instants of the first look that are computed at a time.
+ROOM, CHUNK = 200_000, 8
+# Samples an arc.
+SAMPLES = 32
+# A search looks for minima between samples where a smallest sample is below this part of the largest.
+NEAR = 0.1
+# Halvings of an interval of beta-hat, down to rounding. Slopes below this part of the margins count as zero.
+HALVINGS, FLAT = 60, 1e-12
+# An interval of no values.
+NONE = (LARGEST, -LARGEST)
+
+
+class MarginSieve:
+    """First look at motions by the margins of their tensions, and other limits; see `Sieve`."""
+
+    def __init__(self, checker: "RedundantChecker") -> None:
+        """Keep the checker."""
+        self._checker = checker
+
+    def lowest(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+        """Smallest margin over some instants; see `Sieve.lowest`."""
+        return self._least(segments, arcs, tau)[:, 0]
+
+    def refuted(self, segments: PlatformSegment, arcs: int, tau: np.ndarray, *, limits: bool = True) -> np.ndarray:
+        """Motions that some instants refute; see `Sieve.refuted`."""
+        is_refuted = np.zeros(len(segments.rate), bool)
+        for start in range(0, len(tau), CHUNK):
+            alive = np.flatnonzero(~is_refuted)
+            if not len(alive):
+                break
+            least = self._least(rows(segments, alive), arcs, tau[start : start + CHUNK])
+            is_refuted[alive] = ~(least[:, : None if limits else 1] > -TOLERANCE).all(1)
+        return is_refuted
+
+    def _least(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+        # Return (n, n_slacks), the margin first, without the distances between cables.
+        motions = Motions(segments, np.full(len(segments.rate), arcs))
+        least = self._checker.values(motions, np.tile(tau, (len(motions.arcs), 1)))[:, :, :-1].min(1)
+        return np.where(np.isnan(least), -np.inf, least)
+
+
+class RedundantChecker(MotionChecker):
+    """Checker of motions of one robot on more cables than six; see `MotionChecker`."""
+
+    def __init__(self, problem: Problem, kind: PlatformMotionKind = USUAL, *, batch: int = FEW) -> None:
+        """Find which cables can meet."""
+        super().__init__(problem, kind, batch=batch)
+        robot, limits = problem.robot, problem.limits
+        self._rows = other_limits(limits)
+        basic = (Verdict.WRENCH_INFEASIBLE, Verdict.SINGULAR, Verdict.ABOVE_SPOOLS)
+        self.flags, self.sieve = (*basic, *(row.flag for row in self._rows)), MarginSieve(self)
+        self._requirement = requirement(robot, FEASIBLE, limits)
+        self._workspace = WorkspaceSearch(robot, self._requirement)
+        self._weight = float(robot.mass * robot.gravity) / robot.n_cables
+        self._pairs = np.array(pairs_apart(robot), int).reshape(-1, 2)
+        size = float(np.linalg.norm(np.asarray(robot.platform_points), axis=1).max())
+        self._diameter = 0.0 if robot.cable_diameter is None else float(robot.cable_diameter)
+        self._touch = TOUCH * size
+        knots = np.asarray(problem.amplitude.knots)
+        self._knots = np.clip(np.concatenate([knots - BESIDE_KNOT, knots + BESIDE_KNOT]), 0.0, 1.0)
+
+    def values(self, motions: Motions, tau: Float[np.ndarray, "n m"]) -> Float[np.ndarray, "n m n_values"]:
+        """Margins, other slacks and distances along motions."""
+        row = np.repeat(np.arange(len(tau)), tau.shape[1])
+        kernel = partial(instants, self.problem, self._pairs, kind=self.kind)
+        states = in_batches(kernel, (*motions.items(row), tau.ravel()), size=self.batch)
+        is_finite = (
+            np.isfinite(states.position).all(1)
+            & np.isfinite(states.quaternion).all(1)
+            & np.isfinite(states.wrench).all(1)
+        )
+        margin = np.full(len(row), np.nan)
+        poses = states.position[is_finite], states.quaternion[is_finite], states.wrench[is_finite]
+        margin[is_finite] = self._workspace(*poses).margin
+        values = np.concatenate([margin[:, None] / self._weight, states.slacks], axis=1)
+        return values.reshape(*tau.shape, -1)
+
+    def end_interval(self, position: np.ndarray, quaternion: np.ndarray, z0: float) -> tuple[float, float, float]:
+        """Value with the largest margin, and interval of positive margins; see `MotionChecker.end_interval`."""
+        # The wrench is linear in beta-hat, and so is its distance from each plane; the margin, the least distance, is
+        # concave.
+        matrix, wrenches = (np.asarray(x) for x in end_wrenches(self.problem.robot, position, quaternion, z0))
+        unit = self._workspace.unit
+        planes = exact.margin_planes(matrix / unit[:, None], self._requirement.low, self._requirement.high)
+        if exact.is_outside(wrenches / unit, planes.basis):
+            return AT_REST, *NONE
+        first, second = planes.offsets - (wrenches / unit) @ planes.normals.T
+        slope = second - first
+        if len(slope) == 0 or np.abs(slope).max() <= FLAT * self._weight:
+            is_held = first.min(initial=np.inf) > 0.0
+            return AT_REST, *((-np.inf, np.inf) if is_held else NONE)
+        low, high = -LARGEST, LARGEST
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            rises = slope[np.argmin(first + middle * slope)] > 0.0
+            low, high = (middle, high) if rises else (low, middle)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            zero = -first / slope
+        is_held = (first[slope == 0.0] > 0.0).all()
+        lowest, highest = zero[slope > 0.0].max(initial=-np.inf), zero[slope < 0.0].min(initial=np.inf)
+        return 0.5 * (low + high), *((lowest, highest) if is_held else NONE)
+
+    def end_options(
+        self, positions: np.ndarray, quaternions: np.ndarray, z0: np.ndarray, count: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Values of beta-hat to try at poses, that of the largest margin first; see `MotionChecker.end_options`."""
+        # It stays where no value is feasible, so that its motion can say what is wrong.
+        poses = zip(positions, quaternions, z0.tolist(), strict=True)
+        ends = np.array([self.end_interval(*pose) for pose in poses]).reshape(-1, 3)
+        values = options(ends[:, 0], ends[:, 1], ends[:, 2], count)
+        values[:, 0] = np.where(np.isnan(values[:, 0]), ends[:, 0], values[:, 0])
+        return values, np.ones(len(ends), bool)
+
+    def breaks(self, slack: np.ndarray) -> np.ndarray:
+        """Criteria that are broken for certain; see `MotionChecker.breaks`."""
+        return slack <= -TOLERANCE
+
+    def sampled(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+        """Smallest slacks at some instants; see `MotionChecker.sampled`."""
+        motions = Motions(segments, np.full(len(segments.rate), arcs))
+        return _in_order(self.values(motions, np.tile(tau, (len(motions.arcs), 1))).min(1))
+
+    def check(
+        self,
+        segments: PlatformSegment,
+        arcs: np.ndarray,
+        *,
+        whole: bool = True,
+        margins: bool = True,
+        ignored: np.ndarray | None = None,
+    ) -> PlatformChecks:
+        """Check motions by samples: nothing is proved yet; see `MotionChecker.check`."""
+        return self._at_samples(Motions(segments, arcs), whole, ignored)
+
+    def confirmed(self, segments: PlatformSegment, arcs: np.ndarray, checks: PlatformChecks) -> PlatformChecks:
+        """Checks of motions that passed, with a proof of each; see `MotionChecker.confirmed`."""
+        motions = Motions(segments, arcs)
+        checks = self._at_samples(motions, True, None)
+        for i in np.flatnonzero(checks.verdict == 0).tolist():
+            segment, count = jax.tree.map(lambda x: x[0], motions.items(np.array([i])))
+            motion = PlatformMotion(segment, self.problem.amplitude, count, self.kind)
+            proof = proved(self.problem, motion)
+            checks.verdict[i], checks.bound[i] = proof.verdict, proof.bound / self._weight
+            checks.slack[i, 0] = np.fmin(checks.slack[i, 0], proof.margin / self._weight)
+            checks.gap[i] = np.fmin(checks.gap[i], proof.clearance + self._diameter)
+            checks.instant[i] = proof.instant / float(motion.duration())
+        return checks
+
+    def _at_samples(self, motions: Motions, whole: bool, ignored: np.ndarray | None) -> PlatformChecks:
+        arcs = motions.arcs
+        checks = self.nothing(len(arcs))
+        for count in np.unique(arcs).tolist():
+            # Check motions with the same number of samples together.
+            alike = np.flatnonzero(arcs == count)
+            size = max(ROOM // (SAMPLES * count), 1)
+            for start in range(0, len(alike), size):
+                piece = alike[start : start + size]
+                checks.put(piece, self._checked(motions.rows(piece), SAMPLES * count, whole, ignored))
+        return checks
+
+    def _checked(self, motions: Motions, steps: int, whole: bool, ignored: np.ndarray | None) -> PlatformChecks:
+        tau = np.linspace(0.0, 1.0, steps + 1)
+        samples = self.values(motions, np.tile(tau, (len(motions.arcs), 1)))
+        counted = np.ones(len(self.flags), bool) if ignored is None else ~ignored
+        first = samples[:, :, :-1][:, :, np.append(True, counted[BASIC:])]
+        is_open = np.logical_or(whole, (first.min((1, 2)) > -TOLERANCE))
+        checks = self.nothing(len(motions.arcs))
+        checks.verdict[~is_open] = Verdict.WRENCH_INFEASIBLE.value
+        if not is_open.any():
+            return checks
+        motions, samples = motions.rows(is_open), samples[is_open]
+        least, when = self._smallest(motions, tau, samples, whole)
+        if len(self._knots):  # slacks may jump at knots
+            beside = self.values(motions, np.tile(self._knots, (len(least), 1)))
+            when = np.where(beside.min(1) < least, self._knots[beside.argmin(1)], when)
+            least = np.minimum(least, beside.min(1))
+        judged = self._judged(least, self._met(motions, tau), self.durations(*motions), counted[BASIC:])
+        judged.instant[:] = _refuted_at(least[:, :-1], when[:, :-1])
+        checks.put(np.flatnonzero(is_open), judged)
+        return checks
+
+    def _smallest(
+        self, motions: Motions, tau: np.ndarray, samples: np.ndarray, whole: bool
+    ) -> tuple[np.ndarray, np.ndarray]:
+        # Return smallest values (n, n_values), and their instants.
+        least, when = samples.min(1), tau[samples.argmin(1)]
+        is_near = np.logical_or(whole, ~(least > NEAR * np.abs(samples).max(1)).all(1))
+        if is_near.any():
+            rows_near = motions.rows(is_near)
+            least[is_near], when[is_near] = narrowed_places(partial(self.values, rows_near), tau, samples[is_near])
+        return least, when
+
+    def _met(self, motions: Motions, tau: np.ndarray) -> np.ndarray:
+        # Find motions in which cables pass through each other between samples.
+        many, steps = len(motions.arcs), len(tau) - 1
+        ends = tuple(np.tile(part, many) for part in (tau[:-1], tau[1:]))
+        row = np.repeat(np.arange(many), steps)
+
+        def vectors(motion_row: np.ndarray, when: np.ndarray) -> CableVectors:
+            kernel = partial(cable_vectors, self.problem, self._pairs, kind=self.kind)
+            return in_batches(kernel, (*motions.items(motion_row), when), size=self.batch)
+
+        if not len(self._pairs):
+            return np.zeros(many, bool)
+        return passed_over(vectors, None, row, (ends[0], ends[1]), many)[0]
+
+    def _judged(self, least: np.ndarray, met: np.ndarray, duration: np.ndarray, counted: np.ndarray) -> PlatformChecks:
+        margin, nearest, others = least[:, 0], least[:, -1], least[:, 1:-1]
+        free = nearest - self._diameter
+        verdict = Verdict.CABLE_CABLE.value * (met | (free <= -self._touch))
+        verdict |= np.where(~met & (np.abs(free) < self._touch), Verdict.UNDECIDED.value, 0)
+        verdict |= np.where(np.isneginf(margin), Verdict.SINGULAR.value, 0)
+        is_short = np.isfinite(margin) & (margin <= -TOLERANCE)
+        verdict |= np.where(is_short, Verdict.WRENCH_INFEASIBLE.value, 0)
+        for row, value, counts in zip(self._rows, others.T, counted, strict=True):
+            verdict |= np.where(counts & (value <= -TOLERANCE), row.flag.value, 0)
+        close = (np.abs(least[:, :-1]) <= TOLERANCE) & np.append(True, counted)
+        verdict |= np.where(close.any(1), Verdict.UNDECIDED.value, 0)
+        verdict = conjunction(verdict)
+        is_finite = ~np.isnan(least).any(1) & (duration > 0.0)
+        return PlatformChecks(
+            np.where(is_finite, verdict, Verdict.NOT_FINITE.value),
+            np.where(is_finite[:, None], _in_order(least), np.nan),
+            np.where(is_finite, nearest, np.nan),
+            *(np.full(len(margin), np.nan) for _ in range(4)),
+        )
+
+
+def _refuted_at(least: np.ndarray, when: np.ndarray) -> np.ndarray:
+    # Take smallest values (n, n_values), the margin first, and the instants at which they are attained. Return the
+    # instant of the margin if it is negative, else of the worst other value if that is negative, else NaN.
+    worst = np.where(least[:, 0] <= -TOLERANCE, 0, least.argmin(1))
+    row = np.arange(len(least))
+    return np.where(least[row, worst] <= -TOLERANCE, when[row, worst], np.nan)
+
+
+def _in_order(values: np.ndarray) -> np.ndarray:
+    # Take the margin, slacks of other limits and the distance; return slacks in the order of the flags (n, n_criteria):
+    # NaN for the determinant, which does not exist, and infinity for the depth below the spools, which does not matter.
+    nothing, always = np.full((len(values), 1), np.nan), np.full((len(values), 1), np.inf)
+    return np.concatenate([values[:, :1], nothing, always, values[:, 1:-1]], axis=1)

@@ -1,0 +1,19 @@
+"""Proof of motions of six-cable platforms, fast: tensions, determinant, contacts and limits on blocks.
+
+Files, each importing only from those above it:
+
+    slacks           criteria of one instant
+    slack_lanes      the same, one lane a case
+    screen           a first look, in single precision
+    cable_contacts   proofs that cables meet
+    work_list        blocks that are closed, or halved; the few numbers that this needs of their nodes
+    complex_bounds   bounds of a motion on an ellipse of complex time
+    limit_blocks     limits on blocks
+    tension_blocks   tensions and determinant on blocks
+    pose_blocks      contacts, depth and limits on the pose on blocks
+    tension_proof    proofs of tensions and determinant
+    pose_proof       proofs of contacts, depth and limits on the pose
+    enclosures       bounds over robots that differ a little
+    margins          smallest values, refined
+    checker          verdicts and margins of motions on six cables
+"""

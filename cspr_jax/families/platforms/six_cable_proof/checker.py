@@ -1,0 +1,269 @@
+"""Feasibility of a platform's motions: proved on blocks of time, or refuted by an instant; and margins.
+
+A first look at a few instants refutes most infeasible motions. Tensions, the determinant and the limits on the motion
+are then proved by `proof`, contacts and the limits on the pose by `place_proof`. Margins are the smallest values that
+are attained, narrowed down around the smallest samples of every criterion; beside them stand the proved bounds.
+"""
+
+from __future__ import annotations
+
+import threading
+from functools import partial
+from typing import TYPE_CHECKING
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.families.platforms.beta_hat import end_options
+from cspr_jax.families.platforms.end_acceleration import endpoint
+from cspr_jax.families.platforms.motion_checker import BESIDE_KNOT, FEW, MANY, MotionChecker, PlatformChecks
+from cspr_jax.families.platforms.motions import Motions
+from cspr_jax.families.platforms.platform_segment import PlatformSegment
+from cspr_jax.families.platforms.platform_segment_lanes import instant_lanes, state
+from cspr_jax.families.platforms.six_cable_proof.enclosures import Robustness
+from cspr_jax.families.platforms.six_cable_proof.margins import Samples, narrowed
+from cspr_jax.families.platforms.six_cable_proof.pose_proof import PlaceCertifier, PlaceProof
+from cspr_jax.families.platforms.six_cable_proof.screen import FIRST, TensionSieve
+from cspr_jax.families.platforms.six_cable_proof.slack_lanes import moving_slacks, order, still_slacks
+from cspr_jax.families.platforms.six_cable_proof.slacks import flags
+from cspr_jax.families.platforms.six_cable_proof.tension_blocks import of_motion
+from cspr_jax.families.platforms.six_cable_proof.tension_proof import Certifier, TensionProof
+from cspr_jax.families.platforms.six_cable_proof.work_list import TOLERANCE, allowance
+from cspr_jax.motion.platform_kind import USUAL, PlatformMotionKind
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.batches import in_batches, in_threads
+from cspr_jax.numerics.linear.lanes import dot, smallest
+from cspr_jax.robots.contacts import interference_lanes
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.statics.wrench_lanes import cable_lanes
+from cspr_jax.runtime.persistent_jit import persistent_jit
+from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.verification.robustness.tolerances import Tolerated
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Largest number of blocks in a call, and of arcs that are held at a time.
+BLOCKS, ARCS = 1024, 32 * MANY
+# Instants that are looked at together.
+SAMPLES = 1 << 18
+# With margins, the bound must reach this part of the attained value.
+NEAR = 0.5
+
+
+# XLA compiles one function here instead of some hundred small ones.
+_end = jax.jit(endpoint)
+
+
+@persistent_jit(static_argnames=("pairs", "kind"))
+def slacks_at(problem: Problem, items, *, pairs: tuple, kind: PlatformMotionKind) -> tuple[Float[Array, "n"], ...]:
+    """Slacks and distances between cables at instants."""
+    segments, arcs, tau = items
+    instant = instant_lanes(problem.amplitude, segments.sense, arcs, tau)
+    here = state(segments, arcs, instant, kind)
+    cables = cable_lanes(problem.robot, here.position, here.rotation)
+    slacks = [
+        *moving_slacks(problem, segments, arcs, instant, kind),
+        *still_slacks(problem, segments, here, cables),
+    ]
+    squares = [dot(gap, gap) for gap in interference_lanes.gaps(problem.robot.base_points, pairs, cables)]
+    nearest = jnp.sqrt(smallest(squares)) if squares else jnp.full_like(segments.rate, jnp.inf)
+    # Return a tuple: XLA would compute a whole stack for each of its elements.
+    return *(slacks[k] for k in order(problem.limits)), nearest
+
+
+class PlatformChecker(MotionChecker):
+    """Checker of motions of one robot on six cables.
+
+    Args:
+        problem: robot, limits, amplitude.
+        batch: how many motions are computed at a time.
+
+    Fields:
+        sieve: the first look, which comes before checks.
+        done: numbers of instants that were looked at so far in the first look ("sieve") and in checks ("checks"), and
+            of motions that were checked ("motions").
+    """
+
+    def __init__(self, problem: Problem, kind: PlatformMotionKind = USUAL, *, batch: int = FEW) -> None:
+        """Prepare the sieve and both proofs."""
+        super().__init__(problem, kind, batch=batch)
+        self._lock, self.done = threading.Lock(), {"sieve": 0, "motions": 0, "checks": 0}
+        self._compiling, self._compiled = threading.Lock(), set[bool]()
+        self.flags = flags(problem.limits)
+        knots = np.asarray(problem.amplitude.knots)
+        count, count_checks = partial(self._count, "sieve"), partial(self._count, "checks")
+        self.sieve = TensionSieve(problem.robot, problem.amplitude, kind, -TOLERANCE, FIRST * batch, count)
+        self._tensions = Certifier(problem, kind, batch=min(batch, BLOCKS), count_instants=count_checks)
+        self._places = PlaceCertifier(problem, kind, batch=min(batch, BLOCKS), count_instants=count_checks)
+        self._robustness = None
+        if problem.limits.uncertainty is not None:
+            self._robustness = Robustness(problem, kind, batch=min(batch, BLOCKS), count_instants=count_checks)
+        self._knots = np.concatenate([knots - BESIDE_KNOT, knots + BESIDE_KNOT])
+        self._allowed = allowance(np.arange(len(self.flags)) >= len(flags(Limits())))
+        # Place of each criterion in a list that has the criteria of the motion first, then those of the pose alone.
+        self._order = np.array(order(problem.limits))
+        self._n_moving = 1 + len(of_motion(problem))
+
+    def _count(self, what: str, many: int) -> None:
+        with self._lock:
+            self.done[what] += many
+
+    def end_interval(self, position: np.ndarray, quaternion: np.ndarray, z0: float) -> tuple[float, float, float]:
+        """Values of (3.91) and (3.92); see `MotionChecker.end_interval`."""
+        end = _end(self.problem.robot, position, quaternion, jnp.asarray(z0))
+        return float(end.preferred), float(end.lowest), float(end.highest)
+
+    def end_options(
+        self, positions: np.ndarray, quaternions: np.ndarray, z0: np.ndarray, count: int
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Values of beta-hat to try at poses; see `MotionChecker.end_options`."""
+        return end_options(self.problem.robot, positions, quaternions, z0, count)
+
+    def breaks(self, slack: np.ndarray) -> np.ndarray:
+        """Criteria that are broken for certain; see `MotionChecker.breaks`."""
+        return slack + self._allowed < -TOLERANCE
+
+    def sampled(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+        """Smallest slacks at some instants; see `MotionChecker.sampled`."""
+        motions, size = Motions(segments, np.full(len(segments.rate), arcs)), max(SAMPLES // len(tau), 1)
+        kernel = partial(slacks_at, self.problem, pairs=self._places.pairs, kind=self.kind)
+        least = []
+        for start in range(0, len(motions.arcs), size):
+            row = np.repeat(np.arange(start, min(start + size, len(motions.arcs))), len(tau))
+            instants = np.tile(tau, len(row) // len(tau))
+            slacks = in_batches(kernel, (*motions.items(row), instants), size=self.batch)
+            least.append(np.stack(slacks[:-1], axis=1).reshape(-1, len(tau), len(self.flags)).min(1))
+        return np.concatenate(least)
+
+    def check(
+        self,
+        segments: PlatformSegment,
+        arcs: np.ndarray,
+        *,
+        whole: bool = True,
+        margins: bool = True,
+        ignored: np.ndarray | None = None,
+    ) -> PlatformChecks:
+        """Check motions in full; see `MotionChecker.check`."""
+        checks, motions = self.nothing(len(arcs)), Motions(segments, arcs)
+        self._count("motions", len(arcs))
+        size = max(ARCS // max(arcs, default=1), 1)
+        for start in range(0, len(arcs), size):
+            piece = np.arange(start, min(start + size, len(arcs)))
+            checks.put(piece, self._checked(motions.rows(piece), whole=whole, margins=margins, ignored=ignored))
+        return checks
+
+    def _checked(self, motions: Motions, *, whole: bool, margins: bool, ignored: np.ndarray | None) -> PlatformChecks:
+        checks = self.nothing(len(motions.arcs))
+        self._compile(motions, margins=margins)
+        moving, still = self._narrowed_criteria()
+        moving_ignored, still_ignored = (None if ignored is None else ignored[x] for x in (moving, still[:-1]))
+        near = NEAR if margins else 0.0
+        tensions = self._tensions.prove(*motions, near=near, margins=margins, ignored=moving_ignored)
+        checks.verdict[:] = np.where(tensions.is_refuted, Verdict.SLACK_CABLE.value, Verdict.UNDECIDED.value)
+        checks.instant[:] = np.where(tensions.is_refuted, tensions.instant, np.nan)
+        open_rows = np.flatnonzero(np.logical_or(whole, ~tensions.is_refuted))
+        if not len(open_rows):
+            return checks
+        part = motions.rows(open_rows)
+        places = self._places.prove(*part, margins=margins, ignored=still_ignored)
+        checks.instant[open_rows] = np.where(
+            tensions.is_refuted[open_rows], tensions.instant[open_rows], places.instant
+        )
+        is_finite = ~np.isnan(tensions.attained[open_rows]).any(1) & ~np.isnan(places.attained).any(1)
+        is_finite &= self.durations(*part) > 0.0
+        is_proved = tensions.is_proved[open_rows] & places.is_proved & is_finite
+        checks.bound[open_rows] = np.where(
+            is_proved, np.minimum(tensions.bound[open_rows, 0], places.bound[:, 0]), np.nan
+        )
+        least = self._attained(tensions.attained[open_rows], places.attained)
+        if margins:
+            samples = _samples(moving, tensions, open_rows), _samples(still, places, np.arange(len(open_rows)))
+            self._narrow(least, part, samples, np.logical_or(whole, is_proved))
+        verdict = self._verdict(least[:-1], is_proved, places, ignored)
+        if ignored is None:
+            self._weigh(checks, open_rows, part, verdict)
+        checks.verdict[open_rows] = np.where(is_finite, verdict, Verdict.NOT_FINITE.value)
+        checks.slack[open_rows] = np.where(is_finite, least[:-1], np.nan).T
+        checks.gap[open_rows] = np.where(is_finite, least[-1], np.nan)
+        return checks
+
+    def _compile(self, motions: Motions, *, margins: bool) -> None:
+        # Compile both proofs at once, before the first check: XLA takes seconds for each, on one core. Other threads
+        # wait.
+        with self._compiling:
+            if margins not in self._compiled:
+                one = motions.rows(np.arange(1))
+                in_threads(lambda proofs: proofs.prove(*one, margins=margins), [self._tensions, self._places])
+                self._compiled.add(margins)
+
+    def tolerated(self, segments: PlatformSegment, arcs: np.ndarray) -> Tolerated:
+        """Multiples of the uncertainty that motions stand; see `MotionChecker.tolerated`."""
+        if self._robustness is None:
+            return super().tolerated(segments, arcs)
+        return self._robustness.tolerated(segments, arcs)
+
+    def _weigh(self, checks: PlatformChecks, rows: np.ndarray, motions: Motions, verdict: np.ndarray) -> None:
+        # Judge motions that are feasible as planned by how much of the uncertainty they stand.
+        feasible = np.flatnonzero(verdict == Verdict.FEASIBLE)
+        if self._robustness is None or not len(feasible):
+            return
+        tolerances = self._robustness.tolerated(*motions.rows(feasible), whole=False)
+        checks.tolerated[rows[feasible]], checks.not_tolerated[rows[feasible]] = tolerances
+        open_ones = np.where(tolerances.refuted <= 1.0, Verdict.UNCERTAINTY.value, Verdict.UNDECIDED.value)
+        verdict[feasible] = np.where(tolerances.proved >= 1.0, Verdict.FEASIBLE.value, open_ones)
+
+    def _verdict(
+        self, least: np.ndarray, is_proved: np.ndarray, places: PlaceProof, ignored: np.ndarray | None
+    ) -> np.ndarray:
+        # If a criterion is broken for certain, the verdict says only that.
+        verdict = Verdict.CABLE_CABLE.value * places.met | Verdict.CABLE_PLATFORM.value * places.hit
+        broken = self.breaks(least.T) & (True if ignored is None else ~ignored)
+        for flag, column in zip(self.flags, broken.T, strict=True):
+            verdict |= np.where(column, flag.value, 0)
+        return np.where(is_proved | (verdict != 0), verdict, Verdict.UNDECIDED.value)
+
+    def _attained(self, moving: np.ndarray, still: np.ndarray) -> np.ndarray:
+        # Return (n_criteria + 1, n) in the order of the flags, then the distance between cables. Proofs have the
+        # determinant second among the criteria that depend on the motion.
+        columns = np.concatenate([moving[:, :1], moving[:, 2:], moving[:, 1:2], still[:, :-1]], axis=1)
+        return np.concatenate([columns[:, self._order], still[:, -1:]], axis=1).T
+
+    def _narrowed_criteria(self) -> tuple[np.ndarray, np.ndarray]:
+        # Find the places of the values of both proofs among the criteria, the distance between cables last. The
+        # determinant stands second among the criteria that depend on the motion, and first after these among all.
+        places = np.argsort(self._order)
+        moving = places[[0, self._n_moving, *range(1, self._n_moving)]]
+        return moving, np.append(places[self._n_moving + 1 :], len(self.flags))
+
+    def _narrow(self, least: np.ndarray, motions: Motions, samples: tuple[Samples, ...], selected: np.ndarray) -> None:
+        # Lower the attained values, (n_criteria + 1, n), of the selected motions to their margins.
+        def values_at(row: np.ndarray, tau: np.ndarray) -> np.ndarray:
+            kernel = partial(slacks_at, self.problem, pairs=self._places.pairs, kind=self.kind)
+            return np.stack(in_batches(kernel, (*motions.items(row), tau), size=self.batch))
+
+        rows = np.flatnonzero(selected)
+        if not len(rows):
+            return
+        # Limits on speeds and accelerations are proved by other functions of the same sign, and beyond a singularity
+        # nothing is proved: start again from true slacks.
+        least[np.argsort(self._order)[1 : self._n_moving]] = np.inf
+        least[np.isneginf(least)] = np.inf
+        # Add the ends of motions, and both sides of knots, where slacks may jump.
+        for tau in (0.0, 1.0, *self._knots):
+            least[:, rows] = np.fmin(least[:, rows], values_at(rows, np.full(len(rows), tau)))
+        for one in samples:
+            narrowed(values_at, least, one, selected)
+
+
+def _samples(criteria: np.ndarray, proof: TensionProof | PlaceProof, rows: np.ndarray) -> Samples:
+    # Take samples of the motions in `rows` at the instants of their first blocks; motions are numbered within `rows`.
+    numbers = np.full(len(proof.is_proved), -1)
+    numbers[rows] = np.arange(len(rows))
+    row = numbers[proof.row]
+    # A mask as an index would leave blocks as the slowest axis in memory.
+    row, tau, nodes = (np.compress(row >= 0, x, axis=-1) for x in (row, proof.first.tau, proof.first.nodes))
+    return Samples(criteria, row, tau, nodes)

@@ -1,0 +1,232 @@
+"""Bounds of a platform's motion on an ellipse of complex time, one lane a block.
+
+A motion is analytic between the knots of its amplitude function. Around the middle m of a block, on the ellipse with
+the semi-axes a (along time) and b, every quantity of the motion is bounded in the Hermitian norm: polynomials by their
+terms, sines and cosines by their values in the middle, and rotations by the imaginary part of half their rotation
+vector, v = beta u: for a complex v
+
+    |exp(2 [v])| <= exp(2 |Im v|) = G,    omega = 2 beta' u + 2 beta (integral over s from 0 to 1 of exp(2 s [v]) u')
+
+since a rotation leaves its own axis alone. With b = 0 these are bounds on an interval of real time: docs/theory.md.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.families.platforms.platform_segment import PlatformSegment
+from cspr_jax.families.platforms.platform_segment_lanes import InstantLanes
+from cspr_jax.motion.amplitudes import Amplitude, derivatives
+from cspr_jax.motion.platform_kind import PlatformMotionKind
+from cspr_jax.numerics.elementary import polynomial, sincospi
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
+
+# arccos(s) / sqrt(1 - s^2) is bounded up to this 1 - s, since it is singular at 2; and 1 - s counts as this at least.
+FARTHEST, NEAREST = 1.9, 0.1
+
+
+class Middle(NamedTuple):
+    """The middle of a block, and the amplitude function around it.
+
+    Fields:
+        tau: (n,) normalised time.
+        terms: Taylor coefficients of A there, of the polynomial piece that holds it; (n,) each.
+    """
+
+    tau: Array
+    terms: Sequence[Array]
+
+
+class Reach(NamedTuple):
+    """Bounds on an ellipse, (n,) each; derivatives in normalised time.
+
+    Fields:
+        speed: bound of |p'|, m.
+        bend: bound of |p''|, m.
+        growth: bound of the norm of the rotation matrix.
+        rotation_rate: bound of the norm of the derivative of the rotation matrix.
+        omega: bound of |omega|, rad.
+        angular_acceleration: bound of |omega'|, rad.
+    """
+
+    speed: Array
+    bend: Array
+    growth: Array
+    rotation_rate: Array
+    omega: Array
+    angular_acceleration: Array
+
+
+def middle_of(amplitude: Amplitude, tau: Float[Array, "n"]) -> Middle:
+    """The middle of a block."""
+    values = derivatives(amplitude, tau, order=amplitude.coefficients.shape[1] - 1)
+    return Middle(tau, [value / math.factorial(j) for j, value in enumerate(values)])
+
+
+def instant_beside(
+    middle: Middle, sense: Float[Array, "n"], arcs: Num[Array, "n"], off: Float[Array, "n"]
+) -> InstantLanes:
+    """Instant beside the middle of a block, by the polynomial piece of the middle."""
+    tau, terms = middle.tau + off, middle.terms
+    a, a1, a2, a3 = (polynomial([math.perm(i, j) * terms[i] for i in range(j, len(terms))], off) for j in range(4))
+    return InstantLanes(tau, a, a1, a2, a3, *sincospi(sense * arcs * tau))
+
+
+def reach(
+    segment: PlatformSegment,
+    arcs: Num[Array, "n"],
+    middle: Middle,
+    axes: tuple[Float[Array, "n"], Float[Array, "n"]],
+    kind: PlatformMotionKind,
+) -> Reach:
+    """Bounds of motions around the middles of blocks."""
+    along, aside = axes
+    sizes = _polynomial_sizes(middle.terms, along)
+    phase = math.pi * arcs * along, jnp.exp(math.pi * arcs * aside)
+    sine, cosine = sincospi(arcs * middle.tau)
+    first = _trigonometric((jnp.abs(sine), jnp.abs(cosine)), *phase)
+    speed, bend = _swing(segment, arcs, middle, (along, aside), sizes, first, kind)
+    if kind.plain:
+        omega = math.pi * arcs
+        beats = _Beats(first.cosine, omega * first.sine, omega * omega * first.cosine, first.aside)
+    else:
+        sine3, cosine3 = sine * (3.0 - 4.0 * sine * sine), cosine * (4.0 * cosine * cosine - 3.0)
+        third = _trigonometric((jnp.abs(sine3), jnp.abs(cosine3)), 3.0 * phase[0], phase[1] * phase[1] * phase[1])
+        beats = _beat(segment, arcs, middle, (along, aside), first, third)
+    angle = jnp.abs(segment.slerp.angle)
+    if kind.from_rest:
+        u, u1, u2 = (angle * size for size in sizes[:3])
+    else:
+        u, u1, u2 = _half_vector(segment, middle, (along, aside), sizes, angle)
+    beta, beta1, beta2, beta_aside = beats
+    v1 = beta1 * u + beta * u1
+    grown = jnp.exp(2.0 * jnp.minimum(beta_aside * u + beta * aside * u1, beta * u))
+    beside = 1.0 if kind.from_rest else grown  # from rest, all rotation is about one axis
+    omega = beta1 * u + beside * beta * u1
+    angular_acceleration = beta2 * u + beta1 * u1 + beside * (beta1 * u1 + beta * u2)
+    if not kind.from_rest:
+        angular_acceleration = angular_acceleration + grown * beta * u1 * v1
+    return Reach(speed, bend, grown, 2.0 * grown * v1, 2.0 * omega, 2.0 * angular_acceleration)
+
+
+def _polynomial_sizes(terms: Sequence[Array], along: Array) -> tuple[Array, ...]:
+    # Bound |A|, |A'|, |A''| and |A'''|.
+    sizes = [jnp.abs(term) for term in terms]
+    return tuple(polynomial([math.perm(i, j) * sizes[i] for i in range(j, len(sizes))], along) for j in range(4))
+
+
+class _Trigonometric(NamedTuple):
+    # Bounds of |sin|, |cos|, and the imaginary part of the cosine.
+    sine: Array
+    cosine: Array
+    aside: Array
+
+
+class _Beats(NamedTuple):
+    # Bounds of |beta|, |beta'|, |beta''|, and the imaginary part of beta.
+    value: Array
+    rate: Array
+    bend: Array
+    aside: Array
+
+
+def _trigonometric(middle: tuple[Array, Array], along: Array, growth: Array) -> _Trigonometric:
+    # Bound sines and cosines within `along` of an angle whose |sin| and |cos| are `middle`; growth is exp of the
+    # largest imaginary part.
+    shrunk = 1.0 / growth
+    cosh, sinh = 0.5 * (growth + shrunk), 0.5 * (growth - shrunk)
+    near = jnp.minimum(along, 1.0)
+    off = jnp.sqrt(near * near + sinh * sinh)
+    sine, cosine = middle
+    return _Trigonometric(
+        jnp.minimum(cosh, sine * cosh + cosine * off),
+        jnp.minimum(cosh, cosine * cosh + sine * off),
+        jnp.minimum(1.0, sine + cosine * near) * sinh,
+    )
+
+
+def _swing(
+    segment: PlatformSegment, arcs: Array, middle: Middle, axes, sizes, first, kind: PlatformMotionKind
+) -> tuple[Array, Array]:
+    # Bound |p'| and |p''| by the terms of `platform_segment_lanes`, and by the growth of the frame that turns with the
+    # ellipse.
+    omega = math.pi * arcs
+    sine, cosine, _ = first
+    if kind.from_rest:
+        r, r1, r2, r3 = (jnp.abs(segment.end_radius) * size for size in sizes)
+        nu, steady, frame = 0.0 * r, omega * omega, jnp.ones_like(r)
+    else:
+        span = segment.end_radius - segment.start_radius
+        r1, r2, r3 = (jnp.abs(span) * size for size in sizes[1:])
+        r = jnp.abs(segment.start_radius + span * middle.terms[0]) + axes[0] * r1
+        nu = segment.precession / arcs
+        steady = omega * omega * (1.0 - nu) * (1.0 + nu)
+        frame = jnp.exp(math.pi * segment.precession * axes[1])
+    if kind.variable:
+        w, across = (r * steady + r2) / omega, 2.0 * nu * r1
+        w1 = 2.0 * nu * nu * r1 * omega + (r1 * steady + r3) / omega
+        across1 = nu * (r * steady + 3.0 * r2)
+        speed = sine * _hypotenuse(w, across)
+        bend = _hypotenuse(omega * cosine * w + sine * w1, omega * cosine * across + sine * across1)
+    else:
+        inner = r2 + r * steady
+        speed = _hypotenuse(r1 * cosine + r * steady / omega * sine, nu * r1 * sine)
+        bend = _hypotenuse(inner * cosine + 2.0 * r1 * steady / omega * sine, nu * inner * sine)
+    return frame * speed, frame * bend
+
+
+def _hypotenuse(a: Array, b: Array) -> Array:
+    return jnp.sqrt(a * a + b * b)
+
+
+def _beat(segment: PlatformSegment, arcs: Array, middle: Middle, axes, first, third) -> _Beats:
+    # Bound beta_ff of (3.93) by its terms.
+    slerp, omega, nu = segment.slerp, math.pi * arcs, segment.precession / arcs
+    share = (1.0 - nu) * (1.0 + nu)
+    slope = (slerp.end_beta_hat - slerp.start_beta_hat) * share
+    h, steep = slerp.start_beta_hat * share + slope * middle.tau, jnp.abs(slope)
+    nine, one = jnp.abs(9.0 + h) + steep * axes[0], jnp.abs(1.0 + h) + steep * axes[0]
+    value = nine * first.cosine + one * third.cosine
+    rate = steep * (first.cosine + third.cosine) + omega * (3.0 * one * third.sine + nine * first.sine)
+    bend = 2.0 * steep * omega * (3.0 * third.sine + first.sine)
+    bend = bend + omega * omega * (9.0 * one * third.cosine + nine * first.cosine)
+    aside = nine * first.aside + one * third.aside + steep * axes[1] * (first.cosine + third.cosine)
+    return _Beats(value * 0.125, rate * 0.125, bend * 0.125, aside * 0.125)
+
+
+def _half_vector(segment: PlatformSegment, middle: Middle, axes, sizes, angle: Array) -> tuple[Array, ...]:
+    # Bound |u|, |u'| and |u''|: u = W(s) times the vector part of the envelope, which is at the angle phi = Theta A.
+    slerp = segment.slerp
+    rate, bend = angle * sizes[1], angle * sizes[2]
+    grown = jnp.exp(axes[1] * rate)
+    shrunk = 1.0 / grown
+    cosh = 0.5 * (grown + shrunk)
+    size = jnp.sqrt(0.5 * (grown * grown + shrunk * shrunk))
+    sine, cosine = sincospi(slerp.angle * middle.terms[0] / math.pi)
+    largest = _hypotenuse(slerp.start[:, 0], slerp.across[:, 0]) * cosh
+    off = jnp.abs(1.0 - slerp.start[:, 0] * cosine - slerp.across[:, 0] * sine) + axes[0] * rate * largest
+    w, w1, w2 = _angle_ratio(jnp.maximum(off, NEAREST))
+    s, s1 = jnp.minimum(1.0 + off, largest), largest
+    by_angle = size * (w + w1 * s1)
+    by_square = size * (w + 2.0 * w1 * s1 + w2 * s1 * s1 + w1 * s)
+    return size * w, by_angle * rate, by_square * rate * rate + by_angle * bend
+
+
+def _angle_ratio(off: Array) -> tuple[Array, ...]:
+    # Bound W = arccos(s) / sqrt(1 - s^2) and the sizes of its derivatives where |1 - s| <= off: their series in 1 - s
+    # have positive terms alone, so that they are largest on the real axis.
+    is_inside = off < FARTHEST
+    s = 1.0 - jnp.where(is_inside, off, 1.0)
+    square = 1.0 - s * s
+    sine = jnp.sqrt(square)
+    w = jnp.arctan2(sine, s) / sine
+    w1 = (1.0 - s * w) / square
+    w2 = (w - 3.0 * s * w1) / square
+    return tuple(jnp.where(is_inside, x, jnp.inf) for x in (w, w1, w2))

@@ -1,0 +1,288 @@
+"""Enclosures of a platform on its way, for bounds over robots that differ a little; vectors are in platform axes."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.families.platforms.motions import rows
+from cspr_jax.families.platforms.platform_segment import PlatformSegment
+from cspr_jax.families.platforms.platform_segment_lanes import StateLanes, squared_duration, state
+from cspr_jax.families.platforms.six_cable_proof.complex_bounds import Reach, instant_beside, middle_of, reach
+from cspr_jax.families.platforms.six_cable_proof.tension_proof import Certifier
+from cspr_jax.motion.platform_kind import PlatformMotionKind
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.elementary import unit_vectors
+from cspr_jax.numerics.linear.lanes import stored
+from cspr_jax.robots.contacts.interference import between, contacts, nearest
+from cspr_jax.robots.contacts.interference_lanes import residual
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.robots.statics.wrench_lanes import CABLES
+from cspr_jax.verification.bounds.blocks import Blocks, parts_of_arcs
+from cspr_jax.verification.bounds.enclosures import TOUCHED, Distances, Enclosure, Rates, largest_moves
+from cspr_jax.verification.robustness.tolerances import Tolerated, tolerated
+from cspr_jax.verification.robustness.uncertainty import requirements_of
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Cables count as nearest between their ends, and as not parallel, only beyond these tolerances.
+INSIDE, PARALLEL = 1e-6, 1e-6
+# Number of blocks of an arc to begin with; larger blocks are hardly ever enough.
+PARTS = 32
+# Radius of the discs in complex time on which changes of accelerations are bounded, over the time in which the phase of
+# the oscillation changes by 1 rad.
+RADIUS = 0.4
+
+
+class _Moving(NamedTuple):
+    # State in the middles of n blocks, in fixed axes and normalised time; bounds on the blocks (`near`), and on discs
+    # about all of their instants (`wide`).
+    here: StateLanes
+    squared: Array
+    near: Reach
+    wide: Reach
+
+
+@partial(jax.jit, static_argnames="kind")
+def _moving(problem: Problem, one: Array, items, *, kind: PlatformMotionKind) -> _Moving:
+    segments, arcs, start, stop = items
+    middle, half = middle_of(problem.amplitude, 0.5 * (start + stop)), 0.5 * (stop - start)
+    here = state(segments, arcs, instant_beside(middle, segments.sense, arcs, jnp.zeros_like(half)), kind)
+    near, wide = (
+        reach(segments, arcs, middle, (half + radius, radius), kind)
+        for radius in (jnp.zeros_like(half), RADIUS / (math.pi * arcs))
+    )
+    return stored(_Moving(here, squared_duration(segments, arcs), near, wide), one)
+
+
+@partial(jax.jit, static_argnames="pairs")
+def _contacts(platform, points: Array, rays: Array, *, pairs: tuple) -> tuple[Array, Array, Array]:
+    # Return the places at which pairs of cables are nearest (n, n_pairs, 2), the shortest vectors (n, n_pairs, 3), and
+    # the residuals of the projections of cables onto the sectors of their corners (n, 6, 3).
+    sides, normal = platform
+    one, two = ([sides[:, side, k] for k in range(3)] for side in range(2))
+    left = jax.vmap(lambda ray: jnp.stack(residual((one, two), normal, -ray.T), axis=1))(rays)
+    if not pairs:
+        return jnp.zeros((len(rays), 0, 2)), jnp.zeros((len(rays), 0, 3)), left
+    i, j = (np.array([pair[k] for pair in pairs]) for k in range(2))
+    lines = points[i][None] - rays[:, i], rays[:, i], points[j][None] - rays[:, j], rays[:, j]
+    return jnp.stack(nearest(*lines), axis=2), between(*lines), left
+
+
+class _Middle(NamedTuple):
+    # Values in the middles of k blocks, in platform axes and time: rays, their rates as the platform sees them,
+    # velocity and acceleration of the attachment points (k, 6, 3); force, moment (k, 3) and whirl (k, 3, 3) per mass.
+    rays: np.ndarray
+    pace: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    force: np.ndarray
+    moment: np.ndarray
+    whirl: np.ndarray
+
+
+class _Within(NamedTuple):
+    # Changes of the rays along their tangents up to the stops of k blocks (k, 6, 3), and bounds of changes within these
+    # blocks: of velocities and accelerations of the attachment points, of rays from their tangents, of rays (k, 6), of
+    # force and whirl (k,).
+    way: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    bent: np.ndarray
+    moved: np.ndarray
+    force: np.ndarray
+    whirl: np.ndarray
+
+
+def _middle(robot: PlatformRobot, here: StateLanes, squared: np.ndarray) -> _Middle:
+    vectors = here.position, here.velocity, here.acceleration, here.omega, here.angular_acceleration
+    position, velocity, acceleration, omega, angular_acceleration = (np.stack(x, axis=1) for x in vectors)
+    rotation = np.stack([np.stack(row, axis=1) for row in here.rotation], axis=1)
+    base, arms = np.asarray(robot.base_points), np.asarray(robot.platform_points)
+
+    def in_platform(vectors: np.ndarray) -> np.ndarray:
+        return np.einsum("kji,k...j->k...i", rotation, vectors)
+
+    time = np.sqrt(squared)
+    away, velocity, acceleration = (
+        in_platform(position[:, None] - base),
+        in_platform(velocity),
+        in_platform(acceleration),
+    )
+    omega = in_platform(omega) / time[:, None]
+    angular_acceleration = in_platform(angular_acceleration) / squared[:, None]
+    velocity, acceleration = velocity / time[:, None], acceleration / squared[:, None]
+    whirl = _skew(angular_acceleration) + _skew(omega) @ _skew(omega)
+    inertia = np.asarray(robot.inertia) / float(robot.mass)
+    moment = angular_acceleration @ inertia.T + np.cross(omega, omega @ inertia.T)
+    return _Middle(
+        away + arms,
+        velocity[:, None] - np.cross(omega[:, None], away),
+        velocity[:, None] + np.cross(omega[:, None], arms),
+        acceleration[:, None] + np.einsum("kij,nj->kni", whirl, arms),
+        acceleration - float(robot.gravity) * rotation[:, 2],
+        moment,
+        whirl,
+    )
+
+
+def _skew(vectors: np.ndarray) -> np.ndarray:
+    return np.cross(vectors[:, None], np.eye(3)[None]).swapaxes(1, 2)
+
+
+def _within(robot: PlatformRobot, middle: _Middle, moving: _Moving, half: np.ndarray, arcs: np.ndarray) -> _Within:
+    # Bound changes in real time by `near`; where a derivative has no bound, by Cauchy's inequality from values on
+    # discs.
+    near, wide, squared = (
+        *(Reach(*(x[:, None] for x in y)) for y in (moving.near, moving.wide)),
+        moving.squared[:, None],
+    )
+    half, radius, time = half[:, None], RADIUS / (math.pi * arcs[:, None]), np.sqrt(squared)
+    arms = np.linalg.norm(np.asarray(robot.platform_points), axis=1)
+    away = np.linalg.norm(middle.rays - np.asarray(robot.platform_points), axis=2) + half * near.speed
+    jerk = wide.bend / radius
+    force = jerk / squared + near.omega * (near.bend / squared + float(robot.gravity))
+    whirl = (wide.angular_acceleration / radius + 3.0 * near.omega * near.angular_acceleration) / squared
+    pace = near.speed + arms * near.omega
+    turning = near.angular_acceleration + near.omega**2
+    pull = near.bend + arms * turning
+    steep = jerk + arms * wide.growth * (wide.angular_acceleration + wide.omega**2) / radius
+    bent = 0.5 * half**2 * (near.bend + 2.0 * near.omega * near.speed + turning * away)
+    way = middle.pace * (half * time)[..., None]
+    return _Within(
+        way,
+        half * (pull + near.omega * pace) / time,
+        half * (steep + near.omega * pull) / squared,
+        bent,
+        largest_moves(way, bent),
+        *(half * x for x in (force, whirl)),
+    )
+
+
+class _Columns:
+    # Columns of `Distances`, which are added one by one.
+
+    def __init__(self, count: int) -> None:
+        self._count, self._columns = count, list[tuple]()
+
+    def add(self, bound, change, spools: float, here, here_spools, tilted=(0.0, 0.0, 0.0)) -> None:
+        self._columns.append((bound, change, *tilted, here, here_spools, spools))
+
+    def distances(self) -> Distances:
+        *each, spools = zip(*self._columns, strict=True)
+        bound, change, tilt, slope, swing, here, here_spools = (
+            np.stack([np.broadcast_to(x, self._count) for x in column], axis=1) for column in each
+        )
+        return Distances(bound, change, tilt, slope, swing, np.array(spools), here, here_spools)
+
+
+def _distances(problem: Problem, pairs: tuple, middle: _Middle, within: _Within, met) -> Distances:
+    robot, (places, gaps, left) = problem.robot, met
+    columns, tips = _Columns(len(middle.rays)), np.asarray(robot.platform_points)
+    for n, pair in enumerate(pairs):
+        _add_gap(columns, gaps[:, n], places[:, n], middle, within, tips, pair)
+    for k in range(CABLES):
+        e, height = unit_vectors(left[:, k]), np.linalg.norm(left[:, k], axis=1)
+        change = np.abs(np.sum(e * within.way[:, k], axis=1)) + within.bent[:, k]
+        columns.add(-np.sum(e * middle.rays[:, k], axis=1), change, 1.0, height, 1.0)
+    longest = problem.limits.cable_length_max
+    for k, length in enumerate([] if longest is None else np.asarray(longest).tolist()):
+        room = length * (1.0 + TOUCHED) - np.linalg.norm(middle.rays[:, k], axis=1)
+        columns.add(room, within.moved[:, k], 1.0, room, 1.0)
+    return columns.distances()
+
+
+def _add_gap(columns: _Columns, gaps, places, middle: _Middle, within: _Within, tips: np.ndarray, pair) -> None:
+    # Add the distance of two cables, by the four pairs of their ends: seen from the platform only the spools move.
+    i, j = pair
+    e, gap = unit_vectors(gaps), np.linalg.norm(gaps, axis=1)
+    tilt = _tilted(middle.rays[:, i], middle.rays[:, j], places)
+    slope = np.linalg.norm(tilt, axis=1)
+    along = [np.sum(e * within.way[:, k], axis=1) for k in pair]
+    for first, last in itertools.product((1.0, 0.0), repeat=2):
+        apart = (tips[j] - last * middle.rays[:, j]) - (tips[i] - first * middle.rays[:, i])
+        change = np.abs(first * along[0] - last * along[1]) + first * within.bent[:, i] + last * within.bent[:, j]
+        swing = slope * (first * within.moved[:, i] + last * within.moved[:, j])
+        tilted = np.sum(tilt * apart, axis=1), slope, swing
+        columns.add(np.sum(e * apart, axis=1), change, first + last, gap, 2.0 - places.sum(1), tilted)
+
+
+def _tilted(first: np.ndarray, last: np.ndarray, places: np.ndarray) -> np.ndarray:
+    # Return vectors that grow by 1 along each cable towards its spool, as displacements do, where the cables are
+    # nearest between their ends; there both cables are normal to the shortest vector.
+    ways = np.stack([first, -last], axis=1)
+    inner = (places > INSIDE) & (places < 1.0 - INSIDE)
+    gram = np.einsum("kia,kja->kij", ways, ways) * inner[:, :, None] * inner[:, None] + np.eye(2) * ~inner[:, None]
+    determinant = gram[:, 0, 0] * gram[:, 1, 1] - gram[:, 0, 1] ** 2
+    is_regular = determinant > PARALLEL * gram[:, 0, 0] * gram[:, 1, 1]
+    safe = np.where(is_regular[:, None, None], gram, np.eye(2))
+    weight = np.linalg.solve(safe, (1.0 * inner)[..., None])[..., 0] * (inner & is_regular[:, None])
+    return np.einsum("ki,kia->ka", weight, ways)
+
+
+class Robustness:
+    """Multiples of an uncertainty that motions of one robot on six cables stand.
+
+    Args:
+        problem: robot, limits with an uncertainty, amplitude.
+        batch: how many blocks are computed at a time.
+        count_instants: called with the number of instants that were looked at.
+    """
+
+    def __init__(
+        self, problem: Problem, kind: PlatformMotionKind, *, batch: int, count_instants: Callable[[int], None]
+    ) -> None:
+        """Find which cables can meet each other or the platform."""
+        self._problem, self._kind, self._batch = problem, kind, batch
+        near = contacts(problem.robot)
+        self._pairs = tuple((int(i), int(j)) for i, j in near.pairs)
+        self._platform = near.sides, near.normal
+        self._certifier = Certifier(problem, kind, batch=batch, count_instants=count_instants)
+        self._knots = np.asarray(problem.amplitude.knots)
+
+    def tolerated(self, segments: PlatformSegment, arcs: Float[np.ndarray, "n"], *, whole: bool = True) -> Tolerated:
+        """Multiples that motions stand."""
+        blocks = parts_of_arcs(arcs, self._knots, PARTS)
+        requirements = requirements_of(self._problem, np.asarray(segments.rate) / CABLES)
+        return tolerated(blocks, arcs, requirements, partial(self.enclosure, segments, arcs), whole=whole)
+
+    def enclosure(self, segments: PlatformSegment, arcs: Float[np.ndarray, "n"], blocks: Blocks) -> Enclosure:
+        """Enclosure of blocks of motions."""
+        problem, block_arcs = self._problem._replace(limits=Limits()), arcs[blocks.row].astype(float)
+        items = rows(segments, blocks.row), block_arcs, blocks.start, blocks.stop
+        kernel = partial(_moving, problem, np.ones(()), kind=self._kind)
+        moving = in_batches(kernel, items, size=self._batch)
+        half = 0.5 * (blocks.stop - blocks.start)
+        middle = _middle(problem.robot, moving.here, moving.squared)
+        within = _within(problem.robot, middle, moving, half, block_arcs)
+        points = np.asarray(problem.robot.platform_points)
+        touching = partial(_contacts, self._platform, points, pairs=self._pairs)
+        met = in_batches(lambda x: touching(*x), (middle.rays,), size=self._batch)
+        low, high = self._certifier.ranges(blocks, segments, arcs)
+        scale = np.asarray(segments.rate)[blocks.row, None] / CABLES
+        return Enclosure(
+            rays=middle.rays,
+            arms=points,
+            force=middle.force,
+            moment=middle.moment,
+            whirl=middle.whirl,
+            way=within.way,
+            bent=within.bent,
+            force_change=within.force[:, 0],
+            whirl_change=within.whirl[:, 0],
+            low=scale * low,
+            high=scale * high,
+            distances=_distances(self._problem, self._pairs, middle, within, met),
+            rates=Rates(middle.velocity, middle.acceleration, within.velocity, within.acceleration),
+        )

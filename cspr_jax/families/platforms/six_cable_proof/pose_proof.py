@@ -1,0 +1,169 @@
+"""Proofs about contacts, depth and limits on the pose, which depend on a platform's pose alone.
+
+A motion is clear if all of its blocks are clear (`place_blocks`). It has a contact if two cables, or a cable and the
+platform, are proved to meet between two instants (`meetings`). Else, after many halvings, it is undecided.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING
+
+import jax
+import numpy as np
+from jax import Array
+
+from cspr_jax.families.platforms.motions import rows
+from cspr_jax.families.platforms.platform_segment import PlatformSegment
+from cspr_jax.families.platforms.platform_segment_lanes import state
+from cspr_jax.families.platforms.six_cable_proof.cable_contacts import CablesOfStep, cables_hit, cables_meet
+from cspr_jax.families.platforms.six_cable_proof.complex_bounds import instant_beside, middle_of
+from cspr_jax.families.platforms.six_cable_proof.pose_blocks import PLACES, PlaceBounds, of_pose, place_blocks
+from cspr_jax.families.platforms.six_cable_proof.work_list import BlockBounds, WorkList
+from cspr_jax.motion.platform_kind import PlatformMotionKind
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.robots.contacts import interference_lanes
+from cspr_jax.robots.contacts.interference import contacts
+from cspr_jax.robots.statics.wrench_lanes import cable_lanes
+from cspr_jax.verification.bounds.blocks import Blocks, growing, parts_of_arcs
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float
+
+# Numbers of blocks of an arc to begin with: with margins; else, as in `proof`, at cusps and halfway between two cusps,
+# where a platform moves fastest.
+PARTS = 8
+FROM_REST, BETWEEN = ((0.7, 3.7), (0.7, 15.7)), ((4.0, 4.0), (11.0, 11.0))
+TOUCH = 1e-9  # nearer than this part of the platform's size is undecided
+# After so many halvings a meeting is looked for; and places of the instants halfway between those of a block.
+NEAR_CONTACT = 5
+MIDDLES = 0.5 * (PLACES[1:] + PLACES[:-1])
+
+
+@dataclasses.dataclass(frozen=True)
+class PlaceProof:
+    """Proofs about n motions; criteria are the depth below the spools and the limits on the pose that are set.
+
+    Fields:
+        is_proved: (n,) whether there is no contact, and every criterion is met, at every instant.
+        is_refuted: (n,) whether there is a contact, or a criterion is broken at an instant.
+        met: (n,) whether two cables meet.
+        hit: (n,) whether a cable lies on the platform.
+        attained: (n, n_criteria + 1) smallest slacks at the instants that were looked at, and distance between cables.
+        bound: (n, n_criteria) proved lower bounds; NaN of motions that are not proved.
+        instant: (n,) tau at which a criterion is broken by most, or in the middle of a step with a contact; NaN where
+            there is neither.
+        row: (k,) motion of each of the first blocks.
+        first: bounds of the first blocks.
+    """
+
+    is_proved: np.ndarray
+    is_refuted: np.ndarray
+    met: np.ndarray
+    hit: np.ndarray
+    attained: np.ndarray
+    bound: np.ndarray
+    instant: np.ndarray
+    row: np.ndarray
+    first: BlockBounds
+
+
+@partial(jax.jit, static_argnames="kind")
+def cables_beside(
+    problem: Problem, items, *, kind: PlatformMotionKind
+) -> tuple[Float[Array, "n n_cables 3"], Float[Array, "n n_cables 3"]]:
+    """Cables at one instant beside the middle of each of many blocks."""
+    segments, arcs, middles, off = items
+    instant = instant_beside(middle_of(problem.amplitude, middles), segments.sense, arcs, off)
+    here = state(segments, arcs, instant, kind)
+    cables = cable_lanes(problem.robot, here.position, here.rotation)
+    return interference_lanes.as_arrays(cables.rays, interference_lanes.cable_directions(cables, here.rotation))
+
+
+class PlaceCertifier:
+    """Certifier of contacts, depth and limits on the pose along motions of one robot on six cables.
+
+    Args:
+        problem: robot, limits, amplitude.
+        batch: how many blocks are computed at a time.
+        count_instants: called with the number of instants that were looked at.
+
+    Fields:
+        pairs: cables that can meet.
+    """
+
+    def __init__(
+        self, problem: Problem, kind: PlatformMotionKind, *, batch: int, count_instants: Callable[[int], None]
+    ) -> None:
+        """Find which cables can meet each other or the platform."""
+        self._problem, self._kind, self._batch, self._count = problem, kind, batch, count_instants
+        near, points = contacts(problem.robot), np.asarray(problem.robot.platform_points)
+        self.pairs = tuple((int(i), int(j)) for i, j in near.pairs)
+        self._near, self._arms = near, np.linalg.norm(points, axis=1)
+        self._knots = np.asarray(problem.amplitude.knots)
+        self._limits = np.arange(1 + len(of_pose(problem))) >= 1
+        self._parts = PARTS, growing(problem.amplitude, *(FROM_REST if kind.from_rest else BETWEEN))
+
+    def prove(
+        self,
+        segments: PlatformSegment,
+        arcs: Float[np.ndarray, "n"],
+        *,
+        margins: bool = False,
+        ignored: Bool[np.ndarray, "n_criteria"] | None = None,
+    ) -> PlaceProof:
+        """Prove motions, or refute them."""
+        blocks, work = parts_of_arcs(arcs, self._knots, self._parts[not margins]), WorkList(arcs, self._limits, ignored)
+        met, hit, touch = np.zeros(len(arcs), bool), np.zeros(len(arcs), bool), TOUCH * float(self._arms.max())
+
+        def look(part: Blocks, level: int) -> BlockBounds:
+            bounds = self._bounds(part, segments, arcs, margins=margins)
+            is_clear = np.asarray(bounds.clear) > touch
+            doubtful = np.flatnonzero(~is_clear)
+            if level >= NEAR_CONTACT and len(doubtful):
+                doubtful_blocks = part.part(doubtful)
+                cables = self._cables(doubtful_blocks, np.asarray(bounds.bends)[:, doubtful], (segments, arcs))
+                base, between = np.asarray(self._problem.robot.base_points), doubtful_blocks.instants(MIDDLES[:, None])
+                for flag, step in (
+                    (met, cables_meet(base, self._near.pairs, cables)),
+                    (hit, cables_hit(self._near.sides, self._near.normal, cables)),
+                ):
+                    meeting = np.flatnonzero(step >= 0)
+                    flag[doubtful_blocks.row[meeting]] = True
+                    work.refute(doubtful_blocks.row[meeting], between[step[meeting], meeting])
+            nodes, bound = np.asarray(bounds.nodes), np.asarray(bounds.slacks)
+            tau = part.instants(PLACES[:, None] if margins else np.asarray(bounds.place)[None])
+            return BlockBounds(nodes, bound, tau, lambda _: is_clear)
+
+        first = work.work_off(blocks, look)
+        is_proved = ~work.is_refuted & ~work.is_stuck
+        known = work.attained, work.bound, work.instant
+        return PlaceProof(is_proved, work.is_refuted, met, hit, *known, blocks.row, first)
+
+    def _bounds(self, blocks: Blocks, segments: PlatformSegment, arcs: np.ndarray, *, margins: bool) -> PlaceBounds:
+        self._count(len(blocks.row) * len(PLACES))
+        kernel = partial(
+            place_blocks,
+            self._problem,
+            (self._near.sides, self._near.normal),
+            np.ones(()),
+            pairs=self.pairs,
+            kind=self._kind,
+            margins=margins,
+        )
+        items = (rows(segments, blocks.row), arcs[blocks.row].astype(float), blocks.start, blocks.stop)
+        return in_batches(kernel, items, size=self._batch, axis=-1)
+
+    def _cables(self, blocks: Blocks, bends: np.ndarray, motions) -> CablesOfStep:
+        # Return the cables at the instants of blocks.
+        segments, arcs = motions
+        block = np.tile(np.arange(len(blocks.row)), len(PLACES))
+        row, middle = blocks.row[block], 0.5 * (blocks.start + blocks.stop)[block]
+        items = rows(segments, row), arcs[row].astype(float), middle, blocks.instants(PLACES[:, None]).ravel() - middle
+        vectors = in_batches(partial(cables_beside, self._problem, kind=self._kind), items, size=self._batch)
+        rays, seen = (x.reshape(len(PLACES), len(blocks.row), *x.shape[1:]) for x in vectors)
+        centre, arm, platform = bends
+        return CablesOfStep(rays, seen, centre[:, None] + arm[:, None] * self._arms, platform)

@@ -1,0 +1,185 @@
+"""The first look at many motions of a platform: instants that refute most of them.
+
+Samples are computed in float32, which costs half; the instant with the smallest tension is then computed in float64.
+So the first look refutes nothing that float64 would not refute, and a motion that float32 passes is checked in full
+anyway.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.families.platforms.from_rest_lanes import rest_table, swing, swings
+from cspr_jax.families.platforms.motions import rows
+from cspr_jax.families.platforms.platform_segment import PlatformSegment
+from cspr_jax.families.platforms.platform_segment_lanes import instant_lanes
+from cspr_jax.families.platforms.six_cable_proof.slack_lanes import certain_tension, lowest_tension
+from cspr_jax.motion.amplitudes import Amplitude
+from cspr_jax.motion.platform_kind import PlatformMotionKind
+from cspr_jax.numerics.batches import in_batches, room, row_by_row
+from cspr_jax.numerics.linear.lanes import cross, dot
+from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.robots.statics.wrench_lanes import balance, cable_lanes
+from cspr_jax.runtime.persistent_jit import persistent_jit
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float, Int, Num
+
+# Instants of one call; how many times more motions are looked at than checked at a time; and the part of a batch up to
+# which motions count as few.
+CHUNK, FIRST, FEWER = 8, 2, 8
+
+
+@persistent_jit(static_argnames=("kind", "single_precision"))
+def smallest_tensions(
+    robot: PlatformRobot,
+    amplitude: Amplitude,
+    arcs: Num[Array, ""],
+    tau: Float[Array, "m"],
+    segments: PlatformSegment,
+    *,
+    kind: PlatformMotionKind,
+    single_precision: bool = False,
+) -> tuple[Float[Array, "n"], Int[Array, "n"]]:
+    """Smallest normalised tension of many segments over some instants."""
+    if single_precision:
+        robot, segments = _of_one_size(robot, segments)
+    cast = partial(jax.tree.map, lambda x: jnp.asarray(x, jnp.float32 if single_precision else x.dtype))
+    robot, segments, number = cast((robot, segments, jnp.asarray(arcs)))
+    if kind.from_rest:
+        at, table = _from_rest(robot, segments), cast(rest_table(amplitude, arcs, tau, kind))
+    else:
+        table = cast(jax.vmap(lambda t: instant_lanes(amplitude, segments.sense[0].astype(tau.dtype), arcs, t))(tau))
+
+        def at(instant_lanes):
+            return lowest_tension(robot, segments, number, instant_lanes, kind)
+
+    # The loop returns one number: with several, XLA would compute the tension once for each of them.
+    values = row_by_row(at, table)
+    lowest = values.min(0)
+    return lowest, jnp.where(values == lowest[None], jnp.arange(len(tau))[:, None], len(tau)).min(0)
+
+
+def _of_one_size(robot: PlatformRobot, segments: PlatformSegment) -> tuple[PlatformRobot, PlatformSegment]:
+    # Take the spread of the spools as unit of length: determinants are of ninth order in lengths, their products of
+    # eighteenth order, for which float32 has no room. Tensions over their value at rest do not depend on the unit.
+    unit = jnp.sqrt(jnp.mean(robot.base_points**2))
+    smaller = dataclasses.replace(
+        robot,
+        base_points=robot.base_points / unit,
+        platform_points=robot.platform_points / unit,
+        inertia=robot.inertia / unit**2,
+        gravity=robot.gravity / unit,
+    )
+    return smaller, dataclasses.replace(
+        segments,
+        hub=segments.hub / unit,
+        start_radius=segments.start_radius / unit,
+        end_radius=segments.end_radius / unit,
+        regular=jnp.sign(segments.regular),
+    )
+
+
+def _from_rest(robot: PlatformRobot, segments: PlatformSegment):
+    motions, inertia = swings(segments), robot.inertia / robot.mass
+    # The rotation leaves its axis e alone, so that e, and with it I e, has the same components in platform axes always.
+    axis_inertia = tuple(dot([inertia[i, j] for j in range(3)], motions.axis) for i in range(3))
+
+    def at(row):
+        here = swing(motions, row)
+        cables = cable_lanes(robot, here.position, here.rotation)
+        weight = tuple(dot(line, axis_inertia) for line in here.rotation)
+        whirl = cross(motions.axis, weight)
+        moment = tuple(
+            here.angular_acceleration * a + here.squared_speed * b for a, b in zip(weight, whirl, strict=True)
+        )
+        force = (here.acceleration[0], here.acceleration[1], here.acceleration[2] - robot.gravity)
+        return certain_tension(motions.rate, segments.regular, cables, balance(cables, force, moment))
+
+    return at
+
+
+@partial(jax.jit, static_argnames="kind")
+def _rough_and_certain(
+    robot: PlatformRobot,
+    amplitude: Amplitude,
+    arcs: Array,
+    tau: Array,
+    segments: PlatformSegment,
+    *,
+    kind: PlatformMotionKind,
+) -> tuple[Array, Array]:
+    # Compute `smallest_tensions` in float32, and the tension at its instant in float64, (n,) each.
+    lowest, when = smallest_tensions(robot, amplitude, arcs, tau, segments, kind=kind, single_precision=True)
+    when = jnp.minimum(when, len(tau) - 1)  # where all tensions are NaN there is no such instant
+    if kind.from_rest:
+        return lowest, _from_rest(robot, segments)(rest_table(amplitude, arcs, tau, kind).T[:, when])
+    instant = instant_lanes(amplitude, segments.sense, arcs, tau[when])
+    return lowest, lowest_tension(robot, segments, arcs, instant, kind)
+
+
+class TensionSieve(NamedTuple):
+    """Sieve of motions of one robot, by their tensions at a few instants.
+
+    Fields:
+        robot: the robot.
+        amplitude: A.
+        kind: of the motions.
+        least: tension that refutes, as any smaller one does.
+        size: how many motions are looked at in one call.
+        count_instants: called with the number of instants that were looked at.
+    """
+
+    robot: PlatformRobot
+    amplitude: Amplitude
+    kind: PlatformMotionKind
+    least: float
+    size: int
+    count_instants: Callable[[int], None]
+
+    def lowest(self, segments: PlatformSegment, arcs: int, tau: Float[np.ndarray, "m"]) -> Float[np.ndarray, "n"]:
+        """Smallest tension over some instants."""
+        lowest = np.full(len(segments.rate), np.inf)
+        for chunk in _chunks(tau):
+            lowest = np.minimum(lowest, self._lowest(segments, arcs, chunk))
+        return np.where(np.isnan(lowest), -np.inf, lowest)
+
+    def refuted(
+        self, segments: PlatformSegment, arcs: int, tau: Float[np.ndarray, "m"], *, limits: bool = True
+    ) -> Bool[np.ndarray, "n"]:
+        """Motions that some instants refute."""
+        del limits
+        is_refuted = np.zeros(len(segments.rate), bool)
+        for chunk in _chunks(tau):
+            alive = np.flatnonzero(~is_refuted)
+            if not len(alive):
+                break
+            remaining = segments if len(alive) == len(is_refuted) else rows(segments, alive)
+            if len(alive) <= room(self.size // FEWER):  # not worth two looks
+                is_refuted[alive] = ~(self._lowest(remaining, arcs, chunk) > self.least)
+                continue
+            self.count_instants(len(alive) * (len(chunk) + 1))
+            kernel = partial(_rough_and_certain, self.robot, self.amplitude, float(arcs), chunk, kind=self.kind)
+            lowest, certain = in_batches(kernel, remaining, size=self.size)
+            is_refuted[alive] = (lowest < 0.0) & ~(certain > self.least)
+        return is_refuted
+
+    def _lowest(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
+        # Look at few motions, in float64.
+        self.count_instants(len(segments.rate) * len(tau))
+        kernel = partial(smallest_tensions, self.robot, self.amplitude, float(arcs), tau, kind=self.kind)
+        return in_batches(kernel, segments, size=self.size // FEWER)[0]
+
+
+def _chunks(tau: np.ndarray) -> np.ndarray:
+    # Repeat the last instant, so that all chunks have one shape.
+    length = -(-len(tau) // CHUNK) * CHUNK
+    return np.pad(tau, (0, length - len(tau)), mode="edge").reshape(-1, CHUNK)

@@ -1,0 +1,314 @@
+"""Bounds of tensions and of the determinant on blocks of a platform's motions, one lane a block.
+
+With N_k and det J the determinants of Cramer's rule for the tension of cable k,
+
+    kappa_k = 6 z0 N_k / (g det J(P0)),    D = det J / det J(P0),    slack of a taut cable = kappa_k / D
+
+are analytic on a block. They are computed at Chebyshev's nodes; what the polynomials through these values leave out is
+bounded on ellipses of complex time, by Hadamard's inequality. With Bernstein coefficients k_i of kappa and d_i of D,
+and remainders r and q, no slack is below the smallest (k_i - r) / (d_i + q). Likewise for limits on tensions, speeds
+and accelerations of cables, `limit_blocks`: docs/theory.md.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+
+from cspr_jax.families.platforms.platform_segment import PlatformSegment
+from cspr_jax.families.platforms.platform_segment_lanes import StateLanes, squared_duration, state
+from cspr_jax.families.platforms.six_cable_proof.complex_bounds import Reach, instant_beside, middle_of, reach
+from cspr_jax.families.platforms.six_cable_proof.limit_blocks import (
+    QUANTITIES,
+    STRAIGHT,
+    Enclosed,
+    Here,
+    Pair,
+    Sizes,
+    at_most,
+    ratio,
+)
+from cspr_jax.families.platforms.six_cable_proof.work_list import allowance, least_nodes
+from cspr_jax.motion.limits import limits_set, scales
+from cspr_jax.motion.platform_kind import PlatformMotionKind
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.bounds import chebyshev
+from cspr_jax.numerics.linear import packed_arrays
+from cspr_jax.numerics.linear.lanes import dot, stored
+from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.robots.statics.wrench_lanes import CABLES, balance, cable_lanes, inertial_wrench
+from cspr_jax.runtime.persistent_jit import persistent_jit
+from cspr_jax.schema.limits import Limit
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# A value at a node may be wrong by this part of its bound on real time (tests find a tenth of that), times Lebesgue's
+# constant for the polynomial through such values. Computing the Bernstein coefficients adds a part of the values.
+ROUNDING = 1e-13 * chebyshev.LEBESGUE
+COEFFICIENTS = 2.0 * np.finfo(float).eps * (chebyshev.DEGREE + 1) * float(np.abs(chebyshev.bernstein()).sum(1).max())
+REGULAR = CABLES  # the place of D among the values
+BASIC = 2  # criteria that are no limits
+
+
+class TensionBounds(NamedTuple):
+    """Slacks on n blocks: of taut cables, of the determinant (D), of the limits on the motion that are set.
+
+    Fields:
+        nodes: (n_nodes, n_criteria, n) smallest slacks at the nodes, rounded up: no lower than they truly are; infinite
+            where D is not certainly positive. With margins the slack of the determinant is that of
+            `wrench_lanes.normalised_determinant` over its value at rest in P0. Where only the least values are
+            computed: (1, n_criteria, n).
+        place: (n,) place of the smallest of the least values, from -1 to 1; 0 where the values at all nodes are kept.
+        bound: (n_criteria, n) proved lower bounds.
+        rounding: (n,) largest allowance for rounding in the slacks of taut cables, before they are divided by D.
+        allowed: (n,) largest allowance in all, which includes what the polynomials leave out.
+    """
+
+    nodes: Array
+    place: Array
+    bound: Array
+    rounding: Array
+    allowed: Array
+
+
+class _Block(NamedTuple):
+    # Parameters of n blocks.
+    segments: PlatformSegment
+    squared: Array  # T^2, s^2
+    regular: Array  # det J(P0), m^9
+    z0: Array
+
+
+def of_motion(problem: Problem) -> list[Limit]:
+    """Rows of the limits on the motion that are set."""
+    return [row for row in limits_set(problem.limits) if row.of_motion]
+
+
+@persistent_jit(static_argnames=("kind", "margins", "least"))
+def tension_blocks(
+    problem: Problem, one: Float[Array, ""], items, *, kind: PlatformMotionKind, margins: bool, least: bool = False
+) -> TensionBounds:
+    """Bounds of slacks on blocks."""
+    taken = _taken(problem, one, items, kind=kind, margins=margins, single_precision=least)
+    # Values that only margins need come last, and are not bounded.
+    nodes, bound = _bounds(problem, taken)
+    if margins:
+        nodes[1] = nodes[1] * taken.values[:, len(taken.rests)]
+    if least:
+        node_values, place = least_nodes(nodes, allowance(np.arange(len(nodes)) >= BASIC), chebyshev.nodes())
+    else:
+        node_values, place = jnp.stack(nodes, axis=1), jnp.zeros_like(bound[0])
+    return TensionBounds(node_values, place, jnp.stack(bound), *_allowances(taken))
+
+
+class TensionRange(NamedTuple):
+    """Tensions on n blocks, per mass and length, over those of six equal cables at rest in P0.
+
+    Fields:
+        low: (n_cables, n) proved lower bounds.
+        high: (n_cables, n) proved upper bounds; infinite where the determinant may vanish.
+        rounding: (n,) as in `TensionBounds`.
+        allowed: (n,) likewise.
+    """
+
+    low: Array
+    high: Array
+    rounding: Array
+    allowed: Array
+
+
+@partial(jax.jit, static_argnames="kind")
+def tension_ranges(problem: Problem, one: Float[Array, ""], items, *, kind: PlatformMotionKind) -> TensionRange:
+    """Ranges of the tensions of each cable on blocks."""
+    taken = _taken(problem, one, items, kind=kind, margins=False)
+    low, high = (_coefficients(taken.values) + sign * taken.rests[None] for sign in (-1.0, 1.0))
+    regular = low[:, REGULAR, None], high[:, REGULAR, None]
+    least, most = ratio(low[:, :CABLES], regular), ratio(-high[:, :CABLES], regular)
+    return TensionRange(jnp.min(least, axis=0), -jnp.min(most, axis=0), *_allowances(taken))
+
+
+def _coefficients(values: Array) -> Array:
+    # Return the Bernstein coefficients of polynomials through values (m, n_values, n) at the nodes.
+    matrix = jnp.asarray(chebyshev.bernstein())
+    return (matrix @ values.reshape(len(matrix), -1)).reshape(values.shape)
+
+
+def _allowances(taken: "_Taken") -> tuple[Array, Array]:
+    return jnp.max(taken.rounding[:CABLES], axis=0), jnp.max(taken.rests[:CABLES], axis=0)
+
+
+class _Taken(NamedTuple):
+    # Values of blocks at the nodes (m, n_values, n), what the polynomials through the first n_rests of these values
+    # leave out (n_rests, n), and the part of this that is rounding.
+    block: _Block
+    values: Array
+    rests: Array
+    rounding: Array
+
+
+def _taken(
+    problem: Problem, one: Array, items, *, kind: PlatformMotionKind, margins: bool, single_precision: bool = False
+) -> _Taken:
+    segments, arcs, regular, start, stop = items
+    middle, half = middle_of(problem.amplitude, 0.5 * (start + stop)), 0.5 * (stop - start)
+    block = _Block(segments, squared_duration(segments, arcs), regular, problem.robot.gravity / segments.rate)
+
+    def at(off):
+        instant = instant_beside(middle, segments.sense, arcs, off * half)
+        return state(segments, arcs, stored(instant, one), kind, one)
+
+    def values_at(node):
+        return [x for pair in _values(problem, block, at(node), margins=margins) for x in pair]
+
+    together, apart = (
+        (packed_arrays.packed, packed_arrays.unpacked)
+        if single_precision
+        else (packed_arrays.paired, packed_arrays.parts)
+    )
+    values = jnp.stack(apart(lax.map(lambda node: together(values_at(node)), chebyshev.nodes())), axis=1)
+    lengths = stored(_lengths(problem.robot, at(0.0)), one)
+    radii = np.array(chebyshev.RADII)
+    axes = np.vstack([chebyshev.semi_axes(radii), [1.0, 0.0]])
+
+    def reach_on(ellipse):
+        along, aside = ellipse
+        return packed_arrays.paired(reach(segments, arcs, middle, (along * half, aside * half), kind))
+
+    def sizes_on(ellipse):
+        along, pairs, factor = ellipse
+        bounds = _sizes(problem, block, Reach(*packed_arrays.parts(pairs)), along * half, lengths)
+        return packed_arrays.paired([jnp.where(jnp.isnan(x), jnp.inf, x) * factor for x in bounds])
+
+    factors = np.append(chebyshev.remainders(radii), ROUNDING)
+    sizes = jnp.stack(packed_arrays.parts(lax.map(sizes_on, (axes[:, 0], lax.map(reach_on, axes), factors))))
+    amplified = jnp.max(values[:, REGULAR + 1], axis=0) ** 1.5
+    largest = jnp.max(jnp.abs(values[:, : len(sizes)]), axis=0)
+    largest = jnp.where(jnp.isnan(largest), jnp.inf, largest)  # three cables in one plane
+    rounding = sizes[:, -1] * amplified[None] + COEFFICIENTS * largest
+    rests = jnp.min(sizes[:, :-1], axis=1) + rounding
+    if single_precision:
+        rests = rests + chebyshev.LEBESGUE * packed_arrays.ROUNDING * largest
+    return _Taken(block, values, rests, rounding)
+
+
+def _values(problem: Problem, block: _Block, here: StateLanes, *, margins: bool) -> list[Pair]:
+    # Return the values at one node in pairs, each of which XLA computes in one loop: kappa and D, the factor of
+    # rounding, the values that the limits need, and the factor that turns D into the normalised determinant.
+    robot = problem.robot
+    cables = cable_lanes(robot, here.position, here.rotation)
+
+    def slowed(vector):
+        return tuple(x / block.squared for x in vector)
+
+    force, moment = inertial_wrench(
+        robot, slowed(here.acceleration), here.rotation, here.omega, here.angular_acceleration
+    )
+    balanced = balance(cables, force, slowed(moment))
+    inverse = 1.0 / balanced.volume
+    squares = [dot(ray, ray) for ray in cables.rays]
+    amplified = math.prod(squares[2::2], start=squares[0]) * inverse * inverse
+    share = inverse * inverse * inverse / block.regular
+    kappa = [x * (share * (CABLES * block.z0 / robot.gravity)) for x in balanced.numerators]
+    regular = balanced.denominator * share
+    pairs = [*zip(kappa[::2], kappa[1::2], strict=True), (regular, amplified)]
+    instant = Here(here, cables, kappa, block.squared, block.z0)
+    for quantity, row in _quantities(problem).items():
+        pairs += QUANTITIES[quantity].values(instant, getattr(problem.limits, row[0].name))
+    if margins:
+        standing = cable_lanes(robot, tuple(block.segments.hub[:, i] for i in range(3)), _level(regular))
+        rest = [dot(ray, ray) for ray in standing.rays]
+        lengths = [jnp.sqrt(a / b) for a, b in zip(rest, squares, strict=True)]
+        shortened = math.prod(lengths[1:], start=lengths[0])
+        pairs.append((shortened, shortened))
+    return pairs
+
+
+def _level(template: Array):
+    one, nothing = jnp.ones_like(template), jnp.zeros_like(template)
+    return tuple(tuple(one if i == j else nothing for j in range(3)) for i in range(3))
+
+
+def _quantities(problem: Problem) -> dict[str, list[Limit]]:
+    # Return the quantities that limits bound, each with its limits.
+    rows: dict[str, list[Limit]] = {}
+    for row in of_motion(problem):
+        rows.setdefault(row.quantity, []).append(row)
+    return rows
+
+
+def _lengths(robot: PlatformRobot, here: StateLanes) -> tuple[list[Array], list[Array]]:
+    # Return the lengths of the cables, and the distances from the spools to the mass centre.
+    cables = cable_lanes(robot, here.position, here.rotation)
+    offs = [tuple(here.position[i] - robot.base_points[k, i] for i in range(3)) for k in range(CABLES)]
+    rays, away = ([jnp.sqrt(dot(x, x)) for x in vectors] for vectors in (cables.rays, offs))
+    return rays, away
+
+
+def _sizes(problem: Problem, block: _Block, bounds: Reach, along: Array, lengths) -> list[Array]:
+    # Bound the sizes, on an ellipse, of the values of `_values`, in the same order, by Hadamard's inequality: moments
+    # are in platform axes, over the mean arm times the growth.
+    robot, squared, z0 = problem.robot, block.squared, block.z0
+    sizes = jnp.sqrt(jnp.sum(robot.platform_points**2, axis=1))
+    arm, arms = jnp.sqrt(jnp.mean(sizes**2)), [sizes[k] for k in range(CABLES)]
+    shift, rotated = along * bounds.speed, jnp.minimum(along * bounds.rotation_rate, bounds.growth + 1.0)
+    moved = [shift + lever * rotated for lever in arms]
+    rays = [ray + move for ray, move in zip(lengths[0], moved, strict=True)]
+    columns = [
+        jnp.sqrt(ray**2 + (lever / arm * (away + shift)) ** 2)
+        for ray, lever, away in zip(rays, arms, lengths[1], strict=True)
+    ]
+    inertia = robot.inertia / robot.mass
+    apart = inertia - jnp.trace(inertia) / 3.0 * jnp.eye(3)
+    whirl = jnp.sqrt(jnp.sum(inertia**2)) * bounds.angular_acceleration + jnp.sqrt(jnp.sum(apart**2)) * bounds.omega**2
+    force = bounds.bend / squared + robot.gravity
+    wrench = jnp.sqrt(force**2 + (whirl / squared / (arm * bounds.growth)) ** 2)
+    whole = (arm * bounds.growth) ** 3 / jnp.abs(block.regular) * math.prod(columns[1:], start=columns[0])
+    kappa = [CABLES * z0 / robot.gravity * whole * wrench / column for column in columns]
+    paces = [bounds.speed + lever * bounds.rotation_rate for lever in arms]
+    pulls = [bounds.bend + lever * bounds.growth * (bounds.angular_acceleration + bounds.omega**2) for lever in arms]
+    is_straight = [move < STRAIGHT * ray for ray, move in zip(lengths[0], moved, strict=True)]
+    cable_sizes = Sizes(kappa, rays, paces, pulls, is_straight, squared, z0, bounds.speed, bounds.bend)
+    largest = [*kappa, whole, jnp.zeros_like(whole)]
+    for quantity, row in _quantities(problem).items():
+        largest += QUANTITIES[quantity].sizes(cable_sizes, getattr(problem.limits, row[0].name))
+    return largest
+
+
+def _bounds(problem: Problem, taken: _Taken) -> tuple[list[Array], list[Array]]:
+    # Return the smallest slacks at the nodes, (m, n) each, as large as rounding lets them be; and their lower bounds,
+    # (n,) each.
+    rests, block = taken.rests, taken.block
+    values = taken.values[:, : len(rests)]
+    coefficients = _coefficients(values)
+
+    def around(middle, off, part):
+        return middle[:, part] - off[None, part], middle[:, part] + off[None, part]
+
+    one = slice(REGULAR, REGULAR + 1)
+    regular, share = around(coefficients, rests, one), around(values, taken.rounding, one)
+    # Among quotients with one denominator, the smallest has the smallest numerator.
+    least = jnp.min(coefficients[:, :CABLES] - rests[None, :CABLES], axis=1, keepdims=True)
+    doubt = jnp.max(taken.rounding[None, :CABLES], axis=1, keepdims=True)
+    kappa = jnp.min(values[:, :CABLES], axis=1, keepdims=True) + doubt
+    nodes = [at_most(kappa, share)[:, 0], share[1][:, 0]]
+    bound = [jnp.min(ratio(least, regular), axis=(0, 1)), jnp.min(regular[0], axis=(0, 1))]
+    scale = scales(CABLES, problem.robot.mass * problem.robot.gravity, block.z0)
+    part, slacks = slice(0, REGULAR + 2), {}
+    for quantity, rows in _quantities(problem).items():
+        factor, size = scale.get(quantity, (1.0, jnp.ones(())))
+        part = slice(part.stop, part.stop + QUANTITIES[quantity].width)
+        enclosed = Enclosed(around(coefficients, rests, part), around(values, taken.rounding, part), regular, share)
+        for row in rows:
+            limit = getattr(problem.limits, row.name) * (factor / size)
+            slacks[row.name] = QUANTITIES[quantity].slacks(enclosed, limit, row.sense == "least")
+    for row in of_motion(problem):
+        nodes.append(slacks[row.name][0])
+        bound.append(slacks[row.name][1])
+    return nodes, bound

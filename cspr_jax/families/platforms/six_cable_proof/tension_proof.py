@@ -1,0 +1,226 @@
+"""Proofs about the tensions and the determinant of a platform's motions, between the instants too.
+
+Every block of a motion (`tension_blocks`) is proved, or refuted by an instant, or halved. The motion is then
+
+    proved       if every block is proved: no cable slack, no singularity, limits on the motion met
+    refuted      if some instant breaks a criterion by more than the tolerance
+    undecided    if a block still holds zero where its slack is known to half the tolerance, or after many halvings
+
+A limit that is touched counts as met, as with point masses: limits are allowed twice the tolerance.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from cspr_jax.families.platforms.motions import rows
+from cspr_jax.families.platforms.platform_segment import PlatformSegment
+from cspr_jax.families.platforms.six_cable_proof.tension_blocks import (
+    BASIC,
+    TensionBounds,
+    TensionRange,
+    of_motion,
+    tension_blocks,
+    tension_ranges,
+)
+from cspr_jax.families.platforms.six_cable_proof.work_list import TOLERANCE, BlockBounds, WorkList
+from cspr_jax.motion.platform_kind import PlatformMotionKind
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.bounds import chebyshev
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.statics.wrench_lanes import CABLES
+from cspr_jax.schema.limits import LIMITS
+from cspr_jax.verification.bounds.blocks import Blocks, growing, parts_of_arcs
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float
+
+# Numbers of blocks of an arc to begin with, from rest and between poses, where orientations turn faster. Where margins
+# are narrowed down from the instants of blocks, the number is fixed; for verdicts alone it grows from the first to the
+# second number with the amplitude, see `blocks.growing`.
+WITH_MARGINS, FROM_REST, BETWEEN = (3, 6), (1.0, 5.0), (6.0, 6.0)
+# Orders of the cables that are tried, one after the other, where rounding keeps a block open.
+ORDERS = 6
+MATTERS = 0.1  # part of the whole allowance from which rounding matters
+
+
+@dataclasses.dataclass(frozen=True)
+class TensionProof:
+    """Proofs about n motions; criteria are those of `tension_blocks.TensionBounds`.
+
+    Fields:
+        is_proved: (n,) whether every criterion is met at every instant.
+        is_refuted: (n,) whether some criterion is broken at an instant.
+        attained: (n, n_criteria) smallest slacks at the instants that were looked at.
+        bound: (n, n_criteria) proved lower bounds; NaN of motions that are not proved.
+        instant: (n,) tau at which a criterion is broken by most; NaN where none is.
+        row: (k,) motion of each of the first blocks.
+        first: bounds of the first blocks.
+    """
+
+    is_proved: np.ndarray
+    is_refuted: np.ndarray
+    attained: np.ndarray
+    bound: np.ndarray
+    instant: np.ndarray
+    row: np.ndarray
+    first: BlockBounds
+
+
+class _Order(NamedTuple):
+    # The same robot with its cables in another order, and the sign that the order gives to determinants.
+    problem: Problem
+    sign: float
+    cables: list[int]
+
+
+class Certifier:
+    """Certifier of the tensions, the determinant and the limits on the motion of one robot on six cables.
+
+    Args:
+        problem: robot, limits, amplitude.
+        batch: how many blocks are computed at a time.
+        count_instants: called with the number of instants that were looked at.
+    """
+
+    def __init__(
+        self, problem: Problem, kind: PlatformMotionKind, *, batch: int, count_instants: Callable[[int], None]
+    ) -> None:
+        """Order the cables."""
+        self._kind, self._batch, self._count = kind, batch, count_instants
+        self._knots, self._orders = np.asarray(problem.amplitude.knots), _orders(problem)
+        self._limits = np.arange(BASIC + len(of_motion(problem))) >= BASIC
+        ramp = FROM_REST if kind.from_rest else BETWEEN
+        self._parts = WITH_MARGINS[not kind.from_rest], growing(problem.amplitude, ramp, ramp)
+
+    def prove(
+        self,
+        segments: PlatformSegment,
+        arcs: Float[np.ndarray, "n"],
+        *,
+        near: float = 0.0,
+        margins: bool = False,
+        ignored: Bool[np.ndarray, "n_criteria"] | None = None,
+    ) -> TensionProof:
+        """Prove motions, or refute them."""
+        blocks = parts_of_arcs(arcs, self._knots, self._parts[not margins])
+        motions = segments, arcs, determinant_at_rest(self._orders[0].problem, segments)
+
+        def look(part: Blocks, _: int) -> BlockBounds:
+            bounds = self._looked_at(part, motions, margins=margins)
+            tau = part.instants(chebyshev.nodes()[:, None] if margins else np.asarray(bounds.place)[None])
+            nodes, bound = np.asarray(bounds.nodes), np.asarray(bounds.bound)
+            return BlockBounds(nodes, bound, tau, lambda least: bound[0] >= near * np.maximum(least[part.row, 0], 0.0))
+
+        work = WorkList(arcs, self._limits, ignored)
+        first = work.work_off(blocks, look)
+        is_proved = ~work.is_refuted & ~work.is_stuck
+        return TensionProof(is_proved, work.is_refuted, work.attained, work.bound, work.instant, blocks.row, first)
+
+    def _looked_at(self, blocks: Blocks, motions, *, margins: bool) -> TensionBounds:
+        bounds = self.bounds(0, blocks, motions, margins=margins, least=not margins)
+        for k in range(1, len(self._orders)):
+            # These blocks stay open because the first three cables lie nearly in one plane.
+            open_ones = np.flatnonzero(_rounding_matters(bounds) & ~(bounds.bound > TOLERANCE).all(0))
+            if not len(open_ones):
+                break
+            better = self.bounds(k, blocks.part(open_ones), motions, margins=margins, least=not margins)
+            # Replace the values at nodes too: where these cables lie in one plane the values are rounding, and could
+            # refute.
+            surer = better.rounding < bounds.rounding[open_ones]
+            bounds.nodes[:, :, open_ones[surer]] = better.nodes[:, :, surer]
+            bounds.place[open_ones[surer]] = better.place[surer]
+            bounds.bound[:, open_ones] = np.fmax(bounds.bound[:, open_ones], better.bound)
+            bounds.rounding[open_ones] = np.minimum(bounds.rounding[open_ones], better.rounding)
+            bounds.allowed[open_ones] = np.minimum(bounds.allowed[open_ones], better.allowed)
+        return bounds
+
+    def bounds(self, order: int, blocks: Blocks, motions, *, margins: bool, least: bool = False) -> TensionBounds:
+        """Bounds on blocks."""
+        problem, items = self._items(order, blocks, motions)
+        kernel = partial(tension_blocks, problem, np.ones(()), kind=self._kind, margins=margins, least=least)
+        return in_batches(kernel, items, size=self._batch, axis=-1)
+
+    def _items(self, order: int, blocks: Blocks, motions) -> tuple[Problem, tuple]:
+        # Return the robot with its cables in an order, and its blocks as kernels take them.
+        segments, arcs, standing = motions
+        problem, sign, _ = self._orders[order]
+        self._count(len(blocks.row) * (chebyshev.DEGREE + 1))
+        motion_items = rows(segments, blocks.row), arcs[blocks.row].astype(float), sign * standing[blocks.row]
+        return problem, (*motion_items, blocks.start, blocks.stop)
+
+    def ranges(
+        self, blocks: Blocks, segments: PlatformSegment, arcs: Float[np.ndarray, "n"]
+    ) -> tuple[Float[np.ndarray, "k n_cables"], Float[np.ndarray, "k n_cables"]]:
+        """Ranges of the tensions on blocks."""
+        motions = segments, arcs, determinant_at_rest(self._orders[0].problem, segments)
+        count = len(blocks.row)
+        low, high = np.full((count, CABLES), -np.inf), np.full((count, CABLES), np.inf)
+        remaining = np.arange(count)
+        for k, order in enumerate(self._orders):
+            problem, items = self._items(k, blocks.part(remaining), motions)
+            kernel = partial(tension_ranges, problem._replace(limits=Limits()), np.ones(()), kind=self._kind)
+            bounds = in_batches(kernel, items, size=self._batch, axis=-1)
+            index = np.ix_(remaining, np.array(order.cables))
+            low[index], high[index] = np.fmax(low[index], bounds.low.T), np.fmin(high[index], bounds.high.T)
+            # Go on as in `_looked_at`, where the first three cables lie nearly in one plane.
+            remaining = remaining[_rounding_matters(bounds)]
+            if not len(remaining):
+                break
+        return low, high
+
+
+def _rounding_matters(bounds: TensionBounds | TensionRange) -> np.ndarray:
+    # Tell where rounding matters: elsewhere another order of the cables gives no better bounds, only shorter blocks do.
+    rounding, allowed = np.asarray(bounds.rounding), np.asarray(bounds.allowed)
+    return (rounding > 0.25 * TOLERANCE) & (rounding >= MATTERS * allowed)
+
+
+def _orders(problem: Problem) -> list[_Order]:
+    # The robot's own order comes first, then the orders whose first, third and fifth ray span the largest volumes at
+    # rest, a unit below the spools.
+    robot = problem.robot
+    base, arms = np.asarray(robot.base_points), np.asarray(robot.platform_points)
+    rays = arms + np.array([0.0, 0.0, float(np.abs(base).max())]) - base
+    rays = rays / np.linalg.norm(rays, axis=1, keepdims=True)
+    threes = sorted(
+        itertools.combinations(range(CABLES), 3), key=lambda three: -abs(float(np.linalg.det(rays[list(three)])))
+    )
+    orders = [list(range(CABLES))]
+    for three in threes[: ORDERS - 1]:
+        others = [k for k in range(CABLES) if k not in three]
+        orders.append([k for pair in zip(three, others, strict=True) for k in pair])
+    return [_Order(_reordered(problem, order), _sign(order), order) for order in orders]
+
+
+def _sign(order: list[int]) -> float:
+    return float((-1) ** sum(a > b for a, b in itertools.combinations(order, 2)))
+
+
+def _reordered(problem: Problem, order: list[int]) -> Problem:
+    # Share no joints between cables, so that one compiled function serves every order.
+    robot, limits = problem.robot, problem.limits
+    points = {name: np.asarray(getattr(robot, name))[order] for name in ("base_points", "platform_points")}
+    changed = dataclasses.replace(robot, **points, joints=tuple(range(CABLES)), limits=Limits())
+    each = {row.name: getattr(limits, row.name) for row in LIMITS}
+    values: dict[str, Any] = {
+        row.name: np.asarray(each[row.name])[order] if row.per_cable and each[row.name] is not None else each[row.name]
+        for row in LIMITS
+    }
+    return problem._replace(robot=changed, limits=Limits(**values))
+
+
+def determinant_at_rest(problem: Problem, segments: PlatformSegment) -> Float[np.ndarray, "n"]:
+    """Determinant of the Jacobian J (3.5) in the rest point, with the sign that `wrench_lanes.balance` gives it."""
+    robot, (depths, inverse) = problem.robot, np.unique(np.asarray(segments.hub)[:, 2], return_inverse=True)
+    arms = np.asarray(robot.platform_points)
+    forces = np.asarray(robot.base_points) - arms - np.array([0.0, 0.0, 1.0]) * depths[:, None, None]
+    wrenches = np.concatenate([forces, np.cross(arms, forces)], axis=2)
+    return -np.linalg.det(wrenches)[inverse.ravel()]

@@ -1,0 +1,91 @@
+"""Motions that are functions of time, differentiated by jax."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.curves.spline import turning_of
+from cspr_jax.errors import InputError
+from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.linear import rotations
+from cspr_jax.numerics.linear.frames import Frame
+from cspr_jax.robots.model.state import State
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class FunctionMotion:
+    """Motion that a function of time gives; see `motion.motion.Motion`. It has no bounds.
+
+    Fields:
+        time: () duration, s.
+        z0: () depth at which slacks are normalised, m.
+        factor: () by which time is stretched.
+        function: gives positions (3,) m, of a platform with quaternions behind them (7,), at instants () s; known when
+            a function is compiled.
+    """
+
+    time: Array
+    z0: Array
+    factor: Array
+    function: Callable[[Array], Array] = dataclasses.field(metadata={"static": True})
+
+    def duration(self) -> Array:
+        """Duration; see `Motion.duration`."""
+        return self.time * self.factor
+
+    def state(self, tau: Array) -> State:
+        """State; see `Motion.state`."""
+
+        def value(t: Array) -> Array:
+            return self.function(t / self.factor)
+
+        def rate(t: Array) -> Array:
+            return jax.jvp(value, (t,), (jnp.ones_like(t),))[1]
+
+        t = tau * self.duration()
+        place, (first, second) = value(t), jax.jvp(rate, (t,), (jnp.ones_like(t),))
+        turning = turning_of(place[3:], first[3:], second[3:]) if place.shape[0] > len("xyz") else ()
+        return State(place[:3], first[:3], second[:3], *turning)
+
+    def breaks(self) -> Array:
+        """Breaks; see `Motion.breaks`."""
+        return jnp.zeros(0)
+
+    def stretched(self, factor: float) -> "FunctionMotion":
+        """The motion run more slowly, or faster; see `Spline.stretched`."""
+        return dataclasses.replace(self, factor=leaf(self.factor * factor))
+
+
+def function_motion(
+    function: Callable, duration: float, *, frame: Frame, reference: Float[np.ndarray, "4"], is_platform: bool
+) -> FunctionMotion:
+    """Motion that a function gives in the axes of a robot file, in those of the kernels."""
+    try:
+        size = jax.eval_shape(lambda t: jnp.asarray(function(t)), jnp.asarray(0.0)).shape
+    except TypeError as error:
+        raise InputError("times", None, "must be one of jax.numpy", fault="jax cannot follow it") from error
+    allowed = ((3,), (7,)) if is_platform else ((3,),)
+    if size not in allowed:
+        raise InputError("times", None, f"must give values of shape {' or '.join(map(str, allowed))}", fault=f"{size}")
+    back = jnp.asarray(reference * np.array([1.0, -1.0, -1.0, -1.0]))
+
+    def inward(t: Array) -> Array:
+        value = jnp.asarray(function(t), float)
+        place = jnp.asarray(frame.inward(value[:3]))
+        if not is_platform:
+            return place
+        turning = jnp.asarray(frame.turned_quaternions(value[3:])) if size == (7,) else jnp.eye(4)[0]
+        return jnp.concatenate([place, rotations.product(turning, back)])
+
+    return FunctionMotion(leaf(duration), leaf(1.0), leaf(1.0), inward)

@@ -1,0 +1,293 @@
+"""Answers from upper bounds of the margin, one for each number of arcs: proofs first, margins after.
+
+The candidates that the bounds leave are proved or refuted in increasing order, until one is proved feasible. Bisection
+would be wrong: more arcs can lose margin (tests). Where none is feasible, `families.swings.refusals` names the limits
+that refuse the candidates whose cables stay taut, and one of these candidates is reported; if there is none, the
+candidate with the largest margin. `families.platforms.answers` does the same for platforms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax.families.swings import hypocycloid
+from cspr_jax.families.swings.hypocycloid import Segment
+from cspr_jax.families.swings.parities import pick, rows_of
+from cspr_jax.families.swings.proof import criteria
+from cspr_jax.families.swings.proof.criteria import BASIC
+from cspr_jax.families.swings.proof.enclosures import tolerated_by_point_masses
+from cspr_jax.families.swings.proof.limit_screen import LimitSieve
+from cspr_jax.families.swings.proof.margins import each_margin, margins
+from cspr_jax.families.swings.proof.screen import upper_bounds
+from cspr_jax.families.swings.proof.verdicts import SMALLEST_MARGIN, first_look, prove
+from cspr_jax.families.swings.refusals import refusals, unavoidable
+from cspr_jax.motion.answers import Answers
+from cspr_jax.motion.limits import limits_set
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.robots.model.limits import NO_LIMITS
+from cspr_jax.runtime.persistent_jit import persistent_jit
+from cspr_jax.schema.verdicts import FLAGS, Verdict
+from cspr_jax.verification.robustness.tolerances import Tolerated
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
+
+# Segments computed at a time where little is computed for each.
+BATCH = 4096
+# Candidates whose margins differ by less are equally good; the first of them is reported.
+TIE = 1e-9
+# Samples of the second, denser sieve, multiples of 4. Segments that it takes at a time: few need it.
+SAMPLES_PER_ARC, MOST_SAMPLES, DENSE_BATCH = 32, 1024, 512
+
+
+@persistent_jit
+def _durations(arguments) -> jax.Array:
+    return jax.vmap(hypocycloid.duration)(*arguments)
+
+
+class Known(NamedTuple):
+    """Numbers of arcs proved feasible by other means than `families.swings.proof.verdicts`.
+
+    Fields:
+        arcs: (n,) one for each segment; 0: none.
+        bound: (n,) proved lower bound of its margin.
+    """
+
+    arcs: np.ndarray
+    bound: np.ndarray
+
+
+def decided(
+    problem: Problem,
+    parities: dict[int, Segment],
+    upper: Num[np.ndarray, "n max_arcs"],
+    at_ends: Float[np.ndarray, "n n_criteria"],
+    infinity: Float[np.ndarray, "n"],
+    *,
+    arcs: np.ndarray | None = None,
+    known: Known | None = None,
+    measure: Callable[[Problem, Segment, np.ndarray], np.ndarray] = margins,
+) -> tuple[Answers, Segment]:
+    """Answers from upper bounds."""
+    known = known or Known(np.zeros(len(upper), int), np.full(len(upper), -np.inf))
+    with_limits = only(np.minimum(upper, at_ends.min(1)[:, None] + SMALLEST_MARGIN), arcs)
+    basic = only(np.minimum(upper, at_ends[:, :BASIC].min(1)[:, None] + SMALLEST_MARGIN), arcs)
+    search = _search(problem, parities, with_limits, known)
+    smallest, bound = search.smallest, search.bound
+    tried, slack, broken = _shown(problem, parities, search, with_limits, basic, measure)
+    chosen = pick(parities, np.arange(len(smallest)), tried)
+    duration = in_batches(_durations, (chosen, tried.astype(float)), size=BATCH)
+    none = np.flatnonzero(smallest == 0)
+    is_feasible = smallest > 0
+    if len(none):
+        shown = pick(parities, none, tried[none])
+        look = first_look(problem, shown, tried[none].astype(float))
+        bound[none] = look[1][:, :BASIC].min(1)
+        if problem.limits.uncertainty is not None:
+            is_feasible[none] = prove(problem, shown, tried[none], look=look).feasible
+    multiples = _tolerated(problem, chosen, tried, np.flatnonzero(is_feasible))
+    answers = Answers(
+        smallest,
+        tried,
+        _verdicts(problem, search, slack, broken, multiples),
+        duration,
+        slack[:, :BASIC].min(1),
+        bound,
+        slack[:, BASIC:].min(1, initial=np.inf),
+        infinity,
+        *multiples,
+    )
+    return answers, chosen
+
+
+@persistent_jit
+def end_slacks(problem: Problem, arcs: float, segments: Segment) -> Float[jax.Array, "n n_criteria"]:
+    """Smallest slack of each criterion at the two ends.
+
+    There the velocity is zero and the acceleration a pendulum's, whatever the number of arcs.
+    """
+
+    def one(segment):
+        at_ends = jax.vmap(lambda t: jnp.stack(criteria.slacks(*problem, segment, jnp.asarray(arcs), t)))(
+            jnp.asarray([0.0, 1.0])
+        )
+        return jnp.min(at_ends, axis=0)
+
+    return jax.vmap(one)(segments)
+
+
+def only(upper: Float[np.ndarray, "n max_arcs"], arcs) -> Num[np.ndarray, "n max_arcs"]:
+    """Upper bounds, without those that prescribed numbers of arcs rule out."""
+    if arcs is None:
+        return upper
+    fixed, number = np.asarray(arcs)[:, None], np.arange(1, upper.shape[1] + 1)
+    return np.where(np.where(fixed > 0, number == fixed, number >= -fixed), upper, -np.inf)
+
+
+class _Search(NamedTuple):
+    # The smallest number of arcs proved feasible, whether a smaller one stayed undecided, the proved margin,
+    # whether some number of arcs is feasible as it is planned, if not for every robot within the uncertainty, and the
+    # limits that candidates are known to break, (n, max_arcs, n_criteria).
+    smallest: np.ndarray
+    doubtful: np.ndarray
+    bound: np.ndarray
+    is_planned: np.ndarray
+    broken: np.ndarray
+
+
+def _search(problem: Problem, parities: dict[int, Segment], upper: np.ndarray, known: Known) -> _Search:
+    smallest, doubtful, bound = np.zeros(len(upper), int), np.zeros(len(upper), bool), np.full(len(upper), -np.inf)
+    is_planned = np.zeros(len(upper), bool)
+    sieve = LimitSieve(problem, parities, upper >= -SMALLEST_MARGIN)
+    while True:
+        rows = sieve.look(np.flatnonzero(smallest == 0))
+        if not len(rows):
+            return _Search(smallest, doubtful, bound, is_planned, sieve.broken)
+        arcs = np.argmax(sieve.alive[rows], axis=1) + 1
+        is_known = arcs == known.arcs[rows]
+        smallest[rows[is_known]], bound[rows[is_known]] = arcs[is_known], known.bound[rows[is_known]]
+        rows, arcs = rows[~is_known], arcs[~is_known]
+        if not len(rows):
+            continue
+        proof = prove(problem, pick(parities, rows, arcs), arcs)
+        is_feasible, is_refuted = proof.feasible.copy(), proof.infeasible.copy()
+        is_planned[rows] |= is_feasible
+        if problem.limits.uncertainty is not None:
+            indices = np.flatnonzero(is_feasible)
+            multiples = tolerated_by_point_masses(
+                problem, pick(parities, rows[indices], arcs[indices]), arcs[indices], whole=False
+            )
+            is_feasible[indices], is_refuted[indices] = multiples.proved >= 1.0, multiples.refuted <= 1.0
+        smallest[rows[is_feasible]] = arcs[is_feasible]
+        bound[rows] = proof.bound[:, :2].min(1)
+        doubtful[rows[~is_feasible & ~is_refuted]] = True
+        sieve.alive[rows, arcs - 1] = False
+
+
+class _Shown(NamedTuple):
+    # Numbers of arcs that are reported (n,), their smallest slacks, and the criteria that they break, (n, n_criteria).
+    tried: np.ndarray
+    slack: np.ndarray
+    broken: np.ndarray
+
+
+def _shown(
+    problem: Problem,
+    parities: dict[int, Segment],
+    search: _Search,
+    with_limits: np.ndarray,
+    basic: np.ndarray,
+    measure: Callable,
+) -> _Shown:
+    # Choose what is reported; `with_limits` and `basic` are upper bounds (n, max_arcs) of the margin over all criteria,
+    # and over the criteria that are no limits.
+    fixed, by_cables = search.smallest.copy(), np.zeros(len(with_limits), bool)
+    # Without limits, or with an undecided candidate, the largest margin says enough.
+    is_refused = (fixed == 0) & ~search.doubtful & ~search.is_planned
+    refused = np.flatnonzero(is_refused & bool(limits_set(problem.limits)))
+    why = refusals(problem, rows_of(parities, refused), basic[refused], search.broken[refused])
+    fixed[refused], by_cables[refused] = why.arcs, why.arcs == 0
+    upper = np.where(by_cables[:, None], basic, with_limits)
+    tried, slack = _best(problem, parities, upper, fixed, by_cables, measure)
+    broken = slack <= 0.0
+    broken[refused] = why.broken
+    # If no candidate is taut, name a cable or the spools, and the limits that no number of arcs keeps.
+    rows, is_limit = np.flatnonzero(by_cables), np.arange(slack.shape[1]) >= BASIC
+    broken[rows] = slack[rows] <= 0.0
+    suspects = broken[rows] & is_limit
+    broken[rows] &= unavoidable(problem, rows_of(parities, rows), upper[rows], suspects) | ~is_limit
+    return _Shown(tried, slack, broken)
+
+
+def _best(
+    problem: Problem,
+    parities: dict[int, Segment],
+    upper: np.ndarray,
+    fixed: np.ndarray,
+    by_cables: np.ndarray,
+    measure: Callable,
+) -> tuple[np.ndarray, np.ndarray]:
+    # Return the fixed number of arcs, else the one with the largest margin, over the cables alone or over all criteria,
+    # and its slacks. Where the cables alone choose, limits are measured only for what is chosen.
+    tried, slack = fixed.copy(), np.empty((len(fixed), len(criteria.flags(problem.limits))))
+    free = np.flatnonzero((fixed == 0) & ~by_cables)
+    if len(free):
+        tried[free], slack[free] = _largest_margins(problem, rows_of(parities, free), upper[free], measure)
+    free = np.flatnonzero((fixed == 0) & by_cables)
+    if len(free):
+        without_limits = problem._replace(limits=NO_LIMITS)
+        tried[free], _ = _largest_margins(without_limits, rows_of(parities, free), upper[free], measure)
+        # None of them is feasible, so each criterion is refined at once.
+        slack[free] = each_margin(problem, pick(parities, free, tried[free]), tried[free])
+    chosen = np.flatnonzero(fixed > 0)
+    if len(chosen):
+        slack[chosen] = measure(problem, pick(parities, chosen, tried[chosen]), tried[chosen])
+    return tried, slack
+
+
+def _largest_margins(
+    problem: Problem, parities: dict[int, Segment], upper: np.ndarray, measure: Callable
+) -> tuple[np.ndarray, np.ndarray]:
+    # Return the numbers of arcs with the largest margins, and their slacks; upper bounds say where to look next.
+    upper = np.fmin(upper, _denser_upper_bounds(problem, parities, upper.shape[1]))
+    tried = np.argmax(upper, axis=1) + 1
+    slack = measure(problem, pick(parities, np.arange(len(tried)), tried), tried)
+    best = np.nan_to_num(slack.min(1), nan=-np.finfo(float).max)
+    upper[np.arange(len(tried)), tried - 1] = -np.inf
+    while True:
+        is_open = upper > _improvement(best)[:, None]
+        rows = np.flatnonzero(is_open.any(1))
+        if not len(rows):
+            return tried, slack
+        # The next ones of each segment, as many as fit into a batch, which takes as long whatever it holds.
+        order = np.argsort(-upper[rows], axis=1, kind="stable")[:, : max(BATCH // len(rows), 1)]
+        owner, turn = np.nonzero(np.take_along_axis(is_open[rows], order, axis=1))
+        segment, arcs = rows[owner], order[owner, turn] + 1
+        candidate, bound = measure(problem, pick(parities, segment, arcs), arcs), upper[segment, arcs - 1]
+        upper[segment, arcs - 1] = -np.inf
+        for rank in range(order.shape[1]):
+            # As if they came one by one: what else is in a batch must not decide between equals.
+            due = np.flatnonzero((turn == rank) & (bound > _improvement(best)[segment]))
+            due = due[candidate[due].min(1) > best[segment[due]]]
+            row = segment[due]
+            tried[row], slack[row], best[row] = arcs[due], candidate[due], candidate[due].min(1)
+
+
+def _improvement(best: np.ndarray) -> np.ndarray:
+    return best + TIE * (1.0 + np.abs(best))
+
+
+def _denser_upper_bounds(problem: Problem, parities: dict[int, Segment], max_arcs: int) -> np.ndarray:
+    # The first sieve has a sample an arc or two, which bounds the margins of many arcs loosely.
+    samples = min(SAMPLES_PER_ARC * max_arcs, MOST_SAMPLES)
+    kernel = partial(upper_bounds, max_arcs=max_arcs, samples=samples)
+    return in_batches(lambda pair: kernel(problem.amplitude, *pair), (parities[0], parities[1]), size=DENSE_BATCH)
+
+
+def _tolerated(problem: Problem, segments: Segment, arcs: np.ndarray, rows: np.ndarray) -> Tolerated:
+    # Return the multiples of all segments: NaN of those that are not feasible as planned, and without an uncertainty.
+    multiples = Tolerated(np.full(len(arcs), np.nan), np.full(len(arcs), np.nan))
+    if problem.limits.uncertainty is not None and len(rows):
+        picked = jax.tree.map(lambda leaf: np.asarray(leaf)[rows], segments)
+        for column, values in zip(multiples, tolerated_by_point_masses(problem, picked, arcs[rows]), strict=True):
+            column[rows] = values
+    return multiples
+
+
+def _verdicts(
+    problem: Problem, search: _Search, slack: np.ndarray, broken: np.ndarray, multiples: Tolerated
+) -> np.ndarray:
+    flags = np.where(multiples.refuted <= 1.0, Verdict.UNCERTAINTY.value, 0).astype(FLAGS)
+    for flag, column in zip(criteria.flags(problem.limits), broken.T, strict=True):
+        flags |= np.where(column, flag.value, 0).astype(FLAGS)
+    flags |= np.where(np.isnan(slack).any(1), Verdict.NOT_FINITE.value, 0).astype(FLAGS)
+    none = np.where(search.doubtful, Verdict.UNDECIDED.value, Verdict.NO_ARCS.value | flags)
+    with_arcs = np.where(search.doubtful, Verdict.FEWER_ARCS_UNDECIDED.value, 0)
+    return np.where(search.smallest > 0, with_arcs, none).astype(FLAGS)

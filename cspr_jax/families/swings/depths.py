@@ -1,0 +1,49 @@
+"""Guides for z0, the depth of P0 below the centroid of the spools."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cspr_jax.robots.model.point_mass import plane_normal
+from cspr_jax.robots.model.robot import Robot
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+
+def _depths(robot: Robot, targets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    normal = np.asarray(plane_normal(robot))
+    return targets, targets @ normal, normal
+
+
+def mean_depth(robot: Robot, targets: Float[np.ndarray, "n 3"]) -> float:
+    """Mean depth of the targets, the choice of thesis section 2.9."""
+    return float(_depths(robot, targets)[0][:, 2].mean())
+
+
+def least_depth(robot: Robot, targets: Float[np.ndarray, "n 3"]) -> float:
+    """Bound (2.59): below it some target cannot be reached with many arcs, though perhaps with few."""
+    return float(_depths(robot, targets)[1].max() / 2.0)
+
+
+def conservative_depth(robot: Robot, targets: Float[np.ndarray, "n 3"]) -> float:
+    """Bound (2.58): above it every segment between the targets is feasible with enough arcs.
+
+    It keeps every target inside the sphere about P0 that touches the spool plane,
+    |p - p0| < z0 / |n| with n the plane's normal of unit vertical component. For a plane that is
+    not level the condition is quadratic in z0, and can fail for large z0 too, or for all.
+    """
+    below, depth, normal = _depths(robot, targets)
+    height, square = below[:, 2], (below**2).sum(1)
+    slope = 1.0 - 1.0 / (normal @ normal)  # 0 for a level plane
+    inside = height**2 - slope * square
+    if not ((depth > 0.0) & (inside >= 0.0) & (height > 0.0)).all():
+        return float("nan")
+    root = np.sqrt(inside)
+    with np.errstate(over="ignore"):  # a target a hair below the spools: no z0 will do
+        lowest = float((square / (height + root)).max())
+    if slope > 0.0 and lowest >= float(((height + root) / slope).min()):
+        return float("nan")
+    return lowest

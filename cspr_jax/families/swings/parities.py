@@ -1,0 +1,32 @@
+"""Segments of either parity of their numbers of arcs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import jax
+import numpy as np
+
+from cspr_jax.families.swings.hypocycloid import Segment
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
+
+
+def pick(parities: dict[int, Segment], rows: Float[np.ndarray, "m"], arcs: Num[np.ndarray, "m"]) -> Segment:
+    """Pick segments, each of the parity of its number of arcs."""
+    if parities[0] is parities[1]:
+        return jax.tree.map(lambda leaf: np.asarray(leaf)[rows], parities[0])
+    is_odd = arcs % 2 == 1
+
+    def choose(even, odd):
+        return np.where(is_odd.reshape(-1, *[1] * (even.ndim - 1)), odd[rows], even[rows])
+
+    return jax.tree.map(choose, parities[0], parities[1])
+
+
+def rows_of(parities: dict[int, Segment], rows: Float[np.ndarray, "m"]) -> dict[int, Segment]:
+    """Pick segments, of both parities."""
+    return {
+        parity: jax.tree.map(lambda leaf: np.asarray(leaf)[rows], segments) for parity, segments in parities.items()
+    }

@@ -1,0 +1,85 @@
+"""All criteria of a segment together, in one order: taut cables, below the spools, then the limits that are given."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING
+
+import jax
+from jax import Array
+
+from cspr_jax.families.swings.hypocycloid import Segment
+from cspr_jax.families.swings.proof.limit_slacks import count, limit_curvatures, limit_slacks
+from cspr_jax.families.swings.proof.slacks import each_taut_bounds, instant, row_bounds, stretch
+from cspr_jax.motion.amplitudes import Amplitude
+from cspr_jax.motion.limits import limits_set
+from cspr_jax.numerics.linear.lanes import largest, smallest
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.point_mass import PointMassRobot
+from cspr_jax.schema.verdicts import Verdict
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
+
+# Criteria that are no limits: taut cables, and the depth below the spools.
+BASIC = 2
+
+
+def flags(limits: Limits) -> tuple[Verdict, ...]:
+    """The flag that says that a criterion is broken, for each criterion."""
+    return (Verdict.SLACK_CABLE, Verdict.ABOVE_SPOOLS, *(row.flag for row in limits_set(limits)))
+
+
+def counts(robot: PointMassRobot, limits: Limits) -> tuple[int, ...]:
+    """Numbers of smooth functions of which each criterion is the smallest."""
+    return (robot.n_cables, 1, *(count(row, robot.n_cables) for row in limits_set(limits)))
+
+
+@jax.jit
+def smooth_slacks(
+    robot: PointMassRobot,
+    limits: Limits,
+    amplitude: Amplitude,
+    segment: Segment,
+    arcs: Num[Array, ""],
+    tau: Float[Array, ""],
+) -> tuple[Float[Array, ""], ...]:
+    """Every slack of every criterion, at one instant: smooth functions of tau."""
+    state = instant(segment, amplitude, arcs, tau)
+    terms = [*state.kappa, state.eta]
+    for slack in limit_slacks(robot, limits, segment, arcs, tau, state):
+        terms += slack
+    return tuple(terms)
+
+
+def slacks(
+    robot: PointMassRobot,
+    limits: Limits,
+    amplitude: Amplitude,
+    segment: Segment,
+    arcs: Num[Array, ""],
+    tau: Float[Array, ""],
+) -> tuple[Float[Array, ""], ...]:
+    """The smallest slack of each criterion, at one instant."""
+    values = iter(smooth_slacks(robot, limits, amplitude, segment, arcs, tau))
+    return tuple(smallest(list(itertools.islice(values, n))) for n in counts(robot, limits))
+
+
+def curvatures(
+    robot: PointMassRobot,
+    limits: Limits,
+    amplitude: Amplitude,
+    segment: Segment,
+    arcs: Num[Array, ""],
+    start: Float[Array, ""],
+    stop: Float[Array, ""],
+) -> tuple[Float[Array, ""], ...]:
+    """Bound of the second derivative of each criterion's slacks over an interval."""
+    over = stretch(segment, amplitude, arcs, start, stop)
+    kappa = each_taut_bounds(segment, arcs, over)
+    eta = row_bounds(segment, arcs, over, segment.tilt)
+    return (
+        largest([bounds.curvature for bounds in kappa]),
+        eta.curvature,
+        *limit_curvatures(robot, limits, segment, arcs, over, kappa),
+    )

@@ -1,0 +1,122 @@
+"""Enclosures of a point mass in motion, for bounds over robots that differ a little."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.families.swings.hypocycloid import Segment, duration, motion
+from cspr_jax.families.swings.proof.blocks import INTERVALS
+from cspr_jax.families.swings.proof.limit_slacks import pace_bounds
+from cspr_jax.families.swings.proof.slacks import instant, row_bounds, stretch, taut_bounds
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.verification.bounds.blocks import Blocks, parts_of_arcs
+from cspr_jax.verification.bounds.enclosures import TOUCHED, Distances, Enclosure, Rates, largest_moves
+from cspr_jax.verification.robustness.tolerances import Tolerated, tolerated
+from cspr_jax.verification.robustness.uncertainty import requirements_of
+
+if TYPE_CHECKING:
+    from jaxtyping import Num
+
+# Parts of an arc that are looked at first, and blocks computed at a time.
+PARTS, BATCH = 4, 1024
+
+
+class _Known(NamedTuple):
+    # Values of one block: the first three in its middle, then bounds within it.
+    rays: Array
+    velocity: Array
+    acceleration: Array
+    low: Array
+    high: Array
+    bent: Array
+    velocity_change: Array
+    acceleration_change: Array
+
+
+@jax.jit
+def _enclosed(problem: Problem, items) -> _Known:
+    return jax.vmap(partial(_block, problem))(*items)
+
+
+def _block(problem: Problem, segment: Segment, arcs: Array, start: Array, stop: Array) -> _Known:
+    robot, amplitude = problem.robot, problem.amplitude
+    half, time = 0.5 * (stop - start), duration(segment, arcs)
+    over = stretch(segment, amplitude, arcs, start, stop)
+    weight = jnp.arange(INTERVALS + 1, dtype=arcs.dtype) / INTERVALS
+    instants = jax.vmap(lambda tau: instant(segment, amplitude, arcs, tau))(start * (1.0 - weight) + stop * weight)
+    step = (2.0 * half / INTERVALS) ** 2 / 8.0
+    kappa, taut = jnp.stack(instants.kappa, axis=1), taut_bounds(segment, arcs, over).curvature * step
+    level = row_bounds(segment, arcs, over, segment.tilt).curvature * step
+    eta = jnp.min(instants.eta) - level, jnp.max(instants.eta) + level
+    scale = segment.rate / robot.base_points.shape[0]
+
+    def share(top, is_low):
+        # Bound tensions where eta is positive; a lower bound below zero is divided by the smallest eta.
+        bottom = jnp.where((top > 0.0) == is_low, eta[1], eta[0])
+        return jnp.where(eta[0] > 0.0, scale * top / bottom, jnp.where(is_low, -jnp.inf, jnp.inf))
+
+    position, velocity, acceleration = motion(segment, amplitude, arcs, over.middle)
+    pace, pull = pace_bounds(segment, arcs, over)
+    return _Known(
+        position[None] - robot.base_points,
+        velocity,
+        acceleration,
+        share(jnp.min(kappa, axis=0) - taut, True),
+        share(jnp.max(kappa, axis=0) + taut, False),
+        0.5 * half * half * pace.curvature,
+        half * pace.curvature / time,
+        half * pull.slope / time**2,
+    )
+
+
+@jax.jit
+def _durations(items) -> Array:
+    return jax.vmap(duration)(*items)
+
+
+def enclosure(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"], blocks: Blocks) -> Enclosure:
+    """Enclosure of blocks of motions."""
+    items = (*jax.tree.map(lambda x: np.asarray(x)[blocks.row], (segments, arcs.astype(float))), *blocks[1:])
+    known: Any = in_batches(partial(_enclosed, problem), items, size=BATCH)
+    count, n_cables = known.rays.shape[:2]
+    nothing, each = np.zeros(count), (count, n_cables, 3)
+    half = 0.5 * (blocks.stop - blocks.start)
+    way = (half * in_batches(_durations, items[:2], size=BATCH))[:, None] * known.velocity
+    moved = largest_moves(way, known.bent)[:, None]
+    lengths, longest = np.linalg.norm(known.rays, axis=2), problem.limits.cable_length_max
+    room = np.zeros((count, 0)) if longest is None else np.asarray(longest) * (1.0 + TOUCHED) - lengths
+    once = np.ones(room.shape)
+    changes = [np.repeat(x[:, None], n_cables, axis=1) for x in (known.velocity_change, known.acceleration_change)]
+    vectors = [np.broadcast_to(x[:, None], each) for x in (known.velocity, known.acceleration)]
+    return Enclosure(
+        rays=known.rays,
+        arms=np.zeros((n_cables, 3)),
+        force=known.acceleration - np.array([0.0, 0.0, float(problem.robot.gravity)]),
+        moment=np.zeros((count, 3)),
+        whirl=np.zeros((count, 3, 3)),
+        way=np.broadcast_to(way[:, None], each),
+        bent=np.repeat(known.bent[:, None], n_cables, axis=1),
+        force_change=known.acceleration_change,
+        whirl_change=nothing,
+        low=known.low,
+        high=known.high,
+        distances=Distances(room, moved * once, *(0.0 * once,) * 3, np.ones(room.shape[1]), room, once),
+        rates=Rates(vectors[0], vectors[1], *changes),
+    )
+
+
+def tolerated_by_point_masses(
+    problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"], *, whole: bool = True
+) -> Tolerated:
+    """Multiples of the uncertainty that motions of a point mass tolerate."""
+    blocks = parts_of_arcs(arcs, np.asarray(problem.amplitude.knots), PARTS)
+    rates: Any = np.asarray(segments.rate)
+    requirements = requirements_of(problem, rates / problem.robot.base_points.shape[0])
+    return tolerated(blocks, arcs, requirements, partial(enclosure, problem, segments, arcs), whole=whole)

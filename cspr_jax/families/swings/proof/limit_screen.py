@@ -1,0 +1,95 @@
+"""A second sieve, of limits: a few instants refute most numbers of arcs that break a limit by far.
+
+It looks at candidates only as the search comes to them, as many at a time as a batch holds. A sample that breaks a
+limit by more than rounding is a refutation; nothing is accepted here.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.families.swings.hypocycloid import Segment
+from cspr_jax.families.swings.parities import pick
+from cspr_jax.families.swings.proof.criteria import BASIC, slacks
+from cspr_jax.families.swings.proof.verdicts import BATCH, tolerance
+from cspr_jax.motion.limits import limits_set
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.linear.lanes import smallest_of_each
+from cspr_jax.runtime.persistent_jit import persistent_jit
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
+
+SAMPLES = 32
+# Tolerances by which a sample must lie below zero: twice as far as where `families.swings.proof.verdicts` refutes a
+# limit.
+FAR = 4.0
+
+
+class LimitSieve:
+    """Candidates of n segments: which are left, and the limits that each is known to break.
+
+    Args:
+        parities: the segments for even (key 0) and odd (key 1) numbers of arcs, leaves (n, ...).
+        alive: (n, max_arcs) candidates, column p - 1 for p arcs.
+
+    Attributes:
+        alive: (n, max_arcs) candidates that are not refuted.
+        broken: (n, max_arcs, n_criteria) criteria that a candidate is known to break; only limits.
+    """
+
+    def __init__(self, problem: Problem, parities: dict[int, Segment], alive: np.ndarray) -> None:
+        """No candidate is looked at yet."""
+        n_limits = len(limits_set(problem.limits))
+        self._problem, self._parities = problem, parities
+        self._unseen = alive.copy() if n_limits else np.zeros_like(alive)
+        self.alive, self.broken = alive.copy(), np.zeros((*alive.shape, BASIC + n_limits), bool)
+
+    def look(self, rows: Float[np.ndarray, "m"]) -> Float[np.ndarray, "k"]:
+        """Look at candidates until none that comes first is refuted."""
+        while True:
+            rows = rows[self.alive[rows].any(1)]
+            open_rows = rows[self._unseen[rows, np.argmax(self.alive[rows], axis=1)]]
+            if not len(open_rows):
+                return rows
+            self._see(*upcoming(self._unseen, open_rows))
+
+    def _see(self, rows: np.ndarray, arcs: np.ndarray) -> None:
+        broken = broken_at_samples(self._problem, pick(self._parities, rows, arcs), arcs)
+        self.broken[rows, arcs - 1] = broken
+        self._unseen[rows, arcs - 1] = False
+        self.alive[rows, arcs - 1] &= ~broken.any(1)
+
+
+def broken_at_samples(
+    problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]
+) -> Float[np.ndarray, "n n_criteria"]:
+    """Limits that some sample breaks by more than rounding; a quick refutation."""
+    lowest, near = in_batches(partial(_lowest, problem), (segments, np.asarray(arcs, float)), size=BATCH)
+    return np.concatenate([np.zeros((len(lowest), BASIC), bool), lowest < -FAR * near[:, None]], axis=1)
+
+
+def upcoming(
+    candidates: Num[np.ndarray, "n max_arcs"], rows: Float[np.ndarray, "m"]
+) -> tuple[Num[np.ndarray, "k"], Num[np.ndarray, "k"]]:
+    """Next candidates of segments: one each, or as many as fit into a batch, which takes as long whatever it holds."""
+    left = candidates[rows]
+    owner, column = np.nonzero(left & (np.cumsum(left, axis=1) <= max(BATCH // len(rows), 1)))
+    return rows[owner], column + 1
+
+
+@persistent_jit
+def _lowest(problem: Problem, arguments) -> tuple[Array, Array]:
+    # Return the smallest sampled slack of each limit (n, n_limits), and the tolerances (n,).
+    segments, arcs = arguments
+    tau = jnp.broadcast_to(((jnp.arange(SAMPLES, dtype=arcs.dtype) + 0.5) / SAMPLES)[:, None], (SAMPLES, len(arcs)))
+    values = jax.vmap(jax.vmap(partial(slacks, *problem)), in_axes=(None, None, 0))(segments, arcs, tau)
+    near = jax.vmap(partial(tolerance, problem.amplitude))(segments, arcs)
+    return jnp.stack(smallest_of_each(values[BASIC:]), axis=1), near

@@ -1,0 +1,278 @@
+"""Limits of tension, height, cable length, of speeds and accelerations of cables and mass centre, as slacks.
+
+In the notation of `slacks`, with m the number of cables, rho_k the length of cable k, F the tension over
+the weight, and rates with respect to tau; w_k = (p - a_k) . p'. F of cable k is kappa_k rho_k / (m z0 eta).
+
+    tension        kappa_k rho_k / (m z0) - F_min eta,   F_max eta - kappa_k rho_k / (m z0)
+    floor          (floor - z) / z0
+    length         (rho_max^2 - rho_k^2) / (2 z0^2)
+    speed          (rho_k^2 - (w_k / (T v_max))^2) / (2 z0^2)
+    acceleration   (a_max T^2 rho_k^3 -+ (rho_k^2 w_k' - w_k^2)) / (a_max T^2 z0^3)
+    mass centre    1 - (|p'| / (T v_max))^2,   1 - (|p''| / (T^2 a_max))^2
+
+Each is dimensionless and free of a division that could blow up.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.families.swings.hypocycloid import Segment, duration, oscillation
+from cspr_jax.families.swings.proof.slacks import Instant, Stretch, row_bounds
+from cspr_jax.motion.limits import limits_set
+from cspr_jax.numerics.bounds.value_and_derivatives import Bounds
+from cspr_jax.numerics.elementary import sincospi
+from cspr_jax.numerics.linear.lanes import Vector, dot, largest
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.point_mass import PointMassRobot, plane_normal
+from cspr_jax.schema.limits import Limit
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
+
+
+class _AtInstant(NamedTuple):
+    # A segment and one of its cables at one instant, numbers; derivatives in tau. XLA makes one loop of numbers.
+    z0: Array
+    time: Array
+    weight: Array
+    eta: Array
+    lift: Array
+    depth: Array
+    length: Array
+    rate: Array
+    rate_slope: Array
+    velocity: Vector
+    acceleration: Vector
+
+
+class _OverInterval(NamedTuple):
+    # Bounds over an interval, of one cable; `square` bounds (rho^2)'' without the division that is in `length`.
+    n_cables: int
+    z0: Array
+    time: Array
+    weight: Array
+    kappa: Bounds
+    eta: Bounds
+    depth: Bounds
+    length: Bounds
+    pace: Bounds
+    pull: Bounds
+    square: Array
+
+
+class _Closed(NamedTuple):
+    # Closed form of a limit: its slack, the bound of its second derivative, and how many slacks each cable has (two:
+    # the slack is a pair).
+    slack: Callable[[_AtInstant, Array], Any]
+    curvature: Callable[[_OverInterval, Array], Array]
+    sides: int = 1
+
+
+def _bends(state: _AtInstant, limit: Array) -> tuple[Array, Array]:
+    bend = (state.length**2 * state.rate_slope - state.rate**2) / (limit * state.time**2)
+    return (state.length**3 - bend) / state.z0**3, (state.length**3 + bend) / state.z0**3
+
+
+def _lifted(over: _OverInterval, limit: Array) -> Array:
+    whole = over.kappa._replace(value=1.0 + over.kappa.value)
+    lift = (whole * over.length).times(1.0 / (over.n_cables * over.z0))
+    return (lift + over.eta.times(limit / over.weight)).curvature
+
+
+def _rated(over: _OverInterval, limit: Array) -> Array:
+    rate = _rate(over.length, over.pace, over.pull)
+    return 0.5 * (over.square + (rate * rate).curvature / (over.time * limit) ** 2) / over.z0**2
+
+
+def _bent(over: _OverInterval, limit: Array) -> Array:
+    length, bend = over.length, _bend(over.length, over.pace, over.pull, over.square)
+    cube = 6.0 * length.value * over.pace.slope**2 + 3.0 * length.value**2 * over.pace.curvature
+    return (cube + bend.curvature / (limit * over.time**2)) / over.z0**3
+
+
+def _square_share(vector: Vector, largest: Array) -> Array:
+    return 1.0 - dot(vector, vector) / largest**2
+
+
+# Every row of `schema.limits.LIMITS` has an entry.
+CLOSED = {
+    "tension_min": _Closed(lambda state, limit: state.lift - limit / state.weight * state.eta, _lifted),
+    "tension_max": _Closed(lambda state, limit: limit / state.weight * state.eta - state.lift, _lifted),
+    "floor": _Closed(
+        lambda state, limit: (limit - state.depth) / state.z0, lambda over, _: over.depth.curvature / over.z0
+    ),
+    "cable_length_max": _Closed(
+        lambda state, limit: (limit**2 - state.length**2) / (2.0 * state.z0**2),
+        lambda over, _: 0.5 * over.square / over.z0**2,
+    ),
+    "cable_speed_max": _Closed(
+        lambda state, limit: (state.length**2 - (state.rate / (state.time * limit)) ** 2) / (2.0 * state.z0**2), _rated
+    ),
+    "cable_acceleration_max": _Closed(_bends, _bent, 2),
+    "speed_max": _Closed(
+        lambda state, limit: _square_share(state.velocity, state.time * limit),
+        lambda over, limit: (
+            2.0 * (over.pace.curvature**2 + over.pace.slope * over.pull.slope) / (over.time * limit) ** 2
+        ),
+    ),
+    "acceleration_max": _Closed(
+        lambda state, limit: _square_share(state.acceleration, state.time**2 * limit),
+        lambda over, limit: (
+            2.0 * (over.pull.slope**2 + over.pull.value * over.pull.curvature) / (over.time**2 * limit) ** 2
+        ),
+    ),
+}
+
+
+def count(row: Limit, n_cables: int) -> int:
+    """Number of smooth functions of which the slack of a limit is the smallest."""
+    return CLOSED[row.name].sides * (n_cables if row.per_cable else 1)
+
+
+@jax.jit
+def limit_slacks(
+    robot: PointMassRobot, limits: Limits, segment: Segment, arcs: Num[Array, ""], tau: Float[Array, ""], state: Instant
+) -> tuple[list[Array], ...]:
+    """The slacks of each limit, at one instant: smooth functions, one or two for each cable."""
+    if not limits_set(limits):
+        return ()
+    position, velocity, acceleration = _path(segment, arcs, tau, state)
+    z0, time, weight = segment.hub[2], duration(segment, arcs), robot.mass * robot.gravity
+    speed_square = dot(velocity, velocity)
+
+    def cable_state(cable: int) -> _AtInstant:
+        ray = [position[i] - robot.base_points[cable, i] for i in range(3)]
+        length = jnp.sqrt(dot(ray, ray))
+        lift = state.kappa[cable] * length / (len(state.kappa) * z0)
+        rate, rate_slope = dot(ray, velocity), speed_square + dot(ray, acceleration)
+        numbers = z0, time, weight, state.eta, lift, position[2], length, rate, rate_slope
+        return _AtInstant(*numbers, velocity, acceleration)
+
+    cables = [cable_state(k) for k in range(robot.n_cables)]
+
+    def row_slacks(row: Limit) -> list[Array]:
+        slack, limit = CLOSED[row.name].slack, getattr(limits, row.name)
+        if not row.per_cable:
+            return [slack(cables[0], limit)]
+        return jax.tree.leaves([slack(cable, limit[k]) for k, cable in enumerate(cables)])
+
+    return tuple(row_slacks(row) for row in limits_set(limits))
+
+
+def _path(segment: Segment, arcs: Array, tau: Array, state: Instant) -> tuple[Vector, Vector, Vector]:
+    # Return the position and its first two derivatives in tau.
+    ratio, steady, period = oscillation(segment, arcs)
+    span = segment.end_radius - segment.start_radius
+    r, r1 = segment.start_radius + span * state.amplitude_values[0], span * state.amplitude_values[1]
+    sine, cosine = sincospi(segment.sense * arcs * tau)
+    lateral, axial = sincospi(segment.sense * segment.precession * tau)
+    slope_r = r1 * cosine - r * segment.sense * steady / (math.pi * arcs) * sine
+    slope_t = r1 * ratio * sine
+    slope = axial * slope_r + lateral * slope_t, axial * slope_t - lateral * slope_r
+    bend = period * (state.d[0] - state.c[0]), period * (state.d[1] - state.c[1])
+    return _in_space(segment, state.c, segment.hub), _in_space(segment, slope), _in_space(segment, bend)
+
+
+def _in_space(segment: Segment, vector: Sequence[Array] | Array, origin: Sequence[Any] | Array = (0, 0, 0)) -> Vector:
+    # From the plane of the trajectory; without a product of matrices, beside which XLA makes loops of their own.
+    plane = segment.plane
+    return [origin[i] + plane[i, 0] * vector[0] + plane[i, 1] * vector[1] for i in range(3)]
+
+
+def limit_curvatures(
+    robot: PointMassRobot,
+    limits: Limits,
+    segment: Segment,
+    arcs: Num[Array, ""],
+    over: Stretch,
+    kappa: Sequence[Bounds],
+) -> tuple[Float[Array, ""], ...]:
+    """Bound of the second derivative of each limit's slack over an interval."""
+    if not limits_set(limits):
+        return ()
+    z0, time, weight = segment.hub[2], duration(segment, arcs), robot.mass * robot.gravity
+    pace, pull = pace_bounds(segment, arcs, over)
+    eta = row_bounds(segment, arcs, over, segment.tilt)
+    depth = row_bounds(segment, arcs, over, segment.plane[2])
+
+    def cable_bounds(kappa: Bounds, length: Bounds) -> _OverInterval:
+        square = 2.0 * (pace.slope**2 + length.value * pace.curvature)
+        return _OverInterval(robot.n_cables, z0, time, weight, kappa, eta, depth, length, pace, pull, square)
+
+    cables = [cable_bounds(*each) for each in zip(kappa, _lengths(robot, segment, over, pace, eta), strict=True)]
+
+    def row_curvature(row: Limit) -> Array:
+        curvature, limit = CLOSED[row.name].curvature, getattr(limits, row.name)
+        if not row.per_cable:
+            return curvature(cables[0], limit)
+        return largest([curvature(cable, limit[k]) for k, cable in enumerate(cables)])
+
+    return tuple(row_curvature(row) for row in limits_set(limits))
+
+
+def pace_bounds(segment: Segment, arcs: Num[Array, ""], over: Stretch) -> tuple[Bounds, Bounds]:
+    """Bounds of how the mass moves over an interval, derivatives in normalised time."""
+    ratio, steady, period = oscillation(segment, arcs)
+    omega, gain = math.pi * arcs, steady / period
+    precession = math.pi * segment.precession
+    one = jnp.ones_like(omega)
+    wave = Bounds(one, omega, omega**2)
+    rho = (over.bend + over.size.times(jnp.abs(segment.end_curvature))).times(1.0 / period)
+    c = (over.size * wave).combined((over.size * wave).times(ratio)).turned(precession)
+    d_r = rho * wave + (over.growth * wave).times(2.0 * gain / omega)
+    d_t = ((rho + over.size.times(2.0 * gain)) * wave).times(ratio)
+    return c, (d_r.combined(d_t).turned(precession) + c).times(period)  # c'' = T^2 lambda (d - c)
+
+
+def _lengths(robot: PointMassRobot, segment: Segment, over: Stretch, pace: Bounds, eta: Bounds) -> list[Bounds]:
+    # |rho'| <= |p'|, and rho'' = (|p'|^2 - rho'^2 + ray . p'') / rho.
+    nearest = least_lengths(robot, segment, over, pace, eta)
+    farthest = [x + over.radius * pace.slope for x in _at_middle(robot, segment, over)]
+    bends = [pace.slope**2 / x + pace.curvature for x in nearest]
+    return [Bounds(x, pace.slope, bend) for x, bend in zip(farthest, bends, strict=True)]
+
+
+def _at_middle(robot: PointMassRobot, segment: Segment, over: Stretch) -> list[Array]:
+    return _distances(robot, _in_space(segment, over.place, segment.hub))
+
+
+def _distances(robot: PointMassRobot, position: Vector | Array) -> list[Array]:
+    rays = ([position[i] - spool[i] for i in range(3)] for spool in robot.base_points)
+    return [jnp.sqrt(dot(ray, ray)) for ray in rays]
+
+
+def least_lengths(robot: PointMassRobot, segment: Segment, over: Stretch, pace: Bounds, eta: Bounds) -> list[Array]:
+    """Lower bounds of the lengths of the cables over an interval.
+
+    No cable is shorter than the distance from the spool plane. Where the mass goes far within the interval, its
+    greatest distance from P0 and its least depth say more than its length and depth in the middle.
+    """
+    tilt = segment.tilt[0] * over.place[0] + segment.tilt[1] * over.place[1]
+    lowest = jnp.maximum(tilt - over.radius * eta.slope, -eta.value)
+    depth = jnp.maximum((1.0 + lowest) * segment.hub[2] / jnp.linalg.norm(plane_normal(robot)), 0.0)
+    each = zip(_at_middle(robot, segment, over), _distances(robot, segment.hub), strict=True)
+    return [largest([x - over.radius * pace.slope, y - pace.value, depth]) for x, y in each]
+
+
+def _rate(length: Bounds, pace: Bounds, pull: Bounds) -> Bounds:
+    # w = ray . p'
+    return Bounds(
+        length.value * pace.slope,
+        pace.slope**2 + length.value * pace.curvature,
+        3.0 * pace.slope * pace.curvature + length.value * pull.slope,
+    )
+
+
+def _bend(length: Bounds, pace: Bounds, pull: Bounds, square: Array) -> Bounds:
+    # rho^2 w' - w^2, with w' = |p'|^2 + ray . p'' and the bounds of rho^2 that need no division.
+    rate = _rate(length, pace, pull)
+    last = 3.0 * pace.curvature**2 + 4.0 * pace.slope * pull.slope + length.value * pull.curvature
+    slope = Bounds(rate.slope, rate.curvature, last)
+    return Bounds(length.value**2, 2.0 * length.value * pace.slope, square) * slope + rate * rate

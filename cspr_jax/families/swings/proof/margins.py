@@ -1,0 +1,210 @@
+"""The smallest value along a segment of functions of one instant, refined between the samples.
+
+Every block is sampled; where its smallest sample lies, a parabola estimates the minimum. The best
+three estimates of a group of functions over all blocks are then refined by parabolas, each narrower.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+
+from cspr_jax.families.swings.hypocycloid import Segment
+from cspr_jax.families.swings.proof.blocks import INTERVALS, blocks, over_blocks
+from cspr_jax.families.swings.proof.criteria import BASIC, counts, smooth_slacks
+from cspr_jax.families.swings.proof.verdicts import OF_PLANS, SMALL, length
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.elementary import vertex
+from cspr_jax.numerics.linear.lanes import smallest_of_each, stored
+from cspr_jax.runtime.persistent_jit import persistent_jit
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
+
+CANDIDATES = 3
+# An estimate says in its last 16 bits where it lies, 1/4096 of the distance of samples; none is larger than this.
+LAST_BITS, LARGEST = 2**16 - 1, 1e300
+# Distance of the points of the first refining parabola, in steps between samples; how much narrower each next one is.
+FIRST_WIDTH, NARROWER, ROUNDS = 1.0 / 4.0, 1.0 / 6.0, 7
+
+
+def _block_estimates(function, problem: Problem, segments: Segment, arcs: Array, start: Array, stop: Array):
+    # For each function: an estimate of its minimum in one block of each segment, and where; (n_functions, n) each.
+    weight = (jnp.arange(INTERVALS + 1, dtype=arcs.dtype) / INTERVALS)[:, None]
+    tau = start[None] * (1.0 - weight) + stop[None] * weight
+    sampled = partial(jax.vmap(jax.vmap(partial(function, *problem)), in_axes=(None, None, 0)), segments, arcs)
+    # A parabola through every three neighbours: the lowest sample may be of the valley of another block. Of parts of
+    # computed arrays XLA would compute each anew, with all that several functions share.
+    each = map(vertex, sampled(tau[:-2]), sampled(tau[1:-1]), sampled(tau[2:]))
+    marked = smallest_of_each([_marked(estimate, weight[1:-1] + move / INTERVALS) for move, estimate in each])
+    estimates, fractions = _unmarked(jnp.stack(marked))
+    return estimates, start[None] * (1.0 - fractions) + stop[None] * fractions
+
+
+def _marked(estimates: Array, fractions: Array) -> Array:
+    # Write a number from 0 to 1 into the last bits of another one: the smallest of such numbers says where it lies. XLA
+    # computes an argmin one number at a time, and several minima in one loop only if nothing else is found.
+    numbers = jnp.where(estimates < LARGEST, estimates, LARGEST)  # neither is NaN
+    mark = jnp.round(fractions * LAST_BITS).astype(jnp.int64)
+    return lax.bitcast_convert_type(lax.bitcast_convert_type(numbers, jnp.int64) & ~LAST_BITS | mark, jnp.float64)
+
+
+def _unmarked(marked: Array) -> tuple[Array, Array]:
+    bits = lax.bitcast_convert_type(marked, jnp.int64)
+    return lax.bitcast_convert_type(bits & ~LAST_BITS, jnp.float64), (bits & LAST_BITS).astype(jnp.float64) / LAST_BITS
+
+
+def _insert(best: tuple[Array, Array], estimate: Array, place: Array) -> tuple[Array, Array]:
+    # Keep the candidates in order, the new one in its place; leaves (CANDIDATES, n_values, n). A segment with fewer
+    # blocks than others sees its last block again: a place that is known is not new.
+    estimate = jnp.where((best[1] == place[None]).any(0), jnp.inf, estimate)
+    estimates, places = [], []
+    for old_estimate, old_place in zip(*best, strict=True):
+        first = estimate < old_estimate
+        estimates.append(jnp.where(first, estimate, old_estimate))
+        places.append(jnp.where(first, place, old_place))
+        estimate, place = jnp.where(first, old_estimate, estimate), jnp.where(first, old_place, place)
+    return jnp.stack(estimates), jnp.stack(places)
+
+
+def refined_minimum(
+    function: Callable[[Array], Array],
+    tau: Float[Array, ""],
+    step: Float[Array, ""],
+    one: Float[Array, ""] | None = None,
+) -> Float[Array, ""]:
+    """Smallest value of a continuous function near an estimated minimum, by ever narrower parabolas.
+
+    A parabola is believed only where its middle is the lowest of its three points; else the points move to the lowest.
+    So a minimum that is steep on one side, or a kink beside it, is found too.
+    """
+
+    def narrow(i, state):
+        smallest, at, width = state
+        middle_point = jnp.clip(at, width, 1.0 - width)  # equidistant points, the ends of the motion among them
+        points = jnp.stack([middle_point - width, middle_point, middle_point + width])
+        left, middle, right = stored(jax.vmap(function)(points), one)
+        bracketed = (middle <= left) & (middle <= right)
+        lower = jnp.where(left < right, points[0], points[2])
+        at = jnp.where(bracketed, middle_point + width * vertex(left, middle, right)[0], lower)
+        is_narrower = bracketed | (lower <= 0.0) | (lower >= 1.0)
+        width = jnp.where(is_narrower, width * NARROWER, width)
+        return jnp.minimum(smallest, jnp.minimum(middle, jnp.minimum(left, right))), at, width
+
+    first = (jnp.full_like(tau, jnp.inf), tau, step * FIRST_WIDTH)
+    # The last round evaluates where the one before ended.
+    return lax.fori_loop(0, ROUNDS, narrow, first)[0]
+
+
+class Functions(NamedTuple):
+    """Smooth functions of one instant in groups, each with one smallest value to be found.
+
+    Fields:
+        evaluate: (robot, limits, amplitude, segment, arcs, tau) -> numbers (), group by group; hashable.
+        groups: how many functions each group has.
+    """
+
+    evaluate: Callable
+    groups: tuple[int, ...]
+
+
+def _best_of_groups(groups: tuple[int, ...], estimates: Array, places: Array) -> tuple[Array, Array]:
+    # Choose the best candidates of each group, whatever function they are of: the number of the function, and where;
+    # (n_groups, CANDIDATES, n) each, from (CANDIDATES, n_functions, n).
+    functions, taus, first = [], [], 0
+    for size in groups:
+        columns = slice(first, first + size)
+        values, where = (x[:, columns].reshape(CANDIDATES * size, -1) for x in (estimates, places))
+        number = jnp.broadcast_to(jnp.arange(CANDIDATES * size)[:, None], values.shape)
+        for _ in range(CANDIDATES):
+            is_lowest = values == jnp.min(values, axis=0, keepdims=True)
+            chosen = jnp.min(jnp.where(is_lowest, number, CANDIDATES * size), axis=0)
+            is_chosen = number == chosen[None]
+            functions.append(first + chosen % size)
+            taus.append(jnp.sum(jnp.where(is_chosen, where, 0.0), axis=0))
+            values = jnp.where(is_chosen, jnp.inf, values)
+        first += size
+    shape = (len(groups), CANDIDATES, -1)
+    return jnp.stack(functions).reshape(shape), jnp.stack(taus).reshape(shape)
+
+
+def _chosen(values: Sequence[Array], number: Array) -> Array:
+    # One of some numbers. Of an array of them, XLA would compute what they share for each of them anew.
+    chosen = values[0]
+    for i, value in enumerate(values[1:], 1):
+        chosen = jnp.where(number == i, value, chosen)
+    return chosen
+
+
+@persistent_jit(static_argnames="functions")
+def _minima(functions: Functions, problem: Problem, edges: Array, counts: Array, one: Array, arguments) -> Array:
+    segments, arcs = arguments
+    evaluate, groups = functions
+
+    def step(state, start, stop):
+        return _insert(state, *_block_estimates(evaluate, problem, segments, arcs, start[0], stop[0]))
+
+    nothing = jnp.full((CANDIDATES, sum(groups), *arcs.shape), jnp.inf, arcs.dtype)
+    nowhere = jnp.full_like(nothing, -1.0)
+    estimates, places = over_blocks(edges, counts, arcs, (nothing, nowhere), step)
+    number, where = _best_of_groups(groups, estimates, places)
+    steps = 1.0 / (INTERVALS * counts[arcs.astype(jnp.int32)]).astype(arcs.dtype)
+
+    def refine(segment, p, number, where, width):
+        # number, where: (n_groups, CANDIDATES). One copy of the function serves all: it compiles much faster.
+        def minimum(number, tau):
+            return refined_minimum(lambda t: _chosen(evaluate(*problem, segment, p, t), number), tau, width, one)
+
+        return jnp.min(jax.vmap(jax.vmap(minimum))(number, where), axis=1)
+
+    return jax.vmap(refine, in_axes=(0, 0, 2, 2, 0))(segments, arcs, number, where, steps)
+
+
+def smallest_values(
+    functions: Functions, problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"], table
+) -> Float[np.ndarray, "n n_groups"]:
+    """Smallest values along each segment of functions of one instant."""
+    arcs = np.asarray(arcs, float)
+    order = np.argsort(arcs, kind="stable")
+    arguments = jax.tree.map(lambda x: x[order], (segments, arcs))
+    kernel = partial(_minima, functions, problem, *table, 1.0)
+    minima = in_batches(kernel, arguments, size=length(problem, len(arcs), OF_PLANS))
+    return minima[np.argsort(order, kind="stable")]
+
+
+def margins(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]) -> Float[np.ndarray, "n n_criteria"]:
+    """Smallest slack of each criterion along each segment.
+
+    The smallest sample of every block is refined, so the value does not depend on where the samples lie. For many
+    segments with limits, where all slacks are positive, the smaller one of the cables' and the depth's stands in the
+    first two columns, and the smallest one of the limits in the others: refining two numbers takes less time.
+    """
+    sizes = counts(problem.robot, problem.limits)
+    if len(sizes) == BASIC or len(arcs) <= SMALL:
+        return each_margin(problem, segments, arcs)
+    table = blocks(problem.amplitude, int(np.max(arcs)))
+    both = sum(sizes[:BASIC]), sum(sizes[BASIC:])
+    least = smallest_values(Functions(smooth_slacks, both), problem, segments, arcs, table)
+    smallest = np.repeat(least, [BASIC, len(sizes) - BASIC], axis=1)
+    unclear = np.flatnonzero(~(np.isfinite(least) & (least > 0.0)).all(1))
+    if len(unclear):
+        part, numbers = jax.tree.map(lambda leaf: np.asarray(leaf)[unclear], (segments, np.asarray(arcs)))
+        smallest[unclear] = each_margin(problem, part, numbers)
+    return smallest
+
+
+def each_margin(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]) -> Float[np.ndarray, "n n_criteria"]:
+    """Smallest slack of each criterion along each segment, each refined by itself, as `margins` may not do."""
+    # The smallest over the cables has kinks, each cable's own slack has none.
+    table = blocks(problem.amplitude, int(np.max(arcs)))
+    functions = Functions(smooth_slacks, counts(problem.robot, problem.limits))
+    smallest = smallest_values(functions, problem, segments, arcs, table)
+    # A compiled minimum may pass over NaN; a function without a finite minimum has none.
+    return np.where(np.isfinite(smallest), smallest, np.nan)

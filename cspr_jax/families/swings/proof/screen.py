@@ -1,0 +1,116 @@
+"""A first sieve over all numbers of arcs at once: upper bounds of the margin, fast.
+
+The closed form splits a pseudotension into what depends on the points and what depends only on the
+number of arcs and tau. The second is a table; the precession is the same for all numbers of arcs of
+one parity. What is left of a check is some fifty multiplications and additions without a division.
+A fusion runs over the segments of a batch and takes several samples at a time, so that a segment's
+own numbers stay in registers and no array of segments by samples is made but the precession.
+
+The sieve rejects candidates; it accepts none. `families.swings.proof.verdicts` decides about the rest.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import TYPE_CHECKING
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.families.swings.hypocycloid import Segment, oscillation
+from cspr_jax.families.swings.proof.slacks import largest_term
+from cspr_jax.motion.amplitudes import Amplitude, derivatives
+from cspr_jax.numerics.batches import row_by_row
+from cspr_jax.numerics.elementary import lesser, sincospi
+from cspr_jax.runtime.persistent_jit import persistent_jit
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
+
+SAMPLES = 32
+BATCH = 2048
+# Samples in one pass over the batch; measured.
+UNROLL = 4
+# Below this T^2 lambda a segment has no duration (p = 1, psi -> 0) and is no trajectory.
+SMALLEST_PERIOD = 1e-9
+# Units of rounding of the largest term by which a sampled value is raised to be an upper bound.
+ROUNDING = 256.0
+
+
+def sample_table(
+    amplitude: Amplitude, arcs: Num[np.ndarray, "n_arcs"], tau: Float[np.ndarray, "n_samples"], dtype
+) -> Float[Array, "n_arcs 6 n_samples"]:
+    """Table of the factors of a check that do not depend on the points: of the phase pi p tau and of A."""
+    phase = math.pi * arcs[:, None] * tau
+    cosine, sine = jnp.asarray(np.cos(phase)), jnp.asarray(np.sin(phase))
+    size, slope, bend = (jnp.broadcast_to(v, phase.shape) for v in derivatives(amplitude, jnp.asarray(tau), order=2))
+    return jnp.stack([cosine, sine, size, bend, bend * cosine, slope * sine], axis=1).astype(dtype)
+
+
+def smallest_sampled(
+    amplitude: Amplitude, segments: Segment, arcs: Float[np.ndarray, "n_arcs"], tau: Float[np.ndarray, "n_samples"]
+) -> Float[Array, "n_arcs n"]:
+    """Smallest normalised pseudotension, or depth ratio, over samples, for several numbers of arcs of one parity."""
+    dtype = segments.rate.dtype
+    start, span = segments.start_radius, segments.end_radius - segments.start_radius
+    laterals, axials = sincospi(jnp.asarray(tau, dtype)[:, None] * segments.precession[None, :])
+    # The sense of the rotation mirrors the second axis; after that every quantity is that of sense +1.
+    mirror = jnp.stack([jnp.ones_like(span), segments.sense], axis=-1)
+    tilt = tuple((segments.tilt * mirror).T)
+    rows = [(*(segments.pull[:, k] * mirror).T, segments.twist[:, k] * segments.sense) for k in range(3)]
+
+    def one(candidate):
+        p, table = candidate
+        ratio, _, period = oscillation(segments, p)
+        exists = period > SMALLEST_PERIOD
+        bend, growth = span / jnp.where(exists, period, 1.0), span * ((2.0 / math.pi) / p)
+
+        def check(i, smallest):
+            cosine, sine, size, a2, a2_cosine, a1_sine = (table[column, i] for column in range(6))
+            lateral, axial, r, small = laterals[i], axials[i], start + span * size, ratio * sine
+            c_r, c_t = r * cosine, small * r
+            d_r, d_t = bend * a2_cosine - growth * a1_sine, small * (bend * a2 + 2.0 * r)
+            c0, c1 = axial * c_r + lateral * c_t, axial * c_t - lateral * c_r
+            d0, d1 = axial * d_r + lateral * d_t, axial * d_t - lateral * d_r
+            cross = c_r * d_t - c_t * d_r
+            eta = 1.0 + tilt[0] * c0 + tilt[1] * c1
+            pulls = [row[0] * d0 + row[1] * d1 + row[2] * cross for row in rows]
+            # kappa_k = eta + pull_k; eta itself is the depth ratio
+            # A NaN may be forgotten, which leaves an upper bound: `families.swings.proof.verdicts` decides.
+            lowest = lesser(lesser(pulls[0], pulls[1]), lesser(pulls[2], jnp.zeros_like(eta)))
+            return lesser(smallest, eta + lowest)
+
+        def several(j):
+            smallest = check(UNROLL * j, jnp.full_like(span, jnp.inf))
+            for i in range(1, UNROLL):
+                smallest = check(UNROLL * j + i, smallest)
+            return smallest
+
+        # The minimum is not carried from one sample to the next: XLA leaves on one core what a loop stacks, as the
+        # threads of the caller need it.
+        smallest = row_by_row(several, jnp.arange(len(tau) // UNROLL)).min(0)
+        return jnp.where(exists, smallest, -jnp.inf)
+
+    return row_by_row(one, (jnp.asarray(arcs, dtype), sample_table(amplitude, arcs, tau, dtype)))
+
+
+@persistent_jit(static_argnames=("max_arcs", "samples"))
+def upper_bounds(
+    amplitude: Amplitude, even: Segment, odd: Segment, *, max_arcs: int, samples: int = SAMPLES
+) -> Num[Array, "n max_arcs"]:
+    """Upper bounds of the margin of segments, for every number of arcs; rounding is allowed for."""
+    tau = (np.arange(samples) + 0.5) / samples
+    numbers = np.arange(1, max_arcs + 1)
+    dtype = even.rate.dtype
+    bounds = jnp.zeros((max_arcs, len(even.rate)), dtype)
+    scale = jax.vmap(partial(largest_term, amplitude), in_axes=(0, None))
+    for first, segments in ((0, odd), (1, even)):
+        arcs = numbers[first::2]
+        if len(arcs):
+            terms = jax.vmap(scale, in_axes=(None, 0))(segments, jnp.asarray(arcs, dtype))
+            guard = ROUNDING * jnp.finfo(dtype).eps * jnp.where(jnp.isfinite(terms), terms, 0.0)
+            bounds = bounds.at[first::2].set(smallest_sampled(amplitude, segments, arcs, tau) + guard)
+    return bounds.T

@@ -1,0 +1,179 @@
+"""Criteria of a segment as slacks: numbers that are positive exactly while a criterion is met.
+
+At one instant, with kappa_k the normalised pseudotension of cable k (1 at rest in p0) and eta the
+depth below the spools over z0, both along the vertical:
+
+    taut               kappa_k        thesis (2.12) to (2.14)
+    below the spools   eta
+
+`limit_slacks` adds the slacks of the limits that are set. Beside each slack stands a bound of its second
+derivative over an interval, from the closed form: it is what makes a verdict hold between samples.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.families.swings.hypocycloid import Segment, oscillation, swing
+from cspr_jax.motion.amplitudes import Amplitude, derivatives, local_bounds
+from cspr_jax.numerics.bounds.value_and_derivatives import Bounds, hypotenuse
+from cspr_jax.numerics.elementary import sincospi
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Num
+
+
+class Instant(NamedTuple):
+    """State of a segment at one instant.
+
+    Fields:
+        kappa: normalised pseudotensions, one () a cable.
+        eta: () depth below the spools over z0.
+        c: (2,) position in the plane of the trajectory, m.
+        d: (2,) c + c'' / lambda, m.
+        amplitude_values: A, A', A'', each ().
+    """
+
+    kappa: list[Array]
+    eta: Array
+    c: Array
+    d: Array
+    amplitude_values: tuple[Array, ...]
+
+
+def instant(segment: Segment, amplitude: Amplitude, arcs: Num[Array, ""], tau: Float[Array, ""]) -> Instant:
+    """State of a segment at one instant, by the closed form."""
+    values = derivatives(amplitude, tau, order=2)
+    c, d = swing(segment, values, arcs, tau)
+    cross = c[0] * d[1] - c[1] * d[0]
+    eta = 1.0 + segment.tilt[0] * c[0] + segment.tilt[1] * c[1]
+    pulls = [segment.pull[k, 0] * d[0] + segment.pull[k, 1] * d[1] for k in range(segment.pull.shape[0])]
+    kappa = [eta + pull + segment.twist[k] * cross for k, pull in enumerate(pulls)]
+    return Instant(kappa, eta, c, d, values)
+
+
+def normalised_pseudotensions(
+    segment: Segment, amplitude: Amplitude, arcs: Num[Array, ""], tau: Float[Array, ""]
+) -> Float[Array, "n_cables"]:
+    """Pseudotensions over their value at rest in p0, by the closed form, at one instant."""
+    return jnp.stack(instant(segment, amplitude, arcs, tau).kappa)
+
+
+def largest_term(amplitude: Amplitude, segment: Segment, arcs: Num[Array, ""]) -> Float[Array, ""]:
+    """Bound of the sum of the sizes of all terms of a normalised pseudotension: the scale of its rounding error."""
+    ratio, steady, period = oscillation(segment, arcs)
+    span = jnp.abs(segment.end_radius - segment.start_radius)
+    largest = amplitude.largest.astype(span.dtype)
+    radius = jnp.maximum(segment.start_radius, segment.end_radius) + span * (largest[0] - 1.0)
+    gain, bend = steady / period, jnp.abs(segment.end_curvature)
+    force = (span * largest[2] + bend * radius) / period + gain * (span * largest[1] / arcs + 2.0 * ratio * radius)
+    pull = jnp.max(jnp.sum(jnp.abs(segment.pull), axis=-1))
+    twist = jnp.max(jnp.abs(segment.twist))
+    return 1.0 + radius * jnp.sum(jnp.abs(segment.tilt)) + force * (pull + radius * twist)
+
+
+class Stretch(NamedTuple):
+    """An interval of tau in which no knot of the amplitude function lies inside, with bounds over it.
+
+    Fields:
+        middle: () of the interval.
+        radius: () half of its width.
+        size: bounds of r, as Bounds.
+        growth: bounds of r'.
+        bend: bounds of r''.
+        place: (2,) position c in the middle, m.
+    """
+
+    middle: Array
+    radius: Array
+    size: Bounds
+    growth: Bounds
+    bend: Bounds
+    place: Array
+
+
+def stretch(
+    segment: Segment, amplitude: Amplitude, arcs: Num[Array, ""], start: Float[Array, ""], stop: Float[Array, ""]
+) -> Stretch:
+    """The interval [start, stop] with bounds of the radius r(tau) of (2.48) over it."""
+    middle, radius = 0.5 * (start + stop), 0.5 * (stop - start)
+    span = segment.end_radius - segment.start_radius
+    a = local_bounds(amplitude, middle, radius)
+    r1, r2, r3, r4 = (jnp.abs(span) * a[j] for j in range(1, 5))
+    at_middle = segment.start_radius + span * derivatives(amplitude, middle, order=0)[0]
+    r0 = jnp.abs(at_middle) + radius * r1
+    place = instant(segment, amplitude, arcs, middle).c
+    return Stretch(middle, radius, Bounds(r0, r1, r2), Bounds(r1, r2, r3), Bounds(r2, r3, r4), place)
+
+
+def _components(segment: Segment, vector: Array, over: Stretch) -> tuple[Bounds, Bounds]:
+    # Bound vector . e_r and vector . e_t, which turn into each other at the rate of the precession.
+    lateral, axial = sincospi(segment.sense * segment.precession * over.middle)
+    length = hypotenuse(vector[0], vector[1])
+    rate = math.pi * segment.precession
+    change = over.radius * rate * length
+    radial = jnp.minimum(jnp.abs(vector[0] * axial - vector[1] * lateral) + change, length)
+    tangential = jnp.minimum(jnp.abs(vector[0] * lateral + vector[1] * axial) + change, length)
+    return (
+        Bounds(radial, rate * tangential, rate**2 * radial),
+        Bounds(tangential, rate * radial, rate**2 * tangential),
+    )
+
+
+@jax.jit
+def row_bounds(
+    segment: Segment,
+    arcs: Num[Array, ""],
+    over: Stretch,
+    tilt: Float[Array, "2"],
+    pull: Float[Array, "2"] | None = None,
+    twist: Float[Array, ""] | None = None,
+) -> Bounds:
+    """Bounds of tilt . c + pull . d + twist (c x d) over an interval.
+
+    In the precessing frame it is X cos Phi + Y sin Phi + E (cos 2 Phi - 1) + F sin 2 Phi with
+    Phi = pi p tau, where X, Y, E and F are slow: their bounds, and those of Phi, give the rest.
+    """
+    ratio, steady, period = oscillation(segment, arcs)
+    omega, gain = math.pi * arcs, steady / period
+    tilt_r, tilt_t = _components(segment, tilt, over)
+    x, y = tilt_r * over.size, (tilt_t * over.size).times(ratio)
+    if pull is not None:
+        pull_r, pull_t = _components(segment, pull, over)
+        rho = (over.bend + over.size.times(jnp.abs(segment.end_curvature))).times(1.0 / period)
+        x = x + pull_r * rho
+        y = y + (pull_t * (rho + over.size.times(2.0 * gain))).times(ratio)
+        y = y + (pull_r * over.growth).times(2.0 * gain / omega)
+    total = _oscillating(x, y, omega)
+    if twist is not None:
+        e = (over.size * over.growth).times(gain * twist * ratio / omega)
+        total = total + _oscillating(e, (over.size * over.size).times(gain * twist * ratio), 2.0 * omega) + e
+    return total
+
+
+def _oscillating(cosine: Bounds, sine: Bounds, omega: Array) -> Bounds:
+    # Bound f cos(omega tau) + g sin(omega tau) and its derivatives, with their factors joined at the worst phase.
+    return Bounds(
+        hypotenuse(cosine.value, sine.value),
+        hypotenuse(cosine.slope + omega * sine.value, sine.slope + omega * cosine.value),
+        hypotenuse(
+            cosine.curvature + 2.0 * omega * sine.slope + omega**2 * cosine.value,
+            sine.curvature + 2.0 * omega * cosine.slope + omega**2 * sine.value,
+        ),
+    )
+
+
+def each_taut_bounds(segment: Segment, arcs: Num[Array, ""], over: Stretch) -> list[Bounds]:
+    """Bounds of the variable part of each kappa_k over an interval (of kappa_k - 1; the derivatives are kappa_k's)."""
+    cables = range(segment.pull.shape[0])
+    return [row_bounds(segment, arcs, over, segment.tilt, segment.pull[k], segment.twist[k]) for k in cables]
+
+
+def taut_bounds(segment: Segment, arcs: Num[Array, ""], over: Stretch) -> Bounds:
+    """The bounds of `each_taut_bounds` in arrays."""
+    return jax.tree.map(lambda *bounds: jnp.stack(bounds), *each_taut_bounds(segment, arcs, over))

@@ -1,0 +1,201 @@
+"""Verdicts that hold between the samples.
+
+A slack f with |f''| <= M on an interval of length h satisfies f >= min(f at its ends) - M h^2 / 8.
+The interval [0, 1] is cut into blocks at the knots of the amplitude function, and each block into 16
+intervals; M comes from the closed form, one for each block. A segment is
+
+    proved feasible    if this lower bound exceeds the tolerance in every block,
+    proved infeasible  if a sample lies below minus the tolerance,
+    cut finer          otherwise, only where it is open; each cut into quarters divides the gap by 16,
+    undecided          if the gap has closed to the tolerance and zero is still inside.
+
+The tolerance covers rounding (see `tolerance`). A limit that is touched exactly, such as a target
+on the floor, counts as met: limits are allowed twice the tolerance.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import partial
+from typing import TYPE_CHECKING
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.families.swings.hypocycloid import Segment
+from cspr_jax.families.swings.proof.blocks import INTERVALS, blocks, over_blocks
+from cspr_jax.families.swings.proof.criteria import BASIC, curvatures, slacks
+from cspr_jax.families.swings.proof.slacks import largest_term
+from cspr_jax.motion.amplitudes import Amplitude
+from cspr_jax.motion.limits import limits_set
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.linear.lanes import smallest_of_each
+from cspr_jax.runtime.persistent_jit import persistent_jit
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float, Num
+
+SMALLEST_MARGIN = 1e-9
+BATCH = 1024
+# Length of the batches of few segments: with limits, for which a whole batch would take several times as long, and of
+# plans, which have up to so many.
+SMALL, OF_PLANS = 128, 16
+FINEST_CUT = 12
+# Blocks of a segment in one step of a first look.
+TOGETHER = 2
+
+
+@dataclasses.dataclass(frozen=True)
+class Proof:
+    """Proofs of n segments. `feasible` and `infeasible` exclude each other; neither is undecided.
+
+    Fields:
+        feasible: (n,) every criterion that counts is met at every instant.
+        infeasible: (n,) some criterion that counts is broken at some instant.
+        met: (n, n_criteria) the criterion is met at every instant; False where that is not known.
+        broken: (n, n_criteria) the criterion is broken at some instant; False where that is not known.
+        sampled: (n, n_criteria) smallest slack that a sample of a first look attains.
+        bound: (n, n_criteria) lower bound of the slack that a first look proves.
+    """
+
+    feasible: np.ndarray
+    infeasible: np.ndarray
+    met: np.ndarray
+    broken: np.ndarray
+    sampled: np.ndarray
+    bound: np.ndarray
+
+
+def tolerance(amplitude: Amplitude, segment: Segment, arcs: Num[Array, ""]) -> Float[Array, ""]:
+    """Distance from zero within which a slack is undecided."""
+    terms = largest_term(amplitude, segment, arcs)
+    return SMALLEST_MARGIN + 512.0 * jnp.finfo(terms.dtype).eps * terms
+
+
+def block_bounds(
+    problem: Problem, segments: Segment, arcs: Float[Array, "n"], start: Float[Array, "n"], stop: Float[Array, "n"]
+) -> tuple[tuple[Float[Array, "n"], ...], tuple[Float[Array, "n"], ...]]:
+    """Smallest sampled slack, and proved lower bound, of each criterion over one block of each segment."""
+    weight = (jnp.arange(INTERVALS + 1, dtype=arcs.dtype) / INTERVALS)[:, None]
+    tau = start[None] * (1.0 - weight) + stop[None] * weight
+    values = jax.vmap(jax.vmap(partial(slacks, *problem)), in_axes=(None, None, 0))(segments, arcs, tau)
+    sampled, share = smallest_of_each(values), ((stop - start) / INTERVALS) ** 2 / 8.0
+    bounds = jax.vmap(partial(curvatures, *problem))(segments, arcs, start, stop)
+    return sampled, tuple(low - bound * share for low, bound in zip(sampled, bounds, strict=True))
+
+
+@persistent_jit
+def _first_look(problem: Problem, edges: Array, counts: Array, arguments) -> tuple[Array, Array, Array]:
+    segments, arcs = arguments
+    look = jax.vmap(partial(block_bounds, problem), in_axes=(None, None, 0, 0))
+
+    def step(state, start, stop):
+        sampled, proved = look(segments, arcs, start, stop)
+        return tuple(map(jnp.minimum, state, smallest_of_each((*sampled, *proved))))
+
+    n_criteria = BASIC + len(limits_set(problem.limits))
+    nothing = (jnp.full_like(arcs, jnp.inf),) * (2 * n_criteria)
+    minima = over_blocks(edges, counts, arcs, nothing, step, together=TOGETHER)
+    near = jax.vmap(partial(tolerance, problem.amplitude))(segments, arcs)
+    return jnp.stack(minima[:n_criteria], axis=1), jnp.stack(minima[n_criteria:], axis=1), near
+
+
+@persistent_jit
+def _closer_look(problem: Problem, arguments) -> tuple[Array, Array]:
+    sampled, proved = block_bounds(problem, *arguments)
+    return jnp.stack(sampled, axis=1), jnp.stack(proved, axis=1)
+
+
+def prove(
+    problem: Problem,
+    segments: Segment,
+    arcs: Num[np.ndarray, "n"],
+    *,
+    ignored: Float[np.ndarray, "n n_criteria"] | None = None,
+    look: tuple[np.ndarray, ...] | None = None,
+) -> Proof:
+    """Decide segments, each with a given number of arcs."""
+    arcs = np.asarray(arcs, float)
+    table = blocks(problem.amplitude, int(arcs.max()))
+    sampled, bound, near = first_look(problem, segments, arcs) if look is None else look
+    allowed = _allowance(sampled.shape[1], near)
+    counted = ~(np.zeros(sampled.shape, bool) if ignored is None else ignored)
+    met, broken = bound + allowed > near[:, None], ~(sampled + allowed >= -near[:, None])
+    feasible, infeasible = (met | ~counted).all(1), (broken & counted).any(1)
+    open_ones = np.flatnonzero(~feasible & ~infeasible)
+    if len(open_ones):
+        some_segments, some_arcs = jax.tree.map(lambda x: x[open_ones], (segments, arcs))
+        parts = near[open_ones], counted[open_ones]
+        feasible[open_ones], refuted = _cut(problem, some_segments, some_arcs, *parts, table)
+        infeasible[open_ones], broken[open_ones] = refuted.any(1), broken[open_ones] | refuted
+    return Proof(feasible, infeasible, met | (feasible[:, None] & counted), broken, sampled, bound)
+
+
+def length(problem: Problem, count: int, few: int = 0) -> int:
+    """Length of the batches for some segments, or blocks of them."""
+    return SMALL if count <= few or (2 * count <= BATCH and limits_set(problem.limits)) else BATCH
+
+
+def is_met_at_samples(
+    problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]
+) -> Bool[np.ndarray, "n n_criteria"]:
+    """Criteria that no sample of a first look breaks."""
+    arcs = np.asarray(arcs, float)
+    sampled, _, near = first_look(problem, segments, arcs)
+    return sampled + _allowance(sampled.shape[1], near) >= -near[:, None]
+
+
+def first_look(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]) -> tuple[np.ndarray, ...]:
+    """A first look at segments: smallest samples and proved bounds of all criteria."""
+    table = blocks(problem.amplitude, int(arcs.max()))
+    order = np.argsort(arcs, kind="stable")
+    back = np.argsort(order, kind="stable")
+    arguments = jax.tree.map(lambda x: x[order], (segments, arcs))
+    look = in_batches(partial(_first_look, problem, *table), arguments, size=length(problem, len(arcs), OF_PLANS))
+    return jax.tree.map(lambda x: x[back], look)
+
+
+def _allowance(n_criteria: int, near: np.ndarray) -> np.ndarray:
+    # Limits may be touched; cables may not be slack, and the spool plane may not be reached.
+    is_limit = np.arange(n_criteria) >= 2
+    return 2.0 * near[:, None] * is_limit
+
+
+def _cut(
+    problem: Problem, segments: Segment, arcs: np.ndarray, near: np.ndarray, counted: np.ndarray, table
+) -> tuple[np.ndarray, np.ndarray]:
+    # Return which segments are proved (n,), and which criteria that count are broken (n, n_criteria). Items are blocks
+    # of segments that are still open: owner, start, stop.
+    edges, counts = table
+    broken, stuck = np.zeros(counted.shape, bool), np.zeros(len(arcs), bool)
+    count = counts[arcs.astype(int)]
+    owner = np.repeat(np.arange(len(arcs)), count)
+    place = np.concatenate([np.arange(c) for c in count])
+    row = arcs.astype(int)[owner]
+    start, stop = edges[row, place], edges[row, place + 1]
+    for _ in range(FINEST_CUT):
+        items = (*jax.tree.map(lambda x, o=owner: x[o], (segments, arcs)), start, stop)
+        sampled, proved = in_batches(partial(_closer_look, problem), items, size=length(problem, len(owner)))
+        limit, allowed = near[owner, None], _allowance(sampled.shape[1], near[owner])
+        fails: np.ndarray = ~(sampled + allowed >= -limit) & counted[owner]
+        failing = np.flatnonzero(fails.any(1))
+        np.logical_or.at(broken, owner[failing], fails[failing])
+        refuted = np.asarray(broken.any(1))
+        unproved = ~(proved + allowed > limit) & counted[owner]
+        closed = (unproved & (sampled - proved <= 0.5 * limit)).any(1)
+        np.logical_or.at(stuck, owner, closed)
+        keep = unproved.any(1) & ~refuted[owner] & ~stuck[owner]
+        if not keep.any():
+            return ~refuted & ~stuck, broken
+        owner, start, stop = _quarters(owner[keep], start[keep], stop[keep])
+    stuck[owner] = True
+    return ~broken.any(1) & ~stuck, broken
+
+
+def _quarters(owner: np.ndarray, start: np.ndarray, stop: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    weight = np.arange(5) / 4.0
+    edge = start[:, None] * (1.0 - weight) + stop[:, None] * weight
+    return np.repeat(owner, 4), edge[:, :-1].ravel(), edge[:, 1:].ravel()

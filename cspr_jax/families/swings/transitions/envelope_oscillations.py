@@ -1,0 +1,203 @@
+"""Numbers of oscillations that a transition needs, from the envelopes of its pseudotensions, thesis chapter 1.
+
+With Omega = 4 pi^2 N - A''(1), N = n^2, the normalised pseudotension of cable k is, (1.32),
+
+    1 - C cos(2 pi n tau) + S sin(2 pi n tau),  C = (v + w) c / Omega - v A,  S = 4 pi n (v + w) A' / Omega,
+
+c = A'' - A A''(1). It is positive whatever the phase if C^2 + S^2 < 1, (1.39): a quadratic in
+Omega. Its largest root, the largest over tau and over the cables, is what N must exceed. That
+is sufficient for taut cables, not necessary. n is a real number here: a motion takes the next integer.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+
+from cspr_jax.motion.amplitudes import SMALLEST_EPSILON, Amplitude, derivatives, named
+from cspr_jax.numerics.elementary import vertex
+from cspr_jax.numerics.search.minima import GOLDEN, Bracket, golden_step, inner_points
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Samples of each piece of the amplitude function; between them the maximum is refined.
+SAMPLES = 64
+UNROLL = 4
+# Golden section narrows the bracket to a three-hundredth, parabolas then find the place to rounding.
+STEPS = 12
+PARABOLAS, SMALLEST_SHARE, TINY = 2, 1e-3, 1e-100
+# Steps of golden section for a best inclination: the bracket ends at 4e-9 of where it began.
+INCLINATION_STEPS = 40
+EPSILONS, SMALLEST_WIDTH = 50, 1e-9
+LARGEST_INCLINATION = 1.0 - 1e-9
+
+
+def squared_oscillations_at(
+    amplitude: Amplitude, weight: Float[Array, ""], inclination: Float[Array, ""], tau: Float[Array, ""]
+) -> Float[Array, ""]:
+    """N_k(v, tau) of (1.44): square of the oscillations that keep a cable taut at an instant, whatever the phase."""
+    end = derivatives(amplitude, jnp.ones_like(tau), order=2)[2]
+    return _squared(_root(inclination + weight, inclination, end, derivatives(amplitude, tau, order=2)), end)
+
+
+def _squared(omega: Array, end: Array) -> Array:
+    # Return N of Omega.
+    return (omega + end) / (4.0 * math.pi**2)
+
+
+def _root(load: Array, inclination: Array, end: Array, values: tuple[Array, ...]) -> Array:
+    # Return the largest root Omega of the envelope, for A, A', A'' at an instant.
+    size, slope, bend = values
+    c, swung = bend - size * end, inclination * size
+    d = (1.0 - swung) * (1.0 + swung)
+    half = swung * load * c - 2.0 * (load * slope) ** 2
+    rest = load**2 * (c**2 + 4.0 * end * slope**2)
+    squared = half**2 + d * rest
+    root = jnp.sqrt(jnp.maximum(squared, 0.0))
+    # The second form of the root is taken where the first would cancel. Without a real root every Omega keeps the
+    # envelope up.
+    is_second = half > 0.0
+    largest = jnp.where(is_second, rest, root - half) / jnp.where(is_second, root + half, jnp.where(d > 0.0, d, 1.0))
+    omega = jnp.where(squared < 0.0, 0.0, jnp.maximum(largest, 0.0))
+    # If |v A| >= 1, some phase takes the effector to the spool plane, and one cable slack before that.
+    return jnp.where(d > 0.0, omega, jnp.inf)
+
+
+@jax.jit
+def _samples(amplitude: Amplitude) -> Array:
+    # Every knot is among the samples, which are dense towards the ends of each piece, where steep inclinations have
+    # their maximum.
+    ends = jnp.concatenate([jnp.zeros(1), jnp.asarray(amplitude.knots), jnp.ones(1)])
+    part = 0.5 * (1.0 - np.cos(math.pi * np.arange(SAMPLES) / SAMPLES))
+    inside = ends[:-1, None] + (ends[1:] - ends[:-1])[:, None] * part[None]
+    return jnp.concatenate([inside.ravel(), jnp.ones(1)])
+
+
+def _golden(function: Callable[[Array], Array], low: Array, high: Array, steps: int) -> Array:
+    # Find by golden section where a function that falls and then rises is smallest.
+    left, right = inner_points(low, high)
+    start = Bracket(low, high, left, right, function(left), function(right))
+    last = lax.fori_loop(0, steps, lambda _, bracket: golden_step(function, bracket)[0], start)
+    return 0.5 * (last.low + last.high)
+
+
+@jax.jit
+def _least(amplitude: Amplitude, tau: Array, weights: Array, inclination: Array) -> Array:
+    end = derivatives(amplitude, jnp.ones_like(inclination), order=2)[2]
+    values = derivatives(amplitude, tau, order=2)
+
+    def one(weight):
+        def needed(sample):
+            return _root(inclination + weight, inclination, end, sample)
+
+        def at(t):
+            return needed(derivatives(amplitude, t, order=2))
+
+        places, highest = _peaks(needed, values)
+        low, high = tau[jnp.maximum(places - 1, 0)], tau[jnp.minimum(places + 1, len(tau) - 1)]
+        return _squared(jnp.maximum(highest, jnp.max(jax.vmap(partial(_peak, at))(low, high))), end)
+
+    return jnp.max(jax.vmap(one)(weights))
+
+
+def _peaks(function: Callable[[tuple[Array, ...]], Array], points: tuple[Array, ...]) -> tuple[Array, Array]:
+    # Find where the two highest peaks of a sampled function lie, and the height of the first; samples are looked at one
+    # after the other, since sorting them would cost five times as much.
+    none = -jnp.inf * jnp.ones_like(function(tuple(p[0] for p in points)))
+    nowhere = jnp.zeros((), jnp.int32)
+
+    def take(peaks, value, place):
+        (first, at_first), (second, at_second) = peaks
+        leads, follows = value > first, value > second
+        next_one = jnp.where(leads, first, jnp.where(follows, value, second))
+        at_next = jnp.where(leads, at_first, jnp.where(follows, place, at_second))
+        return (jnp.where(leads, value, first), jnp.where(leads, place, at_first)), (next_one, at_next)
+
+    def step(state, point):
+        before, here, place, peaks = state
+        after = function(point)
+        is_peak = (here >= before) & (here >= after)
+        return (here, after, place + 1, take(peaks, jnp.where(is_peak, here, -jnp.inf), place)), None
+
+    start = (none, none, nowhere - 1, ((none, nowhere), (none, nowhere)))
+    (before, here, place, peaks), _ = lax.scan(step, start, points, unroll=UNROLL)
+    peaks = take(peaks, jnp.where(here >= before, here, -jnp.inf), place)
+    return jnp.stack([peaks[0][1], peaks[1][1]]), peaks[0][0]
+
+
+def _peak(function: Callable[[Array], Array], low: Array, high: Array) -> Array:
+    # Return the largest value, not negative, near the only peak between two places. Where |v A| comes near to 1 it is
+    # sharp, but its reciprocal is smooth: parabolas are laid through that, where it is not too large.
+    middle, width = _golden(lambda t: -function(t), low, high, STEPS), 0.5 * (high - low) * GOLDEN**STEPS
+
+    def narrow(_, state):
+        largest, at, width = state
+        points = jnp.clip(at + width * jnp.array([-1.0, 0.0, 1.0]), low, high)
+        values = jax.vmap(function)(points)
+        shares = 1.0 / jnp.maximum(values, jnp.maximum(SMALLEST_SHARE * jnp.max(values), TINY))
+        move = vertex(shares[0], shares[1], shares[2])[0]
+        return jnp.maximum(largest, jnp.max(values)), jnp.clip(points[1] + width * move, low, high), width / 16.0
+
+    return lax.fori_loop(0, PARABOLAS, narrow, (jnp.full_like(middle, -jnp.inf), middle, width))[0]
+
+
+def least_oscillations(
+    amplitude: Amplitude, weights: Float[Array, "n_cables"], inclination: Float[Array, ""]
+) -> Float[Array, ""]:
+    """Oscillations that the envelopes ask for, a real number: (1.48), (1.94)."""
+    return jnp.sqrt(jnp.maximum(_least(amplitude, _samples(amplitude), _extreme(weights), inclination), 0.0))
+
+
+@jax.jit
+def _extreme(weights: Array) -> Array:
+    # The loads that a given N allows form an interval about zero: only the extreme cables count.
+    return jnp.stack([jnp.max(weights), jnp.min(weights)])
+
+
+def horizontal_oscillations(amplitude: Amplitude, weights: Float[Array, "n_cables"]) -> Float[Array, ""]:
+    """Oscillations that the envelopes ask for on a horizontal transition, a real number: (1.53)."""
+    largest = jnp.max(jnp.abs(weights), keepdims=True)
+    return jnp.sqrt(jnp.maximum(_least(amplitude, _samples(amplitude), largest, jnp.zeros_like(largest[0])), 0.0))
+
+
+def best_inclination(
+    amplitude: Amplitude, weights: Float[Array, "n_cables"]
+) -> tuple[Float[Array, ""], Float[Array, ""]]:
+    """The inclination that needs the fewest oscillations, by golden section."""
+    return _best(amplitude, _samples(amplitude), _extreme(weights))
+
+
+@jax.jit
+def _best(amplitude: Amplitude, samples: Array, weights: Array) -> tuple[Array, Array]:
+    high = LARGEST_INCLINATION / jnp.maximum(amplitude.largest[0], 1.0).astype(weights.dtype)
+    v = _golden(lambda v: _least(amplitude, samples, weights, v), -high, high, INCLINATION_STEPS)
+    return v, jnp.sqrt(jnp.maximum(_least(amplitude, samples, weights, v), 0.0))
+
+
+def best_epsilon(weights: Float[Array, "n_cables"]) -> tuple[float, float]:
+    """The epsilon of A_eff, (1.110), that needs the fewest oscillations on a horizontal transition."""
+
+    def needed(epsilon: float) -> float:
+        return float(horizontal_oscillations(named("effective", epsilon), weights))
+
+    # A coarse look finds the valley; golden section goes down in it.
+    trial = np.linspace(SMALLEST_EPSILON, 0.5, EPSILONS)
+    place = int(np.argmin([needed(float(epsilon)) for epsilon in trial]))
+    low, high = float(trial[max(place - 1, 0)]), float(trial[min(place + 1, EPSILONS - 1)])
+    while high - low > SMALLEST_WIDTH:
+        left, right = inner_points(low, high)
+        low, high = (low, right) if needed(left) <= needed(right) else (left, high)
+    return 0.5 * (low + high), needed(0.5 * (low + high))
+
+
+def many_oscillations(amplitude: Amplitude, weights: Float[Array, "n_cables"]) -> Float[Array, ""]:
+    """Limit of `least_oscillations` on a horizontal transition as the weights grow, (1.55)."""
+    return jnp.max(jnp.abs(weights)) / math.pi * amplitude.largest[1]

@@ -1,0 +1,232 @@
+"""Smallest number of oscillations of many transitions: by the envelopes, and by the true pseudotensions.
+
+The envelopes (1.39) are sufficient, not necessary: a motion may be taut with one oscillation fewer. So the
+smallest integer that they allow stands beside the smallest that is proved from the pseudotensions themselves.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import lax
+
+from cspr_jax.families.swings.arcs import check_numbers
+from cspr_jax.families.swings.decide import BATCH, Known, decided, end_slacks
+from cspr_jax.families.swings.hypocycloid import Segment
+from cspr_jax.families.swings.proof.margins import margins
+from cspr_jax.families.swings.proof.verdicts import tolerance
+from cspr_jax.families.swings.transitions import envelope_oscillations as counts
+from cspr_jax.families.swings.transitions import transition, zero_tension
+from cspr_jax.families.swings.transitions.envelopes import proved_envelope
+from cspr_jax.families.swings.transitions.transition_margins import transition_margins
+from cspr_jax.motion.amplitudes import Amplitude, derivatives
+from cspr_jax.motion.answers import Answers
+from cspr_jax.motion.limits import limits_set
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.runtime.stages import stage
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Instants of the sieve; odd, so that they do not fall on the zeros of an oscillation.
+SAMPLES = 61
+ROUNDING = 1e-12
+
+
+@dataclasses.dataclass(frozen=True)
+class OscillationAnswers(Answers):
+    """One answer for each transition; an oscillation has two arcs.
+
+    Fields:
+        oscillations: (n,) smallest number of oscillations proved feasible; 0: none.
+        tried_oscillations: (n,) the number that duration and margins belong to.
+        envelope_oscillations: (n,) smallest integer that keeps the envelopes positive; 0: none up to the largest tried.
+        least_oscillations: (n,) smallest real number that does; NaN where |v A| reaches 1, so that none does.
+        inclination_gain: (n,) oscillations, a real number, that the inclination saves over a horizontal transition.
+        used_inclination: (n,) v.
+        used_z0: (n,) depth of p0 below the centroid of the spools, m.
+    """
+
+    oscillations: np.ndarray
+    tried_oscillations: np.ndarray
+    envelope_oscillations: np.ndarray
+    least_oscillations: np.ndarray
+    inclination_gain: np.ndarray
+    used_inclination: np.ndarray
+    used_z0: np.ndarray
+
+    def details(self, i: int) -> dict[str, Any]:
+        """Numbers of oscillations; see `Answers.details`."""
+        return {
+            "oscillations": int(self.arcs[i]) // 2 or None,
+            "tried_oscillations": int(self.tried_oscillations[i]),
+            "envelope_oscillations": int(self.envelope_oscillations[i]) or None,
+            "least_oscillations": float(self.least_oscillations[i]),
+            "inclination": float(self.used_inclination[i]),
+        }
+
+
+@jax.jit
+def _transitions(problem: Problem, arguments) -> Segment:
+    return jax.vmap(partial(transition.transition, problem.robot, problem.amplitude))(*arguments)
+
+
+def transitions_to(problem: Problem, targets: Float[np.ndarray, "n 3"], z0: Float[np.ndarray, "n"]) -> Segment:
+    """Transitions from rest to many targets."""
+    return in_batches(partial(_transitions, problem), (targets, z0), size=BATCH)
+
+
+@jax.jit
+def _best_inclinations(amplitude: Amplitude, weights: jax.Array) -> jax.Array:
+    return jax.vmap(lambda w: counts.best_inclination(amplitude, w)[0])(weights)
+
+
+def best_inclinations(
+    problem: Problem, targets: Float[np.ndarray, "n 3"], *, max_arcs: int = 30
+) -> Float[np.ndarray, "n"]:
+    """The inclination of each target that asks for the fewest oscillations."""
+    if problem.robot.n_cables > problem.robot.dof:
+        from cspr_jax.families.swings.transitions.redundant_inclinations import redundant_inclinations
+
+        return redundant_inclinations(problem, targets, transitions_to, max_arcs=max_arcs)
+    # The weights depend on neither the depth of p0 nor that of the target.
+    weights = transition.weights(transitions_to(problem, targets, np.ones(len(targets))))
+    if not np.any(problem.amplitude.largest[2]):  # A = tau
+        return np.asarray(jax.vmap(lambda w: zero_tension.best_inclination(w)[0])(weights))
+    return in_batches(partial(_best_inclinations, problem.amplitude), np.asarray(weights), size=BATCH)
+
+
+@jax.jit
+def _envelopes(amplitude: Amplitude, arguments) -> tuple[jax.Array, jax.Array]:
+    def one(weights, v):
+        inside = jnp.abs(v) < 1.0
+        here = counts.least_oscillations(amplitude, weights, jnp.where(inside, v, 0.0))
+        here = jnp.where(inside & jnp.isfinite(here), here, jnp.nan)
+        return here, counts.horizontal_oscillations(amplitude, weights) - here
+
+    return jax.vmap(one)(*arguments)
+
+
+@jax.jit
+def _level(amplitude: Amplitude, arguments) -> tuple[jax.Array, jax.Array]:
+    # Horizontal transitions take a third of the work.
+    weights, _ = arguments
+    here = jax.vmap(partial(counts.horizontal_oscillations, amplitude))(weights)
+    return here, jnp.zeros_like(here)
+
+
+@partial(jax.jit, static_argnames="largest")
+def _upper_bounds(amplitude: Amplitude, loads: tuple[jax.Array, jax.Array, jax.Array], *, largest: int) -> jax.Array:
+    # Bound 1 + v A cos - L h, the pseudotension under a load L = v + w_k, and the depth, which has L = 0.
+    high, low, v = loads
+    tau = (np.arange(SAMPLES) + 0.5) / SAMPLES
+    size, slope, bend = derivatives(amplitude, jnp.asarray(tau), order=2)
+    end = derivatives(amplitude, jnp.ones(()), order=2)[2]
+
+    def one(n):
+        omega = 2.0 * jnp.pi * n
+        period = omega**2 - end
+        cosine, sine = jnp.cos(omega * tau), jnp.sin(omega * tau)
+        h = ((bend - size * end) * cosine - 2.0 * omega * slope * sine) / period
+        worst = jnp.maximum(high[:, None] * h[None], low[:, None] * h[None])
+        lowest = jnp.min(1.0 + v[:, None] * size[None] * cosine[None] - worst, axis=1)
+        guard = ROUNDING * (1.0 + jnp.abs(v) + jnp.maximum(high, -low) * jnp.max(jnp.abs(h)))
+        return jnp.where(period > 0.0, lowest + guard, -jnp.inf)
+
+    return lax.map(one, jnp.arange(1.0, largest + 1.0)).T
+
+
+@jax.jit
+def _proofs(amplitude: Amplitude, arguments) -> tuple[jax.Array, jax.Array]:
+    def one(segment, weights, v, n):
+        return proved_envelope(amplitude, weights, v, n), tolerance(amplitude, segment, 2.0 * n)
+
+    return jax.vmap(one)(*arguments)
+
+
+def _known(
+    problem: Problem, segments: Segment, of_targets: tuple[np.ndarray, np.ndarray], allowed: np.ndarray
+) -> Known:
+    # Return the whole numbers of oscillations that the envelopes prove.
+    n = np.where(np.isfinite(allowed), allowed, 1.0)
+    kernel = partial(_proofs, problem.amplitude)
+    bound, near = in_batches(kernel, (segments, *of_targets, n), size=BATCH)
+    return Known(np.where(np.isfinite(allowed) & (bound > near), 2 * n, 0).astype(int), bound)
+
+
+def minimum_oscillations(
+    problem: Problem, segments: Segment, z0: Float[np.ndarray, "n"], *, max_arcs: int = 30, arcs=None, steady=None
+) -> OscillationAnswers:
+    """Smallest number of oscillations of transitions.
+
+    Needs 64-bit jax (`jax.config.update("jax_enable_x64", True)`): verdicts are float64's.
+    """
+    check_numbers(problem.robot, z0, max_arcs)
+    stage(f"numbers of oscillations, 1 to {max_arcs // 2}")
+    largest = max(max_arcs // 2, 1)
+    if problem.robot.n_cables > problem.robot.dof:
+        return _on_more_cables(problem, segments, z0, 2 * largest, arcs)
+    v, weights = np.asarray(transition.inclination(segments)), np.asarray(transition.weights(segments))
+    envelopes = _level if (v == 0.0).all() else _envelopes
+    look = in_batches(partial(envelopes, problem.amplitude), (weights, v), size=BATCH)
+    real, gain = (np.array(column) for column in look)
+    loads = v[:, None] + weights
+    extreme = (np.maximum(loads.max(1), 0.0), np.minimum(loads.min(1), 0.0), v)
+    kernel = partial(_upper_bounds, problem.amplitude, largest=largest)
+    upper = np.full((len(v), 2 * largest), -np.inf)
+    upper[:, 1::2] = in_batches(kernel, extreme, size=BATCH)
+    at_ends = in_batches(partial(end_slacks, problem, 4.0), segments, size=BATCH)
+    if steady is not None:
+        upper[steady, 1::2], real[steady], gain[steady] = np.inf, 0.0, 0.0
+    infinity = _infinity(problem, v)
+    allowed = np.floor(np.where(np.isnan(real), np.inf, real)) + 1.0
+    parities = {0: segments, 1: segments}
+    is_plain = steady is None and not limits_set(problem.limits) and problem.limits.uncertainty is None
+    known = _known(problem, segments, (weights, v), allowed) if is_plain else None
+    measure = transition_margins if steady is None else margins
+    answers, _ = decided(problem, parities, upper, at_ends, infinity, arcs=arcs, known=known, measure=measure)
+    return OscillationAnswers(
+        **vars(answers),
+        oscillations=answers.arcs // 2,
+        tried_oscillations=answers.tried_arcs // 2,
+        envelope_oscillations=np.where(allowed <= largest, allowed, 0).astype(int),
+        least_oscillations=real,
+        inclination_gain=np.where(np.isnan(real), np.nan, gain),
+        used_inclination=v,
+        used_z0=np.asarray(z0, float),
+    )
+
+
+def _infinity(problem: Problem, inclination: np.ndarray) -> np.ndarray:
+    # Return the left-hand side of (2.55) of transitions, (n,).
+    highest = max(abs(float(problem.amplitude.lowest)), float(problem.amplitude.highest))
+    return 1.0 - np.abs(inclination) * highest
+
+
+def _on_more_cables(
+    problem: Problem, segments: Segment, z0: np.ndarray, largest: int, arcs: np.ndarray | None
+) -> OscillationAnswers:
+    # Envelopes are of pseudotensions, which the motion does not determine here.
+    v = np.asarray(transition.inclination(segments))
+    from cspr_jax.families.swings.redundant_arcs import redundant_arcs
+
+    answers, _ = redundant_arcs(
+        problem, {0: segments, 1: segments}, _infinity(problem, v), max_arcs=largest, arcs=arcs, step=2
+    )
+    nothing = np.full(len(v), np.nan)
+    return OscillationAnswers(
+        **vars(answers),
+        oscillations=answers.arcs // 2,
+        tried_oscillations=answers.tried_arcs // 2,
+        envelope_oscillations=np.zeros(len(v), int),
+        least_oscillations=nothing,
+        inclination_gain=nothing,
+        used_inclination=v,
+        used_z0=np.asarray(z0, float),
+    )

@@ -1,0 +1,80 @@
+"""Inclinations of transitions on more cables than degrees of freedom that need the fewest oscillations.
+
+The motion determines no pseudotensions there, of which envelopes could tell what each inclination needs. Numbers of
+oscillations are tried in increasing order, each with inclinations on a grid, and the first number that samples do not
+refute with all of them takes the inclination with the largest slack, which a finer grid finds. `redundant_arcs` then
+proves the motion: a smaller number may exist between the inclinations that were tried.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from cspr_jax.families.swings.hypocycloid import Segment
+from cspr_jax.families.swings.redundant_arcs import FEW, MANY, least_slacks
+from cspr_jax.families.swings.transitions.envelope_oscillations import LARGEST_INCLINATION
+from cspr_jax.families.swings.transitions.transition import depth_for
+from cspr_jax.motion.problem import Problem
+from cspr_jax.robots.model.point_mass import plane_normal
+from cspr_jax.runtime.stages import stage
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Inclinations of a first look, of each finer one, and how many of these follow.
+TRIED, FINER, ROUNDS = 41, 9, 3
+Transitions = Callable[[Problem, np.ndarray, np.ndarray], Segment]
+
+
+def redundant_inclinations(
+    problem: Problem, targets: Float[np.ndarray, "n 3"], transitions: Transitions, *, max_arcs: int
+) -> Float[np.ndarray, "n"]:
+    """The inclination of each target that needs the fewest oscillations; of these the one with the largest slack."""
+    largest = LARGEST_INCLINATION / max(float(np.asarray(problem.amplitude.largest)[0]), 1.0)
+    best, most = np.zeros(len(targets)), np.full(len(targets), -np.inf)
+    is_open = targets @ np.asarray(plane_normal(problem.robot)) > 0.0
+    for arcs in range(2, 2 * max(max_arcs // 2, 1) + 1, 2):
+        rows = np.flatnonzero(is_open)
+        if not len(rows):
+            break
+        stage(f"inclinations for {arcs // 2} oscillations")
+        slack = partial(_slacks, problem, transitions, targets[rows], arcs)
+        # The ends belong to no transition.
+        shares, step = np.linspace(-1.0, 1.0, TRIED + 2)[1:-1], 2.0 * largest / (TRIED + 1)
+        tried = np.tile(largest * shares, (len(rows), 1))
+        slacks = slack(tried, FEW)
+        for _ in range(ROUNDS):
+            v = _at(tried, slacks.argmax(1))
+            tried = np.clip(v[:, None] + step * np.linspace(-1.0, 1.0, FINER), -largest, largest)
+            slacks, step = slack(tried, MANY), 2.0 * step / (FINER - 1)
+        v, highest = _at(tried, slacks.argmax(1)), slacks.max(1)
+        gains = highest > most[rows]
+        best[rows[gains]], most[rows[gains]] = v[gains], highest[gains]
+        is_open[rows] = highest <= 0.0
+    return best
+
+
+def _at(values: np.ndarray, column: np.ndarray) -> np.ndarray:
+    return np.take_along_axis(values, column[:, None], axis=1)[:, 0]
+
+
+def _slacks(
+    problem: Problem,
+    transitions: Transitions,
+    targets: np.ndarray,
+    arcs: int,
+    inclinations: np.ndarray,
+    samples: int,
+) -> np.ndarray:
+    # Return the smallest slack of the transition to each of n targets with each of m inclinations, (n, m).
+    places = np.repeat(targets, inclinations.shape[1], axis=0)
+    kernel = jax.vmap(partial(depth_for, problem.robot))
+    segments = transitions(problem, places, np.asarray(kernel(jnp.asarray(places), jnp.asarray(inclinations.ravel()))))
+    least = least_slacks(problem, segments, np.arange(len(places)), arcs, samples)
+    return least.min(1).reshape(inclinations.shape)

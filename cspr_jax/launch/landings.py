@@ -1,0 +1,186 @@
+"""Scatter of landings: errors of the winches and of the instant of release, by a random sample and to first order.
+
+At the release the cables have lengths and rates that miss the plan's; the effector is where the lengths are, and moves
+as the rates say; on redundant cables, whose errors contradict each other, where the sum of the squares of what is left
+is least. From there the object flies to the height of its target. A random sample of errors gives a sample of
+landings, and the derivatives of the landing with respect to all errors the covariance for small errors.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.errors.suggestions import with_suggestions
+from cspr_jax.launch.flight import flown
+from cspr_jax.motion.motion import Motion
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.elementary import solved
+from cspr_jax.robots.model.point_mass import PointMassRobot, is_planar
+from cspr_jax.robots.model.state import State
+from cspr_jax.robots.statics.force_balance import cable_motion
+from cspr_jax.schema.given_numbers import Numbers, whole
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+BATCH, NEWTON = 1024, 12
+# As in the keys of a plan file.
+LARGEST_ERROR, MOST_THROWS, LARGEST_SEED = 1e3, 1_000_000, 2**63 - 1
+
+
+class Throw(NamedTuple):
+    """Planned release.
+
+    Fields:
+        motions: consecutive motions, z down; of one of them the object is released, at its end or before.
+        release: () time after the start of the first one, s.
+        target: (3,) m; landings are looked for at its height.
+    """
+
+    motions: tuple[Motion, ...]
+    release: Any
+    target: Any
+
+
+@with_suggestions
+@dataclasses.dataclass(frozen=True)
+class LaunchErrors:
+    """Independent errors of a launch.
+
+    Fields:
+        release: standard deviation of the instant of release, s.
+        cable_length: standard deviation of the length of each cable at the release, m.
+        cable_speed: standard deviation of the rate of each cable's length, m/s.
+        encoder: largest error of each length due to the resolution of its encoder, m; uniformly distributed.
+        throws: number of throws in the sample.
+        seed: seed of the random sample.
+    """
+
+    release: float = 0.0
+    cable_length: float = 0.0
+    cable_speed: float = 0.0
+    encoder: float = 0.0
+    throws: int = 10_000
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Refuse numbers out of their ranges."""
+        for name in ("release", "cable_length", "cable_speed", "encoder"):
+            Numbers("a number from 0 to 1000", least=0.0, largest=LARGEST_ERROR).array(name, getattr(self, name))
+        whole("throws", self.throws, 2, MOST_THROWS)
+        whole("seed", self.seed, 0, LARGEST_SEED)
+
+
+@dataclasses.dataclass(frozen=True)
+class Scatter:
+    """Landings of a sample of throws, and their covariance to first order.
+
+    Fields:
+        landings: (throws, 2) x and y over those of the target, m; NaN where the object never comes to its height.
+        covariance: (2, 2) of the sample, m^2.
+        first_order: (2, 2) of small errors, by derivatives, m^2.
+    """
+
+    landings: np.ndarray
+    covariance: np.ndarray
+    first_order: np.ndarray
+
+    def to_dict(self) -> dict[str, Any]:
+        """Figures of the scatter."""
+        known = self.landings[np.isfinite(self.landings).all(1)]
+        sizes = np.linalg.norm(known, axis=1)
+        return {
+            "throws": len(self.landings),
+            "missed": len(self.landings) - len(known),
+            "mean": known.mean(0).tolist(),
+            "covariance": self.covariance.tolist(),
+            "covariance_first_order": self.first_order.tolist(),
+            "mean_error": float(sizes.mean()),
+            "standard_deviation": float(sizes.std()),
+            "largest_error": float(sizes.max()),
+        }
+
+
+def state_at(throw: Throw, late: Float[Array, ""]) -> State:
+    """State of the effector some time after the planned release; before and after all motions it rests at an end."""
+    # Between two motions nothing is clipped: a clip would halve the derivative of a release there.
+    time = jnp.maximum(throw.release + late, 0.0)
+    *others, last = throw.motions
+    states, starts = [], []
+    for motion in others:
+        states.append(motion.state(time / motion.duration()))
+        time = time - motion.duration()
+        starts.append(time)
+    state = last.state(jnp.minimum(time / last.duration(), 1.0))
+    for before, since in zip(reversed(states), reversed(starts), strict=True):
+        state = jax.tree.map(partial(jnp.where, since > 0.0), state, before)
+    return state
+
+
+def landing(robot: PointMassRobot, throw: Throw, errors: Array) -> Float[Array, "2"]:
+    """Landing of one throw."""
+    count = robot.n_cables
+    state = state_at(throw, errors[0])
+    lengths, rates, _ = cable_motion(robot, *state[:3])
+    position = _placed(robot, state.position, lengths + errors[1 : count + 1])
+    velocity = _moving(robot, position, rates + errors[count + 1 :])
+    fall, gravity = throw.target[2] - position[2], robot.gravity
+    time = (jnp.sqrt(velocity[2] ** 2 + 2.0 * gravity * fall) - velocity[2]) / gravity
+    return flown(position, velocity, gravity, time)[0][:2] - throw.target[:2]
+
+
+def _placed(robot: PointMassRobot, start: Array, lengths: Array) -> Array:
+    # Find by Newton's method the place where the cables have these lengths; its last step carries the derivatives.
+    def step(place, _):
+        lengths_here = cable_motion(robot, place, place * 0.0, place * 0.0)[0]
+        return place + _moving(robot, place, lengths - lengths_here), None
+
+    return jax.lax.scan(step, start, None, length=NEWTON)[0]
+
+
+def _moving(robot: PointMassRobot, place: Array, rates: Array) -> Array:
+    # Return the velocity at which the lengths have these rates; on redundant cables the one that comes nearest.
+    units = jax.jacfwd(lambda velocity: cable_motion(robot, place, velocity, velocity * 0.0)[1])(place * 0.0)
+    units = units[:, np.array([0, 2])] if is_planar(robot) else units
+    if robot.n_cables > robot.dof:
+        units, rates = units.T @ units, units.T @ rates
+    velocity = solved(units, rates[:, None])[0][:, 0]
+    if not is_planar(robot):
+        return velocity
+    x, z = velocity
+    return jnp.stack([x, jnp.zeros_like(x), z])
+
+
+@jax.jit
+def _landings(robot: PointMassRobot, throw: Throw, errors: Array) -> Array:
+    return jax.vmap(lambda error: landing(robot, throw, error))(errors)
+
+
+@jax.jit
+def _slopes(robot: PointMassRobot, throw: Throw, errors: Array) -> Array:
+    return jax.jacfwd(lambda error: landing(robot, throw, error))(errors)
+
+
+def scatter(robot: PointMassRobot, throw: Throw, errors: LaunchErrors) -> Scatter:
+    """Scatter of the landings of a launch."""
+    count, random = robot.n_cables, np.random.default_rng(errors.seed)
+    # Errors are drawn in this order, so that a sample of one kind of error is that of a larger one, scaled.
+    release = random.normal(size=(errors.throws, 1)) * errors.release
+    lengths = random.normal(size=(errors.throws, count)) * errors.cable_length
+    rates = random.normal(size=(errors.throws, count)) * errors.cable_speed
+    lengths = lengths + random.uniform(-1.0, 1.0, size=(errors.throws, count)) * errors.encoder
+    sample = np.concatenate([release, lengths, rates], axis=1)
+    landings = in_batches(partial(_landings, robot, throw), sample, size=BATCH)
+    known = landings[np.isfinite(landings).all(1)]
+    sizes = [errors.release**2]
+    sizes += [errors.cable_length**2 + errors.encoder**2 / 3.0] * count + [errors.cable_speed**2] * count
+    slopes = np.asarray(_slopes(robot, throw, jnp.zeros(1 + 2 * count)))
+    covariance = np.cov(known.T) if len(known) > 1 else np.full((2, 2), np.nan)
+    return Scatter(landings, covariance, (slopes * np.array(sizes)) @ slopes.T)

@@ -1,0 +1,23 @@
+"""Motion: what every trajectory family provides, and what a plan asks of it.
+
+A motion is a pytree that gives its duration and the state at each instant (`motion`). Slacks and demands take any
+motion of any robot; answers, legs and way-points are what families have in common. No file here knows a family.
+
+Files, each importing only from those above it:
+
+    motion              the protocol: duration, state, breaks; motions reversed and placed
+    amplitudes          amplitude functions A(tau), with bounds of their derivatives
+    swing_plane         the plane in which an effector swings between two points
+    platform_kind       kinds of motions of platforms, known when a function is compiled
+    limits              which limits are set, the quantities that they bound, and their slacks
+    given_limits        limits of a file or a caller, checked
+    problem             robot, limits and amplitude function
+    slacks              slacks of any motion at one instant
+    demands             extremes of tensions, heights, lengths and speeds along a motion
+    acceleration_sets   feasible accelerations of a point mass
+    cause               a criterion that stands between a motion and feasible
+    answers             the record that every family returns
+    waypoints           consecutive poses of a plan, as points of the kernels
+    leg_result          what comes of a leg beyond its motion
+    leg                 consecutive poses that one family joins
+"""

@@ -1,0 +1,152 @@
+"""Feasible accelerations of a point mass on any number of cables: verdicts, margins, and how large they can be.
+
+A place belongs to the static workspace if no cable has to push at rest there, to the wrench-feasible workspace if the
+tensions at rest also keep their limits, to the wrench-closure workspace if the cables can resist any force.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.robots.model.limits import NO_LIMITS, Limits
+from cspr_jax.robots.model.point_mass import PointMassRobot, is_planar, plane_normal
+from cspr_jax.robots.statics.wrench_sets import Faces, acceleration_faces, tension_range
+from cspr_jax.schema.verdicts import Verdict
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Margins nearer to zero than this, over gravity, are undecided.
+TOLERANCE = 1e-9
+# Components of unit normals below this count as zero.
+LEVEL = 1e-12
+
+
+def faces_at(robot: PointMassRobot, limits: Limits, position: Float[Array, "3"]) -> Faces:
+    """Faces of the set of feasible accelerations at one place."""
+    return acceleration_faces(robot, position, *tension_range(robot, limits))
+
+
+def verdict(
+    robot: PointMassRobot, faces: Faces, position: Float[Array, "3"], acceleration: Float[Array, "3"]
+) -> Float[Array, ""]:
+    """Verdict of an acceleration at one place."""
+    margin = faces.margin(acceleration)
+    doubt = jnp.maximum(TOLERANCE * robot.gravity, faces.rounding(acceleration))
+    broken = faces.slacks(acceleration) < -doubt
+    is_out = margin < -doubt
+    over = is_out & (broken & faces.of_largest).any()
+    slack = is_out & ((broken & ~faces.of_largest).any() | ~over)
+    above = is_out & ~(plane_normal(robot) @ position > 0.0)
+    doubtful = ~is_out & (margin <= doubt)
+    flags = (
+        (slack, Verdict.SLACK_CABLE),
+        (over, Verdict.OVER_TENSION),
+        (~faces.is_regular, Verdict.SINGULAR),
+        (above, Verdict.ABOVE_SPOOLS),
+        (doubtful & faces.is_regular, Verdict.UNDECIDED),
+        (~jnp.isfinite(acceleration).all(), Verdict.NOT_FINITE),
+    )
+    return sum((jnp.where(is_so, flag.value, 0) for is_so, flag in flags), jnp.zeros((), int))
+
+
+class AccelerationReach(NamedTuple):
+    """Feasible accelerations at one place, and how large they are; () each.
+
+    Fields:
+        verdict: of rest at the place, flags of `Verdict`.
+        acceleration_margin: distance of rest from the nearest face, m/s^2: of the wrench-feasible workspace.
+        static_margin: the same without limits of the tensions, m/s^2: of the static workspace.
+        closure_margin: of the wrench-closure workspace, a pure number.
+        level_acceleration: largest size of level accelerations that is feasible in every direction, m/s^2.
+        level_acceleration_max: largest size of a feasible level acceleration, m/s^2.
+        upward_acceleration: largest upward acceleration, m/s^2.
+        downward_acceleration: largest downward acceleration, m/s^2.
+    """
+
+    verdict: Array
+    acceleration_margin: Array
+    static_margin: Array
+    closure_margin: Array
+    level_acceleration: Array
+    level_acceleration_max: Array
+    upward_acceleration: Array
+    downward_acceleration: Array
+
+
+def reach(robot: PointMassRobot, limits: Limits, position: Float[Array, "3"]) -> AccelerationReach:
+    """Feasible accelerations at one place."""
+    faces, cone = faces_at(robot, limits, position), faces_at(robot, NO_LIMITS, position)
+    still = jnp.zeros_like(position)
+    slack, margin = faces.slacks(still), faces.margin(still)
+
+    def until(steepness: Array) -> Array:
+        # Return the largest acceleration along a direction, or along all directions that are so steep to the faces.
+        distance = jnp.where(steepness > LEVEL, slack / jnp.where(steepness > LEVEL, steepness, 1.0), jnp.inf)
+        return jnp.where(margin > 0.0, jnp.maximum(jnp.min(distance), 0.0), 0.0)
+
+    across = jnp.linalg.norm(faces.normals[:, :2], axis=1)
+    return AccelerationReach(
+        verdict=verdict(robot, faces, position, still),
+        acceleration_margin=margin,
+        static_margin=cone.margin(still),
+        closure_margin=cone.closure,
+        level_acceleration=until(across),
+        level_acceleration_max=_largest_level(faces, is_planar(robot)),
+        upward_acceleration=until(faces.normals[:, 2]),
+        downward_acceleration=until(-faces.normals[:, 2]),
+    )
+
+
+def _largest_level(faces: Faces, planar: bool) -> Array:
+    # The largest size is that of a corner of the level section; 0 where the section is empty.
+    normal, offset = faces.normals[:, :2], faces.offsets
+    first, second = np.array(list(itertools.combinations(range(len(offset)), 2))).T
+    a, b = normal[first], normal[second]
+    determinant = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    crosses = (jnp.abs(determinant) > LEVEL) & jnp.isfinite(offset[first]) & jnp.isfinite(offset[second])
+    p, q = (jnp.where(crosses, offset[indices], 0.0) for indices in (first, second))
+    corner = jnp.stack([p * b[:, 1] - q * a[:, 1], a[:, 0] * q - b[:, 0] * p], 1)
+    corner = corner / jnp.where(crosses, determinant, 1.0)[:, None]
+    # The level section of a planar robot is part of a line; each of its corners lies on a single face.
+    size = jnp.linalg.norm(normal, axis=1)
+    is_line = jnp.isfinite(offset) & (size > LEVEL)
+    alone = normal * (jnp.where(is_line, offset, 0.0) / jnp.where(is_line, size, 1.0) ** 2)[:, None]
+    points, counts = jnp.concatenate([corner, alone]), jnp.concatenate([crosses, is_line])
+    room = TOLERANCE * (1.0 + jnp.linalg.norm(points, axis=1))
+    inside = counts & (points @ normal.T - offset[None] >= -room[:, None]).all(1)
+    # The section is unbounded if one can go along the edge of a face without end.
+    if planar:
+        along = jnp.array([[1.0, 0.0], [-1.0, 0.0]])
+    else:
+        edge = jnp.stack([-normal[:, 1], normal[:, 0]], axis=1)
+        along = jnp.concatenate([edge, -edge, normal])
+    endless = (along @ normal.T >= -LEVEL).all(1) & (jnp.linalg.norm(along, axis=1) > LEVEL)
+    is_open = endless.any() | ~is_line.any()
+    largest = jnp.max(jnp.where(inside, jnp.linalg.norm(points, axis=1), 0.0))
+    return jnp.where(faces.is_regular, jnp.where(is_open & inside.any(), jnp.inf, largest), 0.0)
+
+
+def along(
+    robot: PointMassRobot, limits: Limits, position: Float[Array, "3"], direction: Float[Array, "3"]
+) -> Float[Array, "2"]:
+    """Accelerations along a direction that are feasible at one place, Boralugoda (15) to (21) and figure 4.1."""
+    faces = faces_at(robot, limits, position)
+    steep = faces.normals @ direction
+    ends = faces.offsets / jnp.where(jnp.abs(steep) > LEVEL, steep, 1.0)
+    low = jnp.max(jnp.where(steep > LEVEL, ends, -jnp.inf))
+    high = jnp.min(jnp.where(steep < -LEVEL, ends, jnp.inf))
+    beside = (jnp.abs(steep) <= LEVEL) & (faces.offsets > 0.0)
+    return jnp.where((low > high) | beside.any(), jnp.nan, jnp.stack([low, high]))
+
+
+@jax.jit
+def reaches(robot: PointMassRobot, limits: Limits, positions: Float[Array, "n 3"]) -> AccelerationReach:
+    """Feasible accelerations at many places."""
+    return jax.vmap(lambda position: reach(robot, limits, position))(positions)

@@ -1,0 +1,199 @@
+"""Amplitude functions A(tau): how the size of the swing grows from its start to its end.
+
+Each is a piecewise polynomial: values and derivatives are exact, a new function is a row of coefficients, and the
+largest value of any derivative is known, which proofs between samples need.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.errors import InputError
+from cspr_jax.errors.suggestions import one_of
+from cspr_jax.numerics.elementary import leaf, polynomial
+from cspr_jax.runtime.persistent_jit import persistent_jit
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+HIGHEST_DERIVATIVE = 5
+NAMES = ("A1", "quintic", "A2", "A3", "effective", "effective-c3", "ideal")
+BOUNDARY_TOLERANCE = 1e-9
+# Shorter ends ask for accelerations that no robot has, and lose the digits of A'' to rounding.
+SMALLEST_EPSILON = 1e-3
+LARGEST_COEFFICIENT = 1e9
+# Tables have at least this many columns, so that few shapes have to be compiled; zeros change no bit.
+COLUMNS = 6
+# Coefficients below this part of the largest one do not change where a function is stationary.
+NEGLIGIBLE = 1e-100
+
+
+@dataclasses.dataclass(frozen=True)
+class Amplitude:
+    """A piecewise polynomial on [0, 1].
+
+    Fields:
+        knots: (n_pieces - 1,) where one piece ends and the next begins, increasing.
+        origins: (n_pieces,) point about which each piece is expanded.
+        coefficients: (n_pieces, 6 or more) of the powers of (tau - origin), lowest first.
+        largest: (6,) largest |A|, |A'|, ... |A^(5)| over [0, 1], rounded up.
+        lowest: () smallest A over [0, 1].
+        highest: () largest A over [0, 1].
+        name: for people.
+    """
+
+    knots: Array
+    origins: Array
+    coefficients: Array
+    largest: Array
+    lowest: Array
+    highest: Array
+    name: str = ""
+
+    def at(self, tau, order: int = 0) -> Float[Array, "..."]:
+        """Value of A, or of one of its derivatives with respect to tau."""
+        return derivatives(self, jnp.asarray(tau, float), order=order)[order]
+
+
+# The name is not part of the pytree: a function of another name is not compiled again.
+_FIELDS = [field.name for field in dataclasses.fields(Amplitude)]
+jax.tree_util.register_dataclass(Amplitude, _FIELDS[:-1], [], drop_fields=["name"])
+
+
+@persistent_jit(static_argnames="order")
+def derivatives(amplitude: Amplitude, tau: Float[Array, "..."], *, order: int) -> tuple[Float[Array, "..."], ...]:
+    """A and its derivatives with respect to tau."""
+    table = amplitude.coefficients.astype(tau.dtype)
+    origins = amplitude.origins.astype(tau.dtype)
+    local = jnp.broadcast_to(origins[0], tau.shape)
+    selected = [jnp.broadcast_to(c, tau.shape) for c in table[0]]
+    for i in range(1, table.shape[0]):
+        later = tau >= amplitude.knots[i - 1].astype(tau.dtype)
+        local = jnp.where(later, origins[i], local)
+        selected = [jnp.where(later, c, s) for c, s in zip(table[i], selected, strict=True)]
+    offset = tau - local
+    return tuple(
+        polynomial([math.perm(i, j) * selected[i] for i in range(j, len(selected))], offset) for j in range(order + 1)
+    )
+
+
+def local_bounds(
+    amplitude: Amplitude, middle: Float[Array, "..."], radius: Float[Array, "..."]
+) -> tuple[Float[Array, "..."], ...]:
+    """Upper bounds of |A|, |A'|, ..., |A''''| on an interval that holds no knot inside."""
+    values = derivatives(amplitude, middle, order=HIGHEST_DERIVATIVE - 1)
+    largest = amplitude.largest.astype(middle.dtype)
+    return tuple(jnp.minimum(jnp.abs(v) + radius * largest[j + 1], largest[j]) for j, v in enumerate(values))
+
+
+def from_pieces(
+    name: str, knots: Sequence[float], origins: Sequence[float], pieces: Sequence[Sequence[float]]
+) -> Amplitude:
+    """Amplitude function from its pieces, with its extreme values computed."""
+    table = np.zeros((len(pieces), max(COLUMNS, *(len(piece) for piece in pieces))))
+    for row, piece in zip(table, pieces, strict=True):
+        row[: len(piece)] = piece
+    ends = [0.0, *knots, 1.0]
+    extremes = np.zeros((HIGHEST_DERIVATIVE + 1, len(pieces), 2))
+    for i, (origin, row) in enumerate(zip(origins, table, strict=True)):
+        curve = np.polynomial.Polynomial(row)
+        for j in range(HIGHEST_DERIVATIVE + 1):
+            extremes[j, i] = _extremes(curve.deriv(j) if j else curve, ends[i] - origin, ends[i + 1] - origin)
+    largest = np.abs(extremes).max((1, 2)) * (1.0 + 1e-9)
+    return Amplitude(
+        leaf(knots), leaf(origins), leaf(table), leaf(largest), leaf(extremes[0].min()), leaf(extremes[0].max()), name
+    )
+
+
+def _extremes(curve: np.polynomial.Polynomial, start: float, stop: float) -> tuple[float, float]:
+    # Finding roots divides by the highest coefficient, which overflows for one that is as good as zero; such a
+    # coefficient only adds roots far away.
+    slope = curve.deriv().trim(NEGLIGIBLE * float(np.abs(curve.coef).max()))
+    stationary = slope.roots() if slope.degree() > 0 else np.zeros(0)
+    # A double root may come out as a close complex pair: its real part is near enough to evaluate.
+    inside = [x.real for x in np.atleast_1d(stationary) if abs(x.imag) < 1e-3 and start < x.real < stop]
+    values = curve(np.array([start, stop, *inside]))
+    return float(values.min()), float(values.max())
+
+
+def named(name: str, epsilon: float | None = None) -> Amplitude:
+    """One of the amplitude functions of the thesis.
+
+    "A1", "quintic" (also "A2"), "A3": thesis (1.101) and (2.50). "effective": (1.110), a cubic-like
+    start, a straight middle and the mirrored end. "effective-c3": the same shape with
+    A'' = k tau (epsilon - tau)^2 at the start, whose third derivative does not jump. "ideal": (1.103), A = tau,
+    which meets no boundary condition and serves for bounds.
+
+    Args:
+        name: one of `NAMES`.
+        epsilon: length of the curved ends of the last two, from 0.001 to 0.5.
+
+    Returns:
+        the amplitude function.
+
+    Raises:
+        InputError: unknown name; epsilon missing, superfluous or out of range.
+    """
+    polynomials = {
+        "A1": (0, 0, 0, 4, -3),
+        "quintic": (0, 0, 0, 10, -15, 6),
+        "A2": (0, 0, 0, 10, -15, 6),
+        "A3": (0, 0, 0, 6, -7, 2),
+        "ideal": (0, 1),
+    }
+    if name in polynomials:
+        if epsilon is not None:
+            raise InputError("epsilon", epsilon, f'no epsilon with "{name}"')
+        return from_pieces(name, (), (0.0,), (polynomials[name],))
+    if name not in NAMES:
+        raise InputError("name", name, one_of(name, NAMES))
+    if epsilon is None or not SMALLEST_EPSILON <= epsilon <= 0.5:
+        raise InputError("epsilon", epsilon, f"a number from {SMALLEST_EPSILON} to 0.5")
+    return _with_straight_middle(name, epsilon)
+
+
+def _with_straight_middle(name: str, epsilon: float) -> Amplitude:
+    e = epsilon
+    start: tuple[float, ...]
+    if name == "effective":
+        slope = 1.0 / (1.0 - e)  # (1.109)
+        start = (0.0, 0.0, 0.0, slope / e**2, -slope / (2 * e**3))  # (1.106)
+    else:
+        slope = 1.0 / (1.0 - 0.8 * e)
+        k = 12.0 * slope / e**4
+        start = (0.0, 0.0, 0.0, k * e**2 / 6, -k * e / 6, k / 20)
+    at_knot = sum(c * e**i for i, c in enumerate(start))
+    # The end is the start rotated by 180 degrees: A(tau) = 1 - start(1 - tau), in powers of tau - 1.
+    end = (1.0, *(-c * (-1) ** i for i, c in enumerate(start) if i > 0))
+    label = f"{name} (epsilon {e:g})"
+    return from_pieces(label, (e, 1.0 - e), (0.0, e, 1.0), (start, (at_knot, slope), end))
+
+
+def from_polynomial(coefficients: Sequence[float]) -> Amplitude:
+    """Amplitude function of a user, c[0] + c[1] tau + c[2] tau^2 + ..."""
+    if not 1 <= len(coefficients) <= 20 or not all(abs(c) <= LARGEST_COEFFICIENT for c in coefficients):
+        raise InputError("polynomial", list(coefficients), "1 to 20 coefficients of at most 1e9, lowest power first")
+    return from_pieces("polynomial", (), (0.0,), (tuple(coefficients),))
+
+
+def boundary_errors(amplitude: Amplitude, *, free_end: bool = False) -> list[str]:
+    """The conditions of thesis (2.49) that a function breaks: A(0) = 0, A(1) = 1, A' and A'' zero at both ends."""
+    first, last = np.asarray(amplitude.coefficients)[[0, -1]]
+    errors = []
+    for tau, row, origin in ((0, first, amplitude.origins[0]), (1, last, amplitude.origins[-1])):
+        curve = np.polynomial.Polynomial(row)
+        marks = ("", "'") if free_end and tau == 1 else ("", "'", "''")
+        for order, mark in enumerate(marks):
+            value = float((curve.deriv(order) if order else curve)(tau - float(origin)))
+            target = float(tau if order == 0 else 0)
+            if not abs(value - target) <= BOUNDARY_TOLERANCE * float(amplitude.largest[order]):
+                errors.append(f"A{mark}({tau}) = {value:g}, must be {target:g}")
+    return errors

@@ -1,0 +1,177 @@
+"""Demands of motions on the robot: tensions, heights, cable lengths and speeds, at their extremes."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.motion.limits import lowest_depth
+from cspr_jax.motion.motion import Motion, common_shape, has_pieces, sample_times
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.search.minima import narrowed_places
+from cspr_jax.robots import cables
+from cspr_jax.robots.model.limits import NO_LIMITS, Limits
+from cspr_jax.robots.model.point_mass import plane_normal
+from cspr_jax.robots.model.tension_rule_table import CENTRED
+from cspr_jax.runtime.persistent_jit import persistent_jit
+from cspr_jax.runtime.stages import stage
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Samples of an arc, at least, and instants computed at a time.
+SAMPLES, BATCH = 64, 512
+# Largest number of samples that is held at a time.
+ROOM = 200_000
+
+
+@dataclasses.dataclass(frozen=True)
+class Demands:
+    """Demands of n motions on the robot, refined between samples; (n,) each.
+
+    Fields:
+        tension_min: smallest tension of any cable, N.
+        tension_max: largest tension of any cable, N.
+        mu_min: smallest tension per mass and length, 1/s^2.
+        depth_min: smallest depth of the mass centre below the spool plane, along the vertical, m.
+        lowest: largest z of any point of the effector, z down, m.
+        length_max: largest length of a cable, with what lies on its pulley, m.
+        speed_max: largest speed of a cable, m/s.
+        acceleration_max: largest acceleration of a cable, m/s^2.
+        mass_centre_speed: largest one, m/s.
+        mass_centre_acceleration: likewise, m/s^2.
+        are_found: whether the rule of redundant cables found tensions within their limits at all instants; 1 or 0.
+        samples: number of instants at which the motion was sampled.
+        when: when each of the extremes above is attained, (n, n_extremes), s.
+        cables: which cable attains it, from 0 on; -1: none.
+    """
+
+    tension_min: np.ndarray
+    tension_max: np.ndarray
+    mu_min: np.ndarray
+    depth_min: np.ndarray
+    lowest: np.ndarray
+    length_max: np.ndarray
+    speed_max: np.ndarray
+    acceleration_max: np.ndarray
+    mass_centre_speed: np.ndarray
+    mass_centre_acceleration: np.ndarray
+    are_found: np.ndarray
+    samples: np.ndarray
+    when: np.ndarray
+    cables: np.ndarray
+
+
+# A largest value is the smallest value of the negative.
+_SIGNS = np.array([1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0, -1.0, -1.0, 1.0])
+EXTREMES = [field.name for field in dataclasses.fields(Demands)][: len(_SIGNS)]
+
+
+@persistent_jit(static_argnames="rule")
+def _values(robot, limits: Limits, corners, arguments, *, rule: str) -> Array:
+    return jax.vmap(partial(_at_instant, robot, limits, corners, rule))(*arguments)
+
+
+@persistent_jit(static_argnames="rule")
+def _values_of_one(robot, limits: Limits, corners, motion: Motion, tau: Array, *, rule: str) -> Array:
+    return jax.vmap(partial(_at_instant, robot, limits, corners, rule, motion))(tau)
+
+
+def _at_instant(robot, limits: Limits, corners, rule: str, motion: Motion, tau: Array) -> Array:
+    state = motion.state(tau)
+    if robot.n_cables > robot.dof:
+        chosen = cables.shared(robot, state, limits, rule)
+        force, are_found = chosen.tensions, jnp.where(chosen.is_within, 1.0, 0.0)
+    else:
+        force, are_found = cables.tensions(robot, state), jnp.asarray(1.0)
+    length, rate, rate_slope = cables.cable_motion(robot, state)
+    of_cables = {
+        "tension_min": force,
+        "tension_max": -force,
+        "mu_min": force / length / robot.mass,
+        "length_max": -length,
+        "speed_max": -jnp.abs(rate),
+        "acceleration_max": -jnp.abs(rate_slope),
+    }
+    extremes = {name: jnp.min(values) for name, values in of_cables.items()} | {
+        "depth_min": plane_normal(robot) @ state.position,
+        "lowest": -lowest_depth(robot, state, corners),
+        "mass_centre_speed": -jnp.linalg.norm(state.velocity),
+        "mass_centre_acceleration": -jnp.linalg.norm(state.acceleration),
+        "are_found": are_found,
+    }
+    nearest = dict.fromkeys(EXTREMES, jnp.asarray(-1.0))
+    nearest |= {name: jnp.argmin(values).astype(float) for name, values in of_cables.items()}
+    return jnp.stack([table[name] for table in (extremes, nearest) for name in EXTREMES])
+
+
+def demands(
+    robot: Any,
+    motions: Sequence[Motion],
+    samples: Sequence[int],
+    limits: Limits = NO_LIMITS,
+    rule: str = CENTRED,
+    corners: Float[np.ndarray, "m 3"] | None = None,
+) -> Demands:
+    """Demands of motions on the robot, narrowed down where a value is extreme."""
+    table = np.empty((len(motions), 3, len(EXTREMES)))
+    times = [sample_times(motion, count) for motion, count in zip(motions, samples, strict=True)]
+    alike: dict[Any, list[int]] = {}
+    for i, (motion, tau) in enumerate(zip(motions, times, strict=True)):
+        # Motions of one structure and one number of samples are computed together, but for those that may have very
+        # many pieces, which would be copied for each instant.
+        group = i if has_pieces(motion) else None
+        shapes = tuple(np.shape(leaf) for leaf in jax.tree.leaves(motion))
+        alike.setdefault((group, jax.tree.structure(motion), shapes, len(tau)), []).append(i)
+    for (*_, count), members in alike.items():
+        size = max(ROOM // count, 1)
+        for first in range(0, len(members), size):
+            stage(f"demands of {len(motions)} segments")
+            batch = members[first : first + size]
+            table[batch] = _of_alike(
+                robot, limits, corners, rule, [motions[i] for i in batch], [times[i] for i in batch]
+            )
+    columns = (table[:, 0] * _SIGNS + 0.0).T  # no -0
+    return Demands(
+        **dict(zip(EXTREMES, columns, strict=True)),
+        samples=np.array([len(tau) for tau in times]),
+        when=table[:, 1] * np.array([[float(motion.duration())] for motion in motions]),
+        cables=table[:, 2].astype(int),
+    )
+
+
+def _of_alike(
+    robot: Any, limits: Limits, corners: Any, rule: str, motions: list[Motion], times: list[np.ndarray]
+) -> np.ndarray:
+    # Extremes of motions of one structure, their normalised times and their cables, (n, 3, n_extremes).
+    if len(motions) == 1:
+        of_one = partial(_values_of_one, robot, limits, corners, common_shape(motions[0]), rule=rule)
+
+        def along(tau: np.ndarray) -> np.ndarray:
+            return in_batches(of_one, tau.ravel(), size=BATCH).reshape(*tau.shape, -1)
+
+        return _narrowed(along, times[0][None])
+    kernel = partial(_values, robot, limits, corners, rule=rule)
+    stacked = jax.tree.map(lambda *leaves: np.stack([np.asarray(leaf, float) for leaf in leaves]), *motions)
+
+    def at(tau: np.ndarray) -> np.ndarray:
+        row = np.repeat(np.arange(len(tau)), tau.shape[1])
+        items = jax.tree.map(lambda leaf: leaf[row], stacked)
+        values = in_batches(kernel, (items, tau.ravel()), size=BATCH)
+        return values.reshape(*tau.shape, -1)
+
+    return _narrowed(at, np.stack(times))
+
+
+def _narrowed(at: Callable[[np.ndarray], np.ndarray], tau: np.ndarray) -> np.ndarray:
+    count = len(EXTREMES)
+    least, when = narrowed_places(lambda points: at(points)[..., :count], tau, at(tau)[..., :count])
+    nearest = np.diagonal(at(when)[..., count:], axis1=1, axis2=2)
+    return np.stack([least, when, nearest], axis=1)

@@ -1,0 +1,149 @@
+"""Limits of a file or a caller, checked, in the kernels' axes."""
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from jax import Array
+
+from cspr_jax.errors import InputError
+from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.linear.frames import frame_of
+from cspr_jax.robots.model.limits import NO_LIMITS, Limits, Uncertainty
+from cspr_jax.robots.model.parallel_pairs import ParallelPairs
+from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.robots.model.point_mass import PointMassRobot
+from cspr_jax.schema.families import FAMILIES
+from cspr_jax.schema.given_numbers import SMALLEST, numbers
+from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES, Limit
+
+
+def limits_of(
+    robot: Any, limits: Mapping[str, Any], defaults: Mapping[str, Any], at: str, n_cables: int | None = None
+) -> Limits:
+    """Limits, with those of a robot where none are given."""
+    n_cables, values = n_cables or len(robot.base_points), dict[str, Any]()
+    for row in LIMITS:
+        value = limits.get(row.name)
+        value = defaults.get(row.name) if value is None else value
+        values[row.name] = None if value is None else _limit(row, value, n_cables, at)
+    low, high = values["tension_min"], values["tension_max"]
+    if low is not None and high is not None and not (low < high).all():
+        raise InputError(f"{at}tension_min", low.tolist(), "below tension_max for every cable")
+    if values["floor"] is not None:
+        values["floor"] = leaf(frame_of(robot.base_points, robot.z_axis).depth(values["floor"]))
+    values |= _narrowed(values, limits.get("tension_margin"), n_cables, at)
+    uncertain = limits.get("uncertainty")
+    uncertain = defaults.get("uncertainty") if uncertain is None else uncertain
+    return Limits(**values, uncertainty=None if uncertain is None else _uncertainty(uncertain, f"{at}uncertainty."))
+
+
+def _narrowed(values: Mapping[str, Any], margin: float | None, n_cables: int, at: str) -> dict[str, Any]:
+    # Tension limits with a distance from both ends of their range.
+    if margin is None:
+        return {}
+    low, high = values["tension_min"], values["tension_max"]
+    low = np.full(n_cables, margin) if low is None else low + margin
+    high = None if high is None else high - margin
+    if high is not None and not (low < high).all():
+        raise InputError(f"{at}tension_margin", margin, "less than half of the range of tensions of every cable")
+    return {"tension_min": leaf(low), "tension_max": None if high is None else leaf(high)}
+
+
+def _uncertainty(uncertainty: Any, at: str) -> Uncertainty:
+    values = {}
+    for row in UNCERTAINTIES:
+        value = getattr(uncertainty, row.name, None)
+        number = numbers(f"{at}{row.name}", value, row.allowed)
+        if number.shape != () or not row.least <= number <= row.largest:
+            raise InputError(f"{at}{row.name}", value, row.allowed)
+        values[row.name] = leaf(number)
+    return Uncertainty(**values)
+
+
+def check_bounded(limits: Limits) -> None:
+    """Refuse largest tensions of which some are infinite."""
+    high = limits.tension_max
+    if high is not None and not np.isfinite(high).all():
+        raise InputError(
+            "tension_max",
+            np.asarray(high).tolist(),
+            "finite, or absent (only workspaces and platforms on more than six cables take infinite ones)",
+        )
+
+
+def check_of_motion(limits: Limits) -> None:
+    """Refuse limits of the mass centre's motion where none is judged."""
+    for row in LIMITS:
+        value = getattr(limits, row.name)
+        if row.of_mass_centre and value is not None:
+            raise InputError(row.name, float(value), "absent where no motion is judged")
+
+
+def check_certain(
+    robot: PointMassRobot | PlatformRobot, limits: Limits, families: tuple[str, ...], *, in_pairs: bool = False
+) -> None:
+    """Refuse an uncertainty where verdicts do not take it into account."""
+    uncertainty = limits.uncertainty
+    if uncertainty is None:
+        return
+    known = [row.name for row in FAMILIES.values() if row.knows_uncertainty]
+    if not families or not set(families) <= set(known):
+        raise InputError("uncertainty", None, f"must be absent but for the families {', '.join(known)}", fault="given")
+    is_redundant = robot.n_cables != robot.dof and not all(FAMILIES[name].uncertain_redundancy for name in families)
+    if is_redundant or in_pairs or robot.pulleys is not None:
+        allowed = "must be absent on redundant cables (but for splines), on pairs of cables, and with pulleys"
+        raise InputError("uncertainty", None, allowed, fault="given")
+    if not isinstance(robot, PlatformRobot) and float(uncertainty.mass_centre) > 0.0:
+        raise InputError(
+            "uncertainty.mass_centre", float(uncertainty.mass_centre), "absent: a point mass has no other one"
+        )
+
+
+def _limit(row: Limit, value: Any, n_cables: int, at: str) -> Array:
+    allowed = row.allowed + f", or {n_cables}: one a cable" * row.per_cable
+    values = numbers(f"{at}{row.name}", value, allowed)
+    least = -np.inf if row.is_height else 0.0 if row.from_zero else np.nextafter(0.0, 1.0)
+    shapes = [(), (n_cables,)] if row.per_cable else [()]
+    is_number = np.isfinite(values) | ((values == np.inf) & (row.name == "tension_max") & (values.ndim > 0))
+    if values.shape not in shapes or not ((values >= least) & is_number).all():
+        raise InputError(f"{at}{row.name}", value, allowed)
+    if not row.is_height and ((values > 0.0) & (values < SMALLEST)).any():
+        raise InputError(f"{at}{row.name}", value, f"{allowed}, at least {SMALLEST:g}")
+    return leaf(np.broadcast_to(values, (n_cables,) if row.per_cable else ()))
+
+
+def pair_limits(limits: Limits, pairs: ParallelPairs) -> Limits:
+    """Limits of the three cables that stand for pairs of six."""
+    values: dict[str, Any] = {
+        row.name: leaf(pairs.bound(value, is_tension=row.quantity == "tension", is_least=row.sense == "least"))
+        for row in LIMITS
+        if row.per_cable and (value := getattr(limits, row.name)) is not None
+    }
+    low, high = values.get("tension_min"), values.get("tension_max")
+    if low is not None and high is not None and not (low < high).all():
+        pair = int(np.argmin(high - low))
+        allowed = "must be below tension_max, each over the cable's share of it"
+        first, second = (pairs.cables[pair] + 1).tolist()
+        raise InputError(
+            "tension_min", None, allowed, fault=f"{low[pair]:.6g} N of the pair of cables {first} and {second}"
+        )
+    return dataclasses.replace(limits, **values)
+
+
+def limits_over(
+    robot: PointMassRobot | PlatformRobot,
+    limits: Limits | None,
+    *,
+    any_tensions: bool = False,
+    families: tuple[str, ...] = (),
+) -> Limits:
+    """Limits, with those of a robot where none are given, as the kernels take them."""
+    merged = limits_of(robot, vars(limits or NO_LIMITS), vars(robot.limits), "limits.")
+    if not any_tensions:
+        check_bounded(merged)
+    if not families:
+        check_of_motion(merged)
+    check_certain(robot, merged, families)
+    return merged

@@ -1,0 +1,99 @@
+"""Leg of a plan: consecutive poses, and how a trajectory family joins them."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, ClassVar
+
+import jax
+import numpy as np
+
+from cspr_jax.errors import ConfigError
+from cspr_jax.motion.answers import Answers, joined
+from cspr_jax.motion.leg_result import LegOutcome
+from cspr_jax.motion.motion import Motion
+from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.waypoints import Waypoints
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+
+@dataclasses.dataclass(frozen=True)
+class JoinedLeg:
+    """Segments of one family, joined.
+
+    Fields:
+        family: name of the family.
+        answers: answers of the n segments.
+        motions: n motions, from the centroid of the spools, z down.
+    """
+
+    family: str
+    answers: Answers
+    motions: list[Motion]
+
+
+class Leg(abc.ABC):
+    """Consecutive poses of a plan, joined by one family.
+
+    Fields:
+        step: between numbers of arcs that a segment can have; 0: segments have none.
+
+    Raises:
+        ConfigError: poses, or keys of the plan, that the family cannot use.
+    """
+
+    step: ClassVar[int] = 0
+    point: str | None = None  # whose positions the files of the leg have, where they say it
+
+    def __init__(self, stops: Waypoints) -> None:
+        """Keep the poses; a family refuses what it cannot join."""
+        self.stops = stops
+
+    def _refuse(self, *keys: str) -> None:
+        # Refuse keys of poses that other families take; at its first pose another leg may have taken them.
+        for i, pose in enumerate(self.stops.poses[1:], start=1):
+            for key in keys:
+                if getattr(pose, key) is not None:
+                    name = f"{self.stops.name(i)}.{key}"
+                    raise ConfigError(self.stops.path, f'{name}: must be absent with family = "{self.stops.family}"')
+
+    def __len__(self) -> int:
+        return len(self.stops)
+
+    def check(self, problem: Problem) -> None:  # noqa: B027
+        """Refuse poses at which no motion can begin or end; called before z0 is chosen."""
+
+    @classmethod
+    def for_searches(cls, stops: Waypoints) -> "Leg":
+        """The leg of the family over poses of another one, from whose motions a search can begin."""
+        return cls(stops)
+
+    def begin_with(self, others: "Sequence[Leg]") -> None:  # noqa: B027
+        """Take legs of other families over the same poses, from whose motions a search can begin."""
+
+    @abc.abstractmethod
+    def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
+        """Join the poses."""
+
+    def answers(self, problem: Problem, depths: Float[np.ndarray, "n_depths"]) -> Answers:
+        """Answers for several depths of P0."""
+        return joined([self.join(problem, float(z0))[0] for z0 in depths])
+
+    def outcome(
+        self, problem: Problem, joined: JoinedLeg, tension_min: Float[np.ndarray, "n"], start: float
+    ) -> LegOutcome | None:
+        """Outcome of the joined leg beyond its motion; a plan calls this once."""
+        return None
+
+    def warnings(self, problem: Problem) -> list[str]:
+        """Warnings for the user of the plan."""
+        return []
+
+
+def each(leaves, count: int) -> list:
+    """Parts of a pytree whose leaves have a leading dimension."""
+    return [jax.tree.map(lambda leaf, i=i: np.asarray(leaf)[i], leaves) for i in range(count)]

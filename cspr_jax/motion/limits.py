@@ -1,0 +1,96 @@
+"""Limits of a state: which are set, the quantities that they bound, and the slacks that follow."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple
+
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.robots import cables
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.robots.model.state import State
+from cspr_jax.schema.limits import LIMITS, Limit
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+
+def limits_set(limits: Limits) -> tuple[Limit, ...]:
+    """Rows of the limits that are set, in the order of their slacks."""
+    return tuple(row for row in LIMITS if getattr(limits, row.name) is not None)
+
+
+class Values(NamedTuple):
+    """Quantities of a state that limits bound.
+
+    Fields:
+        tension: (n_cables,) N.
+        depth: () z of the lowest point of the effector, z down, m.
+        length: (n_cables,) of the cables, m.
+        speed: (n_cables,) size of the rate of the length, m/s.
+        acceleration: (n_cables,) size of its second derivative, m/s^2.
+        mass_centre_speed: () m/s.
+        mass_centre_acceleration: () size of it, m/s^2.
+    """
+
+    tension: Array
+    depth: Array
+    length: Array
+    speed: Array
+    acceleration: Array
+    mass_centre_speed: Array
+    mass_centre_acceleration: Array
+
+
+def values(robot: AnyRobot, state: State) -> Values:
+    """Quantities of a state that limits bound."""
+    return _values(robot, state, cables.tensions(robot, state))
+
+
+def lowest_depth(robot: AnyRobot, state: State, corners: Float[Array, "m 3"] | None = None) -> Float[Array, ""]:
+    """Depth of the lowest point of the effector: mass centre, or joint, attachment points, and corners of its shape."""
+    if not isinstance(robot, PlatformRobot):
+        return state.position[2]
+    points = robot.platform_points if corners is None else jnp.concatenate([robot.platform_points, corners])
+    return state.position[2] + jnp.maximum(jnp.max(points @ state.rotation[2]), 0.0)
+
+
+def _values(robot: AnyRobot, state: State, tensions: Array) -> Values:
+    length, rate, bend = cables.cable_motion(robot, state)
+    speed, pull = jnp.linalg.norm(state.velocity), jnp.linalg.norm(state.acceleration)
+    return Values(tensions, lowest_depth(robot, state), length, jnp.abs(rate), jnp.abs(bend), speed, pull)
+
+
+def scales(n_cables: int, weight: Float[Array, ""], z0: Float[Array, "..."]) -> dict[str, tuple[float, Array]]:
+    """Scales that make slacks dimensionless; the slack of a quantity that has none is relative to its limit."""
+    return {"tension": (float(n_cables), weight), "depth": (1.0, z0)}
+
+
+def slack(
+    row: Limit, limit: Float[Array, "..."], value: Float[Array, "..."], scale: Mapping[str, tuple[float, Array]]
+) -> Float[Array, "..."]:
+    """Slack of a limit: positive exactly while it is met, and free of units."""
+    if row.quantity not in scale:
+        share = value / limit
+        return 1.0 - share if row.sense == "most" else share - 1.0
+    factor, size = scale[row.quantity]
+    return (limit - value if row.sense == "most" else value - limit) * factor / size
+
+
+def other_limits(limits: Limits) -> list[Limit]:
+    """Rows of the limits that are set, except those of tensions, which the margin of redundant cables contains."""
+    return [row for row in limits_set(limits) if row.quantity != "tension"]
+
+
+def other_slacks(robot: AnyRobot, limits: Limits, state: State, z0: Float[Array, ""]) -> list[Array]:
+    """Smallest slack of each of `other_limits`."""
+    quantities = _values(robot, state, jnp.zeros(robot.n_cables))
+    scale = scales(robot.n_cables, robot.mass * robot.gravity, z0)
+    return [
+        jnp.min(slack(row, getattr(limits, row.name), getattr(quantities, row.quantity), scale))
+        for row in other_limits(limits)
+    ]

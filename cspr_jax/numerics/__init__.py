@@ -1,0 +1,1 @@
+"""Numerics: elementary functions that XLA compiles well, batches of one shape, cores, polynomials."""

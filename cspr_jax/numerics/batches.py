@@ -1,0 +1,98 @@
+"""Batches of one shape: the only place that vectorises.
+
+XLA compiles for one shape, and the bits of its results can depend on it. So every call has the
+same shape: the last batch is padded with its own last element, and trimmed.
+"""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+from typing import TypeVar
+
+import jax
+import numpy as np
+from jax import lax
+
+from cspr_jax.numerics.cores import cores
+from cspr_jax.numerics.elementary import double_precision
+
+# How many times as large a batch is as on a CPU, whose caches it has to fit.
+LARGER = {"gpu": 16, "tpu": 16}
+# Largest length of a batch. Tests, which compute few cases at a time, set it lower.
+LARGEST = 1 << 20
+# Cases are divided among so many threads, whatever the number of cores, so that results keep their bits.
+THREADS = 2
+Found = TypeVar("Found")
+
+
+def in_threads(function: Callable, items: Sequence) -> list:
+    """Results of a function, in order, by two threads: work that XLA does on one core runs beside that of the other.
+
+    In a process that computes on one core, one thread does it all.
+    """
+    # jax does not say its type.
+    device = jax.config.jax_default_device  # type: ignore[attr-defined]
+
+    def one(item):
+        # Settings of jax may belong to the caller's thread alone.
+        with double_precision(), jax.default_device(device):
+            return function(item)
+
+    if cores() == 1 or len(items) == 1:
+        return [one(item) for item in items]
+    with ThreadPoolExecutor(THREADS) as pool:
+        return list(pool.map(one, items))
+
+
+def in_parts(function: Callable[[slice], Found], count: int, size: int) -> list[Found]:
+    """Results of many cases, range by range.
+
+    Two threads work: what one does outside of XLA, and what XLA does on one core, runs beside the work of the other.
+    """
+    # All parts have one length, and each thread gets as many.
+    rounds = -(-count // (THREADS * size))
+    bounds = np.linspace(0, count, min(rounds * THREADS, count) + 1).round().astype(int).tolist()
+    return in_threads(function, [slice(*pair) for pair in pairwise(bounds)])
+
+
+def room(size: int) -> int:
+    """Length of a batch on the device in use."""
+    return min(size * LARGER.get(jax.default_backend(), 1), LARGEST)
+
+
+def row_by_row(function: Callable, rows):
+    """Apply a function of many lanes to each row of a table, inside of a compiled function."""
+    if jax.default_backend() == "cpu":
+        return lax.map(function, rows)
+    count = len(jax.tree.leaves(rows)[0])
+    return lax.map(function, rows, batch_size=max(count // 2, 1))
+
+
+def in_batches(function: Callable, arguments, *, size: int, axis: int = 0):
+    """Apply a compiled function to arrays of any length, in batches of one length."""
+    size = room(size)
+    arguments = jax.tree.map(np.asarray, arguments)  # to slice an array of jax takes a hundred times as long
+    count = len(jax.tree.leaves(arguments)[0])
+    if count == 0:
+        return None
+    pending = [
+        function(padded(jax.tree.map(lambda a, s=start: a[s : s + size], arguments), size))
+        for start in range(0, count, size)
+    ]
+    parts = [jax.tree.map(np.asarray, part) for part in pending]
+
+    def whole(*pieces):
+        return np.concatenate(pieces, axis=axis)[(*[slice(None)] * (axis % pieces[0].ndim), slice(count))]
+
+    return jax.tree.map(whole, *parts)
+
+
+def padded(arguments, size: int):
+    """Arrays padded to the length of a batch."""
+
+    def one(array):
+        if len(array) == size:
+            return array
+        return np.concatenate([array, np.repeat(array[-1:], size - len(array), axis=0)])
+
+    return jax.tree.map(one, arguments)

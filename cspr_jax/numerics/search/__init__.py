@@ -1,0 +1,1 @@
+"""Minima: golden sections, constrained and evolutionary searches, and minima by halving blocks."""

@@ -1,0 +1,1 @@
+"""MuJoCo: a plan as a model with tensions, and played."""

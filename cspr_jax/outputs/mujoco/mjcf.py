@@ -1,0 +1,228 @@
+"""A plan for MuJoCo as files: a model of its robot (MJCF), and the tensions that play the plan in it, open-loop.
+
+Written without MuJoCo. The control file has the rows of `mujoco_motion.Played`: two a step, and one that repeats the
+time of the row before where steps end at a jump of the acceleration.
+"""
+
+import csv
+import io
+import math
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import jax
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cspr_jax import __version__
+from cspr_jax.errors import ConfigError, printable
+from cspr_jax.numerics.elementary import double_precision
+from cspr_jax.outputs.mujoco.motion import STEP, Played, Suspended, attachments, coordinates, played, suspended
+from cspr_jax.plans.planning import PlannedMotions
+from cspr_jax.robots.model.pulleys import exits
+from cspr_jax.robots.model.shapes import Body, Box, Cylinder, Hull, Obstacle, Sphere
+from cspr_jax.store.files.disk import Disk
+from cspr_jax.store.files.publishing import publish
+
+_EXITS = jax.jit(jax.vmap(exits, in_axes=(None, None, None, 0)))
+KEYFRAME = "start"
+# Sizes of what is drawn, over the diagonal of the box around spools and path.
+MASS_RADIUS, SPOOL_RADIUS, POINT_RADIUS, CABLE_RADIUS, ROD_RADIUS = 0.012, 0.006, 0.004, 0.002, 0.003
+THINNEST = 1e-4  # cables of a known diameter are drawn thicker than this
+# Of a pulley: where its cable comes from, below the entry point, and half its width, over its radius; its inertia over
+# the mass and the size squared, as little as MuJoCo takes well; distance of the points that keep it in the plane of its
+# cable, over the size.
+LEAD, WHEEL_WIDTH, SWIVEL_INERTIA, FOLLOWING = 0.5, 0.15, 1e-9, 0.1
+ROOM = 0.01  # rad, between start and end of a tendon around a pulley
+LYING = (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)  # from z to -y
+CLEAR = (0.0, 0.0, 0.0, 0.0)
+DARK, BLUE, ORANGE = (0.2, 0.2, 0.2, 1.0), (0.1, 0.3, 0.6, 1.0), (0.85, 0.45, 0.1, 1.0)
+BROWN, GLASS, HULL = (0.36, 0.24, 0.18, 0.6), (0.85, 0.45, 0.1, 0.35), "platform_hull"
+
+
+def model_xml(body: Suspended, moved: Played, step: float = STEP, control_file: str = "", note: str = "") -> str:
+    """A model of a robot for MuJoCo."""
+    root = ElementTree.Element("mujoco", model=printable(body.name))
+    turned = "" if body.z_axis == "up" else ", turned by half a turn about x: (x, -y, -z) of the robot file"
+    words = f"World axes are those of the robot file{turned}; z is up. A control is the tension of a cable, N."
+    root.append(ElementTree.Comment(f" Written by cspr_jax {__version__}. SI units. {words}{note} "))
+    _add(root, "compiler", angle="radian", inertiafromgeom="false")
+    # A dense Jacobian of the tendons has one row a cable. Pulleys follow their cables by constraints.
+    gravity = [0.0, 0.0, -body.gravity]
+    solver = {"tolerance": 1e-14} if len(body.wheels) else {}
+    _add(root, "option", timestep=step, gravity=gravity, integrator="RK4", jacobian="dense", **solver)
+    if control_file:
+        _add(_add(root, "custom"), "text", name="control_file", data=control_file)
+    places = np.vstack([body.spools, moved.position])
+    low, high = places.min(0), places.max(0)
+    size = float(np.linalg.norm(high - low))
+    _add(root, "statistic", center=0.5 * (low + high), extent=size)
+    _add(_add(root, "visual"), "headlight", ambient=[0.4] * 3, diffuse=[0.5] * 3, specular=[0.1] * 3)
+    sky = {"type": "skybox", "builtin": "gradient", "width": "64", "height": "64"}
+    _add(assets := _add(root, "asset"), "texture", **sky, rgb1=[1.0] * 3, rgb2=[0.8, 0.85, 0.9])
+    if isinstance(body.body, Hull):
+        _add(assets, "mesh", name=HULL, vertex=np.unique(body.body.triangles.reshape(-1, 3), axis=0))
+    _world(_add(root, "worldbody"), body, moved, size)
+    tendons = _add(root, "tendon")
+    _cables(tendons, body, size)
+    if len(body.wheels):
+        _followers(tendons, _add(root, "equality"), body, step)
+    _motors(_add(root, "actuator"), body, moved)
+    places, rates, _ = (rows[0] for rows in coordinates(body, moved))
+    _add(_add(root, "keyframe"), "key", name=KEYFRAME, qpos=places, qvel=rates, ctrl=moved.tension[0])
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _add(parent: ElementTree.Element, tag: str, **attributes) -> ElementTree.Element:
+    # Words are written as they are, numbers with all their digits; there is no -0.
+    text = {
+        name: value if isinstance(value, str) else " ".join(repr(float(x) + 0.0) for x in np.ravel(value))
+        for name, value in attributes.items()
+    }
+    return ElementTree.SubElement(parent, tag, text)
+
+
+def _world(world: ElementTree.Element, body: Suspended, moved: Played, size: float) -> None:
+    spools = body.spools.copy()
+    if body.pulleys is not None:
+        spools -= LEAD * (np.asarray(body.pulleys.radius)[:, None] * np.asarray(body.pulleys.axes))
+    for k, spool in enumerate(spools, 1):
+        _add(world, "site", name=f"spool_{k}", pos=spool, size=SPOOL_RADIUS * size, rgba=DARK)
+    drawn = {"contype": "0", "conaffinity": "0"}
+    for number, obstacle in enumerate(body.obstacles, 1):
+        _add(world, "geom", name=f"obstacle_{number}", rgba=BROWN, **drawn, **_geom(obstacle))
+    start = moved.position[0]
+    if body.axes:
+        effector = _add(world, "body", name="effector", pos=start)
+        for axis in body.axes:  # coordinates are places, not ways from the start
+            _add(effector, "joint", name="xyz"[axis], type="slide", axis=np.eye(3)[axis], ref=start[axis])
+    else:
+        effector = _add(world, "body", name="effector", pos=start, quat=moved.coordinates(())[0][0, 3:7])
+        _add(effector, "freejoint", name="pose")
+    radius = MASS_RADIUS * size
+    # An end effector that does not turn may have any inertia, but it must have one.
+    moments, axes = _principal(0.4 * body.mass * radius**2 * np.eye(3) if body.inertia is None else body.inertia)
+    quaternion = np.roll(axes.as_quat(), 1)
+    _add(effector, "inertial", pos=np.zeros(3), mass=body.mass, diaginertia=moments, quat=quaternion)
+    # Drawn bodies have neither weight nor contacts.
+    drawn["rgba"] = ORANGE  # type: ignore[assignment]
+    if body.body is not None:
+        _add(effector, "geom", name="platform", **(drawn | {"rgba": GLASS}), **_geom(body.body))
+    _add(effector, "geom", type="sphere", size=radius, **drawn)
+    for point in np.unique(body.points, axis=0):
+        if np.linalg.norm(point) > radius:
+            rod = np.concatenate([np.zeros(3), point])
+            _add(effector, "geom", type="capsule", fromto=rod, size=ROD_RADIUS * size, **drawn)
+    for k, point in enumerate(body.points, 1):
+        _add(effector, "site", name=f"point_{k}", pos=point, size=POINT_RADIUS * size, rgba=ORANGE)
+    # Behind the effector, whose coordinates are the first ones.
+    if len(body.wheels):
+        _pulleys(world, body, moved, size)
+
+
+def _pulleys(world: ElementTree.Element, body: Suspended, moved: Played, size: float) -> None:
+    # Each swivels about its axis at the entry point, the x axis of its body towards its centre.
+    axes, radii = np.asarray(body.pulleys.axes), np.asarray(body.pulleys.radius)  # type: ignore[union-attr]
+    points, middles = attachments(body, moved)[0], _sides(body, moved)
+    inertia = np.full(3, SWIVEL_INERTIA * body.mass * size**2)
+    for k, middle in zip(body.wheels.tolist(), middles.tolist(), strict=True):
+        across = np.cross(axes[k], points[k] - body.spools[k])
+        across = across / np.linalg.norm(across)
+        matrix = np.stack([np.cross(across, axes[k]), across, axes[k]], axis=1)
+        quaternion, centre = np.roll(Rotation.from_matrix(matrix).as_quat(), 1), np.array([radii[k], 0.0, 0.0])
+        pulley = _add(world, "body", name=f"pulley_{k + 1}", pos=body.spools[k], quat=quaternion)
+        _add(pulley, "joint", name=f"swivel_{k + 1}", type="hinge", axis=[0.0, 0.0, 1.0])
+        _add(pulley, "inertial", pos=np.zeros(3), mass=SWIVEL_INERTIA * body.mass, diaginertia=inertia)
+        wheel = {"type": "cylinder", "size": [radii[k], WHEEL_WIDTH * radii[k]], "quat": LYING, "rgba": DARK}
+        _add(pulley, "geom", name=f"wheel_{k + 1}", pos=centre, contype="0", conaffinity="0", **wheel)
+        side = 2.0 * radii[k] * np.array([-np.cos(middle), 0.0, np.sin(middle)])
+        _add(pulley, "site", name=f"side_{k + 1}", pos=centre + side, size=THINNEST * size, rgba=CLEAR)
+        for name, way in (("left", 1.0), ("right", -1.0)):
+            arm = [0.0, way * FOLLOWING * size, 0.0]
+            _add(pulley, "site", name=f"{name}_{k + 1}", pos=arm, size=THINNEST * size, rgba=CLEAR)
+
+
+def _sides(body: Suspended, moved: Played) -> np.ndarray:
+    # Return directions from the centres of the pulleys, rad from the entry point on, by which MuJoCo wraps tendons the
+    # right way around: less than half a turn behind the start of the tendon, and before its end, in all rows.
+    axes, radii = (np.asarray(x)[body.wheels] for x in (body.pulleys.axes, body.pulleys.radius))  # type: ignore[union-attr]
+    with double_precision():
+        way = _EXITS(body.spools[body.wheels], axes, radii, attachments(body, moved)[:, body.wheels])
+    start, end = -np.arctan(LEAD), np.max(np.asarray(way.wrapped) / radii + np.arctan2(way.free, radii), axis=0)
+    lost = np.flatnonzero(~(end - start < 2.0 * np.pi - ROOM))
+    if len(lost):
+        fault = f"MuJoCo cannot wrap cable {int(body.wheels[lost[0]]) + 1} around its pulley all along its motion"
+        raise ConfigError("plan", f"has no model for MuJoCo: {fault}")
+    return 0.5 * (start + end)
+
+
+def _geom(shape: Obstacle | Body) -> dict[str, Any]:
+    if isinstance(shape, Box):
+        quaternion = np.roll(Rotation.from_matrix(shape.rotation).as_quat(), 1)
+        return {"type": "box", "pos": shape.centre, "size": np.maximum(shape.half, THINNEST), "quat": quaternion}
+    if isinstance(shape, Sphere):
+        return {"type": "sphere", "pos": shape.centre, "size": shape.radius}
+    if isinstance(shape, Cylinder):
+        if (shape.start == shape.end).all():
+            return {"type": "sphere", "pos": shape.start, "size": shape.radius}
+        return {"type": "capsule", "fromto": np.concatenate([shape.start, shape.end]), "size": shape.radius}
+    return {"type": "mesh", "mesh": HULL}
+
+
+def _principal(inertia: np.ndarray) -> tuple[np.ndarray, Rotation]:
+    # MuJoCo finds the axes of a full tensor to 6e-7 only, and refuses a body whose largest moment is above the sum of
+    # the others, be it by rounding.
+    moments, axes = np.linalg.eigh(inertia)
+    moments[2] = min(moments[2], moments[0] + moments[1])
+    return moments, Rotation.from_matrix(axes * np.linalg.det(axes))
+
+
+def _cables(tendons: ElementTree.Element, body: Suspended, size: float) -> None:
+    known = body.cable_diameter
+    radius = CABLE_RADIUS * size if known is None else max(0.5 * known, THINNEST * size)
+    for k in range(1, len(body.spools) + 1):
+        cable = _add(tendons, "spatial", name=f"cable_{k}", width=radius, rgba=BLUE)
+        _add(cable, "site", site=f"spool_{k}")
+        if k - 1 in body.wheels:
+            _add(cable, "geom", geom=f"wheel_{k}", sidesite=f"side_{k}")
+        _add(cable, "site", site=f"point_{k}")
+
+
+def _followers(tendons: ElementTree.Element, equality: ElementTree.Element, body: Suspended, step: float) -> None:
+    # A pulley is in one plane with its cable where two points on either side are equally far from the attachment point.
+    for k in (body.wheels + 1).tolist():
+        for name in ("left", "right"):
+            tendon = _add(tendons, "spatial", name=f"{name}_{k}", width=THINNEST, rgba=CLEAR)
+            _add(tendon, "site", site=f"{name}_{k}")
+            _add(tendon, "site", site=f"point_{k}")
+        hard = {"solref": [4.0 * step, 1.0], "solimp": [0.9999, 0.9999, 0.001, 0.5, 2.0]}
+        _add(equality, "tendon", name=f"follow_{k}", tendon1=f"left_{k}", tendon2=f"right_{k}", **hard)
+
+
+def _motors(actuators: ElementTree.Element, body: Suspended, moved: Played) -> None:
+    # A positive control shortens the cable; no cable pushes. Without a limit there is room for a controller.
+    most = np.maximum(moved.tension.max(0), 0.0)
+    largest = np.maximum(np.where(np.isfinite(body.tension_max), body.tension_max, 2.0 * most.max()), most)
+    for k, tension in enumerate(largest.tolist(), 1):
+        limits = {"ctrllimited": "true", "ctrlrange": [0.0, tension]}
+        _add(actuators, "motor", name=f"tension_{k}", tendon=f"cable_{k}", gear=-1.0, **limits)
+
+
+def control_file_of(path: Path) -> Path:
+    """Control file beside a model."""
+    return path.with_name(f"{path.stem}_control.csv")
+
+
+def write_mjcf(plan: PlannedMotions, path: Path, step: float = STEP) -> None:
+    """Write a model of a plan's robot, and beside it the control file that plays the plan."""
+    moved, beside = played(plan, step), control_file_of(path)
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["t", *(f"tension_{k + 1}" for k in range(moved.tension.shape[1]))])
+    writer.writerows([map(repr, row) for row in np.column_stack([moved.time, moved.tension]).tolist()])
+    note = "" if plan.feasible else " The plan is NOT PROVED FEASIBLE; no cable of the model pushes."
+    # The model names the other one, which is there before it.
+    publish(Disk(), beside, text.getvalue().encode())
+    publish(Disk(), path, model_xml(suspended(plan), moved, step, beside.name, note).encode())

@@ -1,0 +1,218 @@
+"""A plan played in MuJoCo: where its tensions take the model, and which tensions MuJoCo asks for along its path."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import threading
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from cspr_jax.outputs.mujoco.mjcf import model_xml
+from cspr_jax.outputs.mujoco.module import need_mujoco
+from cspr_jax.outputs.mujoco.motion import STEP, Played, Suspended, coordinates, played, suspended, upward
+from cspr_jax.outputs.table_layout import two_digits
+from cspr_jax.plans.planning import PlannedMotions
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Int
+
+_LENT = threading.Lock()
+
+
+class PlayedPath(NamedTuple):
+    """Path of MuJoCo's robot.
+
+    Fields:
+        position: (n, 3) of the mass centre, m.
+        turned: (n,) angle from the planned orientation, rad; 0 of what does not turn.
+    """
+
+    position: np.ndarray
+    turned: np.ndarray
+
+
+@dataclasses.dataclass(frozen=True)
+class PlayedPlan:
+    """A plan beside what MuJoCo makes of it, at the ends of its steps; in the axes of the robot file.
+
+    Fields:
+        robot: its name.
+        z_axis: where its z points, "down" or "up".
+        mujoco: version of MuJoCo.
+        steps: their number.
+        time: (n,) since the start of the plan, s; twice where segments meet or the acceleration may jump.
+        segment: (n,) number of the segment, from 1 on.
+        position: (n, 3) of the plan, m.
+        played: where the tensions take MuJoCo's robot, each segment from its start as planned.
+        through: the same for all segments in one go, from the start of the plan alone.
+        tension: (n, n_cables) of the plan, N; of parallel pairs those of all six cables.
+        tension_deviation: (n, n_cables) the least change, in the sum of squares, with which these tensions supply what
+            MuJoCo's inverse dynamics asks for along the plan's path, N; on as many cables as degrees of freedom that is
+            the difference of the two programs' tensions.
+    """
+
+    robot: str
+    z_axis: str
+    mujoco: str
+    steps: int
+    time: np.ndarray
+    segment: np.ndarray
+    position: np.ndarray
+    played: PlayedPath
+    through: PlayedPath
+    tension: np.ndarray
+    tension_deviation: np.ndarray
+
+    @property
+    def path_deviation(self) -> np.ndarray:
+        """Distance from the plan where each segment is played from its start, (n,) m."""
+        return np.linalg.norm(self.played.position - self.position, axis=1)
+
+    @property
+    def through_deviation(self) -> np.ndarray:
+        """Distance from the plan where all segments are played in one go, (n,) m."""
+        return np.linalg.norm(self.through.position - self.position, axis=1)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The largest deviations, and where they are."""
+        cable = np.abs(self.tension_deviation).argmax(1)
+        of_cables = np.abs(self.tension_deviation).max(1)
+        deviations = {
+            "path": self._largest(self.path_deviation, "m"),
+            "path_in_one_go": self._largest(self.through_deviation, "m"),
+            "turn": self._largest(self.played.turned, "rad"),
+            "turn_in_one_go": self._largest(self.through.turned, "rad"),
+            "tension": self._largest(of_cables, "N") | {"cable": int(cable[of_cables.argmax()]) + 1},
+        }
+        whole = {"robot": self.robot, "mujoco": self.mujoco, "duration": float(self.time[-1]), "steps": self.steps}
+        return whole | {"largest_deviation": deviations}
+
+    def _largest(self, values: np.ndarray, units: str) -> dict[str, Any]:
+        row = int(values.argmax())
+        place = {"t": float(self.time[row]), "segment": int(self.segment[row])}
+        return {"value": float(values[row]), "units": units, **place}
+
+    def lines(self) -> list[str]:
+        """The largest deviations for people."""
+        deviations = self.to_dict()["largest_deviation"]
+        text = [f"{self.robot}: {self.time[-1]:.2f} s in {self.steps} steps of MuJoCo {self.mujoco}"]
+        for name, how in (("", "each segment from its start"), ("_in_one_go", "all in one go")):
+            far, turn = deviations[f"path{name}"], deviations[f"turn{name}"]
+            angle = f" and {two_digits(turn['value'])} rad" if self.played.turned.any() else ""
+            text.append(f"path, {how}: at most {two_digits(far['value'])} m{angle} off the plan, {_place(far)}")
+        most = deviations["tension"]
+        text.append(f"tensions: at most {two_digits(most['value'])} N off, cable {most['cable']}, {_place(most)}")
+        return text
+
+
+def _place(deviation: dict[str, Any]) -> str:
+    return f"at {deviation['t']:.2f} s in segment {deviation['segment']}"
+
+
+def replay(plan: PlannedMotions, step: float = STEP) -> PlayedPlan:
+    """Play a plan in MuJoCo."""
+    mujoco = need_mujoco()
+    body, moved = suspended(plan), played(plan, step)
+    rows, world = ends_of_steps(moved), upward(plan.robot_file.z_axis)
+    ways = [way_of(body, moved, step, by_segment=by_segment) for by_segment in (True, False)]
+    by_segment_path, through = (way._replace(position=world.turned(way.position)) for way in ways)
+    return PlayedPlan(
+        robot=plan.robot_file.name,
+        z_axis=plan.robot_file.z_axis,
+        mujoco=mujoco.__version__,
+        steps=len(rows) - len(moved.runs()),
+        time=moved.time[rows],
+        segment=moved.segment[rows],
+        position=world.turned(moved.position[rows]),
+        played=by_segment_path,
+        through=through,
+        tension=moved.tension[rows],
+        tension_deviation=tension_deviation(body, moved),
+    )
+
+
+def ends_of_steps(moved: Played) -> Int[np.ndarray, "n"]:
+    """Rows of a motion at which steps start or end."""
+    return np.concatenate([np.asarray(run[::2]) for run in moved.runs()])
+
+
+def way_of(body: Suspended, moved: Played, step: float = STEP, *, by_segment: bool) -> PlayedPath:
+    """Path on which the tensions of a motion take MuJoCo's robot, by its own integrator."""
+    mujoco = need_mujoco()
+    places, rates, _ = coordinates(body, moved)
+    reached, row = [], 0
+
+    def pull(model: Any, data: Any) -> None:
+        # RK4 asks at the start of a step, twice in its middle, and at its end.
+        data.ctrl[:] = moved.tension[row + round(2.0 * (data.time - moved.time[row]) / model.opt.timestep)]
+
+    with _callback_lent(mujoco):
+        model = mujoco.MjModel.from_xml_string(model_xml(body, moved, step))
+        data = mujoco.MjData(model)
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+        mujoco.set_mjcb_control(pull)
+        for run in moved.runs():
+            if by_segment and moved.segment[run.start] != moved.segment[run.start - 1]:
+                data.qpos[:], data.qvel[:] = places[run.start], rates[run.start]
+            reached.append(data.qpos.copy())
+            for row in run[:-1:2]:
+                data.time, model.opt.timestep = moved.time[row], moved.time[row + 2] - moved.time[row]
+                mujoco.mj_step(model, data)
+                reached.append(data.qpos.copy())
+    return _way(moved, np.array(reached), body.axes)
+
+
+@contextlib.contextmanager
+def _callback_lent(mujoco: Any) -> Iterator[None]:
+    # A process has one control callback, which MuJoCo calls when it compiles a model, too.
+    with _LENT:
+        before = mujoco.get_mjcb_control()
+        mujoco.set_mjcb_control(None)
+        try:
+            yield
+        finally:
+            mujoco.set_mjcb_control(before)
+
+
+def _way(moved: Played, reached: np.ndarray, axes: Sequence[int]) -> PlayedPath:
+    rows = ends_of_steps(moved)
+    position, turned = moved.position[rows], np.zeros(len(rows))
+    if moved.rotation is None:
+        position[:, list(axes)] = reached[:, : len(axes)]
+    else:
+        position[:], quaternions = reached[:, :3], np.roll(reached[:, 3:7], -1, axis=1)
+        turned = (moved.rotation[rows].inv() * Rotation.from_quat(quaternions)).magnitude()
+    return PlayedPath(position, turned)
+
+
+def tension_deviation(body: Suspended, moved: Played) -> Float[np.ndarray, "n n_cables"]:
+    """How far the tensions of a motion are from those that MuJoCo's inverse dynamics asks for along its path."""
+    mujoco = need_mujoco()
+    with _callback_lent(mujoco):
+        model = mujoco.MjModel.from_xml_string(model_xml(body, moved))
+    # Pulleys are where the cables want them: what keeps them there has nothing to do.
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EQUALITY
+    rows, freedoms = ends_of_steps(moved), model.nv - len(body.wheels)
+    data, (places, rates, accelerations) = mujoco.MjData(model), coordinates(body, moved)
+    pulls, forces = np.empty((len(rows), freedoms, model.nu)), np.empty((len(rows), freedoms))
+    for i, row in enumerate(rows.tolist()):
+        data.qpos[:], data.qvel[:], data.qacc[:] = places[row], rates[row], accelerations[row]
+        mujoco.mj_inverse(model, data)
+        # A cable that shortens pulls.
+        pulls[i], forces[i] = -_tendons(model, data)[: model.nu, :freedoms].T, data.qfrc_inverse[:freedoms]
+    missing = forces - np.einsum("nij,nj->ni", pulls, moved.tension[rows])
+    return np.einsum("nji,ni->nj", np.linalg.pinv(pulls), missing)
+
+
+def _tendons(model: Any, data: Any) -> np.ndarray:
+    # Jacobian of the tendons, (ntendon, nv). MuJoCo may keep only the coordinates on which a tendon depends.
+    if data.ten_J.size == model.ntendon * model.nv:
+        return np.reshape(data.ten_J, (model.ntendon, model.nv))
+    matrix = np.zeros((model.ntendon, model.nv))
+    row = np.repeat(np.arange(model.ntendon), model.ten_J_rownnz)
+    matrix[row, model.ten_J_colind] = data.ten_J
+    return matrix

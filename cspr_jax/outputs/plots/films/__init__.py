@@ -1,0 +1,1 @@
+"""Films of motions, and replays."""

@@ -1,0 +1,217 @@
+"""Films of a motion: the robot in space with its cables coloured by tension, and its tensions over time."""
+
+import hashlib
+import re
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, HTMLWriter
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.patches import Patch
+
+from cspr_jax.config.plan import PlanFile
+from cspr_jax.config.robot import RobotFile
+from cspr_jax.errors import InputError
+from cspr_jax.outputs.plots.films.gif import GifWriter
+from cspr_jax.outputs.plots.films.moving_figure import MovingFigure
+from cspr_jax.outputs.plots.motions.ends import draw_ends, entries_of_ends, segment_rows
+from cspr_jax.outputs.plots.motions.motion import draw_limits, shade_failing
+from cspr_jax.outputs.plots.motions.trajectory import add_tension_bar, name_spools
+from cspr_jax.outputs.plots.robots.bodies_in_space import draw_bodies
+from cspr_jax.outputs.plots.robots.obstacles import AREA, points_of
+from cspr_jax.outputs.plots.robots.robot_along import Moving, limits_of, moving
+from cspr_jax.outputs.plots.style.fitting import fit, legend_above
+from cspr_jax.outputs.plots.style.labels import COLOURS, cable_names, line_look
+from cspr_jax.outputs.plots.style.scene import colours_of_tension, fill_places, set_space, shape_of
+from cspr_jax.runtime.stages import stage
+from cspr_jax.schema.quantities import FAILURES
+
+ENDINGS = (".gif", ".mp4", ".html")
+RANDOM = re.compile(rb"_anim_img([0-9a-f]{32})")
+# Pictures a second: as many as give a film no more pictures than the second numbers, else the last. The delays of a GIF
+# are whole hundredths of a second. The pictures of a page are whole ones each.
+RATES, MOST, OF_PAGES = (20, 10, 5, 2, 1), 600, 150
+SIZE, DPI = (10.0, 7.2), 90
+# Height over width below which a robot lies above its tensions, and not beside them.
+WIDE = 0.85
+# Browsers hardly open a page of more MB than this.
+LARGEST = 100.0
+MARK = "#D55E00"
+# Lines behind the clock would cross its digits.
+BEHIND = {"facecolor": "white", "edgecolor": "none", "pad": 1.5}
+
+
+def film(
+    ending: str,
+    title: str,
+    columns: Mapping[str, np.ndarray],
+    robot_file: RobotFile,
+    keys: PlanFile,
+    speed: float = 1.0,
+) -> bytes:
+    """A film of a motion."""
+    if ending not in ENDINGS:
+        raise InputError("--animate", ending or "no ending", f"a file that ends in {', '.join(ENDINGS)}")
+    if not 0.0 < speed < np.inf:
+        raise InputError("--speed", speed, "a number > 0")
+    time = np.asarray(columns["t"], float)
+    seconds = float(time[-1] - time[0]) / speed
+    most = OF_PAGES if ending == ".html" else MOST
+    rate = next((rate for rate in RATES if seconds * rate <= most), RATES[-1])
+    # The end is shown, at most a part of a picture too late.
+    count = int(np.ceil(seconds * rate - 1e-9)) + 1
+    instants = np.minimum(time[0] + np.arange(count) * speed / rate, time[-1])
+    rows = np.clip(np.searchsorted(time, instants - 1e-9), 0, len(time) - 1)
+    writer = _writer(ending, rate)
+    stage("film")
+    picture = _Picture(title, columns, robot_file, keys, rows)
+    with tempfile.TemporaryDirectory() as folder, matplotlib.rc_context(rc=_settings(ending)):
+        path = Path(folder) / f"film{ending}"
+        with writer.saving(picture.figure, str(path), DPI):
+            for number in range(count):
+                picture.show(number)
+                writer.grab_frame()
+        return _named_by_content(path.read_bytes()) if ending == ".html" else path.read_bytes()
+
+
+def _named_by_content(page: bytes) -> bytes:
+    # matplotlib names the parts of a page at random; the same film has the same bytes, two films different names.
+    match = RANDOM.search(page)
+    if match is None:
+        return page
+    content = hashlib.sha256(page.replace(match[1], b"")).hexdigest()[: len(match[1])]
+    return page.replace(match[1], content.encode())
+
+
+def _settings(ending: str) -> Any:
+    settings = {"animation.embed_limit": LARGEST, "savefig.bbox": "standard"}
+    if ending == ".mp4":
+        settings["animation.ffmpeg_path"] = _encoder()
+    return settings
+
+
+def _encoder() -> str:
+    try:
+        import imageio_ffmpeg
+    except ImportError as error:
+        raise InputError("imageio-ffmpeg", "absent", 'installed: pip install "cspr_jax[film]"') from error
+    return str(imageio_ffmpeg.get_ffmpeg_exe())
+
+
+def _writer(ending: str, rate: int) -> AbstractMovieWriter:
+    if ending == ".gif":
+        return GifWriter(fps=rate)
+    if ending == ".html":
+        return HTMLWriter(fps=rate, embed_frames=True, default_mode="loop")
+    _encoder()
+    # Every player knows this codec and this pixel format.
+    return FFMpegWriter(fps=rate, codec="libx264", extra_args=["-pix_fmt", "yuv420p"])
+
+
+class _Picture:
+    # This figure has artists that are moved from row to row.
+
+    def __init__(
+        self, title: str, columns: Mapping[str, np.ndarray], robot_file: RobotFile, keys: PlanFile, rows: np.ndarray
+    ) -> None:
+        all_rows = np.arange(len(columns["t"]))
+        self.robot, self._path = moving(columns, robot_file, rows, keys), moving(columns, robot_file, all_rows).position
+        self._bodies, self._failing = keys.bodies, {name: columns[name] for name in FAILURES if name in columns}
+        self._flight_time, self._flight = columns.get("flight_t", np.empty(0)), columns.get("flight_position")
+        self._columns = columns
+        self._rows, self._time = rows, np.asarray(columns["t"], float)
+        self.tension = np.asarray(columns["tension"], float)
+        self._names = cable_names(columns)
+        finite = self.tension[np.isfinite(self.tension)]
+        self._largest = float(finite.max(initial=0.0)) or 1.0
+        self._norm = Normalize(0.0, self._largest)
+        self._colours = colours_of_tension()
+        self.figure = MovingFigure(figsize=SIZE, layout="constrained")
+        places = self._places()
+        # A robot that is wide gets the width, one that is high the height.
+        if shape_of(places) < WIDE:
+            grid = self.figure.add_gridspec(2, 1, height_ratios=[1.0, 0.36])
+        else:
+            grid = self.figure.add_gridspec(1, 2, width_ratios=[1.0, 0.8])
+        self._space: Any = self.figure.add_subplot(grid[0], projection="3d", computed_zorder=False)
+        self._draw_space(places, is_down=robot_file.z_axis == "down")
+        self._draw_tensions(self.figure.add_subplot(grid[1]), limits_of(robot_file, keys))
+        self.figure.suptitle(title)
+        # Lay the figure out once: places of axes do not change.
+        self.show(0)
+        fit(self.figure)
+        fill_places(self.figure)
+        of_cables = [*self.cables, *self._edges, self._mass]
+        self.figure.settle([self._flown, self.object, self._behind, *of_cables, self._mark, self._clock], DPI)
+
+    def _places(self) -> np.ndarray:
+        of_robot = [self.robot.ways.reshape(-1, 3), self.robot.corners.reshape(-1, 3)]
+        flight = np.empty((0, 3)) if self._flight is None else self._flight
+        return np.concatenate([*of_robot, self._path, flight, *map(points_of, self._bodies)])
+
+    def _draw_space(self, places: np.ndarray, *, is_down: bool) -> None:
+        space, robot = self._space, self.robot
+        set_space(space, places, is_down=is_down)
+        draw_bodies(space, self._bodies, is_down=is_down)
+        space.plot(*self._path.T, color="0.7", linewidth=0.8)
+        name_spools(space, robot.base)
+        ends = segment_rows(self._columns, self._time)
+        draw_ends(space, self._path, ends)
+        # The object that is released, and its way since then.
+        self._flown = space.plot([], [], [], color=COLOURS[2], linewidth=1.4, linestyle="--")[0]
+        self.object = space.plot([], [], [], linestyle="", marker="o", markersize=6, color=COLOURS[2])[0]
+        if self._flight is not None:
+            self._flown.set_label("flight")
+        handles, words = space.get_legend_handles_labels()
+        entries = entries_of_ends(ends) | dict(zip(words, handles, strict=True))
+        if self._bodies:
+            entries["obstacles"] = Patch(**AREA)
+        self.figure.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=len(entries))
+        self._behind = space.plot([], [], [], color="black", linewidth=1.1)[0]
+        space.plot(*robot.base.T, linestyle="", marker="s", markersize=5, color="0.35", label="spools, by cable")
+        self.cables = [space.plot([], [], [], linewidth=2.0)[0] for _ in robot.base]
+        self._edges = [space.plot([], [], [], color="black", linewidth=2.0)[0] for _ in range(self._edge_count)]
+        self._mass = space.plot([], [], [], linestyle="", marker="o", markersize=6, color="black")[0]
+        self._mass.set_visible(not self._edge_count)
+        add_tension_bar(self.figure, space, ScalarMappable(self._norm, self._colours))
+
+    @property
+    def _edge_count(self) -> int:
+        return self.robot.corners.shape[1] // 2
+
+    def _draw_tensions(self, panel: Any, limits: list[tuple[str, float]]) -> None:
+        for k, values in enumerate(self.tension.T):
+            panel.plot(self._time, values, linewidth=1.2, label=self._names[k], **line_look(k))
+        draw_limits(panel, limits, self.tension, "N")
+        shade_failing(panel, self._failing, "tension")
+        self._mark = panel.axvline(self._time[0], color=MARK, linewidth=1.8)
+        panel.set(xlabel="time (s)", ylabel="tension (N)")
+        panel.margins(x=0.01)
+        panel.set_ylim(bottom=min(0.0, float(np.nanmin(self.tension))))
+        legend_above(panel, len(panel.get_legend_handles_labels()[0]))
+        self._clock = panel.annotate("", (0.99, 0.98), xycoords="axes fraction", ha="right", va="top", bbox=BEHIND)
+
+    def show(self, number: int) -> None:
+        """Move everything to a row."""
+        row = self._rows[number]
+        robot: Moving = self.robot
+        for k, cable in enumerate(self.cables):
+            cable.set_data_3d(*robot.ways[number, k].T)
+            cable.set_color(self._colours(self._norm(self.tension[row, k])))
+        for k, edge in enumerate(self._edges):
+            edge.set_data_3d(*robot.corners[number, 2 * k : 2 * k + 2].T)
+        self._mass.set_data_3d(*robot.position[number][:, None])
+        self._behind.set_data_3d(*self._path[: row + 1].T)
+        instant = float(self._time[row])
+        if self._flight is not None and instant >= self._flight_time[0]:
+            place = [np.interp(instant, self._flight_time, values) for values in self._flight.T]
+            behind = self._flight[self._flight_time < instant]
+            self._flown.set_data_3d(*np.vstack([behind, place]).T)
+            self.object.set_data_3d(*np.transpose([place]))
+        self._mark.set_xdata([instant, instant])
+        self._clock.set_text(f"t = {instant:.2f} s")

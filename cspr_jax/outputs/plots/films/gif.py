@@ -1,0 +1,72 @@
+"""Films as GIF: at most 256 colours, which all pictures share; choosing them takes longer than drawing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.animation import AbstractMovieWriter
+from PIL import Image
+
+from cspr_jax.outputs.plots.films.moving_figure import MovingFigure
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Pictures from which the colours come, and how many of these are exact: white, grey and the like cover most of them.
+SAMPLES, EXACT, COLOURS = 8, 32, 256
+
+
+class GifWriter(AbstractMovieWriter):
+    """A writer of films for matplotlib."""
+
+    def setup(self, fig: Any, outfile: Any, dpi: float | None = None) -> None:
+        """Begin a film."""
+        super().setup(fig, outfile, dpi=dpi)
+        self._moving: MovingFigure = fig
+        self._pictures = list[np.ndarray]()
+
+    def grab_frame(self, **savefig_kwargs: Any) -> None:
+        """Take the figure's picture."""
+        self._pictures.append(self._moving.picture())
+
+    def finish(self) -> None:
+        """Write the file."""
+        last = len(self._pictures) - 1
+        places = np.unique(np.linspace(0, last, SAMPLES).round().astype(int))
+        colours = shared_colours([self._pictures[place] for place in places])
+        nearest = np.full(256**3, -1, np.int16)
+        first, *others = (_in_colours(picture, colours, nearest) for picture in self._pictures)
+        first.save(self.outfile, "gif", save_all=True, append_images=others, duration=round(1000 / self.fps), loop=0)
+
+
+def shared_colours(pictures: list[np.ndarray]) -> Float[np.ndarray, "n 3"]:
+    """Colours for pictures: their most frequent ones as they are, and means of the others."""
+    numbers, counts = np.unique(np.stack([_number(picture) for picture in pictures]), return_counts=True)
+    order = np.argsort(-counts, kind="stable")
+    colours, counts = _colour(numbers[order]), counts[order]
+    if len(colours) <= COLOURS:
+        return colours
+    # The square root lets thin lines have colours beside wide areas.
+    weighted = np.repeat(colours[EXACT:], np.sqrt(counts[EXACT:]).astype(int), axis=0)
+    means = Image.fromarray(weighted[None]).quantize(COLOURS - EXACT).getpalette() or []
+    return np.concatenate([colours[:EXACT], np.reshape(means, (-1, 3)).astype(np.uint8)])
+
+
+def _in_colours(picture: np.ndarray, colours: np.ndarray, nearest: np.ndarray) -> Image.Image:
+    # Pillow looks for the nearest colour by six bits of eight, which makes white grey. `nearest` keeps what was found.
+    numbers = _number(picture)
+    new = np.unique(numbers[nearest[numbers] < 0])
+    differences = _colour(new).astype(int)[:, None] - colours.astype(int)
+    nearest[new] = np.sum(differences**2, axis=2).argmin(1)
+    image = Image.fromarray(nearest[numbers].astype(np.uint8))
+    image.putpalette(colours.tobytes())
+    return image
+
+
+def _number(picture: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(picture).view("<u4")[..., 0] & 0xFFFFFF
+
+
+def _colour(numbers: np.ndarray) -> np.ndarray:
+    return np.stack([numbers & 255, numbers >> 8 & 255, numbers >> 16], axis=-1).astype(np.uint8)

@@ -1,0 +1,94 @@
+"""A plan beside its motion in MuJoCo: both paths, and over time how far paths and tensions are apart."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from cspr_jax.outputs.mujoco.replay import PlayedPlan
+from cspr_jax.outputs.plots.style.fitting import legend_above
+from cspr_jax.outputs.plots.style.labels import COLOURS, line_look
+from cspr_jax.outputs.table_layout import two_digits
+
+# Share of the length of the path that typed digits may leave across a plane.
+ONE_PLANE = 1e-9
+BOUNDARIES = 200  # of longer plans the lines would hide the rest
+RAISED = str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")
+WINDOWS = 250  # of time, each with its largest deviation
+
+
+def replay_figure(replay: PlayedPlan) -> Figure:
+    """Planned and played path, and deviations of path and tensions."""
+    is_planar = np.ptp(replay.position[:, 1]) <= ONE_PLANE * np.ptp(replay.position[:, 0])
+    places: Any = [["xz", "xz"] if is_planar else ["xy", "xz"], ["path", "path"], ["tension", "tension"]]
+    figure = Figure(figsize=(10.0, 8.5), layout="constrained")
+    drawn = figure.subplot_mosaic(places, height_ratios=[1.2, 0.9, 0.9])
+    for name, j in (("xy", 1), ("xz", 2)):
+        if name in drawn:
+            _paths(drawn[name], replay, j)
+    if replay.z_axis == "down":
+        drawn["xz"].invert_yaxis()
+    ways = {"each segment from its start": replay.path_deviation, "all in one go": replay.through_deviation}
+    _deviations(drawn["path"], replay, ways)
+    drawn["path"].set_ylabel("path off the plan (m)")
+    cables = {f"cable {k + 1}": values for k, values in enumerate(np.abs(replay.tension_deviation).T)}
+    _deviations(drawn["tension"], replay, cables)
+    drawn["tension"].set_ylabel("tension off MuJoCo's (N)")
+    path, tension = replay.path_deviation.max(), np.abs(replay.tension_deviation).max()
+    figure.suptitle(
+        f"{replay.robot}: played in MuJoCo {replay.mujoco}, each segment from its start; z axis {replay.z_axis}"
+        f"\npath within {two_digits(path)} m, tensions within {two_digits(tension)} N"
+    )
+    return figure
+
+
+def _paths(panel: Axes, replay: PlayedPlan, j: int) -> None:
+    ways: tuple[tuple[str, np.ndarray, dict[str, Any]], ...] = (
+        ("planned", replay.position, {"color": "black", "linewidth": 2.2, "alpha": 0.35}),
+        ("played", replay.played.position, {"color": COLOURS[1], "linewidth": 1.0, "linestyle": "--"}),
+    )
+    for name, way, look in ways:
+        panel.plot(way[:, 0], way[:, j], label=name, **look)
+    panel.set_xlabel("x (m)")
+    panel.set_ylabel(f"{'xyz'[j]} (m)")
+    panel.set_aspect("equal", adjustable="datalim")
+    panel.grid(alpha=0.3)
+    legend_above(panel, 2)
+
+
+def _deviations(panel: Axes, replay: PlayedPlan, values: dict[str, np.ndarray]) -> None:
+    # Draw the largest value of each window: rounding is noise, which would fill the panel.
+    starts = np.unique(np.linspace(0.0, len(replay.time), WINDOWS, endpoint=False).astype(int))
+    time = replay.time[starts]
+    drawn = {name: _largest(deviations, starts) for name, deviations in values.items()}
+    for k, (name, deviations) in enumerate(drawn.items()):
+        panel.plot(time, deviations, linewidth=1.0, label=name, **line_look(k))
+    _whole_decades(panel, np.concatenate(list(drawn.values())))
+    panel.set_xlabel("time (s)")
+    panel.margins(x=0.01)
+    panel.grid(alpha=0.3)
+    legend_above(panel, len(values))
+    ends = np.flatnonzero(np.diff(replay.segment))
+    for end in replay.time[ends][:BOUNDARIES]:
+        panel.axvline(end, color="black", linewidth=0.8, alpha=0.35)
+
+
+def _whole_decades(panel: Axes, values: np.ndarray) -> None:
+    # The axis goes from one power of ten to another, so that at least two ticks have their numbers.
+    positive = values[np.isfinite(values) & (values > 0.0)]
+    if not len(positive):
+        return
+    low, high = int(np.floor(np.log10(positive.min()))), int(np.ceil(np.log10(positive.max())))
+    panel.set_yscale("log")
+    panel.set_ylim(10.0**low, 10.0 ** max(high, low + 1))
+    panel.yaxis.set_major_locator(LogLocator(numticks=6))
+    panel.yaxis.set_major_formatter(FuncFormatter(lambda tick, _: "10" + str(round(np.log10(tick))).translate(RAISED)))
+    panel.yaxis.set_minor_formatter(NullFormatter())
+
+
+def _largest(values: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    # Return the largest value of each window; a value of exactly 0 leaves a gap.
+    largest = np.maximum.reduceat(values, starts)
+    return np.where(largest > 0.0, largest, np.nan)

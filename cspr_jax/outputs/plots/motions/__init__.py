@@ -1,0 +1,1 @@
+"""Pictures of motions over time and in space."""

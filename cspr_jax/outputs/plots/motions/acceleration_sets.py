@@ -1,0 +1,131 @@
+"""Feasible accelerations at an instant of a motion of a point mass, from its file."""
+
+import dataclasses
+
+import numpy as np
+
+from cspr_jax.build.limits import build_limits
+from cspr_jax.build.robots import gravity_of, kernel_robot
+from cspr_jax.errors import InputError
+from cspr_jax.numerics.elementary import double_precision, leaf
+from cspr_jax.numerics.linear.frames import frame_of
+from cspr_jax.outputs.plots.motions.motion_source import robot_and_plan
+from cspr_jax.outputs.plots.selection import nearest
+from cspr_jax.outputs.plots.style.labels import value
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.point_mass import PointMassRobot
+from cspr_jax.robots.statics.wrench_sets import spanning, tension_range
+from cspr_jax.store.reading.result import Result
+from cspr_jax.workspaces.acceleration_search import faces_of, judged
+
+# Rows that are computed together: with many cables the faces of all rows would not fit into memory.
+ROWS = 1 << 14
+
+
+@dataclasses.dataclass(frozen=True)
+class AccelerationSet:
+    """Feasible accelerations at an instant. Vectors have the axes of the file, but the third one is upward.
+
+    Fields:
+        words: the instant, such as "t = 1.2 s".
+        position: (3,) of the effector, as in the file, m.
+        actual: (3,) its acceleration, m/s^2.
+        margin: distance of the actual acceleration from the nearest face, m/s^2; negative outside.
+        normals: (n_faces, 3) unit vectors that point inside.
+        offsets: (n_faces,) m/s^2; -inf of a face that bounds nothing.
+        names: of the faces.
+        cables: (n_cables, 3) unit vectors from the effector to the spools.
+        reach: (n_cables,) acceleration from the smallest to the largest tension, m/s^2.
+        apex: (3,) acceleration that the smallest tensions give, m/s^2.
+        falling: (3,) acceleration of free fall, m/s^2.
+        motion: (n, 3) accelerations of the whole motion, m/s^2.
+        is_planar: whether the robot moves in a plane.
+    """
+
+    words: str
+    position: np.ndarray
+    actual: np.ndarray
+    margin: float
+    normals: np.ndarray
+    offsets: np.ndarray
+    names: list[str]
+    cables: np.ndarray
+    reach: np.ndarray
+    apex: np.ndarray
+    falling: np.ndarray
+    motion: np.ndarray
+    is_planar: bool
+
+    @property
+    def slacks(self) -> np.ndarray:
+        """Distances of the actual acceleration from the faces, (n_faces,); inf of a face that bounds nothing."""
+        return self.normals @ self.actual - self.offsets
+
+    @property
+    def nearest(self) -> int:
+        """Number of the nearest face."""
+        return int(np.argmin(self.slacks))
+
+    @property
+    def foot(self) -> np.ndarray:
+        """The nearest point of the plane of the nearest face, (3,)."""
+        return self.actual - self.slacks[self.nearest] * self.normals[self.nearest]
+
+
+def acceleration_set(result: Result, file: str, at: dict[str, float]) -> AccelerationSet:
+    """Feasible accelerations at an instant of a motion."""
+    robot_file, keys = robot_and_plan(result, file, "acceleration")
+    if robot_file.is_platform:
+        fault = f'"acceleration" of {robot_file.kind}'
+        raise InputError("--quantity", "acceleration", "must be of a motion of a point mass", fault=fault)
+    place, words = None, ""
+    for axis, instant in at.items():
+        place, words = nearest(result, axis, instant)  # it refuses all but t
+    with double_precision():
+        robot, frame = (
+            kernel_robot(robot_file, keys, file, any_cables=True),
+            frame_of(robot_file.base_points, robot_file.z_axis),
+        )
+        low, high = (leaf(tensions) for tensions in tension_range(robot, build_limits(robot_file, keys, file)))
+        limits = Limits(tension_min=low, tension_max=high)
+        positions, motion = frame.inward(result.data["position"]), frame.turned(result.data["acceleration"])
+        if place is None:
+            place = _tightest(robot, limits, positions, motion)
+            words = f"{value(result, 't', result.axes['t'][place])} (smallest margin)"
+        here = slice(place, place + 1)
+        faces = faces_of(robot, limits, positions[here])
+        margin = judged(robot, faces, positions[here], motion[here])[0]
+    if not np.asarray(faces.is_regular)[0]:
+        raise InputError("--at", words, "an instant at which the cables span the space, or the plane of a planar robot")
+    upward = np.array([*frame.signs[:2], -1.0])
+    rays = np.asarray(robot.base_points) - positions[place]
+    return AccelerationSet(
+        words=words,
+        position=result.data["position"][place],
+        actual=motion[place] * upward,
+        margin=float(margin[0]),
+        normals=np.asarray(faces.normals)[0] * upward,
+        offsets=np.asarray(faces.offsets)[0],
+        names=_names(robot_file.dof, len(rays), np.asarray(faces.of_largest)[0]),
+        cables=rays / np.linalg.norm(rays, axis=1, keepdims=True) * upward,
+        reach=np.asarray(high - low) / robot_file.mass,
+        apex=np.asarray(faces.apex)[0] * upward,
+        falling=np.array([0.0, 0.0, -gravity_of(robot_file, keys)]),
+        motion=motion * upward,
+        is_planar=robot_file.is_planar,
+    )
+
+
+def _tightest(robot: PointMassRobot, limits: Limits, positions: np.ndarray, motion: np.ndarray) -> int:
+    # Return the row with the smallest margin.
+    margins = []
+    for first in range(0, len(positions), ROWS):
+        here, accelerations = positions[first : first + ROWS], motion[first : first + ROWS]
+        margins.append(judged(robot, faces_of(robot, limits, here), here, accelerations)[0])
+    return int(np.nanargmin(np.concatenate(margins)))
+
+
+def _names(dof: int, count: int, of_largest: np.ndarray) -> list[str]:
+    chosen = np.tile(spanning(count, dof) + 1, (2, 1)).tolist()
+    words = [f"cable{'s' * (len(row) > 1)} {', '.join(map(str, row))}" for row in chosen]
+    return [f"{word} (largest tension)" if largest else word for word, largest in zip(words, of_largest, strict=True)]

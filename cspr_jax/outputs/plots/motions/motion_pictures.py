@@ -1,0 +1,73 @@
+"""Pictures of a motion by the names that `--quantity` takes: one row for each."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from matplotlib.figure import Figure
+
+from cspr_jax.errors import InputError
+from cspr_jax.errors.suggestions import one_of
+from cspr_jax.outputs.plots.motions.landings import landing_figure
+from cspr_jax.outputs.plots.motions.motion import motion_figure
+from cspr_jax.outputs.plots.motions.motion_source import robot_and_plan
+from cspr_jax.outputs.plots.motions.path_accelerations import path_figure
+from cspr_jax.outputs.plots.motions.phase_planes import phase_plane_figure
+from cspr_jax.outputs.plots.motions.summary import summary_figure
+from cspr_jax.outputs.plots.motions.tensions import tensions_figure
+from cspr_jax.outputs.plots.motions.trajectory import trajectory_figure
+from cspr_jax.outputs.plots.style.options import (
+    ACCELERATION,
+    LANDING,
+    PATH_ACCELERATION,
+    PHASE_PLANE,
+    SUMMARY,
+    TENSIONS,
+    TRAJECTORY,
+)
+from cspr_jax.store.reading.result import Result
+
+
+class MotionPicture(NamedTuple):
+    """A picture of a motion.
+
+    Fields:
+        draw: makes it from the motion, the name of its file, and the instant.
+        needs: quantity that the file must have; empty for none.
+        at_instant: whether it shows one instant, "t".
+    """
+
+    draw: Callable[[Result, str, dict[str, float]], Figure]
+    needs: str = ""
+    at_instant: bool = False
+
+
+def _acceleration(result: Result, file: str, at: dict[str, float]) -> Figure:
+    from cspr_jax.outputs.plots.motions.accelerations import acceleration_figure
+
+    return acceleration_figure(result, file, at)
+
+
+MOTION_PICTURES = {
+    TRAJECTORY: MotionPicture(
+        lambda result, file, _: trajectory_figure(result, *robot_and_plan(result, file, TRAJECTORY))
+    ),
+    TENSIONS: MotionPicture(lambda result, file, _: tensions_figure(result, *robot_and_plan(result, file, TENSIONS))),
+    SUMMARY: MotionPicture(lambda result, file, _: summary_figure(result, *robot_and_plan(result, file, SUMMARY))),
+    ACCELERATION: MotionPicture(_acceleration, at_instant=True),
+    PATH_ACCELERATION: MotionPicture(lambda result, file, _: path_figure(result, file), needs=PATH_ACCELERATION),
+    PHASE_PLANE: MotionPicture(lambda result, *_: phase_plane_figure(result), needs="path_speed"),
+    LANDING: MotionPicture(lambda result, *_: landing_figure(result), needs=LANDING),
+}
+
+
+def motion_picture(result: Result, file: str, quantity: str | None, at: dict[str, float]) -> Figure:
+    """The requested picture of a motion."""
+    instants = [name for name, row in MOTION_PICTURES.items() if row.at_instant]
+    if at and quantity not in instants:
+        raise InputError("--at", at, f"absent for a motion but with --quantity {', '.join(instants)}")
+    if quantity is None:
+        return motion_figure(result)
+    known = [name for name, row in MOTION_PICTURES.items() if not row.needs or row.needs in result.data]
+    if quantity not in known:
+        raise InputError("--quantity", quantity, f"{one_of(quantity, known)} for this motion, or absent")
+    return MOTION_PICTURES[quantity].draw(result, file, at)

@@ -1,0 +1,115 @@
+"""Robot and plan of a motion, from its file or from one beside it, for pictures that need more than its rows."""
+
+import dataclasses
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cspr_jax.config.equivalents import as_moved
+from cspr_jax.config.mappings import text_of
+from cspr_jax.config.motions.table import Z_AXES
+from cspr_jax.config.plan import PlanFile, kept_plan, plan_keys, read_plan
+from cspr_jax.config.reading import checked, read_text
+from cspr_jax.config.robot import RobotFile, resolve_robot
+from cspr_jax.config.wording import either
+from cspr_jax.errors import ConfigError, InputError, shown
+from cspr_jax.outputs.plots.robots.robot_along import moving
+from cspr_jax.schema.families import FAMILIES
+from cspr_jax.schema.identity import canonical_json
+from cspr_jax.store.reading.result import Result
+
+# Lengths of cables in a table and of the robot in its poses differ by rounding alone, over the longest one.
+SAME_LENGTH = 1e-6
+
+
+def keeps_plan(result: Result) -> bool:
+    """Tell whether a motion has its robot and its plan."""
+    return bool(result.attributes.get("robot_settings") and result.attributes.get("plan"))
+
+
+def completed(
+    result: Result, file: str, *, plan: Path | None, robot: dict[str, Any] | None, z_axis: str | None
+) -> Result:
+    """A motion in CSV, which keeps neither robot nor axes, with what is given of these beside it."""
+    if plan is not None:
+        return with_plan(result, file, plan)
+    if robot is not None:
+        return with_robot(result, file, robot)
+    if z_axis is None:
+        return result
+    _refuse_kept("--z-axis", z_axis, result, file)
+    if z_axis not in Z_AXES:
+        raise ConfigError("--z-axis", f"{shown(z_axis)}: must be {either(Z_AXES)}")
+    return dataclasses.replace(result, attributes=result.attributes | {"z_axis": z_axis})
+
+
+def with_plan(result: Result, file: str, path: Path) -> Result:
+    """A motion without robot and plan, with those of a plan file."""
+    _refuse_kept("--plan", str(path), result, file)
+    text = read_text(path)
+    keys = read_plan(text, path)
+    robot_file = as_moved(resolve_robot(keys.robot, path, path.parent), [FAMILIES[name].legs for name in keys.families])
+    others = {"family": keys.family} | ({"z0": keys.z0} if isinstance(keys.z0, float) else {})
+    return _with_robot_file(result, file, robot_file, path, others | {"plan": text})
+
+
+def with_robot(result: Result, file: str, keys: dict[str, Any]) -> Result:
+    """A motion without robot and plan, with a robot, as a plan that takes the motion from its file."""
+    robot = keys["robot"]
+    _refuse_kept("--robot", robot if isinstance(robot, str) else robot["name"], result, file)
+    plan = plan_keys(keys, "--robot")
+    robot_file = resolve_robot(plan.robot, "--robot", Path())
+    # The cables of a platform that only translates are those of its pairs.
+    robot_file = robot_file.equivalent() if "tension_each" in result.data else robot_file
+    return _with_robot_file(result, file, robot_file, "--robot", {"plan": text_of(keys)})
+
+
+def _refuse_kept(option: str, words: str, result: Result, file: str) -> None:
+    if result.is_map or keeps_plan(result):
+        raise ConfigError(option, f"{words}: cannot be combined with {file}, which keeps what it was made of")
+
+
+def _with_robot_file(
+    result: Result, file: str, robot_file: RobotFile, source: object, others: dict[str, Any]
+) -> Result:
+    _check_cables(result, file, robot_file, source)
+    attributes = {
+        "robot": robot_file.name,
+        "robot_settings": canonical_json(robot_file.settings),
+        "base_points": np.asarray(robot_file.base_points, float),
+        "mass": robot_file.mass,
+        "z_axis": robot_file.z_axis,
+    }
+    return dataclasses.replace(result, attributes=result.attributes | attributes | others)
+
+
+def _check_cables(result: Result, file: str, robot_file: RobotFile, path: object) -> None:
+    # The lengths must be those of this robot in these poses; for cables over pulleys only their number is known.
+    count = result.data["tension"].shape[1]
+    if len(robot_file.base_points) != count:
+        raise ConfigError(
+            path, f"its robot {robot_file.name} has {len(robot_file.base_points)} cables: {file} has {count}"
+        )
+    if robot_file.is_platform is not ("quaternion" in result.data):
+        raise ConfigError(path, f"its robot {robot_file.name} and {file}: must both turn, or both be point masses")
+    if robot_file.pulley_radius is None and "length" in result.data:
+        robot, length = moving(result.data, robot_file, np.arange(len(result.axes["t"]))), result.data["length"]
+        gap = np.abs(np.linalg.norm(robot.attached - robot.base, axis=2) - length)
+        row, cable = np.unravel_index(gap.argmax(), gap.shape)
+        if gap[row, cable] > SAME_LENGTH * length.max():
+            fault = f"cable {cable + 1} is {length[row, cable]:.6g} m long at t = {result.axes['t'][row]:.6g} s"
+            raise ConfigError(path, f"its robot {robot_file.name} is not that of {file}, where {fault}")
+
+
+def robot_and_plan(result: Result, file: str, quantity: str) -> tuple[RobotFile, PlanFile]:
+    """Robot and plan of a motion."""
+    if not keeps_plan(result):
+        fault = f'"{quantity}" of a motion that keeps no robot and no plan'
+        allowed = "must have its plan, --plan FILE.toml, or its robot, --robot, or be an HDF5 file of `cspr plan -o`"
+        raise InputError("--quantity", quantity, allowed, fault=fault)
+    settings, text = (str(result.attributes[name]) for name in ("robot_settings", "plan"))
+    # The settings were checked when the file was read.
+    robot_file = checked(RobotFile, json.loads(settings), file)
+    return robot_file.equivalent() if robot_file.translation_only else robot_file, kept_plan(text, Path(file))

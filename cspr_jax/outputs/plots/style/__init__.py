@@ -1,0 +1,1 @@
+"""Words, colours, panels and sizes that all pictures share."""

@@ -1,0 +1,129 @@
+"""Colours of the cells of a map: a scale that a few extreme cells do not use up."""
+
+import dataclasses
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm, Colormap, ListedColormap, Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+
+from cspr_jax.outputs.plots.style.layout import is_narrow
+
+NONE_COLOUR = "#d0d0d0"
+# The scale ends where this share of the cells does, if a scale of all cells would be longer by this factor. If there
+# are no more cells than the third number, all count; if there are more, at least one may lie beyond.
+MOST, STRETCH, FEW = 0.98, 1.5, 10
+# Up to so many counts always have a colour each.
+TOLD_APART = 12
+# Beyond it the arithmetic of colours overflows; no quantity of a robot is as large.
+LARGEST = 1e100
+
+
+@dataclasses.dataclass(frozen=True)
+class Scale:
+    """Colours of values.
+
+    Fields:
+        colours: the colour map.
+        norm: its bounds.
+        extend: ends at which values lie beyond: "neither", "min", "max" or "both".
+        beyond: words for the values that lie beyond; empty for none.
+        ticks: of the bar, with their texts; None: chosen automatically.
+        whole: whether all values are whole numbers.
+        missing: whether there are cells without a value.
+    """
+
+    colours: Colormap
+    norm: Normalize
+    extend: str = "neither"
+    beyond: str = ""
+    ticks: tuple[list[float], list[str]] | None = None
+    whole: bool = False
+    missing: bool = False
+
+
+def scale_of(data: np.ndarray, *, signed: bool = False) -> Scale:
+    """The scale of the values that a picture shows."""
+    if data.dtype.kind in "iu":
+        return _of_counts(data)
+    data = data.astype(float)  # the largest number is beyond those of single precision
+    inside = data[np.abs(data) < LARGEST]
+    low, high = (float(inside.min()), float(inside.max())) if inside.size else (0.0, 1.0)
+    least, most = low, high
+    if signed:
+        most = _bulk(np.abs(inside)) if inside.size else 1.0
+        high = max(abs(low), abs(high)) or 1.0
+        most = most if high > STRETCH * most > 0.0 else high
+        least, low = -most, -high
+    elif inside.size:
+        upper, lower = _bulk(inside), -_bulk(-inside)
+        most = upper if high - low > STRETCH * (upper - low) > 0.0 else high
+        least = lower if most - low > STRETCH * (most - lower) > 0.0 else low
+    above, below = bool((data > most).any()), bool((data < least).any())
+    colours = matplotlib.colormaps["PuOr_r" if signed else "cividis"].with_extremes(bad=NONE_COLOUR)
+    if most <= least:
+        most = least + (abs(least) or 1.0)
+    extend = {(False, False): "neither", (True, False): "max", (False, True): "min"}.get((above, below), "both")
+    # An infinite value has no number to show.
+    ends = data[np.isfinite(data)]
+    words = [f"up to {float(ends.max()):.3g}"] if (ends > most).any() else []
+    words += [f"down to {float(ends.min()):.3g}"] if (ends < least).any() else []
+    whole = bool((inside == np.round(inside)).all())
+    return Scale(
+        colours,
+        Normalize(least, most),
+        extend,
+        ", ".join(words),
+        whole=whole,
+        missing=bool(np.isnan(data).any()),
+    )
+
+
+def _bulk(values: np.ndarray) -> float:
+    # Return a value that occurs, not one between two values.
+    part = 1.0 if values.size <= FEW else min(MOST, 1.0 - 1.5 / values.size)
+    return float(np.quantile(values, part, method="inverted_cdf"))
+
+
+def _of_counts(data: np.ndarray) -> Scale:
+    # Counts from 1 on have a colour each; 0 and less stand for none.
+    counts = data[data > 0]
+    least, most = (int(counts.min()), int(counts.max())) if counts.size else (1, 1)
+    bulk = int(_bulk(counts)) if counts.size else 1
+    stretched = most - least + 1 > max(TOLD_APART, STRETCH * (bulk - least + 1))
+    end = max(bulk, least + TOLD_APART // 2) if stretched else most
+    number, more, none = end - least + 1, end < most, bool((data <= 0).any())
+    shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 1.0, number + more))
+    bounds = np.arange(least, end + 2) - 0.5
+    step = next(step * 10**k for k in range(10) for step in (1, 2, 5) if number <= 12 * step * 10**k)
+    ticks = [float(tick) for tick in range(-(-least // step) * step, end + 1, step)] or [float(least)]
+    texts = [f"{tick:.0f}" for tick in ticks]
+    if none:
+        bounds = np.concatenate([[min(-0.5, float(data.min()) - 0.5)], bounds])
+        ticks, texts = [float(bounds[:2].mean()), *ticks], ["none", *texts]
+    shown = [NONE_COLOUR, *shades[:number]] if none else list(shades[:number])
+    colours = ListedColormap(shown).with_extremes(over=shades[-1])
+    beyond, extend = (f"up to {most}", "max") if more else ("", "neither")
+    return Scale(colours, BoundaryNorm(bounds, len(shown)), extend, beyond, (ticks, texts), whole=True)
+
+
+def add_bar(figure: Figure, image, panels: list[Axes], scale: Scale, words: str) -> dict[str, Artist]:
+    """Explain colours of panels: by a bar, below them in a narrow picture, or for words by entries of its legend."""
+    ticks, texts = scale.ticks or ([], [])
+    if is_narrow() and texts and not any(text.lstrip("-").isdigit() for text in texts):
+        return {text: Patch(color=image.cmap(image.norm(tick))) for tick, text in zip(ticks, texts, strict=True)}
+    text = f"{words}; {scale.beyond}" if scale.beyond else words
+    where: dict[str, Any] = {"location": "bottom", "aspect": 30, "pad": 0.02} if is_narrow() else {"shrink": 0.9}
+    bar = figure.colorbar(image, ax=panels, extend=scale.extend, label=text, spacing="uniform", **where)
+    if scale.ticks is not None:
+        bar.set_ticks(scale.ticks[0], labels=scale.ticks[1])
+        bar.ax.minorticks_off()
+    elif scale.whole:
+        bar.locator = MaxNLocator(8, integer=True)
+        bar.update_ticks()
+    return {}

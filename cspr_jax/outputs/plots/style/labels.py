@@ -1,0 +1,132 @@
+"""Words and colours that all pictures share: names, units, numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cspr_jax.outputs.plots.style.fitting import shortened
+from cspr_jax.schema.quantities import MARGIN_UNITS
+from cspr_jax.store.reading.result import Result
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Axes whose names in files are no words.
+WORDS = {
+    "tilt_azimuth": "azimuth of the tilt",
+    "circle_radius": "radius of the circle",
+    "scale": "scale of the ellipse",
+    "tau": "normalised time",
+    "inclination": "inclination v",
+    "from_x": "x of the start",
+    "from_y": "y of the start",
+    "from_z": "z of the start",
+}
+LONGEST_LABEL = 80
+PANELS = 6
+# Okabe and Ito: told apart by the colour-blind; the dashes help in grey.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+# Units as pictures show them.
+WRITTEN = {
+    **{"m s-1": "m/s", "m s-2": "m/s²", "rad s-1": "rad/s", "rad s-2": "rad/s²"},
+    **{"m m-1": "m/m", "rad m-1": "rad/m"},
+}
+STYLES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)))
+
+
+def line_look(number: int) -> dict[str, Any]:
+    """Colour and style of one line of many."""
+    style = STYLES[(number + number // len(COLOURS)) % len(STYLES)]
+    return {"color": COLOURS[number % len(COLOURS)], "linestyle": style}
+
+
+def cable_names(columns: Mapping[str, np.ndarray]) -> list[str]:
+    """Names of the columns of a motion's tensions."""
+    word = "pair" if "tension_each" in columns else "cable"
+    return [f"{word} {k + 1}" for k in range(columns["tension"].shape[1])]
+
+
+def margin_unit(segments: Mapping[str, np.ndarray], i: int) -> str:
+    """Unit of the margin of a segment as pictures show it."""
+    codes = segments.get("segment_margin_unit", ())
+    unit = MARGIN_UNITS[int(codes[i])] if len(codes) and 0 <= codes[i] < len(MARGIN_UNITS) else "1"
+    return "" if unit == "1" else unit.replace("^2", "²")
+
+
+def robot_name(result: Result) -> str:
+    """The robot, as a title names it."""
+    return shortened(result.attributes["robot"])
+
+
+def heading(result: Result, name: str) -> str:
+    """The first line of a title."""
+    return f"{robot_name(result)}: {shortened(result.labels[name], LONGEST_LABEL)}"
+
+
+def label(result: Result, name: str) -> str:
+    """A quantity for an axis or a colour bar."""
+    return shortened(result.labels[name], LONGEST_LABEL) + _in_brackets(result, name)
+
+
+def axis_label(result: Result, axis: str) -> str:
+    """A coordinate for an axis."""
+    return WORDS.get(axis, shortened(axis)) + _in_brackets(result, axis)
+
+
+def _in_brackets(result: Result, name: str) -> str:
+    symbol = unit(result, name)
+    return f" ({symbol})" if symbol else ""
+
+
+def unit(result: Result, name: str) -> str:
+    """The unit that a picture shows."""
+    units = result.units[name]
+    symbol = "°" if is_angle(result, name) else WRITTEN.get(units, shortened(units))
+    return "" if symbol == "1" else symbol
+
+
+def is_angle(result: Result, name: str) -> bool:
+    """Tell whether an axis or a quantity is an angle, in radians in the file and in degrees in pictures."""
+    return result.units.get(name) == "rad"
+
+
+def as_drawn(result: Result, name: str, values: np.ndarray) -> np.ndarray:
+    """Values in the unit of the picture."""
+    return np.degrees(values) if is_angle(result, name) else values
+
+
+def principal_angle(degrees: float) -> float:
+    """An angle without whole revolutions."""
+    return degrees if abs(degrees) <= 180.0 + 1e-9 else (degrees + 180.0) % 360.0 - 180.0
+
+
+def value(result: Result, axis: str, point: float, *, digits: int = 4) -> str:
+    """A coordinate with its value."""
+    drawn = float(as_drawn(result, axis, np.asarray(point, float)))
+    symbol = unit(result, axis)
+    if is_angle(result, axis):
+        drawn = principal_angle(drawn)
+    # A range that passes zero may miss it by rounding.
+    drawn = 0.0 if abs(drawn) <= 1e-12 else drawn
+    name = WORDS.get(axis, shortened(axis))
+    if axis == "cable":
+        return f"{name} {drawn:g}"
+    return f"{name} = {drawn:.{digits}g}" + (f" {symbol}" if symbol not in ("", "°") else symbol)
+
+
+def values(result: Result, axis: str, points: Float[np.ndarray, "n"]) -> list[str]:
+    """Coordinates with their values, in as few digits as tell them apart, but at least three."""
+    texts: list[str] = []
+    for digits in range(3, 17):
+        texts = [value(result, axis, point, digits=digits) for point in points]
+        if len(set(texts)) == len(set(points.tolist())):
+            break
+    return texts
+
+
+def chosen(count: int, most: int) -> np.ndarray:
+    """Evenly chosen points of many."""
+    return np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int))

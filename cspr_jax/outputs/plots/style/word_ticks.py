@@ -1,0 +1,50 @@
+"""Quantities whose numbers stand for words, as colours and ticks with these words: verdicts, and bounds by name."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import matplotlib
+import numpy as np
+from matplotlib.colors import BoundaryNorm, ListedColormap, to_hex
+
+from cspr_jax.outputs.plots.style.colours import NONE_COLOUR, Scale
+from cspr_jax.outputs.plots.style.labels import COLOURS
+from cspr_jax.outputs.plots.style.verdict_colours import reasons
+from cspr_jax.schema.map_kinds import quantity_of
+from cspr_jax.schema.meanings import meanings_of
+from cspr_jax.store.reading.result import Result
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Okabe and Ito's colours, too; if there are more words, the colours follow each other.
+MORE = (*COLOURS, "#F0E442", "#000000")
+
+
+def worded(
+    result: Result, name: str, values: Float[np.ndarray, "..."]
+) -> tuple[np.ndarray, list[str], list[str]] | None:
+    """Words that the values of a quantity stand for."""
+    quantity = quantity_of(result.attributes.get("map"), name)
+    if quantity.unflagged:
+        return reasons(values, quantity.unflagged)
+    words = meanings_of(quantity, result.settings)
+    return _named(values, words) if words else None
+
+
+def _named(values: np.ndarray, words: tuple[str, ...]) -> tuple[np.ndarray, list[str], list[str]]:
+    # A word has the same colour in all pictures of a sweep, where there are colours for all. 0 stands for none.
+    used = np.unique(values)
+    few = len(words) - 1 <= len(MORE)
+    ranks = used - 1 if few else np.arange(len(used)) - (0 in used)
+    shades = MORE if few else [to_hex(c) for c in matplotlib.colormaps["viridis"](np.linspace(0.0, 1.0, len(used)))]
+    known = [words[number] if number < len(words) else f"{number}" for number in used.tolist()]
+    colours = [shades[rank % len(shades)] if number else NONE_COLOUR for number, rank in zip(used, ranks, strict=True)]
+    return np.searchsorted(used, values), known, colours
+
+
+def word_scale(words: list[str], colours: list[str]) -> Scale:
+    """The scale of numbers that stand for words."""
+    norm = BoundaryNorm(np.arange(len(colours) + 1) - 0.5, len(colours))
+    return Scale(ListedColormap(colours), norm, ticks=([float(i) for i in range(len(words))], words))

@@ -1,0 +1,231 @@
+"""Bounds of clearances over a block of time: cables from each other, from obstacles and from their platform.
+
+Meetings are those of `robots.contacts.clearance.Scene`. Where no shape of a rigid platform is known and its points lie
+in a plane, the criterion of the thesis (section 3.10.2) takes its place: cables may not pass over the platform's face,
+from whose corner they must be apart. Its clearance is the distance of the spool, as the platform sees it, from the
+sector of the corner, which it may reach at an instant only.
+
+Clearances are signed: where solid bodies meet they are minus the least translation that parts them, and at least
+minus `Bodies.deepest`. Cables without thickness, and cables and sectors, meet at isolated instants only, at which the
+clearance is 0. That they pass through each other is proved where the volume that they span (the height of the cable
+over the face) has opposite signs at both ends of a block, while their lines are nearest to each other inside of both
+cables (the cable is over the sector) all the time: `passings`. Cables of a planar platform lie in one plane, so that
+they may cross for a while; they count as `Bodies.deepest` deep then.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, constant, cross, dot, norm_squared, stacked, turned
+from cspr_jax.numerics.bounds.determinant_bounds import changes_sign
+from cspr_jax.robots.bounds.state_bounds import CableBounds, StateBounds
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.contacts.contact_bodies import Bodies, Shape
+from cspr_jax.robots.contacts.convex_gaps import (
+    BOX,
+    SEGMENT,
+    Solid,
+    along,
+    clearance_bounds,
+    depth_bound,
+    distance_bound,
+    turning,
+)
+from cspr_jax.robots.contacts.interference_lanes import residual
+from cspr_jax.robots.model.patterns import PATTERNS
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Rounding of the corners of shapes, over the size of a scene; cosines up to which directions point away from a sector.
+ROUNDING, POLAR = 1e-14, 1e-12
+
+Range = tuple[Array, Array]
+
+
+def contact_bounds(robot: AnyRobot, bodies: Bodies, state: StateBounds, cables: CableBounds) -> Range:
+    """Bounds of clearances between surfaces, over one block."""
+    ends, parts = _ends(state, cables), []
+    if len(bodies.pairs):
+        parts.append(_of_pairs(robot, bodies, ends))
+    if len(bodies.order):
+        low, high = jax.vmap(lambda x: _from_obstacles(bodies, Solid(x, *SEGMENT)))(ends)
+        parts.append((low.T - bodies.radii[None], high.T - bodies.radii[None]))
+    if bodies.body is not None:
+        parts.append(_of_platform(bodies, bodies.body, state, cables, ends))
+        if len(bodies.order):
+            parts.append(_platform_from_obstacles(bodies, bodies.body, state))
+    if bodies.sectors is not None:
+        sides, normal = bodies.sectors
+        parts.append(jax.vmap(lambda side, way: _from_sector(side, normal, way))(sides, _seen(state, ends)))
+    if not parts:
+        return jnp.zeros(0), jnp.zeros(0)
+    low, high = (jnp.concatenate([side.ravel() for side in sides]) for sides in zip(*parts, strict=True))
+    allowance = ROUNDING * bodies.size
+    return low - allowance, high + allowance
+
+
+def passings(robot: AnyRobot, bodies: Bodies, state: StateBounds, cables: CableBounds) -> Float[Array, "n_meetings"]:
+    """Cables that are proved to pass through each other, or over the platform, within one block."""
+    ends, first = _ends(state, cables), bodies.pairs[:, 0]
+    through = jax.vmap(_pass)(*(ends.each(lambda x, k=k: x[bodies.pairs[:, k]]) for k in range(2)))
+    n_others = len(bodies.order) * len(bodies.radii)
+    if bodies.body is not None:
+        n_others += len(bodies.radii) + len(bodies.order)
+    parts = [through, jnp.zeros(n_others, bool)] if len(first) else [jnp.zeros(n_others, bool)]
+    if bodies.sectors is not None:
+        sides, normal = bodies.sectors
+        parts.append(jax.vmap(lambda side, way: _passes_over(side, normal, way))(sides, _seen(state, ends)))
+    return jnp.concatenate(parts)
+
+
+def corner_depths(corners: Float[Array, "n_corners 3"], state: StateBounds) -> AffineBounds:
+    """Bounds of the depths of points of a platform."""
+    return dot(state.rotation.each(lambda x: x[2][None]), corners) + state.position.each(lambda x: x[2])
+
+
+def _ends(state: StateBounds, cables: CableBounds) -> AffineBounds:
+    # Points at which the cables leave, and those at which they are attached, (n_cables, 2, 3).
+    attached = state.position.each(lambda x: jnp.broadcast_to(x, cables.exit.middle.shape))
+    attached = attached if cables.arm is None else attached + cables.arm
+    return stacked([cables.exit, attached], axis=1)
+
+
+def _seen(state: StateBounds, ends: AffineBounds) -> AffineBounds:
+    # Cables from the platform to the spools in platform axes, (n_cables, 3).
+    away = ends.each(lambda x: x[:, 0]) - ends.each(lambda x: x[:, 1])
+    return turned(state.rotation.each(lambda x: x.T[None]), away)
+
+
+def _of_pairs(robot: AnyRobot, bodies: Bodies, ends: AffineBounds) -> Range:
+    first, second = (ends.each(lambda x, k=k: x[bodies.pairs[:, k]]) for k in range(2))
+    low, high = jax.vmap(lambda p, q: clearance_bounds(Solid(p, *SEGMENT), Solid(q, *SEGMENT)))(first, second)
+    low = jnp.maximum(low, 0.0)
+    if PATTERNS[robot.pattern].is_planar:
+        low = jnp.where(low > 0.0, low, -bodies.deepest)
+        high = jnp.where(jax.vmap(_cross_in_plane)(first, second), -bodies.deepest, high)
+    need = bodies.radii[bodies.pairs].sum(1)
+    return low - need, high - need
+
+
+def _cross_in_plane(first: AffineBounds, second: AffineBounds) -> Array:
+    # Tell whether segments (2, 3) in the plane y = 0 cross throughout: the ends of each are on two sides of the other.
+    def parted(line: AffineBounds, points: AffineBounds) -> Array:
+        start = line.each(lambda x: x[:1])
+        ray, apart = line.each(lambda x: x[1:]) - start, points - start
+        side = cross(ray, apart).each(lambda x: x[:, 1])
+        low, high = side.low(), side.high()
+        return ((low[0] > 0.0) & (high[1] < 0.0)) | ((high[0] < 0.0) & (low[1] > 0.0))
+
+    return parted(first, second) & parted(second, first)
+
+
+def _from_obstacles(bodies: Bodies, solid: Solid) -> Range:
+    # Bound the distances of a body from all obstacles, (n_obstacles,).
+    parts = []
+    if len(bodies.rods):
+        low, high = jax.vmap(lambda rod: clearance_bounds(solid, Solid(constant(rod), *SEGMENT)))(bodies.rods)
+        parts.append((jnp.maximum(low, 0.0) - bodies.rod_radii, high - bodies.rod_radii))
+    if bodies.boxes is not None:
+
+        def from_box(box: Shape) -> Range:
+            return _signed(bodies, solid, Solid(constant(box.corners), *BOX), depth_bound(solid, box.planes))
+
+        parts.append(jax.vmap(from_box)(bodies.boxes))
+    low, high = (jnp.concatenate(sides)[bodies.order] for sides in zip(*parts, strict=True))
+    return low, high
+
+
+def _signed(bodies: Bodies, first: Solid, second: Solid, depth: Array) -> Range:
+    low, high = clearance_bounds(first, second)
+    return jnp.maximum(low, -bodies.deepest), jnp.maximum(jnp.minimum(high, depth), -bodies.deepest)
+
+
+def _of_platform(bodies: Bodies, body: Shape, state: StateBounds, cables: CableBounds, ends: AffineBounds) -> Range:
+    # In the axes of the platform its shape and the attachment points do not move.
+    away = turned(state.rotation.each(lambda x: x.T[None]), cables.direction)
+    spools = _inward(state, ends.each(lambda x: x[:, 0]))
+    starts = away * bodies.leave + bodies.points
+    shape = Solid(constant(body.corners), body.edges, body.faces)
+
+    def one(start: AffineBounds, spool: AffineBounds) -> Range:
+        cable = Solid(stacked([start, spool], axis=0), *SEGMENT)
+        return _signed(bodies, cable, shape, depth_bound(cable, body.planes))
+
+    low, high = jax.vmap(one)(starts, spools)
+    # A cable that may be as short as the part that is left out is not judged.
+    is_long = cables.length.low() > bodies.leave
+    return jnp.where(is_long, low, -bodies.deepest) - bodies.radii, jnp.where(is_long, high, jnp.inf) - bodies.radii
+
+
+def _inward(state: StateBounds, points: AffineBounds) -> AffineBounds:
+    # Points (n, 3) in the axes of the platform, from the mass centre.
+    return turned(state.rotation.each(lambda x: x.T[None]), points - state.position.each(lambda x: x[None]))
+
+
+def _platform_from_obstacles(bodies: Bodies, body: Shape, state: StateBounds) -> Range:
+    shape, parts = Solid(constant(body.corners), body.edges, body.faces), []
+    place = turned(state.rotation.each(lambda x: x[None]), body.corners) + state.position.each(lambda x: x[None])
+
+    def from_rod(rod: Array) -> Range:
+        axis = Solid(_inward(state, constant(rod)), *SEGMENT)
+        return _signed(bodies, axis, shape, depth_bound(axis, body.planes))
+
+    def from_box(box: Shape) -> Range:
+        brick = Solid(_inward(state, constant(box.corners)), *BOX)
+        depth = depth_bound(Solid(place, body.edges, body.faces), box.planes)
+        return _signed(bodies, brick, shape, jnp.minimum(depth, depth_bound(brick, body.planes)))
+
+    if len(bodies.rods):
+        low, high = jax.vmap(from_rod)(bodies.rods)
+        parts.append((low - bodies.rod_radii, high - bodies.rod_radii))
+    if bodies.boxes is not None:
+        parts.append(jax.vmap(from_box)(bodies.boxes))
+    low, high = (jnp.concatenate(sides)[bodies.order] for sides in zip(*parts, strict=True))
+    return low, high
+
+
+def _from_sector(sides: Array, normal: Array, way: AffineBounds) -> Range:
+    # Bound the distance of the end of a cable (3,), seen from its corner, from the sector of the corner. A direction
+    # that points away from the sector has no positive component along its sides, and along the direction between them.
+    def off(seen: Array) -> Array:
+        parts = residual((tuple(sides[0]), tuple(sides[1])), tuple(normal), tuple(seen))
+        return jnp.stack(parts)
+
+    def unit(vector: Array) -> Array:
+        return vector / jnp.sqrt(jnp.maximum(jnp.sum(vector**2, axis=-1, keepdims=True), 1e-200))
+
+    one, two = unit(sides)
+    rays = jnp.stack([one, unit(jnp.cross(normal, two) + jnp.cross(one, normal)), two])
+    line = turning(lambda seen: unit(off(seen)), way)
+    reach = jnp.maximum(rays @ (line.middle - line.slope), rays @ (line.middle + line.slope))
+    line = line._replace(slope=jnp.where((reach <= POLAR).all(), line.slope, 0.0))
+    low = along(line, way.each(lambda x: x[None]))
+    size = jnp.sqrt(norm_squared(way).high())
+    is_polar = (rays @ line.middle <= POLAR).all()
+    low = jnp.where(is_polar, jnp.maximum(low - 4.0 * POLAR * size, 0.0), 0.0)
+    return low, distance_bound(constant(way.middle - off(way.middle)), way)
+
+
+def _pass(first: AffineBounds, second: AffineBounds) -> Array:
+    start, other = (x.each(lambda y: y[0]) for x in (first, second))
+    u, v = (x.each(lambda y: y[1]) - x.each(lambda y: y[0]) for x in (first, second))
+    between, normal = other - start, cross(u, v)
+    square = norm_squared(normal)
+    is_inside = square.low() > 0.0
+    for ray in (v, u):
+        # Share of a cable at which the lines are nearest, times the square of the normal.
+        share = dot(cross(between, ray), normal)
+        is_inside &= (share.low() > 0.0) & ((square - share).low() > 0.0)
+    return is_inside & changes_sign(dot(between, normal))
+
+
+def _passes_over(sides: Array, normal: Array, way: AffineBounds) -> Array:
+    over = [dot(way, jnp.cross(normal, sides[1])), -dot(way, jnp.cross(normal, sides[0]))]
+    is_inside = (over[0].low() > 0.0) & (over[1].low() > 0.0)
+    return changes_sign(dot(way, normal)) & (is_inside | (sides == 0.0).all())

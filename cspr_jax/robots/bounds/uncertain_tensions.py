@@ -1,0 +1,207 @@
+"""Tensions of all robots within an uncertainty, over a block of time, by how far they are from the planned robot's.
+
+Another robot's spool j moves ray j, of length l_j. A part of that along the ray only scales it; across it the unit
+vector u_j gains a vector eps_j that is no longer than t_j. With tensions phi_j at unit vectors u_j + eps_j, which are
+those of the cables over sqrt(1 + eps_j^2), A the planned matrix, f tensions that balance the planned robot, and B a
+right inverse of A in the middle of the block, phi = f + d balances the other robot where
+
+    d = B (delta w - (A' - A) f) - B (A' - A_c) d,    so |d| <= b + (G + D) |d|,    b = |B delta w| + D |f|,
+
+component by component: G bounds B (A - A_c), and D_kj = |part of g_kj across u_j| t_j, g_kj being the change of row k
+of B A with ray j. Where x >= b + (G + D) x for some x > 0 the spectral radius of G + D is below 1; then there is such a
+d, |d| <= x, and A' has full rank. Cauchy's inequality bounds B delta w for a displaced mass centre.
+
+On as many cables as components a closer bound follows from there (docs/theory.md): until a first tension k reaches its
+smallest value, d_k is made of the sum of D_kj phi_j, which is at most y w' for every y with y A' >= D_k.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, NamedTuple
+
+import jax.numpy as jnp
+from jax import Array, lax
+
+from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, constant, cross, dot, norm, turned
+from cspr_jax.numerics.elementary import solved
+from cspr_jax.robots.bounds.state_bounds import CableBounds, StateBounds, balance_bounds, balanced_part
+from cspr_jax.robots.bounds.witness_tensions import witness_tensions
+from cspr_jax.robots.cables import AnyRobot, wrench_units
+from cspr_jax.robots.model.patterns import PATTERNS
+from cspr_jax.robots.model.platform import PlatformRobot
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Surplus of a solution, and least change of tensions, as parts of the largest of them.
+SURPLUS = 1e-9
+# Rounds in which functionals are corrected, and the relative surplus of each correction.
+ROUNDS, SPARE = 8, 0.01
+
+
+class UncertainTensions(NamedTuple):
+    """Tensions of all robots within an uncertainty, over one block.
+
+    Fields:
+        low: (n_cables,) bounds below tensions that balance each robot, N; -inf where nothing is known.
+        high: (n_cables,) bounds above the same tensions, N; inf likewise.
+    """
+
+    low: Array
+    high: Array
+
+
+def with_mass(robot: AnyRobot, ratio: Float[Array, ""]) -> AnyRobot:
+    """A robot whose mass is another one, its inertia in proportion."""
+    if isinstance(robot, PlatformRobot):
+        return dataclasses.replace(robot, mass=robot.mass * ratio, inertia=robot.inertia * ratio)
+    return dataclasses.replace(robot, mass=robot.mass * ratio)
+
+
+def uncertain_tensions(
+    robot: AnyRobot,
+    state: StateBounds,
+    cables: CableBounds,
+    limits: tuple[Float[Array, "n_cables"], Float[Array, "n_cables"]],
+    sizes: tuple[Float[Array, ""], Float[Array, ""]],
+) -> UncertainTensions:
+    """Tensions of all robots that differ from one by places of spools and of the mass centre."""
+    unit = 1.0 / wrench_units(robot)
+    matrix, wrench = balance_bounds(robot, state, cables)
+    matrix, wrench = matrix * unit[:, None], wrench * unit
+    witness = witness_tensions(matrix, wrench, *limits)
+    tensions, inverse = witness.tension, witness.inverse
+    sine = sizes[0] / cables.length.low()
+    tilt = jnp.where((sine >= 0.0) & (sine < 1.0), sine, jnp.nan) / jnp.sqrt(1.0 - sine**2)
+    block = _UnitBlock(inverse, matrix, _across(robot, state, cables, unit), tilt, tensions)
+    centre = _centre_change(robot, state, inverse * unit[None], sizes[1]) + SURPLUS * jnp.max(tensions.size())
+    within, displaced = block.changes(inverse)
+    most = _solution(within + displaced, displaced @ tensions.size() + centre)
+    down, up = most, most
+    if robot.n_cables == robot.dof:
+        down, up = _closer(block, displaced, within @ most + centre, limits[0], centre)
+        down, up = jnp.fmin(most, down), jnp.fmin(most, up)
+    low, high = tensions.low() - down, tensions.high() + up
+    is_known = jnp.isfinite(low).all() & jnp.isfinite(high).all()
+    # A tension at a tilted unit vector is that of its cable over the length of the vector, at least 1.
+    stretch = jnp.sqrt(1.0 + tilt**2)
+    low = jnp.where(low < 0.0, low * stretch, low)
+    return UncertainTensions(jnp.where(is_known, low, -jnp.inf), jnp.where(is_known, high * stretch, jnp.inf))
+
+
+class _UnitBlock(NamedTuple):
+    # A right inverse (n_cables, dof) of the matrix in the middle; bounds of the matrix, of its changes with unit
+    # vectors across cables (dof, n_cables, 3), and of the planned tensions; tilts (n_cables,).
+    inverse: Array
+    matrix: AffineBounds
+    across: AffineBounds
+    tilt: Array
+    tensions: AffineBounds
+
+    def changes(self, rows: Array) -> tuple[Array, Array]:
+        # Bound what rows (m, dof) times the matrix change within the block, and with displaced spools, (m, n_cables).
+        dof, count = self.matrix.middle.shape
+        left = jnp.abs(self.matrix.middle @ self.inverse - jnp.eye(dof))
+        rounding = jnp.where(jnp.sum(left, axis=1).max() < 0.5 * SURPLUS, SURPLUS, jnp.nan)
+        radius = self.matrix.radius + rounding * jnp.sum(jnp.abs(self.matrix.middle), axis=0, keepdims=True)
+        within = jnp.abs(rows @ self.matrix.slope) + jnp.abs(rows) @ radius
+        ways = turned(self.across.each(lambda x: x.reshape(dof, -1).T[None]), rows)
+        return within, norm(ways.each(lambda x: x.reshape(len(rows), count, 3))).high() * self.tilt[None]
+
+
+def _closer(block: _UnitBlock, displaced: Array, rest: Array, least: Array, centre: Array) -> tuple[Array, Array]:
+    # Bound how much each tension falls and rises, (n_cables,); NaN where one might fall below the smallest tension.
+    diagonal = jnp.diagonal(displaced)
+    less, up = _largest_sum(block, jnp.stack([displaced - jnp.diag(diagonal), displaced]), centre)
+    down, up = less + diagonal * least + rest, up + rest
+    is_valid = (block.tensions.low() - down > least).all() & (least >= 0.0).all()
+    return jnp.where(is_valid, down, jnp.nan), jnp.where(is_valid, up, jnp.nan)
+
+
+def _largest_sum(block: _UnitBlock, weights: Array, centre: Array) -> Array:
+    # Bound sums of tensions of any robot, none below 0, times rows of weights, (2, n_cables); NaN: no bound is known.
+    shape, weights = weights.shape[:2], weights.reshape(-1, weights.shape[2])
+    high, floor = block.tensions.high(), SURPLUS * jnp.max(weights, axis=1, keepdims=True)
+
+    def corrected(_, more: Array) -> Array:
+        return sum(block.changes((weights + more) @ block.inverse)) * (1.0 + SPARE) + floor
+
+    more = lax.fori_loop(0, ROUNDS, corrected, jnp.zeros_like(weights))
+    within, shifted = block.changes((weights + more) @ block.inverse)
+    total = (weights + more) @ (high + centre) + within @ high
+    return jnp.where((within + shifted <= more).all(1), total, jnp.nan).reshape(shape)
+
+
+def centre_wrench(robot: AnyRobot, state: StateBounds, centre: Float[Array, "3"]) -> AffineBounds:
+    """Bounds of what a displaced mass centre adds to the wrench that cables must supply."""
+    if not isinstance(robot, PlatformRobot):
+        return constant(jnp.zeros(robot.dof))
+    linear = turned(_centre_influence(robot, state), centre)
+    force = turned(_whirl(state), centre) * robot.mass
+    return linear + _wrench_of(robot, state, None, cross(constant(centre), force))
+
+
+def _across(robot: AnyRobot, state: StateBounds, cables: CableBounds, unit: Array) -> AffineBounds:
+    # Changes of the wrenches of unit tensions with their unit vectors, across these, (dof, n_cables, 3).
+    units = jnp.tile(jnp.eye(3), (robot.n_cables, 1))
+    forces = constant(units.T)
+    if isinstance(robot, PlatformRobot) and cables.arm is not None:
+        arms = cables.arm.each(lambda x: jnp.repeat(x, 3, axis=0))
+        forces = balanced_part(robot, state.rotation, forces, cross(arms, constant(units)).each(jnp.transpose))
+    else:
+        forces = forces.each(lambda x: x[jnp.array(PATTERNS[robot.pattern].forces)])
+    ways = (forces * unit[:, None]).each(lambda x: x.reshape(robot.dof, robot.n_cables, 3))
+    units_of_cables = cables.direction.each(lambda x: x[None])
+    along = dot(ways, units_of_cables)
+    return ways - units_of_cables * along.each(lambda x: x[..., None])
+
+
+def _wrench_of(
+    robot: PlatformRobot, state: StateBounds, force: AffineBounds | None, moment: AffineBounds
+) -> AffineBounds:
+    # Components of one force and moment (3,) that the cables balance, (dof,).
+    force = constant(jnp.zeros(3)) if force is None else force
+    parts = (bounds.each(lambda x: x[:, None]) for bounds in (force, moment))
+    return balanced_part(robot, state.rotation, *parts).each(lambda x: x[:, 0])
+
+
+def _whirl(state: StateBounds) -> AffineBounds:
+    # Maps points of the platform to their relative accelerations, (3, 3).
+    axes = constant(jnp.eye(3))
+    rate, acceleration = (
+        bounds.each(lambda x: x[None]) for bounds in (state.angular_velocity, state.angular_acceleration)
+    )
+    return (cross(acceleration, axes) + cross(rate, cross(rate, axes))).each(jnp.transpose)
+
+
+def _centre_influence(robot: PlatformRobot, state: StateBounds) -> AffineBounds:
+    # Share of a displaced mass centre in the wrench, to first order, (dof, 3) per length.
+    whirl, axes = _whirl(state) * robot.mass, constant(jnp.eye(3))
+    force = (state.acceleration + jnp.asarray([0.0, 0.0, -1.0]) * robot.gravity) * robot.mass
+    moment: AffineBounds | None = None
+    if PATTERNS[robot.pattern].is_jointed and robot.centre_of_mass is not None:
+        arm = turned(state.rotation, robot.centre_of_mass)
+        force = force + turned(whirl, arm)
+        moment = cross(arm.each(lambda x: x[None]), whirl.each(jnp.transpose))
+    turning = cross(axes, force.each(lambda x: x[None]))
+    moment = turning if moment is None else turning + moment
+    return balanced_part(robot, state.rotation, whirl, moment.each(jnp.transpose))
+
+
+def _centre_change(robot: AnyRobot, state: StateBounds, inverse: Array, size: Array) -> Array:
+    # Bound what a displaced mass centre changes of tensions, (n_cables,) N.
+    if not isinstance(robot, PlatformRobot):
+        return jnp.zeros(robot.n_cables)
+    influence = _centre_influence(robot, state).each(lambda x: x.T[None])
+    moments = balanced_part(robot, state.rotation, constant(jnp.zeros((3, 3))), constant(jnp.eye(3)))
+    turning = turned(moments.each(lambda x: x.T[None]), inverse)
+    whirl = jnp.linalg.norm(_whirl(state).size()) * robot.mass
+    return size * (norm(turned(influence, inverse)).high() + size * whirl * norm(turning).high())
+
+
+def _solution(matrix: Array, right: Array) -> Array:
+    # Find x with x >= matrix x + right, all of them positive; NaN without.
+    x = solved(jnp.eye(len(right)) - matrix, right[:, None])[0][:, 0] * (1.0 + SURPLUS)
+    holds = (x > 0.0).all() & (right > 0.0).all() & (matrix @ x + right <= x).all()
+    return jnp.where(holds, x, jnp.nan)

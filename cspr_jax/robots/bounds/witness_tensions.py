@@ -1,0 +1,160 @@
+"""Witness tensions: tensions that balance a motion throughout a block of time, and bounds of how central they can be.
+
+A line f + s f' of tensions, whose middle and slope are corrected by the balance and its derivative, leaves a residual
+r(s) of second order; a parabola, beside bounds of the balance around parabolas, leaves one of third order. For any B
+with A(s) B = 1 + E(s), the correction B (1 + E)^-1 r balances exactly, and where the rows of |E| sum to less than 1 it
+is bounded. Where the bounds keep the limits, there are tensions within them at every instant: a proof. On as many
+cables as components these are the only ones, and A is nowhere singular.
+
+For more cables, the line joins the most central tensions at both ends of the block: between them tensions are at least
+about as far from their limits, also where another face becomes the nearest one. A face of the set of wrenches refutes.
+With y(s) normal to the d - 1 columns that span it (found in the same way, as a solution of a balance), tensions that
+are r from their limits give at most y w >= sum of y A_i times the limit on the other side, and r sum |y A_i|: that
+bounds r from above.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, constant, dot, squares, turned
+from cspr_jax.numerics.elementary import solved
+from cspr_jax.robots.statics.wrench_sets import FLAT
+from cspr_jax.robots.tensions.nearest_face import NearestFace, nearest_face
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+
+class WitnessTensions(NamedTuple):
+    """Tensions of one block.
+
+    Fields:
+        tension: (n_cables,) bounds of tensions that balance throughout, N; radii are NaN where nothing is known.
+        below: (2,) at start and end of the block, a line below the largest distance of tensions from their limits, N;
+            -inf where nothing is known.
+        above: (2,) likewise a line above it; inf where nothing is known.
+        is_regular: () whether the matrix is proved to have full rank throughout.
+        inverse: (n_cables, dof) right inverse of the matrix in the middle.
+    """
+
+    tension: AffineBounds
+    below: Array
+    above: Array
+    is_regular: Array
+    inverse: Array
+
+    @property
+    def margin_low(self) -> Array:
+        """Lower bound of the largest distance of tensions from their limits, at every instant, N."""
+        return self.below.min(-1)
+
+    @property
+    def margin_high(self) -> Array:
+        """Upper bound of the same."""
+        return self.above.max(-1)
+
+
+def witness_tensions(
+    matrix: AffineBounds, wrench: AffineBounds, low: Float[Array, "n_cables"], high: Float[Array, "n_cables"]
+) -> WitnessTensions:
+    """Tensions that balance a motion throughout a block."""
+    dof, count = matrix.middle.shape
+    inverse = right_inverse(matrix.middle)
+    if count == dof:
+        tension, is_regular = _solution(matrix, inverse, wrench, jnp.zeros(count), jnp.zeros(count))
+        smallest = jnp.min(jnp.minimum(tension.high() - low, high - tension.low()))
+        above = jnp.broadcast_to(jnp.where(is_regular, smallest, jnp.inf), (2,))
+    else:
+        matrices, wrenches = (
+            jnp.stack([x.middle + squares(x) - x.slope, x.middle + squares(x) + x.slope]) for x in (matrix, wrench)
+        )
+        faces = jax.vmap(nearest_face, (0, 0, None, None))(matrices, wrenches, low, high)
+        before, after = faces.tensions
+        nearer = jnp.argmin(jnp.min(jnp.minimum(faces.tensions - low[None], high[None] - faces.tensions), axis=1))
+        face = jax.tree.map(lambda leaf: leaf[nearer], faces)
+        back = inverse if matrix.square is None else _central_inverse(matrix.middle, face, inverse)
+        tension, is_regular = _solution(matrix, back, wrench, 0.5 * (before + after), 0.5 * (after - before))
+        above = _face_margin(matrix, inverse, wrench, (low, high), face)
+    if tension.square is not None:
+        least = jnp.min(jnp.minimum(tension.low() - low, high - tension.high()))
+        below = jnp.broadcast_to(jnp.where(is_regular, least, -jnp.inf), (2,))
+        return WitnessTensions(tension, below, above, is_regular, inverse)
+    # The smallest of functions above lines is above the line between the smallest values at both ends.
+    lines = tension.middle - tension.slope, tension.middle + tension.slope
+    slacks = [jnp.minimum(line - low, high - line) - tension.radius for line in lines]
+    below = jnp.stack([jnp.min(slack) for slack in slacks])
+    return WitnessTensions(tension, jnp.where(is_regular, below, -jnp.inf), above, is_regular, inverse)
+
+
+def _central_inverse(matrix: Array, face: NearestFace, other: Array) -> Array:
+    # Right inverse with which tensions stay the most central ones near one face: all cables that do not span it move
+    # away from their limits by the same. Another one where the cables of the face depend on each other.
+    dof, count = matrix.shape
+    ways = jnp.sign(face.along)
+    system = jnp.concatenate([matrix[:, face.columns], (matrix @ ways)[:, None]], axis=1)
+    rows = solved(system, jnp.eye(dof))[0]
+    is_spanning = (jnp.arange(count)[:, None] == face.columns[None]).astype(matrix.dtype)
+    central = is_spanning @ rows[:-1] + ways[:, None] * rows[-1][None]
+    return jnp.where(jnp.isfinite(central).all(), central, other)
+
+
+def right_inverse(matrix: Float[Array, "m n"]) -> Float[Array, "n m"]:
+    """Right inverse of a matrix."""
+    m, n = matrix.shape
+    inverse = solved(matrix if m == n else matrix @ matrix.T, jnp.eye(m))[0]
+    return inverse if m == n else matrix.T @ inverse
+
+
+def _solution(
+    matrix: AffineBounds, inverse: Array, right: AffineBounds, start: Array, rise: Array
+) -> tuple[AffineBounds, Array]:
+    # Bound a solution of M(s) x(s) = b(s), with M (m, n) and n >= m, near a line through `start` that rises by `rise`,
+    # (n,); say whether M, with this right inverse in the middle, is proved to have rank m throughout.
+    m, n = matrix.middle.shape
+    middle = start + inverse @ (right.middle - matrix.middle @ start)
+    slope = rise + inverse @ (right.slope - matrix.slope @ middle - matrix.middle @ rise)
+    line = AffineBounds(middle, slope, jnp.zeros(n))
+    # Sums of rows of |M B - 1|; that of the middle is rounding.
+    rows = jnp.abs(matrix.middle @ inverse - jnp.eye(m)) + jnp.abs(matrix.slope @ inverse)
+    if matrix.square is not None:
+        line = line._replace(square=inverse @ (squares(right) - matrix.square @ middle - matrix.slope @ slope))
+        rows += jnp.abs(matrix.square @ inverse)
+    residual = (right - turned(matrix, line)).size()
+    rows = jnp.sum(rows + matrix.radius @ jnp.abs(inverse), axis=1)
+    share = jnp.max(rows, initial=0.0)
+    radius = jnp.abs(inverse) @ (residual + rows * jnp.max(residual, initial=0.0) / (1.0 - share))
+    is_known = (share < 1.0) & jnp.isfinite(middle).all() & jnp.isfinite(slope).all() & jnp.isfinite(radius).all()
+    return line._replace(radius=jnp.where(is_known, radius, jnp.nan)), is_known
+
+
+def _face_margin(
+    matrix: AffineBounds, inverse: Array, wrench: AffineBounds, limits: tuple[Array, Array], face: NearestFace
+) -> Array:
+    # Values at start and end of a line above the largest distance from the limits, by the face that is nearest in the
+    # middle.
+    dof, count = matrix.middle.shape
+    columns, (low, high) = face.columns, limits
+    across, nothing = matrix.each(lambda x: x[:, columns].T), constant(jnp.zeros(dof - 1))
+    normal, is_normal = _solution(across, right_inverse(across.middle), nothing, face.along @ inverse, jnp.zeros(dof))
+    is_spanning = (jnp.arange(count)[:, None] == columns[None]).any(1)
+    along = turned(matrix.each(jnp.transpose), normal).each(lambda x: jnp.where(is_spanning, 0.0, x))
+    # Each cable at the limit that gives the least; the other one counts as far as its product may change sign.
+    is_inward = along.middle > 0.0
+    limit = jnp.where(is_spanning, 0.0, jnp.where(is_inward, low, high))
+    is_bounded = jnp.isfinite(limit) | (along.size() == 0.0)
+    over = jnp.where(is_inward, -along.low(), along.high())
+    other = jnp.where(over > FLAT * jnp.abs(along.middle), over * (high - low), 0.0)
+    slack = dot(normal, wrench) - dot(along, jnp.where(is_bounded, limit, 0.0))
+    top = slack.middle + slack.radius + jnp.maximum(squares(slack), 0.0) + jnp.sum(other)
+    ends = jnp.stack([top - slack.slope, top + slack.slope])
+    # The quotient is a convex function of the slack: it is below the line between its values at both ends.
+    smallest = jnp.maximum(along.size() - 2.0 * along.reach(), 0.0)
+    size = jnp.where(ends < 0.0, jnp.sum(along.size()), jnp.sum(smallest))
+    is_known = is_normal & is_bounded.all() & (size > 0.0).all() & jnp.isfinite(ends).all()
+    above, half = jnp.where(is_known, ends / jnp.where(is_known, size, 1.0), jnp.inf), 0.5 * jnp.min(high - low)
+    return jnp.where(jnp.max(above) < half, above, half)

@@ -1,0 +1,256 @@
+"""Gaps between moving convex bodies over a block of time: bounds, from affine bounds of their corners.
+
+For a direction n and all corners a and b of two bodies, the least n . (b - a) / |n| is no larger than their signed
+distance (the distance of bodies that are apart, minus the least translation that parts bodies that are not). The
+direction is that of the nearest points in the middle of the block, and turns with the block as they do then: a line
+n(s) = e + s e', so that bounds close with the square of the length of the block. Any direction gives a proof, so it
+need not be known with bounds. From above the distance is bounded by that of two fixed points of the bodies, the nearest
+ones in the middle; of bodies that meet, by how deep a fixed point of one is below all faces of the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, dot, norm_squared
+from cspr_jax.robots.contacts.interference import nearest
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Edges at a smaller angle than about this count as parallel: their common normal is not well known.
+PARALLEL_SQUARE = 1e-8
+TINY = 1e-200
+ROUNDING = 1e-14
+
+
+class Solid(NamedTuple):
+    """Convex body.
+
+    Fields:
+        corners: bounds (m, 3), m.
+        edges: (n_edges, 2) indices of corners.
+        faces: (n_faces, 3) corners of triangles, counterclockwise as seen from outside; (0, 3) of a segment.
+    """
+
+    corners: Any
+    edges: Any
+    faces: Any
+
+
+class FacePlanes(NamedTuple):
+    """FacePlanes of the faces of a body that does not move.
+
+    Fields:
+        normals: (n_faces, 3) outward unit normals.
+        offsets: (n_faces,) products of the normals with points of their planes, m.
+    """
+
+    normals: Any
+    offsets: Any
+
+
+class Features(NamedTuple):
+    """The nearest features of two bodies.
+
+    Fields:
+        bodies: their edges and faces.
+        kind: 0: edges; 1: a corner of the first and a face of the second; 2: the other way round.
+        first: number of that of the first body.
+        second: likewise.
+    """
+
+    bodies: tuple[Solid, Solid]
+    kind: Any
+    first: Any
+    second: Any
+
+    def nearest_on_edges(self, p: Float[Array, "m 3"], q: Float[Array, "k 3"]) -> tuple[list[Array], Array, Array]:
+        """Corners of the two edges that are the nearest ones, and the nearest points as fractions of these edges."""
+        edges = [
+            body.edges[0] if len(body.edges) == 1 else jnp.asarray(body.edges)[jnp.minimum(k, len(body.edges) - 1)]
+            for body, k in zip(self.bodies, (self.first, self.second), strict=True)
+        ]
+        return edges, *nearest(*_ends(p, edges[0]), *_ends(q, edges[1]))
+
+
+SEGMENT = np.array([[0, 1]]), np.zeros((0, 3), int)
+_CORNERS = np.stack(np.meshgrid(*[[0, 1]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+# Corners of boxes in the order of `box_corners`; their edges, and their faces in two triangles each.
+BOX_SIGNS = 2.0 * _CORNERS - 1.0
+BOX = (
+    np.array([[i, j] for i in range(8) for j in range(i) if np.abs(_CORNERS[i] - _CORNERS[j]).sum() == 1]),
+    np.reshape(
+        [0, 1, 3, 0, 3, 2, 4, 7, 5, 4, 6, 7, 0, 5, 1, 0, 4, 5, 2, 3, 7, 2, 7, 6, 0, 2, 6, 0, 6, 4, 1, 7, 3, 1, 5, 7],
+        (-1, 3),
+    ),
+)
+
+
+def clearance_bounds(first: Solid, second: Solid) -> tuple[Float[Array, ""], Float[Array, ""]]:
+    """Bounds of the distance of two bodies."""
+    corners = first.corners.middle, second.corners.middle
+    features = nearest_features(*corners, first, second)
+    line = turning(partial(parting_direction, features), first.corners, second.corners)
+    between = second.corners.each(lambda x: x[None]) - first.corners.each(lambda x: x[:, None])
+    low = along(line, between.each(lambda x: x.reshape(-1, 3)))
+    place, other = (
+        dot(body.corners.each(jnp.transpose), weights[None])
+        for body, weights in zip((first, second), nearest_weights(features, *corners), strict=True)
+    )
+    return low, distance_bound(place, other)
+
+
+def turning(direction: Callable[..., Array], *points: AffineBounds) -> AffineBounds:
+    """A direction that turns at a constant rate, which follows that of a function of points in the middle."""
+    middles, slopes = (tuple(getattr(x, name) for x in points) for name in ("middle", "slope"))
+    middle, turn = jax.jvp(direction, middles, slopes)
+    return AffineBounds(middle, jnp.where(jnp.sum(turn**2) <= 1.0, turn, 0.0), jnp.zeros_like(middle))
+
+
+def along(line: AffineBounds, vectors: AffineBounds) -> Float[Array, ""]:
+    """Least component of vectors along a direction that turns."""
+    middle, turn = line.middle, line.slope
+    low = jnp.min(dot(line.each(lambda x: x[None]), vectors).low())
+    size = jnp.sqrt(jnp.dot(middle, middle) + jnp.dot(turn, turn) + 2.0 * jnp.abs(jnp.dot(middle, turn)))
+    return jnp.where(low > 0.0, low * (1.0 - ROUNDING) / size, -jnp.inf)
+
+
+def distance_bound(first: AffineBounds, second: AffineBounds) -> Float[Array, ""]:
+    """Largest distance of two points."""
+    return jnp.sqrt(norm_squared(second - first).high()) * (1.0 + ROUNDING)
+
+
+def depth_bound(body: Solid, planes: FacePlanes) -> Float[Array, ""]:
+    """Bound of how deep a body reaches into another one that does not move, by points of its edges."""
+    start, end = (body.corners.each(lambda x, k=k: x[body.edges[:, k]]) for k in range(2))
+    part = inner_fractions(start.middle, end.middle, planes)[:, None]
+    points = start * (1.0 - part) + end * part
+    heights = dot(points.each(lambda x: x[:, None]), planes.normals[None]) - planes.offsets[None]
+    least = jnp.min(jnp.max(heights.high(), axis=1))
+    return jnp.where(least < 0.0, least, jnp.inf)
+
+
+def inner_fractions(
+    start: Float[Array, "n_edges 3"], end: Float[Array, "n_edges 3"], planes: FacePlanes
+) -> Float[Array, "n_edges"]:
+    """Points of edges in the middle of their parts behind all planes."""
+    high, low = (points @ planes.normals.T - planes.offsets[None] for points in (start, end))
+    meet = high / jnp.where(high == low, 1.0, high - low)
+    first = jnp.max(jnp.where(low < high, meet, 0.0), axis=1)
+    last = jnp.min(jnp.where(low > high, meet, 1.0), axis=1)
+    return jnp.clip(0.5 * (jnp.clip(first, 0.0, 1.0) + jnp.clip(last, 0.0, 1.0)), 0.0, 1.0)
+
+
+def _ends(corners: Array, edges: Any) -> tuple[Array, Array]:
+    # Starts and rays of edges.
+    start = corners[edges[..., 0]]
+    return start, corners[edges[..., 1]] - start
+
+
+def _over(points: Array, corners: Array, faces: Any) -> Array:
+    # Heights of points (m, 3) over faces, (m, n_faces); infinite where they are not above the triangle.
+    points, (a, b, c) = points[:, None], (corners[faces[:, k]][None] for k in range(3))
+    normals = _normal(a, b, c)
+    height = jnp.sum((points - a) * normals, axis=2)
+    # A triangle without an area has no normal.
+    is_above = (height >= 0.0) & (jnp.sum(normals**2, axis=2) > 0.5)
+    for start, end in ((a, b), (b, c), (c, a)):
+        is_above &= jnp.sum(jnp.cross(end - start, points - start) * normals, axis=2) >= 0.0
+    return jnp.where(is_above, height, jnp.inf)
+
+
+def _normal(a: Array, b: Array, c: Array) -> Array:
+    return _unit(jnp.cross(b - a, c - a))
+
+
+def _unit(vectors: Array) -> Array:
+    return vectors / jnp.sqrt(jnp.maximum(jnp.sum(vectors**2, axis=-1, keepdims=True), TINY))
+
+
+def nearest_features(p: Float[Array, "m 3"], q: Float[Array, "k 3"], first: Solid, second: Solid) -> Features:
+    """Find the nearest features of two bodies."""
+    if len(first.edges) == len(second.edges) == 1:
+        return Features((first, second), 0, 0, 0)
+    (a, u), (b, v) = _ends(p, first.edges), _ends(q, second.edges)
+    a, u, b, v = a[:, None], u[:, None], b[None], v[None]
+    s, t = nearest(a, u, b, v)
+    gap = b + t[..., None] * v - a - s[..., None] * u
+    parts = [jnp.sum(gap**2, axis=2)]
+    if len(second.faces):
+        parts.append(_over(p, q, second.faces) ** 2)
+    if len(first.faces):
+        parts.append(_over(q, p, first.faces).T ** 2)
+    places = [jnp.argmin(part) for part in parts]
+    least = jnp.stack([part.reshape(-1)[place] for part, place in zip(parts, places, strict=True)])
+    best = jnp.argmin(least)
+    numbers = [
+        jnp.stack([place // part.shape[1], place % part.shape[1]]) for part, place in zip(parts, places, strict=True)
+    ]
+    kinds = jnp.asarray([0] + [1] * bool(len(second.faces)) + [2] * bool(len(first.faces)))
+    return Features((first, second), kinds[best], *jnp.stack(numbers)[best])
+
+
+def parting_direction(features: Features, p: Float[Array, "m 3"], q: Float[Array, "k 3"]) -> Float[Array, "3"]:
+    """Direction from the first body to the second along the shortest line between them."""
+    (first, second), (edges, s, t) = features.bodies, features.nearest_on_edges(p, q)
+    (a, u), (b, v) = _ends(p, edges[0]), _ends(q, edges[1])
+    gap, normal = b + t * v - a - s * u, jnp.cross(u, v)
+    inside = (s > 0.0) & (s < 1.0) & (t > 0.0) & (t < 1.0)
+    inside &= jnp.dot(normal, normal) > PARALLEL_SQUARE * jnp.dot(u, u) * jnp.dot(v, v)
+    # The common normal of edges is known however near they are, if both points are inside of them.
+    gap = jnp.where(inside, jnp.where(jnp.dot(normal, gap) < 0.0, -normal, normal), gap)
+    way = _unit(gap)
+    for kind, corners, body, face, sign in (
+        (1, q, second, features.second, -1.0),
+        (2, p, first, features.first, 1.0),
+    ):
+        if len(body.faces):
+            corner = jnp.asarray(body.faces)[jnp.minimum(face, len(body.faces) - 1)]
+            way = jnp.where(features.kind == kind, sign * _normal(*(corners[corner[k]] for k in range(3))), way)
+    return way
+
+
+def nearest_weights(
+    features: Features, p: Float[Array, "m 3"], q: Float[Array, "k 3"]
+) -> tuple[Float[Array, "m"], Float[Array, "k"]]:
+    """Weights of corners, which make the nearest points."""
+    (first, second), (edges, s, t) = features.bodies, features.nearest_on_edges(p, q)
+
+    def spread(count: int, corners: Array, shares: list[Array]) -> Array:
+        return sum(jnp.where(jnp.arange(count) == corners[k], share, 0.0) for k, share in enumerate(shares))  # type: ignore[return-value]
+
+    def on_edge(count: int, edge: Array, part: Array) -> Array:
+        return spread(count, edge, [1.0 - part, part])
+
+    def on_face(corners: Array, faces: Any, face: Array, point: Array) -> Array:
+        corner = jnp.asarray(faces)[jnp.minimum(face, len(faces) - 1)]
+        a, b, c = (corners[corner[k]] for k in range(3))
+        normal = jnp.cross(b - a, c - a)
+        square = jnp.maximum(jnp.dot(normal, normal), TINY)
+        second = jnp.clip(jnp.dot(jnp.cross(point - a, c - a), normal) / square, 0.0, 1.0)
+        third = jnp.clip(jnp.dot(jnp.cross(b - a, point - a), normal) / square, 0.0, 1.0 - second)
+        return spread(len(corners), corner, [1.0 - second - third, second, third])
+
+    def at_corner(count: int, corner: Array) -> Array:
+        return jnp.where(jnp.arange(count) == corner, 1.0, 0.0)
+
+    of_first, of_second = on_edge(len(p), edges[0], s), on_edge(len(q), edges[1], t)
+    if len(second.faces):
+        is_this = features.kind == 1
+        of_first = jnp.where(is_this, at_corner(len(p), features.first), of_first)
+        point = p[jnp.minimum(features.first, len(p) - 1)]
+        of_second = jnp.where(is_this, on_face(q, second.faces, features.second, point), of_second)
+    if len(first.faces):
+        is_this = features.kind == 2
+        point = q[jnp.minimum(features.second, len(q) - 1)]
+        of_first = jnp.where(is_this, on_face(p, first.faces, features.first, point), of_first)
+        of_second = jnp.where(is_this, at_corner(len(q), features.second), of_second)
+    return of_first, of_second

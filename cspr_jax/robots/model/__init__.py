@@ -1,0 +1,1 @@
+"""Models of robots: points, mass, limits, shapes and pulleys, and the state of an effector."""

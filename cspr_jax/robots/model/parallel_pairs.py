@@ -1,0 +1,139 @@
+"""Six cables in three parallel pairs, and the equivalent point mass on three cables.
+
+The cables of a pair run from A and A' to B and B' with A - A' = B - B', and one winch keeps them equally long: a
+parallelogram, so that the platform only translates. With the mass centre P on the line through B and B', at
+B + lambda (B' - B), the moments of a pair about P vanish if and only if its tension is shared 1 - lambda to lambda. All
+forces then act at P, along cables that leave from A + lambda (A' - A) (Machines 11 (2), 2023, 224, section 2.2, which
+gives lambda = 1/2; any lambda follows in the same way).
+
+NumPy alone, since files are checked without jax.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cspr_jax.errors import InputError
+from cspr_jax.robots.model.spool_plane import is_on_line, is_vertical
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+COUNT = 6
+# Tolerance, as part of the size (the largest distance of a spool from the centroid of all): for cables of a pair to be
+# parallel, and for the mass centre to lie on the line between them; as part of this line, the distance that the mass
+# centre must keep from its ends.
+TOLERANCE = 1e-6
+# Below this determinant of unit moments cables let the platform turn; and how far around the spools this is tested.
+SMALLEST_MOMENTS = 1e-6
+_PLACES = np.array([[0.3, 0.2, 1.0], [-0.5, 0.4, 0.7], [0.1, -0.7, -1.1]])
+ALLOWED = "must be six cables in three parallel pairs, with the mass centre between the points of each pair"
+
+
+@dataclasses.dataclass(frozen=True)
+class ParallelPairs:
+    """Three pairs of parallel cables.
+
+    Fields:
+        cables: (3, 2) numbers of the cables from 0 on; pairs are in the order of their first cables.
+        shares: (3, 2) share of each cable in the tension of its pair, which is the tension of the equivalent's cable; 1
+            in sum.
+        exit_points: (3, 3) spools of the equivalent, in the axes of the spools, m.
+    """
+
+    cables: np.ndarray
+    shares: np.ndarray
+    exit_points: np.ndarray
+
+    def tensions(self, of_pairs) -> Float[np.ndarray, "... 6"]:
+        """Tensions of all cables."""
+        pulls = np.asarray(of_pairs, float)
+        each = np.empty((*pulls.shape[:-1], COUNT))
+        each[..., self.cables] = pulls[..., None] * self.shares
+        return each
+
+    def bound(self, of_cables, *, is_tension: bool, is_least: bool) -> Float[np.ndarray, "3"]:
+        """Limits of the pairs with which all cables keep their limits."""
+        limits = np.broadcast_to(np.asarray(of_cables, float), (COUNT,))[self.cables]
+        limits = limits / self.shares if is_tension else limits
+        return limits.max(1) if is_least else limits.min(1)
+
+
+def parallel_pairs(base_points, platform_points) -> ParallelPairs:
+    """The three pairs of a robot."""
+    base, platform = np.asarray(base_points, float), np.asarray(platform_points, float)
+    if len(base) != COUNT:
+        raise _fault(f"{len(base)} cables")
+    room = TOLERANCE * float(np.linalg.norm(base - base.mean(0), axis=1).max())
+    cables = _matched(base - platform, room)
+    shares = np.array([_shares(platform, first, second, room) for first, second in cables.tolist()])
+    exits = (shares[:, :, None] * base[cables]).sum(1)
+    if is_on_line(exits):
+        raise _fault("the three cables of the equivalent leave from points on one line, or from the same one")
+    if is_vertical(exits):
+        raise _fault("the three cables of the equivalent leave from a vertical plane")
+    _refuse_turning(exits, platform[cables[:, 1]] - platform[cables[:, 0]])
+    return ParallelPairs(cables, shares, exits)
+
+
+def _fault(words: str) -> InputError:
+    return InputError("platform_points", None, ALLOWED, fault=words)
+
+
+def _matched(offsets: np.ndarray, room: float) -> np.ndarray:
+    # Cables of a pair have the same offset A - B. Of the fifteen ways to match six cables, take the one that fits best.
+    apart = np.linalg.norm(offsets[:, None] - offsets, axis=2)
+    misses = {way: max(apart[pair] for pair in way) for way in _ways(tuple(range(COUNT)))}
+    way = min(misses, key=lambda known: misses[known])
+    if not misses[way] <= room:
+        first, second = max(way, key=lambda pair: apart[pair])
+        raise _fault(
+            f"cables {first + 1} and {second + 1} are not parallel: base_points[{first}] - base_points[{second}] and "
+            f"platform_points[{first}] - platform_points[{second}] differ by {misses[way]:.3g} m (at most {room:.2g} m)"
+        )
+    return np.array(way)
+
+
+def _ways(left: tuple[int, ...]) -> list[tuple[tuple[int, int], ...]]:
+    if not left:
+        return [()]
+    first, *others = left
+    return [
+        ((first, other), *rest)
+        for other in others
+        for rest in _ways(tuple(cable for cable in others if cable != other))
+    ]
+
+
+def _shares(platform: np.ndarray, first: int, second: int, room: float) -> tuple[float, float]:
+    # Return the shares with which the moments of both cables about the mass centre are in balance.
+    along = platform[second] - platform[first]
+    square = float(along @ along)
+    if not np.sqrt(square) > room:
+        raise _fault(f"cables {first + 1} and {second + 1} are attached at the same point")
+    place = float(-platform[first] @ along) / square
+    beside = float(np.linalg.norm(platform[first] + place * along))
+    names = f"platform_points[{first}] and platform_points[{second}]"
+    if not beside <= room:
+        raise _fault(f"the mass centre lies {beside:.3g} m beside the line of {names} (at most {room:.2g} m)")
+    if not TOLERANCE < place < 1.0 - TOLERANCE:
+        raise _fault(
+            f"the mass centre does not lie between {names}: it is {place:.3g} of the way from one to the other"
+        )
+    return 1.0 - place, place
+
+
+def _refuse_turning(exits: np.ndarray, along: np.ndarray) -> None:
+    # The moment of a pair is `along` x cable. If the lines of the spools meet in one point O, all moments are normal to
+    # the line from O to the platform, wherever it is, so that it can turn about this line; otherwise, as a rule, they
+    # are not.
+    size = np.linalg.norm(exits - exits.mean(0), axis=1).max()
+    for place in exits.mean(0) + size * _PLACES:
+        cables = place - exits
+        units = [rows / np.linalg.norm(rows, axis=1, keepdims=True) for rows in (along, cables)]
+        if abs(np.linalg.det(np.cross(*units))) > SMALLEST_MOMENTS:
+            return
+    raise _fault("the pairs let the platform turn, as where the lines between their spools are parallel or meet")

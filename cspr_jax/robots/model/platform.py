@@ -1,0 +1,224 @@
+"""Bodies on cables, of any pattern of motion: geometry, mass, inertia, limits, wrenches.
+
+Axes are those of `robots.model.point_mass`. `robots.model.patterns` says which forces and moments the cables balance.
+All other components are zero for a planar platform or a rod, and a joint carries them where there is one.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from typing import TYPE_CHECKING
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.errors import InputError
+from cspr_jax.numerics.elementary import leaf
+from cspr_jax.robots.model.body_geometry import checked_centre, checked_inertia, checked_platform, is_same
+from cspr_jax.robots.model.limits import NO_LIMITS, Limits
+from cspr_jax.robots.model.patterns import PATTERNS
+from cspr_jax.robots.model.point_mass import (
+    STANDARD_GRAVITY,
+    Axis,
+    check_axis,
+    check_numbers,
+    checked_coordinates,
+    checked_points,
+    pulls,
+)
+from cspr_jax.robots.model.pulleys import Pulleys
+from cspr_jax.robots.model.state import State
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+RIGID = "3R3T"
+
+
+@dataclasses.dataclass(frozen=True)
+class PlatformRobot:
+    """A body on cables: a rigid platform, or one of another pattern that turns.
+
+    Fields:
+        base_points: (n_cables, 3) points at which the cables leave their spools, or enter their pulleys, in cable
+            order; m.
+        platform_points: (n_cables, 3) points at which they are attached, from the mass centre, or from the joint of a
+            robot on a joint, in platform axes, which are parallel to the fixed ones in the reference orientation; m.
+        mass: () kg.
+        inertia: (3, 3) about the mass centre, platform axes, kg m^2.
+        gravity: () downwards, m/s^2.
+        joints: for each cable the first cable that is attached at the same point; known when a function is compiled, so
+            that the point is computed once. Whoever replaces points so that others coincide must replace it, too.
+        limits: limits beyond taut cables.
+        name: for people.
+        z_axis: direction of z, "down" or "up"; known when a function is compiled.
+        pattern: name of a row of `robots.model.patterns`; known when a function is compiled.
+        centre_of_mass: (3,) from the origin of the platform frame, in platform axes, m; None: at the origin.
+        pulleys: pulleys between base points and cables; None: the cables leave from the base points.
+        cable_diameter: () m; None: 0.
+    """
+
+    base_points: Array
+    platform_points: Array
+    mass: Array
+    inertia: Array
+    gravity: Array
+    joints: tuple[int, ...]
+    limits: Limits = NO_LIMITS
+    name: str = ""
+    z_axis: Axis = "down"
+    pattern: str = RIGID
+    centre_of_mass: Array | None = None
+    pulleys: Pulleys | None = None
+    cable_diameter: Array | None = None
+
+    @property
+    def dof(self) -> int:
+        """Degrees of freedom."""
+        return PATTERNS[self.pattern].dof
+
+    @property
+    def n_cables(self) -> int:
+        """Number of cables."""
+        return self.base_points.shape[-2]
+
+    def wrench_matrix(self, state: State) -> Array:
+        """Wrenches of unit tensions; see `Robot.wrench_matrix`."""
+        arms = self.platform_points @ state.rotation.T
+        forces = pulls(self, state.position[None] + arms)
+        return self._balanced(state.rotation, forces.T, jnp.cross(arms, forces).T)
+
+    def inertial_wrench(self, state: State) -> Array:
+        """Wrench that the cables must supply; see `Robot.inertial_wrench`."""
+        if self.pattern == RIGID:
+            return self.mass * wrench_per_mass(self, state)
+        force = self.mass * state.acceleration.at[2].add(-self.gravity)
+        moment = _spin_moment(self, state)
+        if PATTERNS[self.pattern].is_jointed and self.centre_of_mass is not None:
+            moment = moment + jnp.cross(state.rotation @ self.centre_of_mass, force)
+        return self._balanced(state.rotation, force, moment)
+
+    def _balanced(self, rotation: Array, force: Array, moment: Array) -> Array:
+        # Keep the components of forces and moments, (3, ...) each, that the cables balance.
+        row = PATTERNS[self.pattern]
+        turning = (rotation @ across_line(self)).T @ moment if row.along_line else moment[np.array(row.moments)]
+        return jnp.concatenate([force[np.array(row.forces, int)], turning])
+
+
+jax.tree_util.register_dataclass(
+    PlatformRobot,
+    [
+        *("base_points", "platform_points", "mass", "inertia", "gravity", "limits", "centre_of_mass", "pulleys"),
+        "cable_diameter",
+    ],
+    ["joints", "z_axis", "pattern"],
+    drop_fields=["name"],
+)
+
+
+def platform_robot(  # noqa: PLR0913
+    base_points,
+    platform_points,
+    *,
+    mass: float,
+    inertia,
+    centre_of_mass=None,
+    gravity: float = STANDARD_GRAVITY,
+    name: str = "robot",
+    z_axis: Axis = "down",
+    limits: Limits | None = None,
+    pattern: str = RIGID,
+) -> PlatformRobot:
+    """A platform on cables, its geometry and inertia checked.
+
+    Args:
+        base_points: (n_cables, 3) spool points, m, at least as many as degrees of freedom; y = 0 if planar.
+        platform_points: (n_cables, 3) attachment points in platform axes, m; y = 0 if planar, on one line with the mass
+            centre for a rod, from the joint for a robot on a joint.
+        mass: kg, positive.
+        inertia: (3, 3) about the mass centre, platform axes, kg m^2; symmetric, positive definite, of a real body.
+        centre_of_mass: (3,) mass centre in platform axes, m; None: their origin.
+        gravity: gravity, m/s^2, positive.
+        z_axis: direction of the z axis, "down" or "up".
+        limits: limits beyond taut cables; None: none.
+        pattern: "3R3T" in space; "1R2T" in the plane y = 0; "2R3T" for a rod, with platform_points on one line; "3R"
+            about a fixed joint, the origin of the platform axes.
+
+    Returns:
+        the robot, float64 NumPy leaves.
+
+    Raises:
+        InputError: wrong shape, too few points, different numbers of both, not finite, points that the pattern rules
+            out, two cables between the same two points, an inertia tensor that no body has, mass or gravity not
+            positive, an unknown z_axis or pattern.
+    """
+    row = PATTERNS.get(pattern)
+    if row is None or not row.is_body:
+        bodies = " or ".join(f'"{name}"' for name, known in PATTERNS.items() if known.is_body)
+        raise InputError("pattern", pattern, bodies)
+    base = (checked_coordinates if row.is_planar else checked_points)("base_points", base_points, row.dof)
+    platform = checked_platform(platform_points, len(base), row)
+    if row.is_planar and (base[:, 1] != 0.0).any():
+        raise InputError("base_points", base.tolist(), "points with y = 0: the plane of a planar robot")
+    centre = checked_centre((0.0, 0.0, 0.0) if centre_of_mass is None else centre_of_mass, platform, row)
+    check_numbers(mass, gravity)
+    check_axis(z_axis)
+    tensor = checked_inertia(inertia, row)
+    for first, second in itertools.combinations(range(len(base)), 2):
+        if is_same(base, first, second) and is_same(platform, first, second):
+            raise InputError(
+                "platform_points",
+                platform.tolist(),
+                f"no cables {first + 1} and {second + 1} between the same two points",
+            )
+    joints = tuple(int((platform == point).all(1).argmax()) for point in platform)
+    points = platform if row.is_jointed else platform - centre
+    numbers = (leaf(base), leaf(points), leaf(mass), leaf(tensor), leaf(gravity))
+    return PlatformRobot(*numbers, joints, limits or NO_LIMITS, name, z_axis, pattern, leaf(centre))
+
+
+def across_line(robot: PlatformRobot) -> Float[Array, "3 2"]:
+    """Two axes of a rod, normal to the line of its attachment points and to each other."""
+    offsets = robot.platform_points - robot.platform_points[:1]
+    line = offsets[jnp.argmax(jnp.sum(offsets**2, axis=1))]
+    line = line / jnp.linalg.norm(line)
+    first = jnp.cross(line, jnp.eye(3, dtype=line.dtype)[jnp.argmin(jnp.abs(line))])
+    first = first / jnp.linalg.norm(first)
+    return jnp.stack([first, jnp.cross(line, first)], axis=1)
+
+
+def _spin_moment(robot: PlatformRobot, state: State) -> Array:
+    # Return the rate of the angular momentum about the mass centre, (3.8), or about a joint; N m.
+    inertia = state.rotation @ robot.inertia @ state.rotation.T
+    if PATTERNS[robot.pattern].is_jointed and robot.centre_of_mass is not None:
+        arm = state.rotation @ robot.centre_of_mass
+        inertia = inertia + robot.mass * (jnp.dot(arm, arm) * jnp.eye(3) - jnp.outer(arm, arm))
+    moment = inertia @ state.angular_acceleration
+    return moment + jnp.cross(state.angular_velocity, inertia @ state.angular_velocity)
+
+
+def rays(
+    robot: PlatformRobot, position: Float[Array, "3"], rotation: Float[Array, "3 3"]
+) -> tuple[Float[Array, "n_cables 3"], Float[Array, "n_cables 3"]]:
+    """Cables as vectors from spool to platform, (3.1), and their attachment points from the mass centre."""
+    arms = robot.platform_points @ rotation.T
+    return position[None] + arms - robot.base_points, arms
+
+
+def wrench_per_mass(robot: PlatformRobot, state: State) -> Float[Array, "6"]:
+    """Right-hand side of (3.11): the wrench that the cables must supply, per mass."""
+    moment = _spin_moment(robot, state) / robot.mass
+    return jnp.concatenate([state.acceleration.at[2].add(-robot.gravity), moment])
+
+
+def pairs_apart(robot: PlatformRobot) -> tuple[tuple[int, int], ...]:
+    """Pairs of cables that can meet: those that share neither spool nor platform point."""
+    base, platform = np.asarray(robot.base_points), np.asarray(robot.platform_points)
+    return tuple(
+        (i, j)
+        for i, j in itertools.combinations(range(robot.n_cables), 2)
+        if not is_same(base, i, j) and not is_same(platform, i, j)
+    )

@@ -1,0 +1,36 @@
+"""Robots in the axes of the kernels: origin at the centroid of the spools, z down."""
+
+import dataclasses
+from typing import Any, TypeVar
+
+from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.linear.frames import Frame, frame_of
+from cspr_jax.robots.model.limits import NO_LIMITS
+from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.robots.model.point_mass import PointMassRobot
+from cspr_jax.robots.model.pulleys import Pulleys
+from cspr_jax.robots.model.robot import check_moved
+from cspr_jax.robots.statics.reference_pose import aligned
+
+RobotKind = TypeVar("RobotKind", bound=PointMassRobot | PlatformRobot)
+
+
+def centred(robot: RobotKind) -> tuple[RobotKind, Frame]:
+    """A robot as the kernels take it: origin at the centroid of its spools, z down, without limits."""
+    frame = frame_of(robot.base_points, robot.z_axis)
+    changes: dict[str, Any] = {"base_points": leaf(frame.inward(robot.base_points)), "z_axis": "down"}
+    if isinstance(robot, PlatformRobot):
+        changes["platform_points"] = leaf(frame.turned(robot.platform_points))
+        changes["inertia"] = frame.turned_tensor(leaf(robot.inertia))
+        if robot.centre_of_mass is not None:
+            changes["centre_of_mass"] = leaf(frame.turned(robot.centre_of_mass))
+    if robot.pulleys is not None:
+        changes["pulleys"] = Pulleys(robot.pulleys.radius, leaf(frame.turned(robot.pulleys.axes)))
+    return dataclasses.replace(robot, limits=NO_LIMITS, **changes), frame
+
+
+def prepared(robot: RobotKind, *, pulleys: bool = False) -> tuple[RobotKind, Frame]:
+    """A robot as the kernels take it, a platform also in its reference axes."""
+    check_moved(robot, pulleys=pulleys)
+    moved, frame = centred(robot)
+    return (aligned(moved)[0] if isinstance(moved, PlatformRobot) else moved), frame  # type: ignore[return-value]

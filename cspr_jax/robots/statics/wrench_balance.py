@@ -1,0 +1,86 @@
+"""The wrench balance of a rigid platform on cables, thesis (3.1) to (3.11), at one instant: the readable form."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.numerics.elementary import solved
+from cspr_jax.robots.model.platform import PlatformRobot, rays, wrench_per_mass
+from cspr_jax.robots.model.point_mass import plane_normal, pulls, rest_point
+from cspr_jax.robots.model.robot import check_determined
+from cspr_jax.robots.model.state import State
+from cspr_jax.robots.statics.cable_lengths import moved_lengths
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Normalised determinants up to this count as singular, since rounding may decide their sign.
+SINGULAR = 1e-6
+
+
+def at_rest(position: Float[Array, "3"], rotation: Float[Array, "3 3"]) -> State:
+    """State of a platform that stands still."""
+    still = jnp.zeros_like(position)
+    return State(position, still, still, rotation, still, still)
+
+
+def jacobian(
+    robot: PlatformRobot, position: Float[Array, "3"], rotation: Float[Array, "3 3"]
+) -> Float[Array, "n_cables 6"]:
+    """J of (3.5): cable lengths times their rates, from velocity and angular velocity."""
+    cables, arms = rays(robot, position, rotation)
+    return jnp.concatenate([cables, jnp.cross(arms, cables)], axis=1)
+
+
+def normalised_determinant(
+    robot: PlatformRobot, position: Float[Array, "3"], rotation: Float[Array, "3 3"]
+) -> Float[Array, ""]:
+    """Determinant of J with cables of length 1 and the platform's size as the unit of length.
+
+    It is zero where the cables cannot carry every wrench, (3.5); its sign is that of det J.
+    """
+    check_determined(robot, pulleys=True)
+    arms = robot.platform_points @ rotation.T
+    units = -pulls(robot, position[None] + arms)
+    size = jnp.sqrt(jnp.mean(jnp.sum(robot.platform_points**2, axis=1)))
+    return solved(jnp.concatenate([units, jnp.cross(arms / size, units)], axis=1), jnp.zeros((robot.n_cables, 0)))[1]
+
+
+def is_regular(determinant):
+    """Tell whether cables can carry every wrench: the rule that decides which poses are singular."""
+    return determinant > SINGULAR
+
+
+def determinant_share(
+    robot: PlatformRobot, position: Float[Array, "3"], rotation: Float[Array, "3 3"]
+) -> Float[Array, ""]:
+    """Normalised determinant over its value in the reference orientation at the same depth in the middle."""
+    middle = rest_point(plane_normal(robot) @ position)
+    return normalised_determinant(robot, position, rotation) / normalised_determinant(robot, middle, jnp.eye(3))
+
+
+def tensions_per_length(robot: PlatformRobot, state: State) -> Float[Array, "6"]:
+    """Tension per mass and length of each cable: mu of (3.11)."""
+    check_determined(robot)
+    right = wrench_per_mass(robot, state)[:, None]
+    return solved(-jacobian(robot, state.position, state.rotation).T, right)[0][:, 0]
+
+
+def tensions(robot: PlatformRobot, state: State) -> Float[Array, "6"]:
+    """Cable tensions, (3.10)."""
+    cables, _ = rays(robot, state.position, state.rotation)
+    return robot.mass * jnp.linalg.norm(cables, axis=1) * tensions_per_length(robot, state)
+
+
+def cable_motion(
+    robot: PlatformRobot, state: State
+) -> tuple[Float[Array, "n_cables"], Float[Array, "n_cables"], Float[Array, "n_cables"]]:
+    """Lengths of the cables, (3.2), and their first two derivatives in time, (3.3)."""
+    arms = robot.platform_points @ state.rotation.T
+    swing = jnp.cross(state.angular_velocity, arms)
+    inward = jnp.cross(state.angular_velocity, swing)
+    pull = state.acceleration[None] + jnp.cross(state.angular_acceleration, arms) + inward
+    return moved_lengths(robot, state.position[None] + arms, state.velocity[None] + swing, pull)

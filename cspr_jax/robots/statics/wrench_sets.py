@@ -1,0 +1,232 @@
+"""Sets of wrenches that cables can give, as faces: for any number of cables, and two, three or six components.
+
+With tensions between smallest and largest values the wrenches W t fill a zonotope; without largest tensions, a cone.
+Every face is parallel to d - 1 independent columns of W, so that the normals to all choices of d - 1 columns are
+candidates, each with both signs (hyperplane shifting: Bouchard, Gosselin and Moore 2010; Gouttefarde and
+Krut 2010). A candidate bounds nothing where a cable without a largest tension pulls beyond it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import itertools
+import math
+from typing import TYPE_CHECKING
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.point_mass import PLANAR, PointMassRobot, relative_acceleration
+from cspr_jax.robots.model.robot import Robot
+from cspr_jax.robots.model.state import State
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Columns are unit vectors: d - 1 columns with a volume below this span no face; a column nearer to a plane lies in it.
+FLAT = 1e-12
+# Rounding of a slack, over the size of the numbers of which it is the difference; to be divided by the volume of the
+# face's columns.
+ROUNDING = 1e-14
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class Faces:
+    """Set of feasible wrenches, or of accelerations: where no slack is negative.
+
+    Fields:
+        normals: (..., n_faces, n_components) unit normals that point inside; 0 for a face that bounds nothing.
+        offsets: (..., n_faces) N or m/s^2; -inf for a face that bounds nothing.
+        volumes: (..., n_faces) volume of the unit columns that span the face, in [0, 1].
+        apex: (..., n_components) wrench, or acceleration, of the smallest tensions.
+        of_largest: (..., n_faces) whether a largest tension is reached on the face.
+        is_regular: (...) whether the set has an inside: the cables span all d components.
+        closure: (...) margin of wrench closure, a pure number in [-1, 1], positive if the cables, pulled hard enough,
+            resist every wrench: the least, over all planes that d - 1 unit columns span, of the distance of the
+            farthest column on the emptier side.
+    """
+
+    normals: Array
+    offsets: Array
+    volumes: Array
+    apex: Array
+    of_largest: Array
+    is_regular: Array
+    closure: Array
+
+    def slacks(self, values: Float[Array, "... n_components"]) -> Float[Array, "... n_faces"]:
+        """Distances from the planes of the faces."""
+        return jnp.sum(self.normals * values[..., None, :], axis=-1) - self.offsets
+
+    def margin(self, values: Float[Array, "... n_components"]) -> Float[Array, "..."]:
+        """Distance to the nearest face."""
+        slacks = self.slacks(values)
+        least, spanned = jnp.min(slacks, axis=-1), jnp.isfinite(self.offsets).any(-1)
+        flat = jnp.where(spanned, jnp.minimum(least, 0.0), -jnp.linalg.norm(values - self.apex, axis=-1))
+        return jnp.where(self.is_regular, least, flat)
+
+    def rounding(self, values: Float[Array, "... n_components"]) -> Float[Array, "..."]:
+        """Bound of the rounding error of the smallest slack."""
+        size = jnp.linalg.norm(values, axis=-1)[..., None]
+        offsets = jnp.abs(jnp.where(jnp.isfinite(self.offsets), self.offsets, 0.0))
+        each = ROUNDING * (size + offsets + jnp.linalg.norm(self.apex, axis=-1)[..., None])
+        finite = jnp.isfinite(self.offsets) & (self.volumes > FLAT)
+        smallest = jnp.min(jnp.where(finite, self.slacks(values), jnp.inf), axis=-1, keepdims=True)
+        # A face counts if it may be the nearest one.
+        each = each / jnp.where(finite, self.volumes, 1.0)
+        near = finite & (self.slacks(values) - each <= smallest + each)
+        return jnp.max(jnp.where(near, each, 0.0), axis=-1)
+
+
+@functools.cache
+def _subsets(count: int, size: int) -> np.ndarray:
+    return np.array(list(itertools.combinations(range(count), size)), int).reshape(math.comb(count, size), size)
+
+
+@functools.cache
+def _level(rows: int, columns: int, size: int) -> tuple[np.ndarray, ...]:
+    # Return how products of `size` columns follow from products of one column less: the parent and the last column of
+    # each choice of columns; for each choice of rows the row of the last column, the other rows, and the sign,
+    # (n_choices, size) each.
+    smaller = {tuple(s): i for i, s in enumerate(_subsets(columns, size - 1).tolist())}
+    chosen = _subsets(columns, size)
+    parent = np.array([smaller[tuple(s[:-1])] for s in chosen.tolist()])
+    others = {tuple(s): i for i, s in enumerate(_subsets(rows, size - 1).tolist())}
+    row = _subsets(rows, size)
+    rest = np.array([[others[tuple(s[:k] + s[k + 1 :])] for k in range(size)] for s in row.tolist()])
+    sign = np.array([(-1.0) ** (size - 1 - k) for k in range(size)])
+    return parent, chosen[:, -1], row, rest, sign
+
+
+def spanning(count: int, dof: int) -> np.ndarray:
+    """Choices of cables whose directions span a face."""
+    return _subsets(count, dof - 1)
+
+
+def normals_to(matrix: Float[Array, "dof n_cables"]) -> Float[Array, "n_choices dof"]:
+    """Normals to all choices of d - 1 columns: their generalised cross products."""
+    dof, count = matrix.shape
+    products = matrix.T  # products of one column, by row
+    for size in range(2, dof):
+        parent, last, row, rest, sign = _level(dof, count, size)
+        terms = products[parent][:, rest] * matrix.T[last][:, row]
+        products = terms @ sign
+    # In the order of `_subsets`, the row that a product leaves out is the last one first.
+    signs = np.array([(-1.0) ** (dof - 1 - i) for i in range(dof)])
+    return products[:, ::-1] * signs[None]
+
+
+@functools.cache
+def beside_faces(count: int, dof: int) -> np.ndarray:
+    """Cables that do not span a face."""
+    return np.array([np.setdiff1d(np.arange(count), columns) for columns in spanning(count, dof)])
+
+
+def one_sided_faces(
+    matrix: Float[Array, "dof n_cables"], kernel: Float[Array, "n n_cables"]
+) -> Float[Array, "n_choices n_others"]:
+    """Products of a normal to each choice of d - 1 cables with the other cables.
+
+    With up to two cables more than needed they are relations among the columns of the kernel, some thirty products in
+    place of determinants.
+    """
+    dof, count = matrix.shape
+    chosen = beside_faces(count, dof)
+    if count - dof > 2:
+        normals = normals_to(matrix)
+        size = jnp.linalg.norm(normals, axis=1)[:, None]
+        along = jnp.take_along_axis(normals / jnp.where(size > FLAT, size, 1.0) @ matrix, jnp.asarray(chosen), axis=1)
+        return jnp.where((size > FLAT) & (jnp.abs(along) > FLAT), along, 0.0)
+    # One row of the null space more than it has columns: the relation among them.
+    rows = kernel.T[chosen]
+    if chosen.shape[1] == 1:
+        return jnp.ones(chosen.shape)
+    if chosen.shape[1] == 2:
+        along = jnp.stack([rows[:, 1, 0], -rows[:, 0, 0]], axis=1)
+    else:
+        after, last = rows[:, np.array([1, 2, 0])], rows[:, np.array([2, 0, 1])]
+        along = after[..., 0] * last[..., 1] - after[..., 1] * last[..., 0]
+    size = jnp.max(jnp.abs(along), axis=1, keepdims=True)
+    along = jnp.where(size > FLAT, along / jnp.where(size > FLAT, size, 1.0), 0.0)
+    return jnp.where(jnp.abs(along) > FLAT, along, 0.0)
+
+
+def face_distances(
+    along: Float[Array, "n m"], slacks: Float[Array, "n"], weights: Float[Array, "n m"]
+) -> Float[Array, "n"]:
+    """Distances of tensions from their limits at which a face is reached."""
+    sizes = jnp.sum(jnp.abs(along) * weights, axis=1)
+    return jnp.where(sizes > 0.0, slacks / jnp.where(sizes > 0.0, sizes, 1.0), jnp.inf)
+
+
+@jax.jit
+def wrench_faces(
+    matrix: Float[Array, "dof n_cables"], tension_min: Float[Array, "n_cables"], tension_max: Float[Array, "n_cables"]
+) -> Faces:
+    """Faces of the set of wrenches that cables can give."""
+    dof, count = matrix.shape
+    # A cable that ends in its own spool has no direction.
+    has_directions = jnp.isfinite(matrix).all()
+    matrix = jnp.where(jnp.isfinite(matrix), matrix, 0.0)
+    products = normals_to(matrix)
+    volumes = jnp.linalg.norm(products, axis=1)
+    spans = volumes > FLAT
+    units = products / jnp.where(spans, volumes, 1.0)[:, None]
+    along = units @ matrix
+    is_own = np.zeros(along.shape, bool)
+    np.put_along_axis(is_own, spanning(count, dof), True, axis=1)
+    along = jnp.where(is_own | (jnp.abs(along) <= FLAT), 0.0, along)
+    is_regular = has_directions & (spans & (along != 0.0).any(1)).any()
+    both = jnp.concatenate([along, -along])
+    offsets = _offset(both, tension_min, tension_max)
+    bounds = jnp.concatenate([spans, spans]) & jnp.isfinite(offsets)
+    farthest = jnp.max(jnp.where(np.concatenate([is_own, is_own]), -jnp.inf, both), axis=1)
+    emptier = jnp.min(jnp.where(jnp.concatenate([spans, spans]), farthest, jnp.inf))
+    return Faces(
+        normals=jnp.where(bounds[:, None], jnp.concatenate([units, -units]), 0.0),
+        offsets=jnp.where(bounds, offsets, -jnp.inf),
+        volumes=jnp.concatenate([volumes, volumes]),
+        apex=matrix @ tension_min,
+        of_largest=bounds & (both < 0.0).any(1),
+        is_regular=is_regular,
+        closure=jnp.where(is_regular, emptier, -1.0),
+    )
+
+
+def _offset(along: Array, low: Array, high: Array) -> Array:
+    # Return the smallest product of each normal with a wrench of the set.
+    return jnp.sum(along * jnp.where(along > 0.0, low[None], jnp.where(along < 0.0, high[None], 0.0)), axis=1)
+
+
+@jax.jit
+def acceleration_faces(
+    robot: PointMassRobot,
+    position: Float[Array, "3"],
+    tension_min: Float[Array, "n_cables"],
+    tension_max: Float[Array, "n_cables"],
+) -> Faces:
+    """Faces of the set of accelerations that the cables of a point mass can give at one place."""
+    still = jnp.zeros_like(position)
+    matrix = robot.wrench_matrix(State(position, still, still))
+    faces = wrench_faces(matrix, tension_min / robot.mass, tension_max / robot.mass)
+    if robot.dof == PLANAR:
+        normals, apex = (jnp.stack([x[..., 0], 0.0 * x[..., 0], x[..., 1]], -1) for x in (faces.normals, faces.apex))
+    else:
+        normals, apex = faces.normals, faces.apex
+    falling = -relative_acceleration(robot, still)
+    # A face that bounds nothing keeps its -inf.
+    return dataclasses.replace(faces, normals=normals, apex=apex + falling, offsets=faces.offsets + normals @ falling)
+
+
+@jax.jit
+def tension_range(robot: Robot, limits: Limits) -> tuple[Float[Array, "n_cables"], Float[Array, "n_cables"]]:
+    """Smallest and largest tension of each cable."""
+    count = robot.n_cables
+    low = jnp.zeros(count) if limits.tension_min is None else jnp.asarray(limits.tension_min)
+    high = jnp.full(count, jnp.inf) if limits.tension_max is None else jnp.asarray(limits.tension_max)
+    return jnp.broadcast_to(low, (count,)), jnp.broadcast_to(high, (count,))

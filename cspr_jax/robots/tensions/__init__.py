@@ -1,0 +1,1 @@
+"""Tensions of redundant cables: the least ones, rules that choose among them, and linear programs."""

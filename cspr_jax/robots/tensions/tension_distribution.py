@@ -1,0 +1,315 @@
+"""Tensions of a robot with more cables than it needs, at one instant: the least ones, or the farthest from limits.
+
+All tensions that give a wrench are t = t0 + N^T x: t0 is the least of all, N an orthonormal basis of tensions without a
+wrench, so that the least tensions within limits belong to the shortest feasible x. With one or two components of x
+(d + 1 or d + 2 cables) this is the nearest feasible point among 0, the point of the line of each limit nearest to 0,
+and the points where the lines of two limits meet. With more components, the limit that is broken most is fixed, again
+and again, as in the improved closed form of Pott (2013); a limit that then holds a tension back is let go again
+(Goldfarb and Idnani 1983), which makes the answer exact, and proves that there is none where there is none.
+
+The largest distance from the limits is the distance of the wrench from the nearest face of `wrench_sets`.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from typing import TYPE_CHECKING, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+
+from cspr_jax.errors import InputError
+from cspr_jax.numerics.elementary import solved
+from cspr_jax.robots.statics.wrench_sets import FLAT, beside_faces, face_distances, one_sided_faces
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Float
+
+# A limit counts as kept within the first of these parts of the largest tension; for points that are compared, within
+# the second.
+WITHIN, ROUNDING = 1e-9, 1e-11
+# A unit vector depends on others if its component normal to them is shorter than this.
+DEPENDENT = 1e-10
+# Largest number of steps of the search for the limits that are reached, over the number of cables; random cases take
+# fewer than two.
+LONGEST = 10
+
+
+class Distribution(NamedTuple):
+    """Tensions of all cables at one instant.
+
+    Fields:
+        tensions: (n_cables,) N. Where none are feasible, or a rule finds none that are, the tensions of least norm,
+            whatever the limits. They may not be finite where the cables do not span all components of a wrench.
+        residual: () length of W t - w, over 1 + the length of w.
+        is_within: () whether all limits are kept, to 1e-9 of the largest tension, and W has full rank.
+    """
+
+    tensions: Array
+    residual: Array
+    is_within: Array
+
+
+class AllTensions(NamedTuple):
+    """All tensions that give a wrench: least + x @ kernel.
+
+    Fields:
+        least: (n_cables,) tensions of least norm, N.
+        kernel: (n_free, n_cables) orthonormal rows of tensions without a wrench, one for each cable more than needed.
+        is_regular: () whether the cables span all components of a wrench.
+    """
+
+    least: Array
+    kernel: Array
+    is_regular: Array
+
+    def tensions(self, point: Float[Array, "m"]) -> Float[Array, "n_cables"]:
+        """Tensions of one x."""
+        return self.least + point @ self.kernel
+
+
+@jax.jit
+def least_norm(
+    matrix: Float[Array, "dof n_cables"],
+    wrench: Float[Array, "dof"],
+    tension_min: Float[Array, "n_cables"],
+    tension_max: Float[Array, "n_cables"],
+) -> Distribution:
+    """The least tensions within limits."""
+    solutions = all_tensions(matrix, wrench)
+    tensions = solutions.tensions(_shortest(solutions, tension_min, tension_max))
+    return checked(matrix, wrench, tension_min, tension_max, solutions, tensions)
+
+
+@jax.jit
+def centred(
+    matrix: Float[Array, "dof n_cables"],
+    wrench: Float[Array, "dof"],
+    tension_min: Float[Array, "n_cables"],
+    tension_max: Float[Array, "n_cables"],
+) -> tuple[Distribution, Array]:
+    """The tensions that are farthest from their limits; among these the least."""
+    solutions = all_tensions(matrix, wrench)
+    largest = _largest_distance(matrix, tension_min, tension_max, solutions)
+    inwards = jnp.where(jnp.isfinite(largest), largest, 0.0)
+    tensions = solutions.tensions(_shortest(solutions, tension_min + inwards, tension_max - inwards))
+    answer = checked(matrix, wrench, tension_min, tension_max, solutions, tensions)
+    return answer, jnp.where(solutions.is_regular, largest, -jnp.inf)
+
+
+def checked(
+    matrix: Float[Array, "dof n_cables"],
+    wrench: Float[Array, "dof"],
+    low: Float[Array, "n_cables"],
+    high: Float[Array, "n_cables"],
+    solutions: AllTensions,
+    tensions: Float[Array, "n_cables"],
+) -> Distribution:
+    """Tensions with their residual and verdict."""
+    tensions = jnp.where(keeps(tensions, low, high), tensions, solutions.least)
+    residual = jnp.linalg.norm(matrix @ tensions - wrench) / (1.0 + jnp.linalg.norm(wrench))
+    return Distribution(tensions, residual, solutions.is_regular & keeps(tensions, low, high))
+
+
+def keeps(
+    tensions: Float[Array, "n_cables"], low: Float[Array, "n_cables"], high: Float[Array, "n_cables"]
+) -> Bool[Array, ""]:
+    """Tell whether tensions keep their limits, to 1e-9 of the largest."""
+    return jnp.max(jnp.abs(beyond(tensions, low, high))) <= WITHIN * jnp.max(jnp.abs(tensions))
+
+
+def beyond(tensions: Float[Array, "..."], low: Float[Array, "..."], high: Float[Array, "..."]) -> Float[Array, "..."]:
+    """How far tensions are below their smallest; negative: above their largest."""
+    return jnp.maximum(low - tensions, 0.0) - jnp.maximum(tensions - high, 0.0)
+
+
+def all_tensions(matrix: Float[Array, "dof n_cables"], wrench: Float[Array, "dof"]) -> AllTensions:
+    """All tensions that give a wrench."""
+    dof, count = matrix.shape
+    if count < dof:
+        raise InputError("matrix", None, f"must be {dof} or more, one a cable", fault=f"{count} columns")
+    frame, along, left = _frame(matrix, wrench)
+    return AllTensions(along[:dof] @ frame[:dof], frame[dof:], jnp.min(left[:dof]) > FLAT * jnp.max(left[:dof]))
+
+
+def _frame(matrix: Array, wrench: Array) -> tuple[Array, Array, Array]:
+    """Orthonormal rows (n, n), those of W first; (n,) their products with tensions; (n,) their lengths at first.
+
+    By Gram and Schmidt, the longest vector first: the rows of W, then unit vectors, whose products mean nothing.
+    """
+    dof, count = matrix.shape
+    is_row = np.arange(dof + count) < dof
+
+    def take(carry, k):
+        rest, products, frame, along = carry
+        square = jnp.where(is_row == (k < dof), jnp.sum(rest**2, axis=1), -1.0)
+        place = jnp.argmax(square)
+        # Subtract the components along the other rows that rounding has left.
+        again = frame @ rest[place]
+        vector = rest[place] - again @ frame
+        length = jnp.linalg.norm(vector)
+        unit, product = vector / length, (products[place] - jnp.dot(again, along)) / length
+        parts, is_next = rest @ unit, jnp.arange(count) == k
+        rest, products = rest - parts[:, None] * unit[None], products - parts * product
+        frame, along = jnp.where(is_next[:, None], unit[None], frame), jnp.where(is_next, product, along)
+        return (rest, products, frame, along), square[place]
+
+    none = jnp.zeros(count)
+    start = jnp.concatenate([matrix, jnp.eye(count)]), jnp.concatenate([wrench, none]), jnp.zeros((count, count)), none
+    (_, _, frame, along), square = lax.scan(take, start, jnp.arange(count))
+    return frame, along, lax.stop_gradient(jnp.sqrt(square))
+
+
+def _shortest(solutions: AllTensions, low: Array, high: Array) -> Array:
+    """The shortest x (r,) within limits; where there is none, an x that is not far beyond them."""
+    freedom = solutions.kernel.shape[0]
+    if freedom == 0:
+        return jnp.zeros(0)
+    if freedom > 2:
+        return _at_limits(solutions, low, high, _limits_reached(solutions, low, high))
+    points, is_point = _candidates(solutions, low, high)
+    tensions = solutions.least[None] + points @ solutions.kernel
+    excess = jnp.max(jnp.abs(beyond(tensions, low[None], high[None])), axis=1)
+    is_within = is_point & (excess <= ROUNDING * jnp.max(jnp.abs(tensions), axis=1))
+    # If the limits leave only one point, rounding can leave none.
+    worse = jnp.where(is_within.any(), jnp.where(is_within, jnp.sum(points**2, axis=1), jnp.inf), excess)
+    return points[jnp.argmin(jnp.where(is_point, worse, jnp.inf))]
+
+
+def _candidates(solutions: AllTensions, low: Array, high: Array) -> tuple[Array, Array]:
+    """Candidates for the shortest x of one or two components, (k, r), and a mask of those that exist."""
+    freedom, count = solutions.kernel.shape
+    rows = jnp.concatenate([solutions.kernel.T, solutions.kernel.T])
+    limits = jnp.concatenate([low, high])
+    is_limit = jnp.isfinite(limits)
+    offsets = jnp.where(is_limit, limits, 0.0) - jnp.concatenate([solutions.least, solutions.least])
+    square = jnp.sum(rows**2, axis=1)
+    is_line = is_limit & (square > FLAT**2)
+    feet = rows * (offsets / jnp.where(is_line, square, 1.0))[:, None]
+    points, is_point = jnp.concatenate([jnp.zeros((1, freedom)), feet]), jnp.concatenate([np.array([True]), is_line])
+    if freedom == 1:
+        return points, is_point
+    one, other = _pairs(count)
+    turned = jnp.stack([rows[:, 1], -rows[:, 0]], axis=1)
+    product = jnp.sum(rows[one] * turned[other], axis=1)
+    meet = is_line[one] & is_line[other] & (jnp.abs(product) > FLAT)
+    crossings = offsets[one][:, None] * turned[other] - offsets[other][:, None] * turned[one]
+    crossings = crossings / jnp.where(meet, product, 1.0)[:, None]
+    return jnp.concatenate([points, crossings]), jnp.concatenate([is_point, meet])
+
+
+@functools.cache
+def _pairs(count: int) -> tuple[np.ndarray, np.ndarray]:
+    # Return the pairs of limits of two different cables, among 2n limits, the smallest tensions first.
+    pairs = [pair for pair in itertools.combinations(range(2 * count), 2) if (pair[1] - pair[0]) % count]
+    return np.array(pairs)[:, 0], np.array(pairs)[:, 1]
+
+
+class _ActiveSet(NamedTuple):
+    # State of the search for the limits that the shortest x reaches. At each step x = pulls @ kernel.T is the shortest
+    # for some limits.
+    point: Array  # (r,)
+    pulls: Array  # (n,) with the signs of `sides`, and of the limit sought
+    sides: Array  # (n,) 1 held at its smallest tension, -1 at its largest, 0 free
+    sought: Array  # () the cable whose limit is next
+    is_seeking: Array  # ()
+    is_stuck: Array  # ()
+    steps: Array  # ()
+
+
+def _limits_reached(solutions: AllTensions, low: Array, high: Array) -> Array:
+    """Limits that the shortest x reaches, (n,): 1 the smallest tension, -1 the largest, 0 none."""
+    solutions, low, high = lax.stop_gradient((solutions, low, high))
+    freedom, count = solutions.kernel.shape
+
+    def is_open(search):
+        tensions = solutions.tensions(search.point)
+        worst = jnp.max(jnp.abs(beyond(tensions, low, high)))
+        is_beyond = worst > ROUNDING * jnp.max(jnp.abs(tensions))
+        return (search.is_seeking | is_beyond) & ~search.is_stuck & (search.steps < LONGEST * count)
+
+    none, no = jnp.zeros(count), jnp.asarray(False)
+    # Tensions that are not finite are never within limits.
+    is_lost = ~(jnp.isfinite(solutions.least).all() & jnp.isfinite(solutions.kernel).all())
+    start = _ActiveSet(jnp.zeros(freedom), none, none, jnp.asarray(0), no, is_lost, jnp.asarray(0))
+    return lax.while_loop(is_open, lambda search: _step(solutions, low, high, search), start).sides
+
+
+def _step(solutions: AllTensions, low: Array, high: Array, search: _ActiveSet) -> _ActiveSet:
+    """Step towards the limit that is sought, until it is reached or one that is held is in the way, and let go."""
+    excess = beyond(solutions.tensions(search.point), low, high)
+    sought = jnp.where(search.is_seeking, search.sought, jnp.argmax(jnp.abs(excess)))
+    is_sought = jnp.arange(excess.size) == sought
+    side, distance = jnp.sign(excess[sought]), jnp.abs(excess[sought])
+    is_held = search.sides != 0.0
+    way, loss = projected(solutions.kernel, is_held, side * solutions.kernel[:, sought], jnp.zeros_like(excess))
+    square = jnp.dot(way, way)
+    is_blocked = (is_held.sum() >= way.size) | (square <= DEPENDENT**2)
+    whole = jnp.where(is_blocked, jnp.inf, distance / jnp.where(is_blocked, 1.0, square))
+    losing = is_held & (search.sides * loss > 0.0)
+    until = jnp.where(losing, search.pulls / jnp.where(losing, loss, 1.0), jnp.inf)
+    first = jnp.argmin(until)
+    length = jnp.minimum(whole, until[first])
+    is_stuck, is_reached = jnp.isinf(length), whole <= until[first]
+    length = jnp.where(is_stuck, 0.0, length)
+    let_go = (jnp.arange(excess.size) == first) & ~is_reached
+    pulls = search.pulls + length * (jnp.where(is_sought, side, 0.0) - loss)
+    sides = jnp.where(is_sought & is_reached & ~is_stuck, side, search.sides)
+    return _ActiveSet(
+        point=search.point + jnp.where(is_blocked, 0.0, length) * way,
+        pulls=jnp.where(let_go, 0.0, pulls),
+        sides=jnp.where(let_go, 0.0, sides),
+        sought=sought,
+        is_seeking=~is_reached,
+        is_stuck=is_stuck,
+        steps=search.steps + 1,
+    )
+
+
+def _at_limits(solutions: AllTensions, low: Array, high: Array, sides: Array) -> Array:
+    # Return the shortest x at which the tensions with a side are at their limits.
+    limits = jnp.where(sides > 0.0, low, jnp.where(sides < 0.0, high, 0.0))
+    offsets = jnp.where(sides == 0.0, 0.0, limits - solutions.least)
+    return projected(solutions.kernel, sides != 0.0, jnp.zeros(solutions.kernel.shape[0]), offsets)[0]
+
+
+def projected(
+    kernel: Float[Array, "m n_cables"],
+    is_held: Bool[Array, "n_cables"],
+    vector: Float[Array, "m"],
+    products: Float[Array, "n_cables"],
+) -> tuple[Float[Array, "m"], Float[Array, "n_cables"]]:
+    """The vector nearest to another one that has given products with columns of the kernel."""
+    freedom = kernel.shape[0]
+    held = jnp.where(is_held[None], kernel, 0.0)
+    above = jnp.concatenate([jnp.eye(freedom), held], axis=1)
+    below = jnp.concatenate([held.T, jnp.diag(jnp.where(is_held, 0.0, 1.0))], axis=1)
+    right = jnp.concatenate([vector, jnp.where(is_held, products, 0.0)])
+    solution = solved(jnp.concatenate([above, below]), right[:, None])[0][:, 0]
+    return solution[:freedom], solution[freedom:]
+
+
+def _largest_distance(matrix: Array, low: Array, high: Array, solutions: AllTensions) -> Array:
+    """Largest r, () N: half of a cable's range, or a face's slack over its way inwards for each newton of r."""
+    dof, count = matrix.shape
+    if count == dof:
+        return jnp.min(jnp.minimum(solutions.least - low, high - solutions.least))
+    others, products = beside_faces(count, dof), one_sided_faces(matrix, solutions.kernel)
+
+    def slack(along, cables):
+        # A cable without a largest tension pulls beyond the face: its slack is infinite.
+        reached = jnp.where(along < 0.0, high[cables], low[cables])
+        return jnp.sum(along * (solutions.least[cables] - reached), axis=-1)
+
+    both, cables = jnp.concatenate([products, -products]), np.concatenate([others, others])
+    each = lax.stop_gradient(face_distances(both, slack(both, cables), jnp.ones(both.shape)))
+    # Compute the distance from the nearest face once more, now differentiable: infinite limits must not appear in it.
+    nearest = jnp.argmin(each)
+    is_face = jnp.isfinite(each[nearest])
+    along = jnp.where(is_face, both[nearest], 0.0)
+    size = jnp.where(is_face, jnp.sum(jnp.abs(along)), 1.0)
+    distance = jnp.where(is_face, slack(along, jnp.asarray(cables)[nearest]) / size, jnp.inf)
+    return jnp.minimum(distance, 0.5 * jnp.min(high - low))

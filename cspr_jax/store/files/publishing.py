@@ -1,0 +1,96 @@
+"""Files and folders that are there whole or not at all.
+
+A file gets its name only when it is whole and on the disk: written under another name in the same
+folder, flushed, renamed, and the folder flushed. A crash leaves the old state or the new one.
+"""
+
+import contextlib
+import errno
+import os
+import secrets
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from cspr_jax.errors import StoreError, printable
+from cspr_jax.store.files.disk import USUAL, Disk, write_all
+
+# Endings of unfinished files: of this version, and of earlier ones, which named their process.
+LONGEST_NAME = 255  # bytes, of whatever disk
+PART = r"\.(?:[0-9a-f]{12}|\d+)\.part"
+
+
+def part_of(path: Path) -> Path:
+    """Name under which a file is written until it is whole; nobody can know it beforehand."""
+    return path.with_name(f".{path.name}.{secrets.token_hex(6)}.part")
+
+
+def check_place(path: Path | None) -> None:
+    """Refuse a file that cannot be written where it is to be, before the work of which it is the end."""
+    if path is None:
+        return
+    is_long = len(os.fsencode(part_of(path).name)) > LONGEST_NAME
+    faults: tuple[tuple[int, Callable[[], bool]], ...] = (
+        (errno.ENAMETOOLONG, lambda: is_long),
+        (errno.EISDIR, path.is_dir),
+        (errno.ENOENT, lambda: not path.parent.exists()),
+        (errno.ENOTDIR, lambda: not path.parent.is_dir()),
+        (errno.EACCES, lambda: not os.access(path.parent, os.W_OK | os.X_OK)),
+    )
+    number = next((number for number, is_so in faults if is_so()), None)
+    if number is not None:
+        raise refusal(path, OSError(number, os.strerror(number)))
+
+
+@contextlib.contextmanager
+def new_file(disk: Disk, path: Path, *, mode: int = USUAL) -> Iterator[int]:
+    """A file that gets its name when the block ends well, and leaves nothing when it does not."""
+    part = part_of(path)
+    try:
+        file = disk.create(part, mode)  # where it fails, what has that name is not ours to remove
+        try:
+            try:
+                yield file
+                disk.sync(file)
+            finally:
+                os.close(file)
+            disk.replace(part, path)
+        except BaseException:
+            with contextlib.suppress(OSError):  # the first failure tells more
+                disk.unlink(part)
+            raise
+        disk.sync_folder(path.parent)
+    except OSError as error:
+        raise refusal(path, error) from error
+
+
+def publish(disk: Disk, path: Path, data: bytes, *, mode: int = USUAL) -> None:
+    """Write a small file whole or not at all."""
+    with new_file(disk, path, mode=mode) as file:
+        write_all(disk, file, data)
+
+
+def make_folders(disk: Disk, path: Path) -> None:
+    """Make a folder and those above it, each named on the disk before the next."""
+    missing = []
+    folder = path
+    while not folder.is_dir():
+        missing.append(folder)
+        if folder.parent == folder:
+            break
+        folder = folder.parent
+    try:
+        for folder in reversed(missing):
+            with contextlib.suppress(FileExistsError):  # somebody made it meanwhile
+                disk.make_folder(folder)
+            disk.sync_folder(folder.parent)
+        if not path.is_dir():
+            raise NotADirectoryError(20, "Not a directory")
+    except OSError as error:
+        raise StoreError(printable(f"{path}: cannot be made: {error.strerror or error}")) from error
+
+
+def refusal(path: Path, error: OSError) -> StoreError:
+    """Error for a file that cannot be written."""
+    return StoreError(
+        printable(f"{path}: cannot be written: {error.strerror or error}; make room or choose another -o")
+    )

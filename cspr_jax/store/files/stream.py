@@ -1,0 +1,86 @@
+"""A file that HDF5 writes through."""
+
+import io
+import os
+
+from cspr_jax.store.files.disk import Disk, write_all
+
+
+class DiskFile(io.RawIOBase):
+    """A new file that HDF5 writes through, and that never fails in HDF5's hands.
+
+    HDF5 can crash the interpreter when the disk refuses a write and it then has to close the file.
+    So the first refusal is kept, everything after it is dropped, and `raise_failure` tells.
+
+    Args:
+        file: descriptor of an empty file.
+    """
+
+    def __init__(self, disk: Disk, file: int) -> None:
+        """Start at the beginning."""
+        self._disk, self._file, self._at, self._size = disk, file, 0, 0
+        self._failure: BaseException | None = None
+
+    @property
+    def size(self) -> int:
+        """Bytes that the file has."""
+        return self._size
+
+    def raise_failure(self) -> None:
+        """Raise what the disk first refused, if it did."""
+        if self._failure is not None:
+            raise self._failure
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET, /) -> int:
+        """Go to an offset."""
+        self._at = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: self._size}[whence]
+        return self._at
+
+    def tell(self) -> int:
+        """Position at which reading and writing goes on."""
+        return self._at
+
+    def readinto(self, buffer, /) -> int:
+        """Read what has been written, or keep the reason why not."""
+        view = memoryview(buffer).cast("B")
+        try:
+            data = os.pread(self._file, len(view), self._at)
+        except OSError as failure:
+            self._failure, data = self._failure or failure, b""
+        view[: len(data)] = data
+        self._at += len(data)
+        return len(data)
+
+    def write(self, data, /) -> int:
+        """Write all of the data, or keep the reason why not."""
+        view = memoryview(data).cast("B")
+        if self._failure is None:
+            try:
+                write_all(self._disk, self._file, bytes(view), self._at)
+            except BaseException as failure:  # noqa: BLE001 - whatever it is, it must not pass through HDF5
+                self._failure = failure
+        self._at += len(view)
+        self._size = max(self._size, self._at)
+        return len(view)
+
+    def truncate(self, size: int | None = None, /) -> int:
+        """Set the size, or keep the reason why not."""
+        self._size = self._at if size is None else size
+        if self._failure is None:
+            try:
+                self._disk.truncate(self._file, self._size)
+            except BaseException as failure:  # noqa: BLE001 - as above
+                self._failure = failure
+        return self._size
+
+    def readable(self) -> bool:
+        """It can be read."""
+        return True
+
+    def writable(self) -> bool:
+        """It can be written."""
+        return True
+
+    def seekable(self) -> bool:
+        """It has offsets."""
+        return True

@@ -1,0 +1,229 @@
+"""Work of the process that reads files for another one: see `store.reading.isolated`."""
+
+import contextlib
+import dataclasses
+import json
+import math
+import os
+import resource
+import socket
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import h5py
+import numpy as np
+from h5py import h5a
+
+from cspr_jax.errors import StoreError
+from cspr_jax.schema.quantities import (
+    AXES,
+    FAILURES,
+    FLIGHT,
+    PATHS,
+    QUANTITIES,
+    SEGMENTS,
+    TRAJECTORY,
+    Quantity,
+    register,
+)
+from cspr_jax.store.consolidation import content_of
+from cspr_jax.store.files import guard
+from cspr_jax.store.files.checksum import UNSEALED, DamagedError
+from cspr_jax.store.files.netcdf import UNREADABLE, reason
+from cspr_jax.store.shards import Layout, decode, header_of
+
+# A result is read into memory as a whole. A byte of a file stands for a few bytes of data, unless these are all alike.
+LARGEST_DATA, DENSEST = 8e9, 50
+# Processor seconds to inspect a file; and to read it, for each byte and each chunk, on a slow machine.
+_LOOK, _PER_BYTE, _PER_CHUNK = 1.0, 1.0 / 25e6, 1e-4
+_MEMORY = 256 << 20
+# Names of parts of vectors, for other programs.
+_MARKS = (b"axis", b"cable", b"component", b"each", b"couple", b"bound", b"level", b"edge", b"speed")
+# Attribute that libraries of netCDF add to the files that they write.
+_OF_NETCDF = b"_NCProperties"
+_LONG = ("settings", "environment_settings", "plan", "robot_settings")
+_TEXTS = (
+    *("Conventions", "title", "map", "identity", "z_axis", "robot", "software", "environment", "environments"),
+    *("content_sha256", "family", "point"),
+)
+_INTEGERS, _NUMBERS = ("schema", "cells_near_zero", "mixed", "feasible"), ("mass", "z0", "proved")
+
+
+def serve() -> None:
+    """Answer questions about one file after the other, until there are no more.
+
+    Standard input is a socket: questions come in on it, each with an open file; answers go out, as JSON and arrays. The
+    arguments of the command are two folders of `store.reading.isolated`, and the quantities that the asking process has
+    registered.
+    """
+    for row in json.loads(sys.argv[3]):
+        register(Quantity(**row))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    channel = socket.socket(fileno=0)
+    out = channel.makefile("wb")
+    _tell(out, {})  # ready
+    while (request := _next(channel)) is not None:
+        words, file = request
+        _grant(_LOOK, 0)
+        answer(Path(f"/dev/fd/{file}"), words, out)
+        os.close(file)
+
+
+def answer(file: Path, words: dict[str, Any], out: BinaryIO) -> None:
+    """Answer one question."""
+    try:
+        _ANSWERS[words["what"]](file, words, out)
+    except MemoryError:
+        if _Limits.are_foreign:
+            _tell(out, {"failed": "too little memory to read a file: raise the limit (ulimit -v)"})
+        else:
+            _tell(out, {"refused": "it needs more memory than its size explains"})
+    except (DamagedError, StoreError, *UNREADABLE) as error:
+        _tell(out, {"refused": reason(error)})
+
+
+def _next(channel: socket.socket) -> tuple[dict[str, Any], int] | None:
+    data, files, _, _ = socket.recv_fds(channel, 8, 1)
+    if not data:
+        return None
+    size = int.from_bytes(data + _exactly(channel, 8 - len(data)), "little")
+    return json.loads(_exactly(channel, size)), files[0]
+
+
+def _exactly(channel: socket.socket, count: int) -> bytes:
+    data = b""
+    while len(data) < count:
+        part = channel.recv(count - len(data))
+        if not part:
+            raise EOFError
+        data += part
+    return data
+
+
+def _check_netcdf(path: Path) -> None:
+    # Another program's files have no seal; one of this program that is not whole has none either.
+    with contextlib.suppress(*UNREADABLE), h5py.File(path, "r") as file:
+        if h5a.exists(file.id, _OF_NETCDF):
+            return
+    raise DamagedError(UNSEALED)
+
+
+def _dimensions(data: h5py.Dataset) -> list[str]:
+    # The axes themselves are scales, which have none.
+    if data.is_scale:
+        return [Path(data.name).name]
+    return [Path(dimension[0].name).name for dimension in data.dims if len(dimension)]
+
+
+def _result(path: Path, words: dict[str, Any], out: BinaryIO) -> None:
+    if not words["is_sealed"]:
+        _check_netcdf(path)
+    with h5py.File(path, "r") as file:
+        attributes = _attributes(file)
+        tables = (AXES, QUANTITIES) if "map" in attributes else (TRAJECTORY, SEGMENTS, FLIGHT, FAILURES, PATHS)
+        is_joined = not words["is_sealed"]
+        if is_joined and not {"map", "settings"} <= attributes.keys():
+            raise DamagedError("a joined map must keep the attributes of one of them: combine_attrs='override'")
+        datasets = guard.datasets(file, [name for table in tables for name in table], is_joined=is_joined)
+        marks = [name for name in _MARKS if "map" not in attributes and file.id.links.exists(name)]
+        if not is_joined:
+            guard.refuse_others(file, len(datasets) + len(marks), len(attributes))
+        guard.refuse_dense(datasets.values(), path.stat().st_size, densest=DENSEST)
+        total = sum(one.size for one in datasets.values())
+        if total > LARGEST_DATA:
+            raise DamagedError(f"it holds {total / 1e9:.3g} GB of data: must be at most {LARGEST_DATA / 1e9:.3g} GB")
+        arrays = [[name, one.dtype, one.shape] for name, one in datasets.items()]
+        dimensions = {name: _dimensions(file[name]) for name in datasets} if is_joined else None
+        _tell(out, {"attributes": attributes, "arrays": arrays, "dimensions": dimensions})
+        _grant_for(datasets.values())
+        for one in datasets.values():
+            values = one.values()
+            _tell(out, {})  # it could be read
+            _send(out, values)
+        out.flush()
+
+
+def _content(path: Path, words: dict[str, Any], out: BinaryIO) -> None:
+    with h5py.File(path, "r") as file:
+        motion = guard.text(file, "map") is None
+    if motion:
+        _tell(out, {"motion": True})
+        return
+
+    def go_on(datasets: Iterable[guard.ReadableDataset]) -> None:
+        _tell(out, {})  # the slow part begins
+        _grant_for(datasets)
+
+    _tell(out, {"content": dataclasses.asdict(content_of(path, go_on))})
+
+
+def _shard(path: Path, words: dict[str, Any], out: BinaryIO) -> None:
+    shard = decode(path, Layout(**words["layout"]), words["index"], tuple(words["shape"]), _grant_for)
+    plain = {field.name: getattr(shard, field.name) for field in dataclasses.fields(shard) if field.name != "values"}
+    _tell(out, {"shard": plain, "arrays": [[name, array.dtype.name] for name, array in shard.values.items()]})
+    for array in shard.values.values():
+        _send(out, array)
+    out.flush()
+
+
+def _header(path: Path, words: dict[str, Any], out: BinaryIO) -> None:
+    with h5py.File(path, "r") as file:
+        _tell(out, {"header": header_of(file).model_dump()})
+
+
+_ANSWERS = {"result": _result, "content": _content, "shard": _shard, "header": _header}
+
+
+def _attributes(file: h5py.File) -> dict[str, Any]:
+    # Only attributes that this program writes are read; all others stay where they are.
+    attributes: dict[str, Any] = {name: guard.text(file, name) for name in _LONG}
+    attributes |= {name: guard.text(file, name, largest=1 << 16) for name in _TEXTS}
+    for names, dtype in ((_INTEGERS, "int64"), (_NUMBERS, "float64")):
+        for name in names:
+            value = guard.numbers(file, name, dtype)
+            attributes[name] = None if value is None else value.item()
+    points = guard.numbers(file, "base_points", "float64", (None, 3))
+    attributes["base_points"] = None if points is None else points.tolist()
+    return {name: value for name, value in attributes.items() if value is not None}
+
+
+def _tell(out: BinaryIO, answer: dict[str, Any]) -> None:
+    data = json.dumps(answer).encode()
+    out.write(len(data).to_bytes(8, "little") + data)
+    out.flush()
+
+
+def _send(out: BinaryIO, values: np.ndarray) -> None:
+    if values.size:
+        out.write(values.reshape(-1).data.cast("B"))
+
+
+def _grant_for(datasets: Iterable[guard.ReadableDataset]) -> None:
+    readable = list(datasets)
+    seconds = sum(one.size * _PER_BYTE + one.chunks * _PER_CHUNK for one in readable)
+    _grant(_LOOK + seconds, 2 * max((one.size for one in readable), default=0))
+
+
+def _grant(seconds: float, memory: int) -> None:
+    # Time of the processor, not of the clock: a busy machine is no fault of the file.
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    _limit(resource.RLIMIT_CPU, math.ceil(used.ru_utime + used.ru_stime + seconds))
+    try:
+        pages = int(Path("/proc/self/statm").read_text().split()[0])
+    except OSError:
+        return  # only Linux says it, and only there does the limit work
+    _limit(resource.RLIMIT_AS, pages * resource.getpagesize() + _MEMORY + memory)
+
+
+class _Limits:
+    # The flag is set where somebody else's limits are narrower: a failure at them is no fault of the file.
+    are_foreign = False
+
+
+def _limit(what: int, most: int) -> None:
+    hard = resource.getrlimit(what)[1]
+    if hard != resource.RLIM_INFINITY and hard < most:
+        most, _Limits.are_foreign = hard, True
+    resource.setrlimit(what, (most, hard))

@@ -1,0 +1,96 @@
+"""Smallest slacks that a proved motion attains, and when: minima within the blocks that the proof leaves for them.
+
+The proof bounds each smallest slack and says which blocks may hold it. States at single times within these, at their
+ends and on both sides of joints say what is attained; the best of them are followed until the time is known to a
+millionth of the duration, and better.
+"""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+import numpy as np
+
+from cspr_jax.motion.motion import BESIDE, Motion
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.search.minima import followed, lowest_samples, vertex_values
+from cspr_jax.robots.contacts.clearance import Scene
+from cspr_jax.verification.bounds.block_parts import TimeBlocks
+from cspr_jax.verification.bounds.block_slacks import block_slacks
+from cspr_jax.verification.proved_answers import MotionProof, ProvedAnswers, margins_of
+from cspr_jax.verification.robustness.motion_tolerances import instant_states
+
+# Samples that are followed for each criterion at first, and then; rounds, each eight times as fine.
+STARTS, FOLLOWED, ROUNDS = 6, 2, 7
+# Blocks of a criterion that are sampled at most: those with the smallest upper bounds.
+MOST_BLOCKS = 1000
+Slacks = Callable[[np.ndarray], np.ndarray]
+AnyProved = TypeVar("AnyProved", bound=ProvedAnswers)
+
+
+def with_attained(
+    problem: Problem, answers: AnyProved, motions: Sequence[Motion], scene: Scene | None = None
+) -> AnyProved:
+    """Answers whose margins and causes are those that motions attain."""
+    proofs = np.array(answers.proof)
+    for i, motion in enumerate(motions):
+        proofs[i] = attained(problem, motion, answers.proof[i], scene)
+    return dataclasses.replace(answers, proof=proofs, **margins_of(list(proofs)))
+
+
+def attained(
+    problem: Problem, motion: Motion, case: MotionProof, scene: Scene | None = None, *, contacts_alone: bool = False
+) -> MotionProof:
+    """A proof whose smallest slacks, and their times, are those that the motion attains."""
+    proof, duration = case.proof, float(motion.duration())
+    columns = _nearest(case)
+    if proof.near is None or not len(columns) or not np.isfinite(duration):
+        return case
+
+    def slacks(tau: np.ndarray) -> np.ndarray:
+        times = tau[0]
+        states = instant_states(motion, times)
+        bounds = problem.robot, problem.limits, lambda *_: states, times, times, scene
+        return block_slacks(*bounds, contacts_alone=contacts_alone).high[None, :, columns]
+
+    columns = columns[columns < proof.near.slacks.low.shape[1]]  # feeds come last, from another proof
+    smallest, tau = _minima(slacks, _blocks(proof.near, proof.high, columns, duration), np.asarray(motion.breaks()))
+    high, when = proof.high.copy(), proof.when.copy()
+    # A touch between two floats is proved but not attained.
+    is_seen = np.isfinite(smallest) & ~((high[columns] < 0.0) & (smallest >= 0.0))
+    high[columns[is_seen]], when[columns[is_seen]] = smallest[is_seen], duration * tau[is_seen]
+    return case._replace(proof=dataclasses.replace(proof, high=high, when=when))
+
+
+def _nearest(case: MotionProof) -> np.ndarray:
+    # Criteria that may be the worst ones of their flags.
+    low, high = (side / case.scales for side in (case.proof.low, case.proof.high))
+    flags = np.array([row.flag.value for row in case.criteria])
+    least = np.array([high[flags == flag].min() for flag in flags])
+    return np.flatnonzero((low <= least) & np.isfinite(high))
+
+
+def _blocks(near: TimeBlocks, high: np.ndarray, columns: np.ndarray, duration: float) -> tuple[np.ndarray, np.ndarray]:
+    # Starts and ends (2, k) of the blocks to sample, tau, and which criteria (k, m) each may be the worst of.
+    may_hold = near.slacks.low[:, columns] <= high[columns]
+    upper = np.where(may_hold, near.slacks.high[:, columns], np.inf)
+    for column in np.flatnonzero(may_hold.sum(0) > MOST_BLOCKS):
+        may_hold[np.argsort(upper[:, column], kind="stable")[MOST_BLOCKS:], column] = False
+    chosen = may_hold.any(1)
+    return np.stack([near.start[chosen], near.end[chosen]]) / duration, may_hold[chosen]
+
+
+def _minima(slacks: Slacks, blocks: tuple[np.ndarray, np.ndarray], joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    # Smallest slack of each of m criteria, and when, tau, by samples of blocks and then around the best.
+    edges, may_hold = blocks
+    inner = joints[(np.searchsorted(edges[0], joints, "right") > np.searchsorted(edges[1], joints))]
+    knots = np.unique(np.concatenate([*edges, inner, inner * (1.0 - BESIDE)]))
+    tau = np.clip(np.sort(np.concatenate([knots, 0.5 * (knots[1:] + knots[:-1])])), 0.0, 1.0)
+    # Samples in blocks that cannot hold the smallest slack of a criterion, and between blocks, do not count for it.
+    inside = np.zeros((len(tau) + 1, len(may_hold[0])), int)
+    np.add.at(inside, np.searchsorted(tau, edges[0]), may_hold)
+    np.subtract.at(inside, np.searchsorted(tau, edges[1], side="right"), may_hold)
+    values = np.where(inside.cumsum(0)[:-1] > 0, slacks(tau[None])[0], np.inf)
+    starts = lowest_samples(values, vertex_values(tau, values), STARTS)
+    smallest, when = followed(slacks, tau[None], starts[None], ROUNDS, FOLLOWED)
+    return smallest[0], when[0]

@@ -1,0 +1,50 @@
+"""Several motions of one family on one amplitude function, so that bounds of blocks of all are computed together."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import jax
+import numpy as np
+
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.elementary import leaf
+from cspr_jax.robots.bounds.state_bounds import StateBounds
+from cspr_jax.verification.bounds.amplitude_bounds import time_bounds
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Int
+
+BATCH = 64
+
+
+class SeveralMotions:
+    """Motions between points or poses, with numbers of arcs."""
+
+    def __init__(
+        self, motions: Any, durations: Float[np.ndarray, "n"], kernel: Callable[[Any], StateBounds], *, orders: int = 3
+    ) -> None:
+        """Keep what all have in common."""
+        self._motions, self.durations, self._kernel, self._orders = motions, np.asarray(durations), kernel, orders
+
+    def __getitem__(self, i: int) -> Any:
+        segment, arcs = self._rows(i)
+        return dataclasses.replace(self._motions, segment=segment, arcs=leaf(arcs))
+
+    def taken(self, chosen: np.ndarray) -> "SeveralMotions":
+        """Some of the motions."""
+        segment, arcs = self._rows(chosen)
+        motions = dataclasses.replace(self._motions, segment=segment, arcs=arcs)
+        return SeveralMotions(motions, self.durations[chosen], self._kernel, orders=self._orders)
+
+    def bounds(
+        self, motion: Int[np.ndarray, "k"], start: Float[np.ndarray, "k"], end: Float[np.ndarray, "k"]
+    ) -> StateBounds:
+        """Bounds of the states over blocks; see `motion.motion.BoundedMotion.bounds`."""
+        blocks = time_bounds(self._motions.amplitude, self.durations[motion], start, end, orders=self._orders)
+        return in_batches(self._kernel, (*self._rows(motion), blocks), size=BATCH)
+
+    def _rows(self, chosen: Any) -> Any:
+        return jax.tree.map(lambda leaves: np.asarray(leaves)[chosen], (self._motions.segment, self._motions.arcs))

@@ -1,0 +1,130 @@
+"""Blocks of several motions with bounds of their slacks, and the parts into which they are cut.
+
+Over a block a slack lies between two lines. Each leaves what it decides: the part in which the lower line is above a
+level, or the upper one below zero, needs no second look. Where the rest is a small part of the block, the block is cut
+there; the rest shrinks with the square of its length at a simple root, while halves would take a step for each digit.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from cspr_jax.numerics.bounds.affine_bounds import ROUNDING
+from cspr_jax.verification.bounds.block_slacks import BlockSlacks
+
+if TYPE_CHECKING:
+    from jaxtyping import Bool, Complex, Float
+
+# A block is halved unless the rest is a smaller part of it than this; the rest is widened by this part of the block.
+SMALL, WIDER = 0.5, 1e-3
+
+
+class TimeBlocks(NamedTuple):
+    """Blocks of time.
+
+    Fields:
+        motion: (k,) number of the motion, from 0 on.
+        start: (k,) s.
+        end: (k,) s.
+        slacks: bounds, (k, n_criteria).
+    """
+
+    motion: np.ndarray
+    start: np.ndarray
+    end: np.ndarray
+    slacks: BlockSlacks
+
+    def taken(self, chosen: np.ndarray) -> "TimeBlocks":
+        """Some of the blocks."""
+        slacks = BlockSlacks(*(bounds[chosen] for bounds in self.slacks))
+        return TimeBlocks(self.motion[chosen], self.start[chosen], self.end[chosen], slacks)
+
+    def undecided(self) -> Bool[np.ndarray, "k n_criteria"]:
+        """Tell which criteria are neither met nor broken throughout."""
+        return ~((self.slacks.low > 0.0) | (self.slacks.high < 0.0))
+
+    def rest(
+        self, level: Float[np.ndarray, "k n_criteria"], matters: Bool[np.ndarray, "k n_criteria"], *, has_upper: bool
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Part of each block outside of which no lower line is below a level, or the upper one is below zero."""
+        low, high, low_rise, high_rise = self.slacks
+        sides = [_below(low + np.maximum(-low_rise, 0.0) - level, low_rise)]
+        if has_upper:
+            sides.append(_below(np.maximum(high_rise, 0.0) - high, -high_rise))
+        first = np.where(matters, np.max([side[0] for side in sides], axis=0), 1.0).min(1)
+        last = np.where(matters, np.min([side[1] for side in sides], axis=0), 0.0).max(1)
+        first, last = first - WIDER, last + WIDER
+        return np.where(first < WIDER, 0.0, first), np.where(last > 1.0 - WIDER, 1.0, last)
+
+    def cut(
+        self, first: Float[np.ndarray, "k"], last: Float[np.ndarray, "k"], jumps: Complex[np.ndarray, "n"]
+    ) -> "tuple[TimeBlocks, TimeBlocks]":
+        """Cut each block before and after its rest, or in two; where accelerations jump within a block, there."""
+        width = self.end - self.start
+        before, after = self.start + first * width, np.where(last < 1.0, self.start + last * width, self.end)
+        is_cut = (last - first < SMALL) & (before < after)
+        outside = [self._part(is_cut & (first > 0.0), 0.0, first + 0.5 * WIDER, end=before)]
+        outside.append(self._part(is_cut & (last < 1.0), last - 0.5 * WIDER, 1.0, start=after))
+        # No bounds of a block across a jump come close to what is on both of its sides.
+        start, end = np.where(is_cut, before, self.start), np.where(is_cut, after, self.end)
+        middle, has_jump = _jump_within(jumps, self.motion, start, end)
+        middle = np.where(has_jump, middle, 0.5 * (start + end))
+        is_split = has_jump | ~is_cut
+        inner = self._replace(start=start, end=end)
+        halves = [inner._replace(end=middle).taken(is_split), inner._replace(start=middle).taken(is_split)]
+        return joined(outside), joined([inner.taken(~is_split), *halves])
+
+    def _part(self, chosen, first, last, **edges) -> "TimeBlocks":
+        # Bounds by the lines between two shares of the block, beyond the edges by more than these are rounded.
+        low, high, low_rise, high_rise = self.slacks
+        ends = [np.broadcast_to(share, len(low))[:, None] for share in (first, last)]
+        fall = np.minimum(*(low_rise * share for share in ends)) + np.maximum(-low_rise, 0.0)
+        rise = np.maximum(*(high_rise * share for share in ends)) - np.maximum(high_rise, 0.0)
+        low = low + fall - ROUNDING * (np.abs(low) + np.abs(low_rise))
+        high = high + rise + ROUNDING * (np.abs(high) + np.abs(high_rise))
+        level = np.zeros_like(low)
+        return self._replace(slacks=BlockSlacks(low, high, level, level), **edges).taken(chosen)
+
+    def no_looser_than(self, whole: BlockSlacks) -> "TimeBlocks":
+        """The blocks with the better of two bounds."""
+        low, high, low_rise, high_rise = self.slacks
+        is_low, is_high = low < whole.low, high > whole.high
+        return self._replace(
+            slacks=BlockSlacks(
+                np.where(is_low, whole.low, low),
+                np.where(is_high, whole.high, high),
+                np.where(is_low, 0.0, low_rise),
+                np.where(is_high, 0.0, high_rise),
+            )
+        )
+
+
+def joined(several: "list[TimeBlocks]") -> TimeBlocks:
+    """All blocks of several lists."""
+    bounds = (np.concatenate(parts) for parts in zip(*(blocks.slacks for blocks in several), strict=True))
+    motion, start, end = (np.concatenate(parts) for parts in zip(*(blocks[:3] for blocks in several), strict=True))
+    return TimeBlocks(motion, start, end, BlockSlacks(*bounds))
+
+
+def _jump_within(
+    jumps: np.ndarray, motion: np.ndarray, start: np.ndarray, end: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    # Instants of jumps strictly within blocks, near their middles, (k,), and whether there are any.
+    if not len(jumps):
+        return start, np.zeros(len(start), bool)
+    # NumPy orders complex numbers by their real parts first.
+    earliest, latest = (
+        np.searchsorted(jumps, motion + 1j * start, side="right"),
+        np.searchsorted(jumps, motion + 1j * end),
+    )
+    chosen = np.clip(np.searchsorted(jumps, motion + 0.5j * (start + end)), earliest, np.maximum(latest - 1, earliest))
+    return jumps.imag[np.minimum(chosen, len(jumps) - 1)], latest > earliest
+
+
+def _below(value: np.ndarray, rise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    # Shares between which a line with this value at the start is not above zero.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = np.clip(-value / rise, 0.0, 1.0)
+    return np.where(rise < 0.0, root, 0.0), np.where(rise > 0.0, root, 1.0)

@@ -1,0 +1,249 @@
+"""Slacks of any motion over blocks of time: bounds, from bounds of its states, of how far each criterion is met.
+
+A motion passes a singularity, and cables without thickness pass through each other, at an instant only. Where that is
+proved to happen within a block that is short enough, the slack counts as negative there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.motion.limits import limits_set
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, dot, norm
+from cspr_jax.numerics.bounds.determinant_bounds import changes_sign, determinant, size_range
+from cspr_jax.robots.bounds.contact_bounds import contact_bounds, corner_depths, passings
+from cspr_jax.robots.bounds.state_bounds import CableBounds, StateBounds, balance_bounds, cable_bounds
+from cspr_jax.robots.bounds.witness_tensions import witness_tensions
+from cspr_jax.robots.cables import AnyRobot, wrench_units
+from cspr_jax.robots.contacts.clearance import Scene
+from cspr_jax.robots.contacts.contact_bodies import Bodies, bodies_of, default_scene, platform_corners
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.point_mass import plane_normal
+from cspr_jax.robots.statics.wrench_balance import SINGULAR
+from cspr_jax.robots.statics.wrench_sets import tension_range
+from cspr_jax.runtime import compile_options
+from cspr_jax.runtime.persistent_jit import persistent_jit
+from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.verification.criteria import AT_INSTANTS, contact_criteria, criteria, judged_poses
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Blocks that are bounded together, with contacts and without.
+BATCH, RATES_BATCH = 64, 128
+# Length of a block and the one before it, together, at which what happens at an instant counts for the block, s.
+INSTANT = 1e-6
+# Upper bound of a slack that vanishes at an instant.
+SMALLEST = 1e-12
+Pair = tuple[Array, Array] | Array
+# Bounds of slacks, without lines or with them, in the order of the fields of `BlockSlacks`.
+Part = tuple[Array, ...]
+
+
+class BlockSlacks(NamedTuple):
+    """Bounds of slacks over k blocks: by numbers, and by lines over the block that rise from or to these numbers.
+
+    Fields:
+        low: (k, n_criteria) lower bounds, -inf where nothing is known.
+        high: (k, n_criteria) upper bounds, inf where nothing is known.
+        low_rise: (k, n_criteria) rise of the line below the slack, from start to end, whose lower end is at `low`;
+            None: no line is known.
+        high_rise: (k, n_criteria) likewise of the line above, whose higher end is at `high`.
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+    low_rise: np.ndarray = None  # type: ignore[assignment]
+    high_rise: np.ndarray = None  # type: ignore[assignment]
+
+    def complete(self) -> "BlockSlacks":
+        """The bounds with lines, level ones where none are known."""
+        rises = (np.zeros_like(self.low) if rise is None else rise for rise in (self.low_rise, self.high_rise))
+        return BlockSlacks(self.low, self.high, *rises)
+
+
+def _lines(below: Pair, above: Pair) -> Part:
+    # Fields of `BlockSlacks` from values of a line below and of a line above, at the start and at the end of a block.
+    return jnp.minimum(*below), jnp.maximum(*above), below[1] - below[0], above[1] - above[0]
+
+
+def _part(slack: AffineBounds) -> Part:
+    # Bound the smallest value of a parabola.
+    return _lines(*_edges(slack)) if slack.square is None else (slack.low(), slack.low() + 2.0 * slack.radius)
+
+
+def _edges(slack: AffineBounds) -> tuple[Pair, Pair]:
+    sides = slack.middle - slack.radius, slack.middle + slack.radius
+    below, above = ((side - slack.slope, side + slack.slope) for side in sides)
+    return below, above
+
+
+@persistent_jit(static_argnames=("passes", "contacts_alone"))
+def _kernel(
+    robot: AnyRobot,
+    limits: Limits,
+    bodies: Bodies,
+    states: StateBounds,
+    passes: bool = False,
+    contacts_alone: bool = False,
+) -> tuple[Array, ...] | Array:
+    # Bound the slacks, or tell which of them are proved to vanish at an instant.
+    def one(state: StateBounds) -> tuple[Array, ...] | Array:
+        cables, matrix, wrench = _balance(robot, state)
+        if passes:
+            return _passes(robot, bodies, matrix, state, cables)
+        parts: list[Part] = []
+        if not contacts_alone:
+            parts += [*tension_slacks(robot, limits, matrix, wrench), *limit_slacks(limits, state, cables)]
+            parts += _of_pose(robot, matrix, state)
+        parts.append(contact_bounds(robot, bodies, state, cables))
+        corners = platform_corners(robot, bodies)
+        if limits.floor is not None and corners is not None:
+            heights = -corner_depths(corners, state) + limits.floor
+            parts.append((jnp.min(heights.low(), keepdims=True), jnp.min(heights.high(), keepdims=True)))
+        return _joined(parts)
+
+    return jax.vmap(one)(states)
+
+
+def _balance(robot: AnyRobot, state: StateBounds) -> tuple[CableBounds, AffineBounds, AffineBounds]:
+    cables, unit = cable_bounds(robot, state), 1.0 / wrench_units(robot)
+    matrix, wrench = balance_bounds(robot, state, cables)
+    return cables, matrix * unit[:, None], wrench * unit
+
+
+def _joined(parts: list[Part]) -> Part:
+    # A part of two bounds has no lines.
+    level = [(*part, *[jnp.zeros_like(part[0])] * (4 - len(part))) for part in parts]
+    low, high, *rises = (jnp.concatenate(side) for side in zip(*level, strict=True))
+    low, high = jnp.where(jnp.isnan(low), -jnp.inf, low), jnp.where(jnp.isnan(high), jnp.inf, high)
+    return low, high, *(jnp.where(jnp.isfinite(rise), rise, 0.0) for rise in rises)
+
+
+@persistent_jit(compiler_options=compile_options.least())
+def _speeds_kernel(velocity: AffineBounds) -> Part:
+    return jax.vmap(lambda each: _joined([_part(-norm(each.each(lambda x: x[None])))]))(velocity)
+
+
+@persistent_jit
+def _rates_kernel(robot: AnyRobot, limits: Limits, states: StateBounds) -> tuple[Array, Array]:
+    # Bound the smallest slacks: the lower end of a line above a slack is above its smallest value.
+    def one(state: StateBounds) -> tuple[Array, Array]:
+        cables, matrix, wrench = _balance(robot, state)
+        parts = [*tension_slacks(robot, limits, matrix, wrench), *limit_slacks(limits, state, cables)]
+        low, high, _, rise = _joined(parts)
+        return low, high - jnp.abs(rise)
+
+    return jax.vmap(one)(states)
+
+
+def tension_slacks(robot: AnyRobot, limits: Limits, matrix: AffineBounds, wrench: AffineBounds) -> list[Part]:
+    """Bounds of the slacks of tensions over one block."""
+    low, high = tension_range(robot, limits)
+    tensions = witness_tensions(matrix, wrench, low, high)
+    if robot.n_cables > robot.dof:
+        return [_lines(tensions.below[:, None], tensions.above[:, None])]
+    slacks = [tensions.tension - low]
+    slacks += [] if limits.tension_max is None else [high - tensions.tension]
+    return [_part(slack) for slack in slacks]
+
+
+def _of_pose(robot: AnyRobot, matrix: AffineBounds, state: StateBounds) -> list[Part]:
+    # Bound the determinant and the depth below the spools, where they are judged.
+    parts: list[Part] = []
+    is_regular, is_below = judged_poses(robot)
+    if is_regular:
+        low, high = size_range(determinant(matrix))
+        parts.append((low[None] - SINGULAR, high[None] - SINGULAR))
+    if is_below:
+        parts.append(_lines(*_edges(dot(state.position, plane_normal(robot)).each(lambda x: x[None]))))
+    return parts
+
+
+def _passes(robot: AnyRobot, bodies: Bodies, matrix: AffineBounds, state: StateBounds, cables: CableBounds) -> Array:
+    # Tell which of the determinant and the contacts are proved to vanish within a block, (1 + n_meetings,).
+    is_regular, _ = judged_poses(robot)
+    through = changes_sign(determinant(matrix)) if is_regular else jnp.zeros((), bool)
+    return jnp.concatenate([through[None], passings(robot, bodies, state, cables)])
+
+
+def limit_slacks(limits: Limits, state: StateBounds, cables: CableBounds) -> list[Part]:
+    """Bounds of the slacks of all other limits over one block; of speeds and accelerations that of the worse sign."""
+    parts: list[Part] = []
+    values = {"depth": state.position.each(lambda x: x[2:]), "length": cables.length}
+    rates = {"speed": cables.rate, "acceleration": cables.acceleration}
+    sizes = {"mass_centre_speed": state.velocity, "mass_centre_acceleration": state.acceleration}
+    for row in limits_set(limits):
+        limit = jnp.asarray(getattr(limits, row.name))
+        if row.quantity in values:
+            parts.append(_part(limit - values[row.quantity]))
+        elif row.quantity in sizes:
+            parts.append(_part(limit - norm(sizes[row.quantity].each(lambda x: x[None]))))
+        elif row.quantity in rates:
+            parts.append(_within(limit, rates[row.quantity]))
+    return parts
+
+
+def _within(limit: Array, value: AffineBounds) -> Part:
+    # The smaller of two slacks is above the line between the smaller values at both ends, and below each of both.
+    one, other = limit - value, value + limit
+    if value.square is not None:
+        return tuple(jnp.minimum(*sides) for sides in zip(_part(one), _part(other), strict=True))
+    (below, above), (other_below, other_above) = _edges(one), _edges(other)
+    is_nearer = one.high() <= other.high()
+    start, end = (jnp.where(is_nearer, *ends) for ends in zip(above, other_above, strict=True))
+    low = jnp.minimum(below[0], other_below[0]), jnp.minimum(below[1], other_below[1])
+    return _lines(low, (start, end))
+
+
+def block_slacks(
+    robot: AnyRobot,
+    limits: Limits,
+    bounds: Callable[[np.ndarray, np.ndarray], StateBounds],
+    start: Float[np.ndarray, "k"],
+    end: Float[np.ndarray, "k"],
+    scene: Scene | None = None,
+    *,
+    contacts_alone: bool = False,
+) -> BlockSlacks:
+    """Bounds of the slacks of a motion over blocks of time."""
+    bodies = bodies_of(robot, scene or default_scene(robot))
+    slacks = partial(_kernel, robot, limits, bodies, contacts_alone=contacts_alone)
+    low, high, *rises = in_batches(slacks, bounds(start, end), size=BATCH)
+    rows = (contact_criteria if contacts_alone else criteria)(robot, limits, scene)
+    at_instants = np.array([row.flag in AT_INSTANTS for row in rows])
+    is_open = ~((low > 0.0) | (high < 0.0))[:, at_instants]
+    # An event at the border of two blocks is within the second one and the end of the first.
+    before = np.maximum(2.0 * start - end, 0.0)
+    short = np.flatnonzero(is_open.any(1) & (end - before <= INSTANT))
+    if len(short):
+        kernel = partial(_kernel, robot, limits, bodies, passes=True)
+        # Bounds are of all blocks together, which may be those of several motions.
+        states = jax.tree.map(lambda leaf: np.asarray(leaf)[short], bounds(before, end))
+        passes = in_batches(kernel, states, size=BATCH)
+        passes = passes if rows[np.argmax(at_instants)].flag == Verdict.SINGULAR else passes[:, 1:]
+        vanishing = np.zeros((len(short), len(rows)), bool)
+        vanishing[:, at_instants] = passes & is_open[short]
+        high[short] = np.where(vanishing, -SMALLEST, high[short])
+        rises[1][short] = np.where(vanishing, 0.0, rises[1][short])
+    return BlockSlacks(low, high, *rises)
+
+
+def rate_slacks(
+    robot: AnyRobot, limits: Limits, states: StateBounds
+) -> tuple[Float[np.ndarray, "k n"], Float[np.ndarray, "k n"]]:
+    """Bounds of the smallest slacks of tensions and limits over blocks: of the first criteria alone."""
+    return in_batches(partial(_rates_kernel, robot, limits), states, size=RATES_BATCH)
+
+
+def speed_slacks(states: StateBounds) -> BlockSlacks:
+    """Bounds of the negative speed of the mass centre over k blocks: of its slack, less what is allowed."""
+    return BlockSlacks(*in_batches(_speeds_kernel, states.velocity, size=RATES_BATCH))

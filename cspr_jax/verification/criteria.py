@@ -1,0 +1,111 @@
+"""Criteria of any motion, in the order of their slacks (`verification.bounds.block_slacks`).
+
+In natural units (N, m, m/s, m/s^2), with n cables:
+
+    tension     of n = dof cables: n distances of the tensions from their limits; of more: the largest distance that all
+                tensions together can have from their limits
+    limits      that are given, one for each cable, of the floor one: depth, length, speed, acceleration
+    regular     of a platform on n = dof cables: size of the normalised determinant less what counts as singular
+    below       of a point mass or a rigid platform on n = dof cables: depth below the plane of the spools
+    contacts    of all bodies that can meet: clearance of their surfaces, `robots.bounds.contact_bounds`
+    floor       of a platform, where there is one: height above it of the lowest of its attachment points, and of the
+                corners of its shape, if that is known
+"""
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from cspr_jax.motion.limits import limits_set
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.contacts.clearance import Scene
+from cspr_jax.robots.contacts.contact_bodies import default_scene, meetings
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.patterns import PATTERNS
+from cspr_jax.robots.model.platform import RIGID, PlatformRobot
+from cspr_jax.robots.statics.wrench_balance import SINGULAR
+from cspr_jax.robots.statics.wrench_sets import tension_range
+from cspr_jax.schema.verdicts import Verdict
+
+# Patterns of the robots that have to stay below their spools.
+BELOW = ("2T", "3T", RIGID)
+FLAGS = {
+    "cables": Verdict.CABLE_CABLE,
+    "platform": Verdict.CABLE_PLATFORM,
+    "obstacle": Verdict.OBSTACLE,
+    "platform-obstacle": Verdict.OBSTACLE,
+}
+# Flags of what can happen at a single instant.
+AT_INSTANTS = (Verdict.SINGULAR, *FLAGS.values())
+
+
+class Criterion(NamedTuple):
+    """Criterion of a slack.
+
+    Fields:
+        flag: the verdict where it is broken; of the tensions of redundant cables `WRENCH_INFEASIBLE`.
+        cables: numbers from 0 on: of one cable, of two that meet, or none.
+        unit: of the slack.
+        obstacle: number of the obstacle from 0 on; None: no obstacle is concerned.
+        allowed: the least, or the most, that the quantity may be.
+        sense: whether it must be at least or at most so large.
+    """
+
+    flag: Verdict
+    cables: tuple[int, ...]
+    unit: str
+    obstacle: int | None = None
+    allowed: float = 0.0
+    sense: Literal["least", "most"] = "least"
+
+    def value(self, slack: float) -> float:
+        """Value of the quantity that is bounded."""
+        return self.allowed + slack if self.sense == "least" else self.allowed - slack
+
+
+def criteria(robot: AnyRobot, limits: Limits, scene: Scene | None = None) -> list[Criterion]:
+    """Criteria, in the order of their slacks."""
+    numbers = range(robot.n_cables)
+    if robot.n_cables > robot.dof:
+        rows = [Criterion(Verdict.WRENCH_INFEASIBLE, (), "N")]
+    else:
+        low, high = (np.broadcast_to(side, robot.n_cables).tolist() for side in tension_range(robot, limits))
+        rows = [Criterion(Verdict.SLACK_CABLE, (k,), "N", allowed=low[k]) for k in numbers]
+        if limits.tension_max is not None:
+            rows += [Criterion(Verdict.OVER_TENSION, (k,), "N", allowed=high[k], sense="most") for k in numbers]
+    for row in limits_set(limits):
+        if row.quantity == "tension":
+            continue
+        values = np.atleast_1d(np.asarray(getattr(limits, row.name), float))
+        values = np.broadcast_to(values, robot.n_cables if row.per_cable else 1).tolist()
+        cables = [(k,) if row.per_cable else () for k in range(len(values))]
+        rows += [
+            Criterion(row.flag, each, row.unit, allowed=value, sense=row.sense)
+            for each, value in zip(cables, values, strict=True)
+        ]
+    is_regular, is_below = judged_poses(robot)
+    rows += [Criterion(Verdict.SINGULAR, (), "1", allowed=SINGULAR)] if is_regular else []
+    rows += [Criterion(Verdict.ABOVE_SPOOLS, (), "m")] if is_below else []
+    return rows + contact_criteria(robot, limits, scene)
+
+
+def contact_criteria(robot: AnyRobot, limits: Limits, scene: Scene | None = None) -> list[Criterion]:
+    """Criteria of bodies that can meet: the last of all criteria."""
+    rows, around = [], scene or default_scene(robot)
+    for kind, cable, other in meetings(robot, around):
+        bodies = [k for k in (cable, other if kind == "cables" else -1) if k >= 0]
+        rows.append(Criterion(FLAGS[kind], tuple(bodies), "m", other if FLAGS[kind] == Verdict.OBSTACLE else None))
+    if limits.floor is not None and has_extent(robot, around):
+        rows.append(Criterion(Verdict.BELOW_FLOOR, (), "m", allowed=float(limits.floor), sense="most"))
+    return rows
+
+
+def has_extent(robot: AnyRobot, scene: Scene) -> bool:
+    """Tell whether a robot has points beside its mass centre that must be above a floor."""
+    return isinstance(robot, PlatformRobot) or scene.body is not None
+
+
+def judged_poses(robot: AnyRobot) -> tuple[bool, bool]:
+    """Tell which conditions of poses are judged."""
+    is_determined = robot.n_cables == robot.dof
+    return is_determined and PATTERNS[robot.pattern].is_body, is_determined and robot.pattern in BELOW

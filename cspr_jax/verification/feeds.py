@@ -1,0 +1,45 @@
+"""Feeds: largest speeds of the mass centre that hold over some pieces of a motion alone, such as those of G-code."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cspr_jax.schema.verdicts import Verdict
+from cspr_jax.verification.bounds.block_slacks import BlockSlacks, speed_slacks
+from cspr_jax.verification.criteria import Criterion
+from cspr_jax.verification.time_proof import TimeProof, time_proof
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+
+def feed_proof(motion: Any, feeds: Float[np.ndarray, "m"]) -> tuple[Criterion, TimeProof]:
+    """Proof that a motion keeps its feeds; without one, the slack counts as the largest feed."""
+    knots, largest = np.asarray(motion.knots), float(feeds[np.isfinite(feeds)].max())
+
+    def slacks(start: np.ndarray, end: np.ndarray) -> BlockSlacks:
+        least, most = (side[:, None] for side in _extremes(feeds, knots, start, end))
+        low, high, *rises = speed_slacks(motion.bounds(start, end))
+        is_one = (least == most) & np.isfinite(most)
+        return BlockSlacks(
+            np.where(np.isfinite(least), low + least, largest),
+            np.where(np.isfinite(most), high + most, largest),
+            *(np.where(is_one, rise, 0.0) for rise in rises),
+        )
+
+    proof = time_proof(slacks, float(knots[-1]), jumps=knots[1:-1][feeds[1:] != feeds[:-1]])
+    allowed = float(feeds[np.searchsorted(knots, proof.when[0], side="right") - 1])
+    return Criterion(Verdict.OVER_FEED, (), "m/s", allowed=allowed, sense="most"), proof
+
+
+def _extremes(
+    feeds: np.ndarray, knots: np.ndarray, start: np.ndarray, end: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    # Smallest and largest feed of the pieces in which blocks lie.
+    first = np.clip(np.searchsorted(knots, start, side="right") - 1, 0, len(feeds) - 1)
+    last = np.clip(np.searchsorted(knots, end, side="left"), first + 1, len(feeds))
+    edges = np.stack([first, last], axis=1).ravel()
+    least = np.minimum.reduceat(np.append(feeds, np.inf), edges)[::2]
+    return least, np.maximum.reduceat(np.append(feeds, 0.0), edges)[::2]

@@ -1,0 +1,137 @@
+"""Motions of families that know neither surroundings nor pulleys, judged with both, and smallest numbers of arcs so.
+
+The family makes its motions as for cables from points and without surroundings. Among obstacles, or with the shape of a
+platform, contacts alone are then proved, since the family has proved the rest; over pulleys, everything is. Where
+numbers of arcs are free, larger ones are tried until the motion is proved.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from cspr_jax.motion.answers import Answers, replaced
+from cspr_jax.motion.problem import Problem
+from cspr_jax.robots.contacts.clearance import Scene
+from cspr_jax.schema.verdicts import FLAGS, Verdict
+from cspr_jax.verification.proved_answers import MotionProof, proof_of, proofs_of, sampled_proof
+from cspr_jax.verification.robustness.motion_tolerances import motion_tolerances
+
+if TYPE_CHECKING:
+    from jaxtyping import Num
+
+# Gives answers and motions of some segments, by their numbers, with numbers of arcs: those of `Waypoints.arcs`.
+Join = Callable[[np.ndarray, np.ndarray], tuple[Answers, Any]]
+UNSURE = FLAGS(Verdict.UNDECIDED | Verdict.FEWER_ARCS_UNDECIDED)
+FEWER = FLAGS(Verdict.FEWER_ARCS_UNDECIDED)
+
+
+class JudgedSegments(NamedTuple):
+    """Answers of n segments.
+
+    Fields:
+        answers: the family's, with the verdicts of further proofs, and what they leave of an uncertainty.
+        proofs: of the motions; None: the family refuses the motion, or has none.
+        arcs: (n,) numbers with which the family joins the segments by these motions.
+    """
+
+    answers: Answers
+    proofs: list[MotionProof | None]
+    arcs: np.ndarray
+
+
+class _Trial(NamedTuple):
+    # Answers of the family, further proofs of its motions, and the verdicts (n,) of both.
+    answers: Answers
+    proofs: list[MotionProof | None]
+    verdict: np.ndarray
+
+
+class Judge(NamedTuple):
+    """Judge of motions, beyond their family.
+
+    Fields:
+        problem: its robot with pulleys, if it has some.
+        scene: bodies that can meet, in the robot's axes.
+        intervals: whether intervals of failure are sought, as for `time_proofs`.
+    """
+
+    problem: Problem
+    scene: Scene
+    intervals: bool = True
+
+    @property
+    def has_pulleys(self) -> bool:
+        """Tell whether the robot has pulleys."""
+        return self.problem.robot.pulleys is not None
+
+    def smallest(self, join: Join, arcs: Num[np.ndarray, "n"], *, step: int, max_arcs: int) -> JudgedSegments:
+        """Smallest numbers of arcs whose motions are proved."""
+        trial = self._trial(*join(np.arange(len(arcs)), arcs), self.intervals)
+        answers, proofs, arcs = trial.answers, list(trial.proofs), arcs.copy()
+        verdict, is_free = trial.verdict.copy(), (arcs == 0) & (step * max_arcs > 0)
+        doubtful = is_free & ((trial.verdict | (0 if self.has_pulleys else answers.verdict)) & UNSURE != 0)
+        # Over pulleys the family's choice says nothing.
+        rows = np.flatnonzero(is_free & (self.has_pulleys | (answers.feasible & (verdict != 0))))
+        least = np.full(len(rows), step) if self.has_pulleys else answers.tried_arcs[rows] + step
+        none = np.zeros(len(arcs), bool)
+        none[rows] = True
+        while True:
+            rows, least = rows[least <= max_arcs], least[least <= max_arcs]
+            if not len(rows):
+                break
+            trial = self._trial(*join(rows, least if self.has_pulleys else -least), intervals=False)
+            doubtful[rows] |= (trial.verdict | (0 if self.has_pulleys else trial.answers.verdict)) & UNSURE != 0
+            proved = np.flatnonzero(trial.verdict == 0)
+            done = rows[proved]
+            answers = replaced(answers, done, trial.answers, proved)
+            for i, k in zip(done.tolist(), proved.tolist(), strict=True):
+                proofs[i] = trial.proofs[k]
+            arcs[done], verdict[done], none[done] = trial.answers.tried_arcs[proved], 0, False
+            goes_on = (trial.verdict != 0) & (self.has_pulleys | trial.answers.feasible)
+            rows, least = rows[goes_on], (least if self.has_pulleys else trial.answers.tried_arcs)[goes_on] + step
+        if self.has_pulleys and not max_arcs:  # the family has refuted smaller numbers for cables from points
+            doubtful |= (arcs == 0) & (answers.tried_arcs > max(step, 1))
+        verdict = np.where(none, np.where(doubtful, Verdict.UNDECIDED, verdict | FLAGS(Verdict.NO_ARCS)), verdict)
+        verdict = np.where(verdict == 0, np.where(doubtful, FEWER, answers.verdict & FEWER), verdict).astype(FLAGS)
+        feasible = np.where(verdict & ~FEWER == 0, answers.tried_arcs, 0)
+        return JudgedSegments(dataclasses.replace(answers, verdict=verdict, arcs=feasible), proofs, arcs)
+
+    def _trial(self, answers: Answers, motions: Any, intervals: bool) -> _Trial:
+        # Judge the motions of a family: without pulleys those that it proves.
+        is_judged = np.isfinite(answers.duration) & (self.has_pulleys | answers.feasible)
+        rows, verdict = np.flatnonzero(is_judged), np.array(answers.verdict, FLAGS)
+        proofs: list[MotionProof | None] = [None] * len(verdict)
+        for i, proof in zip(rows.tolist(), self._proofs(motions, rows, intervals), strict=True):
+            proofs[i], verdict[i] = proof, proof.verdict
+        verdict[~is_judged & (verdict & ~FEWER == 0)] = Verdict.NOT_FINITE
+        uncertainty: Any = self.problem.limits.uncertainty
+        if uncertainty is not None and float(uncertainty.spool_positions) > 0.0:  # masses move no cable
+            answers = self._for_all_robots(answers, motions, verdict, rows[verdict[rows] == 0])
+        return _Trial(answers, proofs, verdict)
+
+    def _proofs(self, motions: Any, rows: np.ndarray, intervals: bool) -> list[MotionProof]:
+        how: Any = {"scene": self.scene, "contacts_alone": not self.has_pulleys}
+        if not isinstance(motions, list):
+            several = motions.taken(rows)
+            return proofs_of(self.problem, several.bounds, several.durations, intervals=intervals, **how)
+        chosen = [motions[i] for i in rows]
+        return [
+            proof_of(self.problem, motion, intervals=intervals, **how)
+            if hasattr(motion, "bounds")
+            else sampled_proof(self.problem, motion, **how)
+            for motion in chosen
+        ]
+
+    def _for_all_robots(self, answers: Answers, motions: Any, verdict: np.ndarray, rows: np.ndarray) -> Answers:
+        # Judge feasible motions for all robots within an uncertainty; the family has done so but for contacts.
+        proved, refuted = answers.tolerated.copy(), answers.not_tolerated.copy()
+        for i in rows.tolist():
+            ours = motion_tolerances(self.problem, motions[i], self.scene, contacts_alone=True)
+            proved[i], refuted[i] = min(proved[i], float(ours.proved[0])), min(refuted[i], float(ours.refuted[0]))
+            if proved[i] < 1.0:
+                verdict[i] = Verdict.UNCERTAINTY if refuted[i] <= 1.0 else Verdict.UNDECIDED
+        return dataclasses.replace(answers, tolerated=proved, not_tolerated=refuted)

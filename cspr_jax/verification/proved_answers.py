@@ -1,0 +1,313 @@
+"""Answers of motions that give bounds of their states: proved or refuted over their whole time, in natural units."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from cspr_jax.motion.answers import Answers
+from cspr_jax.motion.cause import UNITS, Cause
+from cspr_jax.motion.motion import BoundedMotion, Motion
+from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.bounds.intervals import united
+from cspr_jax.numerics.linear.frames import Frame
+from cspr_jax.robots.bounds.state_bounds import StateBounds
+from cspr_jax.robots.contacts.clearance import Scene
+from cspr_jax.robots.model.point_mass import spool_radius
+from cspr_jax.schema.verdicts import FLAGS, Verdict
+from cspr_jax.verification.bounds.block_parts import TimeBlocks
+from cspr_jax.verification.bounds.block_slacks import BlockSlacks, block_slacks
+from cspr_jax.verification.criteria import AT_INSTANTS, Criterion, contact_criteria, criteria
+from cspr_jax.verification.robustness.motion_tolerances import instant_states, motion_tolerances
+from cspr_jax.verification.time_proof import TimeProof, time_proofs
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Intervals between instants of a motion that is only sampled.
+SAMPLES = 2000
+ManyBounds = Callable[[np.ndarray, np.ndarray, np.ndarray], StateBounds]
+TENSIONS = Verdict.SLACK_CABLE | Verdict.OVER_TENSION | Verdict.WRENCH_INFEASIBLE
+
+
+class MotionProof(NamedTuple):
+    """Proof of one motion.
+
+    Fields:
+        criteria: of a robot within its limits.
+        proof: of the same criteria.
+        scales: (n_criteria,) sizes by which slacks of several criteria are compared, in their units.
+        obstacles: their names.
+        feeds: (pieces,) largest speed of the mass centre in each piece of the motion, m/s, inf for none; None: there
+            are none.
+    """
+
+    criteria: tuple[Criterion, ...]
+    proof: TimeProof
+    scales: np.ndarray
+    obstacles: tuple[str, ...] = ()
+    feeds: np.ndarray | None = None
+
+    @property
+    def broken(self) -> np.ndarray:
+        """Mask (n_criteria,) of the criteria that fail at some instant."""
+        return (self.proof.high < 0.0) | np.array([len(intervals) > 0 for intervals in self.proof.failing])
+
+    @property
+    def verdict(self) -> Verdict:
+        """Flags of the criteria that fail; without any, feasible or undecided."""
+        flags = Verdict.FEASIBLE
+        for row, is_broken in zip(self.criteria, self.broken, strict=True):
+            flags |= row.flag if is_broken else Verdict.FEASIBLE
+        if flags or bool((self.proof.low > 0.0).all()):
+            return flags
+        return Verdict.UNDECIDED
+
+    def least(self, side: Float[np.ndarray, "n_criteria"], flags: Verdict, *, others: bool = False) -> float:
+        """Smallest of the bounds of some criteria."""
+        chosen = np.array([bool(row.flag & flags) != others for row in self.criteria])
+        return float(np.min((side / self.scales if others else side)[chosen], initial=np.inf))
+
+    def with_feeds(self, motion: Any, feeds: np.ndarray | None) -> "MotionProof":
+        """The proof of a motion of pieces that has to keep feeds, too."""
+        if feeds is None or not np.isfinite(feeds).any():
+            return self
+        from cspr_jax.verification.feeds import feed_proof
+
+        usual, (row, proof) = self.proof, feed_proof(motion, feeds)
+        both = TimeProof(
+            low=np.append(usual.low, proof.low),
+            high=np.append(usual.high, proof.high),
+            when=np.append(usual.when, proof.when),
+            failing=usual.failing + proof.failing,
+            open=usual.open + proof.open,
+            blocks=usual.blocks + proof.blocks,
+            near=usual.near,
+        )
+        scales = np.append(self.scales, row.allowed)
+        return self._replace(criteria=(*self.criteria, row), proof=both, scales=scales, feeds=feeds)
+
+    @property
+    def failing(self) -> np.ndarray:
+        """Intervals in which at least one criterion fails, (m, 2) s, in their order and apart from each other."""
+        return united(np.concatenate([np.empty((0, 2)), *self.proof.failing]))
+
+    @property
+    def failing_by_criterion(self) -> dict[str, list[list[float]]]:
+        """Intervals in which criteria fail, by the names of their flags, [start, end] s each."""
+        parts: dict[str, list[np.ndarray]] = {}
+        for row, intervals in zip(self.criteria, self.proof.failing, strict=True):
+            if len(intervals):
+                parts.setdefault(row.flag.text, []).append(intervals)
+        return {name: united(np.concatenate(each)).tolist() for name, each in parts.items()}
+
+    @property
+    def details(self) -> dict[str, Any]:
+        """Intervals of failure, as `Answers.details` gives them."""
+        return {"failing": self.failing.tolist(), "failing_by_criterion": self.failing_by_criterion}
+
+    def causes(self, frame: Frame) -> tuple[Cause, ...]:
+        """The worst cable of each criterion that fails, the worst one first; else of the criterion nearest to it."""
+        order = np.argsort(self.proof.high / self.scales).tolist()
+        if not self.broken.any():
+            return (dataclasses.replace(cause_of(self, order[0], frame), criterion=Verdict.UNDECIDED.text),)
+        order = [k for k in order if self.broken[k]]
+        flags = [self.criteria[k].flag for k in order]
+        return tuple(cause_of(self, k, frame) for j, k in enumerate(order) if flags.index(flags[j]) == j)
+
+
+@dataclasses.dataclass(frozen=True)
+class ProvedAnswers(Answers):
+    """Answers of motions that are proved or refuted over their whole time; margins are those of the tensions, in N.
+
+    Fields:
+        proof: (n,) `MotionProof` of each.
+    """
+
+    proof: np.ndarray
+
+    @property
+    def feasible(self) -> np.ndarray:
+        """Tell whether each motion is feasible, (n,): proved."""
+        return self.verdict == 0
+
+    def details(self, i: int) -> dict[str, Any]:
+        """Intervals of failure and the unit of the margin; see `Answers.details`."""
+        return {"margin_unit": "N"} | self.proof[i].details
+
+    def proved_causes(self, i: int, frame: Frame) -> tuple[Cause, ...]:
+        """The worst cable of each criterion that fails, else the nearest to it; see `Answers.proved_causes`."""
+        if self.verdict[i] == Verdict.UNCERTAINTY or not self.proof[i].verdict:
+            flag, stands = Verdict.UNCERTAINTY, float(np.fmin(self.tolerated[i], self.not_tolerated[i]))
+            return (Cause(flag.text, needed=1.0, allowed=stands, unit=UNITS[flag]),)
+        return self.proof[i].causes(frame)
+
+
+def cause_of(case: MotionProof, k: int, frame: Frame) -> Cause:
+    """A criterion of a proof as a cause."""
+    row, proof = case.criteria[k], case.proof
+    needed, allowed = row.value(float(proof.high[k])), row.allowed
+    if row.flag == Verdict.BELOW_FLOOR:
+        needed, allowed = (float(frame.height(depth)) for depth in (needed, allowed))
+    obstacle = "" if row.obstacle is None else case.obstacles[row.obstacle]
+    return Cause(row.flag.text, row.cables, float(proof.when[k]), needed, allowed, row.unit, obstacle)
+
+
+def proved_answers(
+    problem: Problem, motions: Sequence[Any], scene: Scene | None = None, feeds: Sequence[np.ndarray | None] = ()
+) -> ProvedAnswers:
+    """Answers of motions, by bounds of their states; a motion that gives none is sampled."""
+    proofs = [(proof_of if hasattr(motion, "bounds") else sampled_proof)(problem, motion, scene) for motion in motions]
+    for i, speeds in enumerate(feeds):
+        proofs[i] = proofs[i].with_feeds(motions[i], speeds)
+    answers = answers_of(proofs, np.array([float(motion.duration()) for motion in motions]))
+    judge_all_robots(problem, answers, motions, scene)
+    return answers
+
+
+def judge_all_robots(
+    problem: Problem, answers: ProvedAnswers, motions: Sequence[Any], scene: Scene | None = None
+) -> None:
+    """Judge feasible motions for all robots within an uncertainty, if there is one."""
+    if problem.limits.uncertainty is not None:
+        for i in np.flatnonzero(answers.feasible).tolist():
+            proved, refuted = (float(side[0]) for side in motion_tolerances(problem, motions[i], scene))
+            answers.tolerated[i], answers.not_tolerated[i] = proved, refuted
+            if proved < 1.0:
+                answers.verdict[i] = (Verdict.UNCERTAINTY if refuted <= 1.0 else Verdict.UNDECIDED).value
+
+
+def proof_of(
+    problem: Problem,
+    motion: BoundedMotion,
+    scene: Scene | None = None,
+    *,
+    contacts_alone: bool = False,
+    intervals: bool = True,
+) -> MotionProof:
+    """Proof of one motion."""
+    jumps = [motion.jumps()] if hasattr(motion, "jumps") else []
+    durations = np.array([float(motion.duration())])
+
+    def bounds(_: np.ndarray, start: np.ndarray, end: np.ndarray) -> StateBounds:
+        return motion.bounds(start, end)
+
+    kind = {"contacts_alone": contacts_alone, "intervals": intervals}
+    return proofs_of(problem, bounds, durations, scene, jumps, **kind)[0]
+
+
+def proofs_of(
+    problem: Problem,
+    bounds: ManyBounds,
+    durations: Float[np.ndarray, "n"],
+    scene: Scene | None = None,
+    jumps: Sequence[np.ndarray] = (),
+    *,
+    contacts_alone: bool = False,
+    intervals: bool = True,
+) -> list[MotionProof]:
+    """Proofs of several motions at once."""
+    rows = _criteria(problem, scene, contacts_alone)
+
+    def slacks(motion: np.ndarray, start: np.ndarray, end: np.ndarray) -> BlockSlacks:
+        of_motion = partial(bounds, motion)
+        return block_slacks(problem.robot, problem.limits, of_motion, start, end, scene, contacts_alone=contacts_alone)
+
+    # Answers tell the nearest contact of each kind alone.
+    names = [(row.flag, () if row.flag in AT_INSTANTS else row.cables) for row in rows]
+    groups = np.array([names.index(name) for name in names])
+    proofs = time_proofs(slacks, durations, jumps=jumps, groups=groups, intervals=intervals)
+    return [_proof(problem, rows, proof, scene) for proof in proofs]
+
+
+def _criteria(problem: Problem, scene: Scene | None, contacts_alone: bool) -> tuple[Criterion, ...]:
+    return tuple((contact_criteria if contacts_alone else criteria)(problem.robot, problem.limits, scene))
+
+
+def _proof(problem: Problem, rows: tuple[Criterion, ...], proof: TimeProof, scene: Scene | None) -> MotionProof:
+    names = () if scene is None else tuple(obstacle.name for obstacle in scene.obstacles)
+    return MotionProof(rows, proof, _scales(problem, rows), names)
+
+
+def answers_of(proofs: Sequence[MotionProof], duration: Float[np.ndarray, "n"]) -> ProvedAnswers:
+    """Answers of proofs."""
+    count = len(proofs)
+    none, nothing = np.zeros(count, int), np.full(count, np.nan)
+    each = np.empty(count, object)
+    each[:] = proofs
+    return ProvedAnswers(
+        arcs=none,
+        tried_arcs=none,
+        verdict=np.array([proof.verdict.value for proof in proofs], FLAGS),
+        duration=duration,
+        **margins_of(proofs),
+        feasible_at_infinity=nothing,
+        tolerated=nothing.copy(),
+        not_tolerated=nothing.copy(),
+        proof=each,
+    )
+
+
+def margins_of(proofs: Sequence[MotionProof]) -> dict[str, np.ndarray]:
+    """Margins of proofs."""
+    return {
+        "margin": np.array([case.least(case.proof.high, TENSIONS) for case in proofs]),
+        "margin_bound": np.array([case.least(case.proof.low, TENSIONS) for case in proofs]),
+        "limit_margin": np.array([case.least(case.proof.high, TENSIONS, others=True) for case in proofs]),
+    }
+
+
+def sampled_proof(
+    problem: Problem,
+    motion: Motion,
+    scene: Scene | None = None,
+    samples: int = SAMPLES,
+    *,
+    contacts_alone: bool = False,
+) -> MotionProof:
+    """Refute a motion that has no bounds by its samples, or leave it undecided."""
+    tau = np.linspace(0.0, 1.0, samples + 1)
+    # A block without a length has the slacks of its instant.
+    states = instant_states(motion, tau)
+    rows = _criteria(problem, scene, contacts_alone)
+    high = block_slacks(
+        problem.robot, problem.limits, lambda start, end: states, tau, tau, scene, contacts_alone=contacts_alone
+    ).high
+    times = tau * float(motion.duration())
+    failing = [_runs(times, column < 0.0) for column in high.T]
+    whole = np.array([[0.0, times[-1]]])
+    proof = TimeProof(
+        low=np.full(high.shape[1], -np.inf),
+        high=high.min(0),
+        when=times[high.argmin(0)],
+        failing=failing,
+        open=[whole] * high.shape[1],
+        blocks=len(tau),
+        near=_between(times, high),
+    )
+    return _proof(problem, rows, proof, scene)
+
+
+def _between(times: np.ndarray, high: np.ndarray) -> TimeBlocks:
+    # Blocks between instants, of which nothing is known from below.
+    upper = np.minimum(high[1:], high[:-1])
+    slacks = BlockSlacks(np.full_like(upper, -np.inf), upper).complete()
+    return TimeBlocks(np.zeros(len(upper), int), times[:-1], times[1:], slacks)
+
+
+def _runs(times: np.ndarray, flags: np.ndarray) -> np.ndarray:
+    # First and last instants of runs of flags, (m, 2).
+    edges = np.diff(np.concatenate([[0], flags.astype(int), [0]]))
+    return np.stack([times[edges[:-1] == 1], times[edges[1:] == -1]], axis=1)
+
+
+def _scales(problem: Problem, rows: Sequence[Criterion]) -> np.ndarray:
+    # Tensions compare with the weight a cable, lengths with the robot, and others with what is allowed.
+    robot = problem.robot
+    weight, size = float(robot.mass * robot.gravity) / robot.n_cables, float(spool_radius(robot))
+    of_unit = {"N": weight, "m": size, "1": 1.0}
+    return np.array([of_unit.get(row.unit, row.allowed) for row in rows])

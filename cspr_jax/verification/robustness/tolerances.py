@@ -1,0 +1,303 @@
+"""Largest multiple of an uncertainty that motions are proved to tolerate, and the smallest that is refuted.
+
+Blocks of a motion are proved for a multiple or halved (`uncertainty.holds`); a robot that breaks a criterion in the
+middle of a block bounds the multiple from above (`uncertainty.fails`).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+import numpy as np
+
+from cspr_jax.schema.limits import LARGEST_MULTIPLE
+from cspr_jax.verification.bounds.blocks import Blocks
+from cspr_jax.verification.bounds.enclosures import Enclosure, Influence, influence
+from cspr_jax.verification.robustness.uncertainty import Requirements, WorstDisplacements, fails, holds, worst
+
+if TYPE_CHECKING:
+    from jaxtyping import Num
+
+# `ROW` is tried first, in its order. A multiple that fails is then divided by `RATIO` while it fails, down to `FIRST`.
+RATIO, FIRST = 8.0, 1e-6
+ROW = (1.0, 8.0, 64.0, 512.0, LARGEST_MULTIPLE)
+# Ratio that the proved and the refuted multiple are to reach, and bisections that find each.
+NEAR, STEPS = 0.99, 12
+# Most halvings of a block, and most open blocks of an arc.
+HALVINGS, OPEN = 14, 256
+# Times as many blocks as usual may be open where it is decided whether a motion is feasible: at the multiple 1.
+DECIDED = 4.0
+# Factor by which a target is lowered where more blocks are open, and how often it is applied in a row.
+LESS, LESSER = 0.95, 8
+# Levels of halving at which a robot that fails is still looked for once the bounds cannot hold.
+MORE = 3
+
+
+class Tolerated(NamedTuple):
+    """Multiples of an uncertainty, of n motions.
+
+    Fields:
+        proved: (n,) every robot within this multiple is proved to meet all criteria; 0 where nothing is proved.
+        refuted: (n,) a robot within this multiple breaks a criterion; infinite where none was found.
+    """
+
+    proved: np.ndarray
+    refuted: np.ndarray
+
+
+class Pool(Protocol):
+    """Blocks that are not settled, and what is known of them; multiples are (k,), one for each block."""
+
+    blocks: Blocks
+
+    def part(self, rows: np.ndarray) -> "Pool":
+        """Blocks chosen by indices, or by a mask (k,)."""
+        ...
+
+    def halves(self, rows: np.ndarray) -> "Pool":
+        """Halves of chosen blocks."""
+        ...
+
+    def middles(self) -> "Pool":
+        """Middles of the blocks, as if blocks had no length."""
+        ...
+
+    def hold(self, multiple: np.ndarray) -> np.ndarray:
+        """Tell in which blocks every robot within a multiple is proved to meet all criteria.
+
+        Args:
+            multiple: (k,).
+
+        Returns:
+            (k,).
+        """
+        ...
+
+    def fail(self, multiple: np.ndarray) -> np.ndarray:
+        """Tell in the middle of which blocks a robot within a multiple breaks a criterion.
+
+        Args:
+            multiple: (k,).
+
+        Returns:
+            (k,).
+        """
+        ...
+
+
+@dataclasses.dataclass
+class _Open:
+    # Blocks of swings, and of platforms on six cables.
+    look: Callable[[Blocks], "_Open"]
+    blocks: Blocks
+    known: Enclosure
+    influence: Influence
+    worst: WorstDisplacements
+    requirements: Requirements
+
+    def part(self, rows: np.ndarray) -> "_Open":
+        worst = WorstDisplacements(*(x[:, rows] for x in self.worst))
+        requirements = dataclasses.replace(self.requirements, slack=self.requirements.slack[rows])
+        known, influence = self.known.part(rows), self.influence.part(rows)
+        return _Open(self.look, self.blocks.part(rows), known, influence, worst, requirements)
+
+    def halves(self, rows: np.ndarray) -> "_Open":
+        return self.look(self.blocks.part(rows).halves())
+
+    def middles(self) -> "_Open":
+        return dataclasses.replace(self, known=self.known.middle(self.influence.mu))
+
+    def fail(self, multiple: np.ndarray) -> np.ndarray:
+        return fails(self.known, self.influence, self.worst, self.requirements, multiple)
+
+    def hold(self, multiple: np.ndarray) -> np.ndarray:
+        return holds(self.known, self.influence, self.requirements, multiple)
+
+
+def tolerated(
+    blocks: Blocks,
+    arcs: Num[np.ndarray, "n"],
+    requirements: Requirements,
+    enclose: Callable[[Blocks], Enclosure],
+    *,
+    whole: bool = True,
+) -> Tolerated:
+    """Multiples of an uncertainty that motions are proved to tolerate, and that are refuted."""
+    if not len(arcs):
+        return Tolerated(np.zeros(0), np.zeros(0))
+    return tolerated_by(_looked_at(requirements, enclose, blocks), arcs, whole=whole)
+
+
+def tolerated_by(pool: Pool, arcs: Num[np.ndarray, "n"], *, whole: bool = True) -> Tolerated:
+    """Multiples of an uncertainty, as `tolerated` gives them, by any way to prove and to refute blocks."""
+    search = _MultipleSearch(arcs, whole=whole)
+    search.refuted = (
+        _refuted_first(pool, len(arcs)) if whole else _refuted_below(pool, search.refuted, np.ones(len(arcs)))
+    )
+    search.targets = _targets(search.refuted, whole=whole)
+    for level in range(HALVINGS + 1):
+        pool = search.left(pool)
+        is_open = search.open_blocks(pool, level)
+        if not is_open.any():
+            break
+        pool = pool.halves(is_open)
+        search.refute(pool)
+    return Tolerated(search.proved, search.refuted)
+
+
+class _MultipleSearch:
+    # State of the search for n motions: refuted multiples, targets and, of motions that are settled, proved multiples.
+
+    def __init__(self, arcs: np.ndarray, *, whole: bool) -> None:
+        self._arcs, self._whole, self._count = arcs, whole, len(arcs)
+        self.refuted, self.targets = np.full(len(arcs), np.inf), np.ones(len(arcs))
+        self.proved, self._is_hopeless = np.full(len(arcs), np.nan), np.zeros(len(arcs), bool)
+
+    @property
+    def _most_open(self) -> np.ndarray:
+        # Multiples other than 1 need not be so close: they decide nothing.
+        return OPEN * self._arcs * np.where(self.targets == 1.0, DECIDED, 1.0)
+
+    def left(self, pool: Pool) -> Pool:
+        # Return the blocks of motions that are not settled.
+        if self._whole:
+            self.targets = _reachable(pool, self.targets)
+        self.proved = np.where(np.isnan(self.proved) & (self.targets == 0.0), 0.0, self.proved)
+        return pool.part(np.isnan(self.proved)[pool.blocks.row])
+
+    def open_blocks(self, pool: Pool, level: int) -> np.ndarray:
+        # Return the blocks to be halved; settle motions without any, and motions with too many.
+        row = pool.blocks.row
+        is_open = ~pool.hold(self.targets[row])
+        is_open = self._lessened(pool, is_open) if self._whole else self._hopeful(pool, is_open)
+        many = np.bincount(row[is_open], minlength=self._count)
+        ends = (many > self._most_open) | ((many > 0) & (level == HALVINGS))
+        ends |= self._is_hopeless & (many > 0) & (level >= MORE)
+        left = is_open & ends[row]
+        if left.any():
+            self.proved[ends] = _held(pool.part(left), self.targets)[ends] if self._whole else 0.0
+        done = np.isnan(self.proved) & (many == 0)
+        self.proved[done] = np.where(self._is_hopeless, 0.0, self.targets)[done]
+        return is_open & ~ends[row]
+
+    def _lessened(self, pool: Pool, is_open: np.ndarray) -> np.ndarray:
+        # Lower the targets of motions of which too many blocks are open.
+        row = pool.blocks.row
+        for _ in range(LESSER):
+            much = np.bincount(row[is_open], minlength=self._count) > self._most_open
+            if not much.any():
+                break
+            self.targets = np.where(much, _not_across_one(LESS * self.targets, self.targets), self.targets)
+            indices = np.flatnonzero(is_open & much[row])
+            is_open[indices] = ~pool.part(indices).hold(self.targets[row[indices]])
+        return is_open
+
+    def _hopeful(self, pool: Pool, is_open: np.ndarray) -> np.ndarray:
+        # Once the middle of a block cannot hold, nothing can be proved for its motion: only look for a robot that
+        # fails, in such middles.
+        row = pool.blocks.row
+        is_bad = is_open & ~pool.middles().hold(self.targets[row])
+        self._is_hopeless |= _any(row, is_bad, self._count)
+        return is_open & (is_bad | ~self._is_hopeless[row])
+
+    def refute(self, pool: Pool) -> None:
+        # Take in the multiples that the middles of new blocks refute.
+        self.refuted = _refuted_below(pool, self.refuted, NEAR * self.refuted if self._whole else self.targets)
+        self.targets = np.minimum(self.targets, _targets(self.refuted, whole=self._whole))
+
+
+def _reachable(pool: Pool, multiples: np.ndarray) -> np.ndarray:
+    # Lower the multiples that cannot hold even in a middle.
+    row, middles = pool.blocks.row, pool.middles()
+    fails = ~middles.hold(multiples[row])
+    if not fails.any():
+        return multiples
+    failing = middles.part(fails)
+    least = _held(failing, multiples)
+    return np.where(least < multiples, _near(least), multiples)
+
+
+def _looked_at(requirements: Requirements, enclose: Callable[[Blocks], Enclosure], blocks: Blocks) -> _Open:
+    known = enclose(blocks)
+    influences = influence(known)
+    each = dataclasses.replace(requirements, slack=requirements.slack[blocks.row])
+    look = partial(_looked_at, requirements, enclose)
+    return _Open(look, blocks, known, influences, worst(known, influences, each), each)
+
+
+def _targets(refuted: np.ndarray, *, whole: bool) -> np.ndarray:
+    # Return the multiples that are to be proved; 0 where there is nothing to be proved any more.
+    if not whole:
+        return np.where(refuted > 1.0, 1.0, 0.0)
+    return np.minimum(_near(refuted), LARGEST_MULTIPLE)
+
+
+def _near(multiple: np.ndarray) -> np.ndarray:
+    # Return a slightly smaller multiple, but not less than 1 if it is more.
+    return _not_across_one(NEAR * multiple, multiple)
+
+
+def _not_across_one(smaller: np.ndarray, multiple: np.ndarray) -> np.ndarray:
+    # At 1 it is decided whether a motion is feasible.
+    return np.where(multiple > 1.0, np.maximum(smaller, 1.0), smaller)
+
+
+def _any(row: np.ndarray, is_so: np.ndarray, count: int) -> np.ndarray:
+    return np.bincount(row[is_so], minlength=count) > 0
+
+
+def _refuted_first(pool: Pool, count: int) -> np.ndarray:
+    # Find the least multiple of a coarse row that the middles refute, then narrow it down.
+    high, row = np.full(count, np.inf), pool.blocks.row
+    for multiple in ROW:
+        left = pool.part(np.isinf(high)[row])
+        broken = left.fail(np.full(len(left.blocks.row), multiple))
+        high[_any(left.blocks.row, broken, count)] = multiple
+    bad = pool.part(np.isfinite(high)[row])
+    bad = bad.part(bad.fail(high[bad.blocks.row]))
+    while len(bad.blocks.row):
+        broken = bad.fail(high[bad.blocks.row] / RATIO)
+        lower = _any(bad.blocks.row, broken, count) & (high > FIRST)
+        high = np.where(lower, high / RATIO, high)
+        bad = bad.part(broken & lower[bad.blocks.row])
+    return _narrowed(pool, high / RATIO, high)
+
+
+def _refuted_below(pool: Pool, refuted: np.ndarray, multiples: np.ndarray) -> np.ndarray:
+    # Try the multiples on the blocks, narrow down those that they refute, and return the least refuted multiples.
+    multiples = np.minimum(multiples, LARGEST_MULTIPLE)
+    is_new = _any(pool.blocks.row, pool.fail(multiples[pool.blocks.row]), len(refuted)) & (multiples > 0.0)
+    high = np.where(is_new, multiples, np.inf)
+    return np.minimum(refuted, _narrowed(pool, np.zeros(len(refuted)), high))
+
+
+def _narrowed(pool: Pool, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    # Narrow `high`, which some middle refutes where it is finite, down towards `low`: some middle refutes it still.
+    pool = pool.part(np.isfinite(high)[pool.blocks.row])
+    pool = pool.part(pool.fail(high[pool.blocks.row]))
+    low, high = low.copy(), high.copy()
+    for _ in range(STEPS):
+        if not len(pool.blocks.row):
+            break
+        middle = np.where(np.isfinite(high), 0.5 * (low + high), 0.0)
+        broken = pool.fail(middle[pool.blocks.row])
+        lower = _any(pool.blocks.row, broken, len(high))
+        low, high = np.where(lower, low, middle), np.where(lower, middle, high)
+        pool = pool.part(broken | ~lower[pool.blocks.row])
+    return high
+
+
+def _held(left: Pool, multiples: np.ndarray) -> np.ndarray:
+    # Find the largest multiple that holds in all blocks of each motion, (n,); motions without blocks keep theirs.
+    row = left.blocks.row
+    low, high = np.zeros(len(row)), multiples[row]
+    for _ in range(STEPS):
+        middle = 0.5 * (low + high)
+        held = left.hold(middle)
+        low, high = np.where(held, middle, low), np.where(held, high, middle)
+    least = multiples.copy()
+    np.minimum.at(least, row, low)
+    return least

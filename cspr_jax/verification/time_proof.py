@@ -1,0 +1,184 @@
+"""Proof of any motion over its whole time: blocks are cut until each criterion is decided on each of them.
+
+A criterion is met throughout a block if the lower bound of its slack is positive, and broken throughout if the upper
+bound is negative. What is left when blocks are as short as the resolution are the ends of intervals in which a
+criterion fails, or instants that are undecided. Open blocks of all motions are bounded together.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cspr_jax.verification.bounds.block_parts import TimeBlocks, joined
+from cspr_jax.verification.bounds.block_slacks import BlockSlacks
+
+if TYPE_CHECKING:
+    from jaxtyping import Float, Int
+
+# Blocks at the start, and the share of itself, or of a tenth of usual ones, to which the smallest slack is narrowed.
+FIRST = 32
+CLOSE = 0.002
+# Blocks of one motion, all cuts together; beyond, what is open stays undecided, and margins are less close.
+MOST, NARROWING = 100_000, 4_000
+# TimeBlocks that narrow a margin are no shorter than this part of the resolution.
+SHORTEST = 1e-3
+
+
+@dataclasses.dataclass(frozen=True)
+class TimeProof:
+    """Bounds of n_criteria over a motion, and where it breaks them.
+
+    Fields:
+        low: (n_criteria,) lower bound of each slack over the whole motion.
+        high: (n_criteria,) upper bound of the smallest slack.
+        when: (n_criteria,) an instant within the block in which that bound was found, s.
+        failing: for each criterion (m, 2) intervals of time in which it fails throughout, s; as wide as is proved.
+        open: for each criterion (m, 2) intervals, none longer than the resolution unless blocks ran out, that are
+            undecided.
+        blocks: number of blocks that were looked at.
+        near: blocks that may hold the smallest slack of some criterion; None: not known.
+    """
+
+    low: np.ndarray
+    high: np.ndarray
+    when: np.ndarray
+    failing: list[np.ndarray]
+    open: list[np.ndarray]
+    blocks: int
+    near: TimeBlocks | None = None
+
+
+def time_proof(
+    slacks: Callable[[np.ndarray, np.ndarray], BlockSlacks],
+    duration: float,
+    resolution: float = 5e-7,
+    jumps: np.ndarray | None = None,
+) -> TimeProof:
+    """Decide criteria over a whole motion."""
+    at_jumps = [] if jumps is None else [jumps]
+    return time_proofs(lambda _, start, end: slacks(start, end), np.array([duration]), resolution, at_jumps)[0]
+
+
+def time_proofs(
+    slacks: Callable[[np.ndarray, np.ndarray, np.ndarray], BlockSlacks],
+    durations: Float[np.ndarray, "n_motions"],
+    resolution: float = 5e-7,
+    jumps: Sequence[np.ndarray] = (),
+    groups: Int[np.ndarray, "n_criteria"] | None = None,
+    *,
+    intervals: bool = True,
+) -> list[TimeProof]:
+    """Decide criteria over several whole motions at once."""
+    count = len(durations)
+    if not count:
+        return []
+    edges = np.asarray(durations, float)[:, None] * np.linspace(0.0, 1.0, FIRST + 1)
+    places = np.repeat(np.arange(count), FIRST), edges[:, :-1].ravel(), edges[:, 1:].ravel()
+    start = blocks = _bounded(slacks, *places, whole=None)
+    totals, leaves, fails = np.full(count, FIRST), [], np.zeros(count, bool)
+    at_jumps = np.concatenate([np.empty(0, complex), *(i + 1j * np.asarray(row) for i, row in enumerate(jumps))])
+    while len(blocks.start):
+        undecided = blocks.undecided()
+        is_open = undecided.any(1) & (blocks.end - blocks.start > resolution)
+        if not intervals:
+            fails |= np.bincount(blocks.motion, (blocks.slacks.high < 0.0).any(1), count) > 0.0
+            is_open &= ~fails[blocks.motion]
+        is_open &= (totals + 2 * np.bincount(blocks.motion[is_open], minlength=count))[blocks.motion] <= MOST
+        leaves.append(blocks.taken(~is_open))
+        first, last = blocks.rest(np.zeros(1), undecided, has_upper=True)
+        outside, inner = blocks.taken(is_open).cut(first[is_open], last[is_open], at_jumps)
+        leaves.append(outside)
+        blocks = _bounded(slacks, *inner)
+        totals += np.bincount(blocks.motion, minlength=count)
+    narrow, more = _narrowed(slacks, joined(leaves), _usual(start.slacks.high, count), resolution, at_jumps, groups)
+    return _proofs(narrow.taken(np.lexsort((narrow.start, narrow.motion))), totals + more)
+
+
+def _bounded(slacks, motion: np.ndarray, start: np.ndarray, end: np.ndarray, whole: BlockSlacks | None) -> TimeBlocks:
+    # A part has no looser bounds than the whole.
+    if whole is not None and not len(start):
+        return TimeBlocks(motion, start, end, whole)
+    blocks = TimeBlocks(motion, start, end, slacks(motion, start, end).complete())
+    return blocks if whole is None else blocks.no_looser_than(whole)
+
+
+def _usual(high: np.ndarray, count: int) -> np.ndarray:
+    # Size that slacks of each motion usually have, (count, n_criteria).
+    return np.median(np.where(np.isfinite(high), np.abs(high), 0.0).reshape(count, FIRST, -1), axis=1)
+
+
+def _least(motion: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
+    # Smallest values of each motion, (count, n_criteria), inf for a motion without any.
+    least = np.full((count, values.shape[1]), np.inf)
+    if len(motion):
+        order = np.argsort(motion, kind="stable")
+        firsts = np.flatnonzero(np.diff(motion[order], prepend=-1))
+        least[motion[order][firsts]] = np.minimum.reduceat(values[order], firsts)
+    return least
+
+
+def _narrowed(
+    slacks,
+    blocks: TimeBlocks,
+    usual: np.ndarray,
+    resolution: float,
+    jumps: np.ndarray,
+    groups: np.ndarray | None,
+) -> tuple[TimeBlocks, np.ndarray]:
+    # Cut the blocks that may hold the smallest slack of a criterion until its bounds are close; tell how many more.
+    count, leaves = len(usual), []
+    more = np.zeros(count, int)
+    least = _grouped(_least(blocks.motion, blocks.slacks.high, count), groups)
+    while len(blocks.start):
+        # Slacks are as large as they usually are: near zero no share of the smallest one is small enough.
+        with np.errstate(invalid="ignore"):  # of bounds that are infinite
+            level = (least - CLOSE * np.fmax(np.abs(least), 0.1 * usual))[blocks.motion]
+        matters = (blocks.slacks.low < level) & np.isfinite(level)
+        is_open = matters.any(1) & (blocks.end - blocks.start > SHORTEST * resolution)
+        is_open &= (more < NARROWING)[blocks.motion]
+        leaves.append(blocks.taken(~is_open))
+        first, last = blocks.rest(level, matters, has_upper=False)
+        outside, inner = blocks.taken(is_open).cut(first[is_open], last[is_open], jumps)
+        leaves.append(outside)
+        blocks = _bounded(slacks, *inner)
+        more += np.bincount(blocks.motion, minlength=count)
+        least = np.minimum(least, _grouped(_least(blocks.motion, blocks.slacks.high, count), groups))
+    return joined(leaves), more
+
+
+def _grouped(least: np.ndarray, groups: np.ndarray | None) -> np.ndarray:
+    # The smallest value of the group of each column.
+    if groups is None or not len(groups):
+        return least
+    smallest = np.full((len(least), int(groups.max()) + 1), np.inf)
+    np.minimum.at(smallest.T, groups, least.T)
+    return smallest[:, groups]
+
+
+def _proofs(blocks: TimeBlocks, totals: np.ndarray) -> list[TimeProof]:
+    count = len(totals)
+    low, high = (_least(blocks.motion, side, count) for side in blocks.slacks[:2])
+    failing = [_merged(blocks, column < 0.0, count) for column in blocks.slacks.high.T]
+    is_open = [_merged(blocks, column, count) for column in blocks.undecided().T]
+    proofs, firsts = [], np.searchsorted(blocks.motion, np.arange(count + 1))
+    for i, (first, last) in enumerate(itertools.pairwise(firsts)):
+        when = 0.5 * (blocks.start + blocks.end)[first + blocks.slacks.high[first:last].argmin(0)]
+        near = blocks.taken(first + np.flatnonzero((blocks.slacks.low[first:last] <= high[i]).any(1)))
+        near = near._replace(motion=np.zeros_like(near.motion))  # the one motion of its proof
+        sides = [parts[i] for parts in failing], [parts[i] for parts in is_open]
+        proofs.append(TimeProof(low[i], high[i], when, *sides, int(totals[i]), near))
+    return proofs
+
+
+def _merged(blocks: TimeBlocks, flags: np.ndarray, count: int) -> list[np.ndarray]:
+    # Join neighbouring blocks of one motion to intervals, (m, 2) for each motion.
+    is_next = np.diff(blocks.motion, prepend=-1) == 0
+    before, after = np.append(False, flags[:-1]) & is_next, np.append(flags[1:] & is_next[1:], False)
+    firsts, lasts = np.flatnonzero(flags & ~before), np.flatnonzero(flags & ~after)
+    intervals = np.stack([blocks.start[firsts], blocks.end[lasts]], axis=1)
+    return np.split(intervals, np.searchsorted(blocks.motion[firsts], np.arange(1, count)))

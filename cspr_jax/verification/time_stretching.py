@@ -1,0 +1,96 @@
+"""Least uniform stretching of time with which a motion is feasible.
+
+Stretched by c, velocities are divided by c and accelerations by c^2, so that what the cables must supply is affine in
+u = 1 / c^2. Tensions within limits for u and for v share out to tensions for each u between them: at every instant the
+feasible u are an interval, and so they are for a whole motion. The smallest distance from limits of tensions is concave
+in u, and speeds and accelerations of cables only fall: a search along u finds a feasible stretching if there is one.
+"""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+from cspr_jax.verification.proved_answers import TENSIONS, MotionProof
+
+# Times by which a motion is slowed down until it counts as at rest, and the ratio to which the least one is narrowed.
+SLOWEST, CLOSE = 1e6, 1e-6
+# Steps of the search for a feasible u where rest is not feasible, each of which narrows it by the golden section.
+STEPS, GOLDEN = 40, 0.5 * (math.sqrt(5.0) - 1.0)
+
+
+class Stretching(NamedTuple):
+    """Answer to a search for the least stretching.
+
+    Fields:
+        factor: by which durations grow, proved feasible; NaN: none was found.
+        proof: of the motion that is so stretched; of the one that comes nearest where none is feasible.
+        is_static: whether the path is proved feasible at rest everywhere, so that some stretching is feasible.
+    """
+
+    factor: float
+    proof: MotionProof
+    is_static: bool
+
+
+def least_stretching(proved: Callable[[float], MotionProof]) -> Stretching:
+    """Find the least stretching that is proved feasible; at one shorter by `CLOSE` nothing is proved."""
+    first = proved(1.0)
+    if _is_feasible(first):
+        return Stretching(1.0, first, is_static=False)
+    slowest = proved(SLOWEST)
+    is_static = _is_feasible(slowest)
+    feasible = _any_feasible(proved, slowest) if not is_static else _doubled(proved)
+    if feasible is None:
+        return Stretching(math.nan, slowest, is_static)
+    high, proof = feasible
+    low = max(1.0, 0.5 * high) if is_static else 1.0
+    while high - low > CLOSE * high:
+        middle = 0.5 * (low + high)
+        trial = proved(middle)
+        if _is_feasible(trial):
+            high, proof = middle, trial
+        else:
+            low = middle
+    return Stretching(high, proof, is_static)
+
+
+def _is_feasible(proof: MotionProof) -> bool:
+    return bool((proof.proof.low > 0.0).all())
+
+
+def _doubled(proved: Callable[[float], MotionProof]) -> tuple[float, MotionProof] | None:
+    factor = 1.0
+    while factor < SLOWEST:
+        factor *= 2.0
+        proof = proved(factor)
+        if _is_feasible(proof):
+            return factor, proof
+    return None
+
+
+def _any_feasible(proved: Callable[[float], MotionProof], slowest: MotionProof) -> tuple[float, MotionProof] | None:
+    # Criteria but tensions that are broken at rest stay broken. Otherwise the worst slack has one highest point over u.
+    if any(
+        is_broken and not row.flag & TENSIONS for row, is_broken in zip(slowest.criteria, slowest.broken, strict=True)
+    ):
+        return None
+    low, high = 0.0, 1.0
+    best: dict[float, MotionProof] = {}
+
+    def worst(u: float) -> float:
+        proof = best[u] = proved(1.0 / math.sqrt(u))
+        return float((proof.proof.high / proof.scales).min())
+
+    left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+    values = worst(left), worst(right)
+    for _ in range(STEPS):
+        for u, proof in best.items():
+            if _is_feasible(proof):
+                return 1.0 / math.sqrt(u), proof
+        if values[0] < values[1]:
+            low, left, right = left, right, left + GOLDEN * (high - left)
+            values = values[1], worst(right)
+        else:
+            high, right, left = right, left, right - GOLDEN * (right - low)
+            values = worst(left), values[0]
+    return None

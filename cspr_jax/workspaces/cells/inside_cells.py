@@ -1,0 +1,160 @@
+"""Cells in which tensions stay within limits at every position, from tensions at the centre; no jax.
+
+With force densities f0 at the centre, Z0 f0 = w, and weights D, the force densities
+
+    f(x) = f0 + D U^T (I - T)^-1 j,    C^-1 Z0 D = U,    T = sum_k x_k T_k,    j = sum_k x_k j_k,
+    T_k = C^-1 N_k D U^T,    j_k = C^-1 N_k f0
+
+satisfy Z(x) f(x) = w, where C C^T = Z0 D^2 Z0^T, so that U has orthonormal rows: to first order, f moves from f0 by the
+least sum of (df_i / D_i)^2. D_i is the distance of f0_i from its limits, so that tensions near a limit hardly move.
+Then
+
+    f_i(x) = f0_i + D_i (U_i . j + U_i . T j + e_i),    |e_i| <= |U_i| |T| |T j| / (1 - |T|),
+
+and the tension is its product with L_i(x), which lies between L0_i - u_i . dp and the same plus
+|dp|^2 / (2 (L0_i - |dp|)). Where exits may be off by s_i, -A_i s_i f0_i adds to C j, and u_i . s_i to the length: the
+effects of each exit on a tension are added as vectors, so that one that moves along its own cable changes nothing to
+first order; all else that they do is bounded by norms. The bounds allow for rounding of C, so that C^-1 Z0 D U^T is not
+quite I and Z0 f0 not quite w. Where |T| < 1 the rank of Z(x) is full, too, since C^-1 Z(x) D U^T = I - T.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from cspr_jax.workspaces.cells.cells import (
+    ROUNDING,
+    Cells,
+    inverse_factor,
+    least_quadratic,
+    norm_reach,
+    pair_norm,
+    reach,
+)
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+
+class _Way(NamedTuple):
+    # Relative change of the force densities over a cell: terms of first and second order in x, of first order in what
+    # exits are off, and a bound of the rest.
+    linear: np.ndarray  # (n, n_cables, 3)
+    quadratic: np.ndarray  # (n, n_cables, 3, 3)
+    exits: np.ndarray  # (n, n_cables, n_exits, 3) 1/m
+    rest: np.ndarray  # (n, n_cables)
+
+    @property
+    def second(self) -> np.ndarray:
+        """Bound of the absolute value of the term of second order, (n, n_cables)."""
+        return -np.minimum(least_quadratic(self.quadratic), least_quadratic(-self.quadratic))
+
+
+def least_margins(
+    cells: Cells,
+    tensions: Float[np.ndarray, "n n_cables"],
+    wrench: Float[np.ndarray, "m"],
+    low: Float[np.ndarray, "n_cables"],
+    high: Float[np.ndarray, "n_cables"],
+) -> Float[np.ndarray, "n"]:
+    """Lower bounds of the tension margin over cells."""
+    least, most = tension_bounds(cells, tensions, wrench, low, high)
+    with np.errstate(invalid="ignore"):
+        below = np.where(np.isfinite(high), high - most, np.inf)
+    margin = np.minimum(least - low, below).min(1)
+    return np.where(np.isnan(margin), -np.inf, margin)
+
+
+def tension_bounds(
+    cells: Cells,
+    tensions: Float[np.ndarray, "n n_cables"],
+    wrench: Float[np.ndarray, "m"],
+    low: Float[np.ndarray, "n_cables"],
+    high: Float[np.ndarray, "n_cables"],
+) -> tuple[Float[np.ndarray, "n n_cables"], Float[np.ndarray, "n n_cables"]]:
+    """Bounds of tensions that give a wrench everywhere in cells."""
+    with np.errstate(all="ignore"):
+        densities = tensions / cells.lengths
+        weights = np.minimum(tensions - low, high - tensions) / cells.lengths
+        way = _way(cells, densities, weights, wrench)
+        least, most = _tension_range(cells, densities, weights, way)
+        lost = ROUNDING * (np.abs(tensions) + np.abs(low) + np.where(np.isfinite(high), np.abs(high), 0.0))
+        is_known = ((weights > 0.0) & (cells.shortest > 0.0) & np.isfinite(way.rest)).all(1, keepdims=True)
+        return np.where(is_known, least - lost, -np.inf), np.where(is_known, most + lost, np.inf)
+
+
+def _way(cells: Cells, densities: np.ndarray, weights: np.ndarray, wrench: np.ndarray) -> _Way:
+    weighted = cells.matrices * weights[:, None]
+    inverse = inverse_factor(weighted @ weighted.transpose(0, 2, 1))
+    rows = inverse @ weighted  # U
+    back = rows.transpose(0, 2, 1)
+    changes = inverse[:, None] @ cells.changes
+    operators = (changes * weights[:, None, None]) @ back[:, None]  # T_k
+    first = (changes @ densities[:, None, :, None])[..., 0]  # j_k
+    second = (operators[:, :, None] @ first[:, None, ..., None])[..., 0]  # T_k j_l
+    # Bound C^-1 Z0 D U^T - I and C^-1 (Z0 f0 - w), which are not zero because of rounding.
+    size = np.linalg.norm(inverse, axis=(1, 2))
+    parts = np.linalg.norm(weighted, axis=(1, 2)) + norm_reach(cells.changes * weights[:, None, None])
+    lost = size * np.linalg.norm(rows, axis=(1, 2)) * (ROUNDING * parts + _length(cells.rounding * weights))
+    defect = np.linalg.norm(rows @ back - np.eye(rows.shape[1]), axis=(1, 2))
+    off, exits = np.zeros(len(size)), np.zeros((*densities.shape, densities.shape[1], 3))
+    if cells.moves.any():
+        moved = -inverse[:, None] @ cells.wrenches  # (n, 3, m, n_exits)
+        most = np.linalg.norm(moved, axis=(1, 2)) * cells.moves
+        off = (most * densities).sum(1)
+        exits = (back[:, None] @ (moved * densities[:, None, None])).transpose(0, 2, 3, 1)
+        lost = lost + np.sqrt(1.0 + defect) * _length(most * weights)
+    defect = defect + lost
+    supplied = (cells.matrices @ densities[..., None])[..., 0]
+    sizes = np.abs(cells.matrices) @ np.abs(densities)[..., None]
+    hidden = ROUNDING * (_length(sizes[..., 0]) + _length(wrench)) + (cells.rounding * np.abs(densities)).sum(1)
+    residual = _length((inverse @ (supplied - wrench)[..., None])[..., 0]) + size * hidden
+    norm, start = norm_reach(operators) + defect, norm_reach(first)
+    after = np.where(norm < 1.0, 1.0 / (1.0 - norm), np.inf)
+    late = np.minimum(pair_norm(second), norm_reach(operators) * start) + defect * start
+    rest = defect * start + norm * after * (late + off) + after * residual
+    columns = _length(back)
+    linear, quadratic = (first @ rows).transpose(0, 2, 1), _by_cable(second @ rows[:, None])
+    return _Way(linear, quadratic, exits, columns * rest[:, None])
+
+
+def _over_exits(cells: Cells, effects: np.ndarray) -> np.ndarray:
+    # Largest sums, (n, n_cables), of effects (n, n_cables, n_exits, 3) of exits anywhere within their balls.
+    return (_length(effects) * cells.moves[:, None]).sum(2)
+
+
+def _length(vectors: np.ndarray) -> np.ndarray:
+    return np.sqrt((vectors * vectors).sum(-1))
+
+
+def _by_cable(values: np.ndarray) -> np.ndarray:
+    return np.moveaxis(values, -1, 1)
+
+
+def _tension_range(
+    cells: Cells, densities: np.ndarray, weights: np.ndarray, way: _Way
+) -> tuple[np.ndarray, np.ndarray]:
+    """Smallest and largest tensions over cells, (n, n_cables) each."""
+    lengths, shortening = cells.lengths, reach(cells.steps)
+    second = way.second
+    moved = _over_exits(cells, way.exits)
+    spread = weights * (reach(way.linear) + second + moved + way.rest)
+    lowest, highest = densities - spread, densities + spread
+    # Expand (L0 - u . dp) f, in which terms of first order may cancel each other.
+    relative = weights * lengths
+    linear = relative[..., None] * way.linear - densities[..., None] * cells.steps
+    mixed = cells.steps[..., :, None] * way.linear[..., None, :]
+    quadratic = relative[..., None, None] * way.quadratic - weights[..., None, None] * mixed
+    rest = weights * (shortening * (second + moved) + (lengths + shortening) * way.rest)
+    middle = lengths * densities
+    lengthened = np.eye(lengths.shape[1])[None, ..., None] * (cells.rays * (densities / lengths)[..., None])[:, :, None]
+    rest = rest + _over_exits(cells, relative[..., None, None] * way.exits + lengthened) + cells.moves * spread
+    least = middle - reach(linear) + least_quadratic(quadratic) - rest
+    most = middle + reach(linear) - least_quadratic(-quadratic) + rest
+    radius = cells.radius[:, None]
+    longest = lengths + radius + cells.moves
+    least = np.where(lowest >= 0.0, np.maximum(least, cells.shortest * lowest), longest * lowest)
+    most = np.minimum(most + 0.5 * (radius + cells.moves) ** 2 / cells.shortest * highest, longest * highest)
+    return least, np.where(highest >= 0.0, most, 0.0)

@@ -1,0 +1,83 @@
+"""Bounds of how far cables move and turn while a robot moves within a cell without turning. Arrays in, answers out.
+
+A cable is a segment from its exit E to its attachment point. While the robot moves by at most h, that point does too.
+On its pulley of radius r, E moves along the cable by r / f of the distance that A moves across the cable in the plane
+of the pulley, where f is the free length; and with this plane by at most 2 r / w of the distance that A moves out of
+it, where w is the distance of A from the swivel axis (`robots.model.pulleys`). Wherever A goes, E stays within a band
+of width 4 r and height 2 r.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.workspaces.poses import geometry
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+BATCH = 4096
+# Diagonal of the band within which exits lie, over the radius of the pulley.
+BAND = math.sqrt(20.0)
+
+
+class Shifts(NamedTuple):
+    """Bounds of movements while robots move within their cells.
+
+    Fields:
+        robot: (n,) how far the robot moves, m.
+        exits: (n,) how far an exit moves, m; 0 without pulleys.
+        units: (n, n_cables) length of the change of the cable's unit vector.
+        free: (n, n_cables) least free lengths of the cables, m.
+    """
+
+    robot: np.ndarray
+    exits: np.ndarray
+    units: np.ndarray
+    free: np.ndarray
+
+
+def shifts(
+    robot: AnyRobot,
+    positions: Float[np.ndarray, "n 3"],
+    quaternions: Float[np.ndarray, "n 4"],
+    reach: Float[np.ndarray, "n"],
+) -> Shifts:
+    """Bounds of movements while robots move within their cells."""
+    targets = in_batches(lambda x: geometry.attachments(robot, *x), (positions, quaternions), size=BATCH)
+    rays, most = targets - np.asarray(robot.base_points), reach[:, None]
+    if robot.pulleys is None:
+        free = np.linalg.norm(rays, axis=2) - most
+        return Shifts(reach, np.zeros(len(reach)), unit_changes(most, free), free)
+    radius, axes = np.asarray(robot.pulleys.radius), np.asarray(robot.pulleys.axes)
+    high = (rays * axes).sum(2)
+    wide = np.linalg.norm(rays - high[..., None] * axes, axis=2)
+    # The distance from the centre of the pulley, which swivels with the cable, changes by no more than the robot moves.
+    out = np.hypot(wide - radius, high) - most
+    free = np.sqrt(np.maximum(np.square(np.maximum(out, 0.0)) - radius**2, 0.0))
+    wide = np.maximum(wide - most, 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        exits = most * np.fmax(radius / free, 2.0 * radius / wide)
+    exits = np.where(radius > 0.0, np.fmin(exits, BAND * radius), 0.0)
+    return Shifts(reach, exits.max(1), unit_changes(most, np.minimum(free, wide)), free)
+
+
+def leaving_points(
+    robot: AnyRobot, positions: Float[np.ndarray, "n 3"], quaternion: Float[np.ndarray, "4"]
+) -> Float[np.ndarray, "n n_cables 3"]:
+    """Points at which cables leave: their base points, or points of their pulleys."""
+    pulleys = robot.pulleys
+    if pulleys is None:
+        return np.broadcast_to(np.asarray(robot.base_points), (len(positions), robot.n_cables, 3))
+    poses = positions, np.tile(quaternion, (len(positions), 1))
+    return in_batches(lambda x: geometry.exit_points(robot, pulleys, *x), poses, size=BATCH)
+
+
+def unit_changes(reach: Float[np.ndarray, "n k"], length: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
+    """Bound of the changes of unit vectors."""
+    return np.where(length > 0.0, np.minimum(reach / np.where(length > 0.0, length, 1.0), 2.0), 2.0)

@@ -1,0 +1,96 @@
+"""Speeds of cables that velocities of the effector need, for maps of workspaces. Arrays in, answers out.
+
+A cable of unit vector u, attached at the arm a from the origin of the platform frame, changes its length at the rate
+-(u.v + (a x u).w), where v is the velocity of the origin and w the angular velocity. Over all v and w with |v| <= V and
+|w| <= W that the robot's pattern allows, the largest rate is |u'| V + |(a x u)'| W, where primes mark the components
+along which the effector can move and about which it can turn: the rows of the wrench matrix.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.elementary import leaf, unit_vectors
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.model.patterns import PATTERNS
+from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.workspaces.cells.cell_proofs import cable_wrenches
+from cspr_jax.workspaces.cells.shifts import Shifts
+from cspr_jax.workspaces.poses import geometry
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+BATCH = 4096
+
+
+@dataclasses.dataclass(frozen=True)
+class CableSpeeds:
+    """Velocities that an effector must be able to have, and largest speeds of its cables.
+
+    Fields:
+        robot: centred, z down, its arms from the origin of the platform frame; see `cable_speeds`.
+        speed: largest speed of the origin, m/s.
+        angular_speed: rad/s.
+        most: (n_cables,) largest speeds, m/s.
+    """
+
+    robot: AnyRobot
+    speed: float
+    angular_speed: float
+    most: np.ndarray
+
+    def margins(
+        self, origins: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"]
+    ) -> Float[np.ndarray, "n n_cables"]:
+        """Slack up to the largest speeds of the cables."""
+        poses = origins, quaternions
+        columns = in_batches(lambda x: geometry.wrench_matrices(self.robot, *x), poses, size=BATCH)
+        forces = len(PATTERNS[self.robot.pattern].forces)
+        along, about = (np.linalg.norm(part, axis=1) for part in (columns[:, :forces], columns[:, forces:]))
+        return self.most - (along * self.speed + about * self.angular_speed)
+
+    def displaced(
+        self, origins: Float[np.ndarray, "n 3"], quaternion: Float[np.ndarray, "4"], distance: float
+    ) -> tuple[Float[np.ndarray, "n n_cables"], Float[np.ndarray, "n n_cables"]]:
+        """Margins of robots without pulleys whose spools are displaced so that, to first order, cables are fastest."""
+        robot = self.robot
+        arms, wrenches = cable_wrenches(robot, quaternion, np.ones(robot.dof))
+        forces = len(PATTERNS[robot.pattern].forces)
+        parts = (wrenches[:, :forces], self.speed), (wrenches[:, forces:], self.angular_speed)
+        rays = np.asarray(robot.base_points) - arms - origins[:, None]
+
+        def each(rays: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+            # Unit vectors, rates, and derivatives of rates with respect to unit vectors.
+            units = unit_vectors(rays)
+            rates, gradients = np.zeros(units.shape[:2]), np.zeros_like(units)
+            for wrench, speed in parts:
+                columns = np.einsum("nik,kmi->nim", units, wrench)
+                rates += np.linalg.norm(columns, axis=2) * speed
+                gradients += np.einsum("nim,kmi->nik", unit_vectors(columns), wrench) * speed
+            return units, rates, gradients
+
+        units, _, gradients = each(rays)
+        rays = rays + distance * unit_vectors(gradients - (gradients * units).sum(2, keepdims=True) * units)
+        return self.most - each(rays)[1], np.linalg.norm(rays, axis=2)
+
+    def changes(self, moved: Shifts) -> Float[np.ndarray, "n n_cables"]:
+        """Largest change of `margins` within cells."""
+        # |u'| is constant for a robot that moves in all directions in which its cables lie.
+        speed = self.speed if PATTERNS[self.robot.pattern].forces == (2,) else 0.0
+        if not isinstance(self.robot, PlatformRobot):
+            return moved.units * speed
+        arms = np.linalg.norm(np.asarray(self.robot.platform_points), axis=1)
+        return moved.units * (speed + arms * self.angular_speed)
+
+
+def cable_speeds(robot: AnyRobot, most: np.ndarray, *, speed: float, angular_speed: float) -> CableSpeeds:
+    """Velocities that an effector must be able to have."""
+    if isinstance(robot, PlatformRobot) and not PATTERNS[robot.pattern].is_jointed and robot.centre_of_mass is not None:
+        points = np.asarray(robot.platform_points) + np.asarray(robot.centre_of_mass)
+        robot = dataclasses.replace(robot, platform_points=leaf(points))
+    return CableSpeeds(robot, speed, angular_speed, np.broadcast_to(np.asarray(most, float), (robot.n_cables,)))

@@ -1,0 +1,89 @@
+"""The cocircuit that decides at a pose: the normal to some cables along which the others do the least."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from cspr_jax.robots.statics.wrench_sets import normals_to, spanning
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Components of a cocircuit below this part of the largest one do not make it void.
+ZERO = 1e-9
+# A normal to dof - 1 unit columns means nothing if its products with all other columns are smaller than this.
+SHORT = 1e-9
+
+
+class WorstCocircuits(NamedTuple):
+    """Cocircuits, one a pose.
+
+    Fields:
+        normal: (n, dof) c.
+        subset: (n,) row of `wrench_sets.spanning`: the cables that it is normal to.
+        load: (n,) number of the wrench that needs the most along it.
+        inner: (n, dof) sum of all normals along which the same wrench is out of reach, weighted by how far. Since the
+            most that tensions give along c is a convex function of c, the wrench is out of reach along the sum too, and
+            no cable is normal to it.
+    """
+
+    normal: Array
+    subset: Array
+    load: Array
+    inner: Array
+
+
+@partial(jax.jit, static_argnames=("condition", "unbounded"))
+def worst_cocircuits(
+    matrices: Float[Array, "n dof n_cables"],
+    wrenches: Float[Array, "k dof"],
+    spreads: Float[Array, "l dof"],
+    low: Float[Array, "n_cables"],
+    high: Float[Array, "n_cables"],
+    *,
+    condition: str,
+    unbounded: Sequence[bool],
+) -> WorstCocircuits:
+    """Cocircuits with the least slack, times the volume of the columns that they are normal to.
+
+    This weight puts cocircuits of nearly dependent columns last, whose normals turn fast from place to place. Where a
+    single cocircuit is violated, it is that one; where none is, it is the one whose plane is the nearest.
+    """
+    dof, count = matrices.shape[1:]
+    chosen = spanning(count, dof)
+    is_own = np.zeros((len(chosen), count), bool)
+    np.put_along_axis(is_own, chosen, True, axis=1)
+    free = np.array(unbounded)
+
+    def one(matrix):
+        normals = jnp.ones((1, 1)) if dof == 1 else normals_to(matrix)
+        along = jnp.where(is_own, 0.0, normals @ matrix)
+        normals, along = jnp.concatenate([normals, -normals]), jnp.concatenate([along, -along])
+        largest = jnp.max(jnp.abs(along), axis=1, keepdims=True)
+        beside = jnp.sum(jnp.linalg.norm(normals[:, None] * spreads[None], axis=2), axis=1)
+        products = normals @ wrenches.T + beside[:, None]
+        if condition == "closure":
+            others = jnp.where(np.concatenate([is_own, is_own]), jnp.inf, along)
+            value = -jnp.min(others, axis=1)
+            is_void, load = jnp.zeros(value.shape, bool), jnp.asarray(0)
+        else:
+            reach = jnp.sum(jnp.where(along > 0.0, along * jnp.where(free, 0.0, high)[None], along * low[None]), axis=1)
+            value = reach - jnp.max(products, axis=1)
+            is_void = ((along > ZERO * largest) & free[None]).any(1)
+        is_void = is_void | ~(largest[:, 0] > SHORT)
+        value = jnp.where(value > 0.0, value / jnp.linalg.norm(normals, axis=1), value)
+        worst = jnp.argmin(jnp.where(is_void, jnp.inf, value))
+        if condition != "closure":
+            load = jnp.argmax(products[worst])
+            value = reach - products[:, load]
+        weight = jnp.where(is_void, 0.0, jnp.maximum(-value, 0.0))
+        return WorstCocircuits(normals[worst], worst % len(chosen), load, weight @ normals)
+
+    return jax.vmap(one)(matrices)

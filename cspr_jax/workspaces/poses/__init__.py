@@ -1,0 +1,10 @@
+"""Margins of poses: facet normals of the wrenches that cables give, exact margins, compiled ones.
+
+Files, each importing only from those above it:
+
+    geometry        unit vectors and wrench matrices of many poses
+    facet_normals   cocircuits that a robot has
+    margins         margins, cocircuit by cocircuit, between two bounds
+    exact           margins of single poses by singular values
+    kernels         compiled margins of many poses
+"""

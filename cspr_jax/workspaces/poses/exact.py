@@ -1,0 +1,121 @@
+"""Margins of poses one by one, by singular values: for any robot, and where the wrench matrix loses rank; no jax."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from cspr_jax.workspaces.poses.facet_normals import CableSubsets
+from cspr_jax.workspaces.required_wrenches import RequiredWrenches
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Singular values count as zero below the first of these parts of the largest one, or below the second number, since
+# columns are unit vectors.
+RANK, NOTHING = 1e-9, 1e-13
+# Components of a cocircuit below this part of the largest one count as zero.
+ZERO = 1e-10
+# A wrench may lie outside of the span of the cables by this part of its length.
+OUTSIDE = 1e-9
+
+
+def cocircuits(
+    matrix: Float[np.ndarray, "dof n_cables"],
+) -> tuple[Float[np.ndarray, "k n_cables"], Float[np.ndarray, "k dof"], Float[np.ndarray, "dof rank"]]:
+    """Cocircuits of a wrench matrix, and a basis of its span."""
+    left, sizes, right = np.linalg.svd(matrix, full_matrices=False)
+    rank = int((sizes > max(RANK * sizes[0], NOTHING)).sum())
+    rows = right[:rank]
+    if rank == 0:
+        return np.zeros((0, matrix.shape[1])), np.zeros((0, matrix.shape[0])), left[:, :0]
+    if rank == 1:
+        normals = np.ones((1, 1))
+    else:
+        chosen = np.array(list(itertools.combinations(range(matrix.shape[1]), rank - 1)))
+        _, values, vectors = np.linalg.svd(rows.T[chosen])
+        normals = vectors[values[:, -1] > RANK, -1]
+    components = normals @ rows
+    components[np.abs(components) < ZERO * np.abs(components).max(1, keepdims=True)] = 0.0
+    return components, (normals / sizes[:rank]) @ left[:, :rank].T, left[:, :rank]
+
+
+class Planes(NamedTuple):
+    """Bounds of the margin of a wrench w: offsets - normals @ w, and half of the narrowest range of tensions.
+
+    Fields:
+        offsets: (k,) N.
+        normals: (k, dof).
+        half_range: N; inf without largest tensions.
+        basis: (dof, rank) orthonormal, of the wrenches that the cables span.
+    """
+
+    offsets: np.ndarray
+    normals: np.ndarray
+    half_range: float
+    basis: np.ndarray
+
+
+def margin_planes(
+    matrix: Float[np.ndarray, "dof n_cables"], low: Float[np.ndarray, "n_cables"], high: Float[np.ndarray, "n_cables"]
+) -> Planes:
+    """Planes that bound the margin by their distances, in newtons of tension: one a cocircuit and sign."""
+    components, normals, basis = cocircuits(matrix)
+    rows, normals = np.concatenate([components, -components]), np.concatenate([normals, -normals])
+    finite = np.where(np.isfinite(high), high, 0.0)
+    bounds = ~((rows > 0.0) & np.isinf(high)).any(1)
+    rows, normals = rows[bounds], normals[bounds]
+    sizes = np.abs(rows).sum(1)
+    reach = np.where(rows > 0.0, rows * finite, rows * low).sum(1)
+    return Planes(reach / sizes, normals / sizes[:, None], float(0.5 * (high - low).min()), basis)
+
+
+def wrench_margin(
+    matrix: Float[np.ndarray, "dof n_cables"],
+    wrenches: RequiredWrenches,
+    low: Float[np.ndarray, "n_cables"],
+    high: Float[np.ndarray, "n_cables"],
+    measure: Float[np.ndarray, "dof"] | None = None,
+) -> float:
+    """Margin of wrenches: the largest s such that tensions between low + s and high - s give each; or capacity."""
+    planes = margin_planes(matrix, low, high)
+    if any(is_outside(loads, planes.basis) for loads in wrenches.spanning):
+        return -np.inf
+    slacks = planes.offsets - wrenches.supports(planes.normals)
+    if measure is not None:
+        return float((slacks / np.linalg.norm(planes.normals * measure, axis=1)).min(initial=np.inf))
+    return float(min(slacks.min(initial=np.inf), planes.half_range))
+
+
+def is_outside(wrenches: Float[np.ndarray, "n dof"], basis: Float[np.ndarray, "dof rank"]) -> bool:
+    """Tell whether some wrench is outside of the span of the cables."""
+    outside = np.linalg.norm(wrenches - wrenches @ basis @ basis.T, axis=1)
+    return bool((outside > OUTSIDE * np.linalg.norm(wrenches, axis=1)).any())
+
+
+def closure_margin(matrix: Float[np.ndarray, "dof n_cables"], choices: CableSubsets) -> float:
+    """Margin of wrench closure; see `workspaces.poses.margins.closure_margin`."""
+    components, _, basis = cocircuits(matrix)
+    if basis.shape[1] < len(matrix):
+        return -1.0
+    other = components != 0.0
+    most, least = components.max(1, initial=-np.inf, where=other), components.min(1, initial=np.inf, where=other)
+    rarer = np.minimum(most, -least) / np.abs(components).max(1)
+    # A component that is zero here, but not at every pose, may have either sign.
+    always = len(matrix) - 1 + _always_zero(components, choices)
+    has_more = (~other).sum(1) > always
+    return float(np.where(has_more, np.maximum(rarer, 0.0), rarer).min())
+
+
+def _always_zero(components: np.ndarray, choices: CableSubsets) -> np.ndarray:
+    # Return the number of components, beside those of a hyperplane's columns, that are zero at every pose of the robot.
+    if choices.counts is None:
+        return np.zeros(len(components), int)
+    size = components.shape[1] - choices.counts.shape[1]
+    more: dict[tuple[int, ...], int] = {}
+    for row, counts in zip(choices.table, choices.counts, strict=True):
+        support = tuple(sorted(row[size:][counts > 0.0].tolist()))
+        more[support] = int((counts == 0.0).sum())
+    return np.array([more.get(tuple(np.flatnonzero(row).tolist()), 0) for row in components])

@@ -1,0 +1,128 @@
+"""Margins of poses, cocircuit by cocircuit, between two bounds that show what rounding may have decided.
+
+Where the bounds lie apart, `workspaces.poses.exact` answers the pose by singular values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import jax.numpy as jnp
+from jax import Array
+
+from cspr_jax.numerics.linear.lanes import largest
+from cspr_jax.workspaces.poses.facet_normals import Column, product
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+# Allowances for errors, in units of rounding: of a product of unit columns, and of the numbers of a block of six
+# cables. They are estimates, not proofs; wherever tests look, margins by singular values lie between the bounds.
+ROUNDING = 64.0
+BLOCK_ROUNDING = 8.0
+
+
+class Wrenches(NamedTuple):
+    """Wrenches that cables must supply: all sums of a wrench of a finite set, one of a box and one of each ellipsoid.
+
+    Fields:
+        points: the finite set, dof components each, () or one a pose, moments over a length, N.
+        box: (dof,) half widths of a box about zero, N; None: there is none.
+        ellipsoids: (dof,) semi-axes of each ellipsoid about zero, N.
+    """
+
+    points: Sequence[Column]
+    box: Array | None = None
+    ellipsoids: Sequence[Array] = ()
+
+
+class CocircuitLimits(NamedTuple):
+    """A cocircuit with the limits of its cables.
+
+    Fields:
+        entries: components that need not be zero, of any common length.
+        low: smallest tensions of these cables, () each, N.
+        high: largest tensions, () each, N; inf where there is none.
+        size: divisor of the margin: the sum of the components' sizes for tensions, the length of the normal for the
+            capacity margin.
+        noises: errors of the components.
+        error: error of the difference between tensions and wrenches along the cocircuit, in units of size times N.
+    """
+
+    entries: Sequence[Array]
+    low: Sequence[Array]
+    high: Sequence[Array]
+    size: Array
+    noises: Sequence[Array]
+    error: Array
+
+
+Bounds = tuple[Array, Array]
+
+
+def one_norm(entries: Sequence[Array]) -> Float[Array, "..."]:
+    """Sum of the sizes of components."""
+    parts = [jnp.abs(entry) for entry in entries]
+    return sum(parts[1:], parts[0])
+
+
+def length(vector: Sequence[Array]) -> Float[Array, "..."]:
+    """Length of a vector."""
+    return jnp.sqrt(product(vector, vector))
+
+
+def supports(normal: Column, wrenches: Wrenches) -> tuple[Array, Array]:
+    """Largest products of a normal, and of its negative, with the wrenches of a set."""
+    products = [product(normal, point) for point in wrenches.points]
+    most, least = largest(products), largest([-value for value in products])
+    spreads = list[Array]()
+    if wrenches.box is not None:
+        spreads.append(product([jnp.abs(x) for x in normal], list(wrenches.box)))
+    spreads += [length([x * axis for x, axis in zip(normal, axes, strict=True)]) for axes in wrenches.ellipsoids]
+    for spread in spreads:
+        most, least = most + spread, least + spread
+    return most, least
+
+
+def bounded_margin(pull: CocircuitLimits, most: Array, least: Array) -> Bounds:
+    """Bounds of the margin of one cocircuit whose cables all have a largest tension."""
+    limits = list(zip(pull.entries, pull.low, pull.high, strict=True))
+    ranges = [(0.5 * (high - low)) * jnp.abs(y) for y, low, high in limits]
+    middles = [(0.5 * (high + low)) * y for y, low, high in limits]
+    middle = sum(middles[1:], middles[0])
+    slack = sum(ranges[1:], ranges[0]) - jnp.maximum(most - middle, least + middle)
+    return _between(pull, slack, slack)
+
+
+def _between(pull: CocircuitLimits, sure: Array, possible: Array) -> Bounds:
+    # Divide by a size that has an error as well.
+    inverse = 1.0 / pull.size
+    lower, upper, loss = sure * inverse, possible * inverse, sum(pull.noises[1:], pull.noises[0])
+    less, more = (jnp.where(jnp.isinf(x), 0.0, loss * jnp.abs(x)) for x in (lower, upper))
+    return lower - (pull.error + less) * inverse, upper + (pull.error + more) * inverse
+
+
+def free_margin(pull: CocircuitLimits, most: Array, least: Array) -> Bounds:
+    """Bounds of the margin of one cocircuit; any of its cables may have no largest tension.
+
+    A component that may be zero but for rounding frees the upper bound, but not the lower one.
+    """
+    lower, upper = list[Array](), list[Array]()
+    for sign, demand in ((1.0, most), (-1.0, least)):
+        sure = possible = -demand
+        for entry, noise, low, high in zip(pull.entries, pull.noises, pull.low, pull.high, strict=True):
+            y = sign * entry
+            sure = sure + jnp.where(y > noise, y * high, y * low)
+            possible = possible + jnp.where(y > -noise, (y + 2.0 * noise) * high, y * low)
+        lower.append(sure)
+        upper.append(possible)
+    return _between(pull, jnp.minimum(*lower), jnp.minimum(*upper))
+
+
+def closure_margin(pull: CocircuitLimits) -> Bounds:
+    """Bounds of the margin of wrench closure of one cocircuit."""
+    fewest = jnp.minimum(largest(pull.entries), largest([-entry for entry in pull.entries]))
+    inverse = 1.0 / largest([jnp.abs(entry) for entry in pull.entries])
+    error = 2.0 * largest(pull.noises) * inverse
+    return fewest * inverse - error, fewest * inverse + error

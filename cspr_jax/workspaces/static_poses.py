@@ -1,0 +1,167 @@
+"""Poses at rest against all conditions of a workspace, and sets of orientations at places. Arrays in, answers out."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from cspr_jax.numerics.batches import in_batches
+from cspr_jax.robots.cables import AnyRobot
+from cspr_jax.robots.contacts.clearance import Scene
+from cspr_jax.robots.contacts.contact_bodies import shape_corners
+from cspr_jax.robots.model.limits import Limits
+from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.schema.verdicts import FLAGS, OPEN, Verdict, conjunction
+from cspr_jax.workspaces.cells.speeds import CableSpeeds
+from cspr_jax.workspaces.clearances import at_rest, flags, nearest_bodies
+from cspr_jax.workspaces.poses import geometry
+from cspr_jax.workspaces.poses.geometry import mass_centres
+from cspr_jax.workspaces.requirements import CLOSURE
+from cspr_jax.workspaces.search import WorkspaceSearch
+
+if TYPE_CHECKING:
+    from jaxtyping import Float
+
+CLEARANCES = {"clearance_cables": "cables", "clearance_obstacles": "obstacles", "clearance_platform": "platform"}
+MARGINS = (
+    *("wrench_margin", "closure_margin", "capacity_margin"),
+    *("clearance", *CLEARANCES, "floor_margin", "length_margin", "speed_margin"),
+)
+NEAREST = "nearest_bodies"
+BATCH = 4096
+# Poses that are answered at a time, where each place has many orientations.
+AT_ONCE = 1 << 19
+
+PoseColumns = dict[str, np.ndarray]
+OrientationSet = Literal["inclusion", "total"]
+
+
+@dataclasses.dataclass(frozen=True)
+class RestPoses:
+    """Conditions that a pose at rest is to meet.
+
+    Fields:
+        robot: centred, z down.
+        searches: search of each condition on the cables.
+        around: bodies that the cables may not meet, each other included; None: contacts do not count.
+        limits: floor and largest cable lengths, kernels' axes; limits of tensions are those of the searches.
+        speeds: velocities that the robot must be able to have; None: speeds do not count.
+        capacity: search for the capacity margin, which has no part in the verdict; None: there is none.
+        of_mass_centre: whether positions are those of the mass centre, and not of the origin of the platform frame.
+    """
+
+    robot: AnyRobot
+    searches: Mapping[Any, WorkspaceSearch]
+    around: Scene | None
+    limits: Limits
+    speeds: CableSpeeds | None = None
+    capacity: WorkspaceSearch | None = None
+    of_mass_centre: bool = False
+
+    def origins(
+        self, positions: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"]
+    ) -> Float[np.ndarray, "n 3"]:
+        """Origins of the platform frame."""
+        if not self.of_mass_centre:
+            return positions
+        return positions - mass_centres(self.robot, np.zeros_like(positions), quaternions)
+
+    def __call__(self, positions: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"]) -> PoseColumns:
+        """Tell whether poses meet all conditions."""
+        origins = self.origins(positions, quaternions)
+        places, count = mass_centres(self.robot, origins, quaternions), len(origins)
+        columns: PoseColumns = {name: np.full(count, np.nan) for name in MARGINS}
+        verdict = np.zeros(count, FLAGS)
+        for condition, search in self.searches.items():
+            answers = search(places, quaternions)
+            verdict |= answers.verdict
+            name = "closure_margin" if condition == CLOSURE else "wrench_margin"
+            columns[name] = np.fmin(columns[name], answers.margin)
+        if self.capacity is not None:
+            columns["capacity_margin"] = self.capacity(places, quaternions).margin
+        columns[NEAREST] = np.zeros(count, np.int16)
+        if self.around is not None:
+            distances = at_rest(self.robot, self.around, places, quaternions)
+            columns |= {"clearance": distances.clearance, NEAREST: nearest_bodies(self.around, distances)}
+            columns |= {name: getattr(distances, of) for name, of in CLEARANCES.items()}
+            verdict |= flags(distances)
+        for name, flag, slack in self.limited(origins, quaternions):
+            verdict |= np.where((slack < 0.0).any(1), flag, 0).astype(FLAGS)
+            columns[name] = slack.min(1)
+        return {"verdict": conjunction(verdict), **columns}
+
+    def _lengths(self, places: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
+        poses = places, quaternions
+        return in_batches(lambda x: geometry.cable_lengths(self.robot, *x), poses, size=BATCH)
+
+    def _depths(self, places: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
+        # Depths (n, k) of the mass centre, or joint, of the attachment points and of the corners of the shape.
+        robot = self.robot
+        if not isinstance(robot, PlatformRobot):
+            return places[:, 2:]
+        points = np.concatenate([np.zeros((1, 3)), np.asarray(robot.platform_points)])
+        corners = None if self.around is None else shape_corners(robot, self.around)
+        points = points if corners is None else np.concatenate([points, corners])
+        w, x, y, z = quaternions.T
+        lowest_row = np.stack([2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)], axis=1)
+        return places[:, 2:] + lowest_row @ points.T
+
+    def limited(
+        self, origins: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"]
+    ) -> Iterator[tuple[str, Verdict, np.ndarray]]:
+        """Slacks of the limits."""
+        places = mass_centres(self.robot, origins, quaternions)
+        if self.limits.floor is not None:
+            yield "floor_margin", Verdict.BELOW_FLOOR, float(self.limits.floor) - self._depths(places, quaternions)
+        if self.limits.cable_length_max is not None:
+            slack = np.asarray(self.limits.cable_length_max) - self._lengths(places, quaternions)
+            yield "length_margin", Verdict.CABLE_TOO_LONG, slack
+        if self.speeds is not None:
+            yield "speed_margin", Verdict.CABLE_TOO_FAST, self.speeds.margins(origins, quaternions)
+
+
+def over_orientations(
+    ask: Callable[[np.ndarray, np.ndarray], PoseColumns],
+    origins: Float[np.ndarray, "n 3"],
+    orientations: Float[np.ndarray, "k 4"],
+    volume: Float[np.ndarray, "k"],
+    kind: OrientationSet,
+) -> PoseColumns:
+    """Tell whether places belong to the workspace of a set of orientations."""
+    parts, count = list[PoseColumns](), len(orientations)
+    step = max(1, AT_ONCE // count)
+    for start in range(0, len(origins), step):
+        places = origins[start : start + step]
+        columns = ask(np.repeat(places, count, axis=0), np.tile(orientations, (len(places), 1)))
+        parts.append(_of_places({name: values.reshape(-1, count) for name, values in columns.items()}, volume, kind))
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def _of_places(columns: PoseColumns, volume: np.ndarray, kind: OrientationSet) -> PoseColumns:
+    # Reduce columns (n_places, n_orientations) to columns (n_places,).
+    verdict = columns["verdict"]
+    inside = verdict == 0
+    is_open = ~inside & ((verdict & ~FLAGS(OPEN.value)) == 0)
+    if kind == "inclusion":
+        best, is_met = np.fmax.reduce, inside.any(1)
+        may_be = ~is_met & is_open.any(1)
+    else:
+        best, is_met = np.fmin.reduce, inside.all(1)
+        may_be = ~is_met & (inside | is_open).all(1)
+    # The reasons of a refuted set are those of the refuted orientations, however many others are open.
+    reasons = np.where(is_met, 0, _most_frequent(np.where(is_open == may_be[:, None], verdict, 0)))
+    best_values = {name: best(columns[name], axis=1) for name in MARGINS}
+    at = (columns["clearance"] == best_values["clearance"][:, None]).argmax(1)
+    best_values[NEAREST] = columns[NEAREST][np.arange(len(at)), at]
+    return {"verdict": reasons.astype(FLAGS), **best_values, "orientation_fraction": inside @ volume}
+
+
+def _most_frequent(verdict: np.ndarray) -> np.ndarray:
+    # Return for each row its most frequent flags among the entries that are not 0.
+    values = np.unique(verdict[verdict != 0])
+    if len(values) == 0:
+        return np.zeros(len(verdict), FLAGS)
+    return values[np.argmax([(verdict == value).sum(1) for value in values], axis=0)]

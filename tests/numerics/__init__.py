@@ -1,0 +1,1 @@
+"""Tests of `cspr_jax.numerics`."""
