@@ -18,7 +18,7 @@ INK, CURVE, MARK = "#222222", "#1f6fb4", "#c03a2b"
 
 
 def swing(tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (n, 3), m, and accelerations (n, 3), m/s^2: the closed form of docs/theory.md, quintic amplitude."""
+    """Positions (n, 3), m, and accelerations (n, 3), m/s^2: docs/theory/swings.md with the quintic amplitude."""
     first, second = START - P0, TARGET - P0
     r1, r2 = np.linalg.norm(first), np.linalg.norm(second)
     q1 = first / r1
@@ -27,47 +27,47 @@ def swing(tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     delta, sense = (np.pi - psi, 1.0) if ARCS % 2 else (psi, -1.0)
     nu, phase, turn = delta / (np.pi * ARCS), sense * np.pi * ARCS * tau, sense * delta * tau
     r = r1 + (r2 - r1) * tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2)
-    slope = (r2 - r1) * 30.0 * tau**2 * (1.0 - tau) ** 2
-    bend = (r2 - r1) * 60.0 * tau * (1.0 - tau) * (1.0 - 2.0 * tau)
-    rho = bend / ((np.pi * ARCS) ** 2 * (1.0 - nu**2))
-    along = np.cos(turn)[:, None] * q1 - np.sin(turn)[:, None] * q2
-    aside = np.sin(turn)[:, None] * q1 + np.cos(turn)[:, None] * q2
+    r_rate = (r2 - r1) * 30.0 * tau**2 * (1.0 - tau) ** 2
+    r_second = (r2 - r1) * 60.0 * tau * (1.0 - tau) * (1.0 - 2.0 * tau)
+    rho = r_second / ((np.pi * ARCS) ** 2 * (1.0 - nu**2))
+    radial = np.cos(turn)[:, None] * q1 - np.sin(turn)[:, None] * q2
+    tangential = np.sin(turn)[:, None] * q1 + np.cos(turn)[:, None] * q2
     cos, sin = np.cos(phase), np.sin(phase)
-    place = (r * cos)[:, None] * along + (r * nu * sin)[:, None] * aside
-    pull = (rho * cos - 2.0 * sense * slope * sin / (np.pi * ARCS))[:, None] * along
-    pull += (nu * (rho + 2.0 * r) * sin)[:, None] * aside
-    return P0 + place, GRAVITY / Z0 * (pull - place)
+    position = (r * cos)[:, None] * radial + (r * nu * sin)[:, None] * tangential
+    relative_acceleration = (rho * cos - 2.0 * sense * r_rate * sin / (np.pi * ARCS))[:, None] * radial
+    relative_acceleration += (nu * (rho + 2.0 * r) * sin)[:, None] * tangential
+    return P0 + position, GRAVITY / Z0 * (relative_acceleration - position)
 
 
-def pseudotensions(places: np.ndarray, accelerations: np.ndarray) -> np.ndarray:
+def pseudotensions(positions: np.ndarray, accelerations: np.ndarray) -> np.ndarray:
     """(n, 3) over their value at rest in P0: tension over mass and length, times the depth below the spools."""
-    cables = np.swapaxes(SPOOLS - places[:, None], 1, 2)
+    cables = np.swapaxes(SPOOLS - positions[:, None], 1, 2)
     loads = accelerations - np.array([0.0, 0.0, GRAVITY])
-    return 3.0 / GRAVITY * places[:, 2:] * np.linalg.solve(cables, loads[..., None])[..., 0]
+    return 3.0 / GRAVITY * positions[:, 2:] * np.linalg.solve(cables, loads[..., None])[..., 0]
 
 
 def draw_side(axes: plt.Axes, tau: np.ndarray) -> None:
     """The robot from the side, z down."""
-    places, _ = swing(tau)
+    positions, _ = swing(tau)
     cusps, _ = swing(np.arange(ARCS + 1) / ARCS)
-    reach = np.abs(SPOOLS[:, 0]).max()
-    axes.axvspan(-reach, reach, color="#eeeeee", zorder=0)
+    half_width = np.abs(SPOOLS[:, 0]).max()
+    axes.axvspan(-half_width, half_width, color="#eeeeee", zorder=0)
     axes.text(0.0, 2.26, "static workspace", ha="center", va="center", fontsize=8, color="#777777")
     for spool in SPOOLS:
         axes.plot(*zip(spool[[0, 2]], START[[0, 2]], strict=True), color="#aaaaaa", lw=0.8)
     axes.plot(SPOOLS[:, 0], SPOOLS[:, 2], "s", color=INK, ms=7)
-    axes.plot(places[:, 0], places[:, 2], color=CURVE, lw=1.2)
+    axes.plot(positions[:, 0], positions[:, 2], color=CURVE, lw=1.2)
     last = tau >= (ARCS - 1) / ARCS
-    axes.plot(places[last, 0], places[last, 2], color=CURVE, lw=3.0)
+    axes.plot(positions[last, 0], positions[last, 2], color=CURVE, lw=3.0)
     axes.plot(cusps[1:-1, 0], cusps[1:-1, 2], "o", mfc="white", mec=CURVE, ms=6)
     axes.plot(*P0[[0, 2]], "o", color=MARK, ms=7, zorder=5)
     double = {"arrowstyle": "<->", "color": MARK, "shrinkA": 0, "shrinkB": 3}
     axes.annotate("", P0[[0, 2]], (0.0, 0.0), arrowprops=double)
     axes.plot(*START[[0, 2]], "o", color=INK, ms=7)
     axes.plot(*TARGET[[0, 2]], "*", color=INK, ms=13)
-    middle = places[np.searchsorted(tau, (ARCS - 0.35) / ARCS)]
+    middle = positions[np.searchsorted(tau, (ARCS - 0.35) / ARCS)]
     notes = (
-        ("spools", (reach, 0.0), (0.62, -0.12), INK),
+        ("spools", (half_width, 0.0), (0.62, -0.12), INK),
         ("centroid c0", (0.0, 0.0), (-0.75, -0.12), INK),
         ("z0", (0.0, 0.62), (0.06, 0.68), MARK),
         ("P0", P0[[0, 2]], (0.1, 1.98), MARK),
