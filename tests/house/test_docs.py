@@ -191,6 +191,14 @@ def test_pages_of_commands_and_functions_are_generated():
 
 
 @pytest.mark.prose
+def test_pages_that_are_read_first_stay_short():
+    """And the film of the README loads at once."""
+    lines = {name: len((ROOT / name).read_text("utf-8").splitlines()) for name in ("README.md", "docs/performance.md")}
+    assert lines["README.md"] <= 80 and lines["docs/performance.md"] <= 150
+    assert (ROOT / "docs" / "images" / "swing.gif").stat().st_size < 2_000_000
+
+
+@pytest.mark.prose
 def test_every_kind_of_map_has_its_page():
     assert set(script("generate_maps").PAGES) == set(MAP_KINDS)
     assert all(f'map = "{name}"' in texts()[BUILT / "maps" / f"{name}.md"] for name in MAP_KINDS)
