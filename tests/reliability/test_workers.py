@@ -7,6 +7,7 @@ kernels, and kill at any time.
 import contextlib
 import os
 import pickle
+import re
 import shutil
 import signal
 import socket
@@ -78,12 +79,17 @@ def job(file):
     return file, content(file.parent / "run")
 
 
+def has_only_progress(err):
+    """On a slow machine a run says now and then how far it is."""
+    return all(re.match(r"cspr: +\d+ %, ", line) for line in err.splitlines())
+
+
 def test_worker_processes(toys, tmp_path):
     """One dies at the last tile; what is missing then is computed by new ones."""
     path, reference = toys
     (path.parent / "die").write_text("0.5")
     code, _, err = cspr("run", path, "-o", tmp_path / "run", "--workers", 2)
-    assert (code, err) == (0, "") and not (path.parent / "die").exists()
+    assert code == 0 and has_only_progress(err) and not (path.parent / "die").exists()
     check_same(tmp_path / "run", reference)
 
 
@@ -114,7 +120,7 @@ def one_killed_of_two(job, tmp_path, victims):
     thread = kill_one_when(tmp_path / "run", 2, victims)
     code, _, err = cspr("run", path, "-o", tmp_path / "run", "--workers", 2)
     thread.join()
-    assert (code, err) == (0, "")
+    assert code == 0 and has_only_progress(err)
     check_same(tmp_path / "run", reference)
 
 
@@ -146,7 +152,7 @@ def test_a_dask_scheduler(toys, tmp_path):
     (path.parent / "die").write_text("0.2")
     with a_cluster(2) as cluster:
         code, _, err = cspr("run", path, "-o", tmp_path / "run", "--scheduler", cluster.scheduler_address)
-    assert (code, err) == (0, "") and not (path.parent / "die").exists()
+    assert code == 0 and has_only_progress(err) and not (path.parent / "die").exists()
     check_same(tmp_path / "run", reference)
 
 
@@ -223,7 +229,7 @@ def test_a_dask_scheduler_all(job, tmp_path):
         thread = kill_one_when(tmp_path / "run", 2, lambda: victims)
         code, _, err = cspr("run", path, "-o", tmp_path / "run", "--scheduler", cluster.scheduler_address)
         thread.join()
-    assert (code, err) == (0, "")
+    assert code == 0 and has_only_progress(err)
     check_same(tmp_path / "run", reference)
 
 
