@@ -22,29 +22,28 @@ def every_key(text):
     return {line.removeprefix("# ").partition(" = ")[0] for line in text.splitlines() if " = " in line}
 
 
-@pytest.mark.parametrize("like", catalogue_names())
-def test_robots_to_begin_with(tmp_path, like):
-    path = new_file("robot", tmp_path / "mine.toml", like=like)
-    robot = read_robot(path)
-    assert robot.name == "my robot"
-    assert {field.alias or name for name, field in RobotFile.model_fields.items()} <= every_key(path.read_text("utf-8"))
+def test_robots_to_begin_with(tmp_path):
+    keys = {field.alias or name for name, field in RobotFile.model_fields.items()}
+    for like in catalogue_names():
+        path = new_file("robot", tmp_path / f"{like}.toml", like=like)
+        assert read_robot(path).name == "my robot", like
+        assert keys <= every_key(path.read_text("utf-8")), like
 
 
-@pytest.mark.parametrize("kind", list(MAP_KINDS))
-def test_sweeps_to_begin_with(tmp_path, kind):
-    path = new_file("sweep", tmp_path / "mine.toml", map=kind)
-    assert read_sweep(path).grid.size > 0
-    text = path.read_text("utf-8")
-    assert tomllib.loads(text)["map"] == kind
-    own = {key.rpartition(".")[2] for key in MAP_KINDS[kind].keys}
-    heads = {line.strip("# []").partition("]")[0] for line in text.splitlines() if "[" in line}
-    assert own <= every_key(text) | heads
+def test_sweeps_to_begin_with(tmp_path):
+    for kind, row in MAP_KINDS.items():
+        path = new_file("sweep", tmp_path / f"{kind}.toml", map=kind)
+        assert read_sweep(path).grid.size > 0, kind
+        text = path.read_text("utf-8")
+        assert tomllib.loads(text)["map"] == kind
+        heads = {line.strip("# []").partition("]")[0] for line in text.splitlines() if "[" in line}
+        assert {key.rpartition(".")[2] for key in row.keys} <= every_key(text) | heads, kind
 
 
-@pytest.mark.parametrize("family", list(FAMILIES))
-def test_plans_to_begin_with(tmp_path, family):
-    path = new_file("plan", tmp_path / "mine.toml", family=family)
-    assert read_plan(path.read_text("utf-8"), path).family == family
+def test_plans_to_begin_with(tmp_path):
+    for family in FAMILIES:
+        path = new_file("plan", tmp_path / f"{family}.toml", family=family)
+        assert read_plan(path.read_text("utf-8"), path).family == family
 
 
 def test_defaults_that_are_shown_are_the_schema_s(tmp_path):
