@@ -202,6 +202,7 @@ PLANS = {
 }
 
 
+@pytest.mark.quick("formulas")
 @pytest.mark.parametrize("name", ["formulas", "limits", pytest.param("several planes", marks=pytest.mark.thorough)])
 def test_plans_say_what_the_cells_say(name):
     result = mapped(**PLANS[name])

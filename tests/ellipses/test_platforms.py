@@ -76,6 +76,7 @@ def six():
     return cspr_jax.plan(SIX)
 
 
+@pytest.mark.thorough
 def test_tensions_on_six_cables(six):
     assert six.feasible
     robot = cspr_jax.load_robot("laval-mssm")

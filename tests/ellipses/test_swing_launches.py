@@ -168,6 +168,7 @@ def test_a_late_object_is_on_what_follows(thrown):
         )
 
 
+@pytest.mark.quick("0.0")
 @pytest.mark.parametrize("radius", [0.0, 0.08])
 def test_errors_of_redundant_cables_and_over_pulleys(radius):
     """Derivatives are those of differences; the place has the least sum of squares of what lengths miss."""
@@ -258,6 +259,7 @@ def test_the_earliest_landing():
     assert landing <= slow["release"]["time"] + slow["flight_time"]
 
 
+@pytest.mark.quick("fastest", "best")
 @pytest.mark.parametrize("rule", ["fastest", "slowest", "best"])
 def test_frequencies_by_rules(rule):
     """The ellipse changes with the frequency: samples say where it stays taut, and which has the most room."""

@@ -56,6 +56,7 @@ def missed(free):
     return dataclasses.replace(free, answers=dataclasses.replace(free.answers, verdict=verdict), is_optimal=False)
 
 
+@pytest.mark.thorough
 def test_other_families_are_asked(asked):
     (form,) = asked["forms"]
     assert form.family == "hypocycloid-standard"

@@ -172,6 +172,7 @@ MSSM = {"schema": 1, "robot": "laval-mssm", "family": "hypocycloid", "z0": 1.4, 
 MSSM |= {"amplitude": {"name": "effective-c3", "epsilon": 0.1}}
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("limits", "key", "flag"),
     [
@@ -214,6 +215,7 @@ def test_a_platform_that_is_slack_names_limits_that_no_number_of_arcs_keeps():
     assert segment["verdict"] == "slack_cable+over_tension+no_arcs" and segment["cable_speed_max"] > 2.0
 
 
+@pytest.mark.quick("limits0-cable_too_fast")
 @pytest.mark.parametrize(
     ("limits", "flag"), [({"cable_speed_max": 1.5}, "cable_too_fast"), ({"cable_length_max": 2.5}, "cable_too_long")]
 )

@@ -76,6 +76,7 @@ def test_transitions_and_lines_among_obstacles():
         assert met.causes[0][0].needed == pytest.approx(clearances(met, [0.0, 0.05, 1.515], 0.02).min(), rel=0.01)
 
 
+@pytest.mark.quick("keys0")
 @pytest.mark.parametrize("keys", [SWING, LINE, BEZIER])
 def test_motions_over_pulleys(keys):
     """The margin is the smallest tension of the cables over their pulleys, whatever it is without them."""
