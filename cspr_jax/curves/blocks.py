@@ -15,7 +15,7 @@ from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Float, Int
 
 BATCH = 256
 
@@ -28,7 +28,7 @@ def spline_bounds(
     end: Float[np.ndarray, "k"],
     *,
     of_knots: np.ndarray | None = None,
-    of_blocks: Float[np.ndarray, "k"] | None = None,
+    of_blocks: Int[np.ndarray, "k"] | None = None,
     parabolas: bool = False,
 ) -> StateBounds:
     """Bounds of the states over blocks of time, of one motion or of several, whose tables follow each other."""

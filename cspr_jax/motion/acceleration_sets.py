@@ -20,7 +20,7 @@ from cspr_jax.robots.statics.wrench_sets import Faces, acceleration_faces, tensi
 from cspr_jax.schema.verdicts import Verdict
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Float, Int
 
 # Margins nearer to zero than this, over gravity, are undecided.
 TOLERANCE = 1e-9
@@ -35,7 +35,7 @@ def faces_at(robot: PointMassRobot, limits: Limits, position: Float[Array, "3"])
 
 def verdict(
     robot: PointMassRobot, faces: Faces, position: Float[Array, "3"], acceleration: Float[Array, "3"]
-) -> Float[Array, ""]:
+) -> Int[Array, ""]:
     """Verdict of an acceleration at one place."""
     margin = faces.margin(acceleration)
     doubt = jnp.maximum(TOLERANCE * robot.gravity, faces.rounding(acceleration))

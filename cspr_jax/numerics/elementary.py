@@ -107,9 +107,7 @@ def leaf(value) -> Array:
     return value if isinstance(value, jax.core.Tracer) else cast(Array, np.asarray(value, float))
 
 
-def vertex(
-    left: Float[Array, ""], middle: Float[Array, ""], right: Float[Array, ""]
-) -> tuple[Float[Array, ""], Float[Array, ""]]:
+def vertex(left: Array, middle: Array, right: Array) -> tuple[Array, Array]:
     """Vertex of the parabola through three equidistant values: its place, and the value there."""
     bend = left - 2.0 * middle + right
     move = 0.5 * (left - right) / jnp.where(bend > 0.0, bend, 1.0)

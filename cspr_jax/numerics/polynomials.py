@@ -22,7 +22,7 @@ def product(first: Float[np.ndarray, "... n"], second: Float[np.ndarray, "... m"
     return coefficients
 
 
-def total(first: Float[np.ndarray, "... n"], second: Float[np.ndarray, "... m"]) -> Float[np.ndarray, "n m"]:
+def total(first: Float[np.ndarray, "... n"], second: Float[np.ndarray, "... m"]) -> np.ndarray:
     """Sum of polynomials of any degrees."""
     size = max(first.shape[-1], second.shape[-1])
     a, b = (np.concatenate([x, np.zeros((*x.shape[:-1], size - x.shape[-1]))], axis=-1) for x in (first, second))

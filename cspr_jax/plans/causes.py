@@ -17,7 +17,7 @@ from cspr_jax.schema.verdicts import NO_REASON, Verdict
 from cspr_jax.verification.needs import Need, needs
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Int
 
 # A criterion with a larger slack, without a unit, is met: numbers would not say why.
 MET = 1e-6
@@ -51,7 +51,7 @@ def cause_text(columns: Mapping[str, np.ndarray], i: int) -> str:
 
 
 def causes(
-    problem: Problem, frame: Frame, answers: Answers, motions: list[Motion], samples: Float[np.ndarray, "n"]
+    problem: Problem, frame: Frame, answers: Answers, motions: list[Motion], samples: Int[np.ndarray, "n"]
 ) -> list:
     """Causes of segments of one family."""
     each = []

@@ -18,7 +18,7 @@ import numpy as np
 from cspr_jax.schema.verdicts import Verdict
 
 if TYPE_CHECKING:
-    from jaxtyping import Float, Num
+    from jaxtyping import Bool, Int, Num
 
 
 class Refused(NamedTuple):
@@ -33,7 +33,7 @@ class Refused(NamedTuple):
     broken: np.ndarray
 
 
-def rank(flags: Sequence[Verdict], broken: Float[np.ndarray, "n n_criteria"]) -> Float[np.ndarray, "n"]:
+def rank(flags: Sequence[Verdict], broken: Bool[np.ndarray, "n n_criteria"]) -> Int[np.ndarray, "n"]:
     """Rank of candidates by the limits that they break."""
     is_slack = np.array([flag == Verdict.SLACK_CABLE for flag in flags])
     return 2 * broken.sum(1) + (broken & is_slack).any(1)
@@ -53,7 +53,7 @@ class FewestLimits:
         self._least = np.full(count, 2 * len(flags) + 2)
 
     def take(
-        self, rows: Float[np.ndarray, "m"], arcs: Num[np.ndarray, "m"], broken: Float[np.ndarray, "m n_criteria"]
+        self, rows: Int[np.ndarray, "m"], arcs: Num[np.ndarray, "m"], broken: Bool[np.ndarray, "m n_criteria"]
     ) -> None:
         """Take in candidates that are proved but for limits."""
         ranks = rank(self._flags, broken)
@@ -62,9 +62,7 @@ class FewestLimits:
         self._least[rows[better]] = ranks[better]
         self._common[rows] &= broken
 
-    def may_change(
-        self, rows: Float[np.ndarray, "m"], broken: Float[np.ndarray, "m n_criteria"]
-    ) -> Float[np.ndarray, "m"]:
+    def may_change(self, rows: Int[np.ndarray, "m"], broken: Bool[np.ndarray, "m n_criteria"]) -> Bool[np.ndarray, "m"]:
         """Tell which candidates can change what is known, since fewer limits may refuse them, or others."""
         return (rank(self._flags, broken) < self._least[rows]) | (self._common[rows] & ~broken).any(1)
 

@@ -15,7 +15,7 @@ from cspr_jax.robots.model.point_mass import PointMassRobot
 from cspr_jax.robots.statics.wrench_sets import Faces
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Float, Int
 
 # Number of places computed at a time; fewer for robots on many cables, whose faces are many.
 BATCH = 4096
@@ -51,6 +51,6 @@ def _judged(robot: PointMassRobot, arguments):
 
 def judged(
     robot: PointMassRobot, faces: Faces, positions: Float[np.ndarray, "n 3"], accelerations: Float[np.ndarray, "n 3"]
-) -> tuple[Float[np.ndarray, "n"], Float[np.ndarray, "n"]]:
+) -> tuple[Int[np.ndarray, "n"], Int[np.ndarray, "n"]]:
     """Margins and verdicts of accelerations, one at each place."""
     return in_batches(partial(_judged, robot), (faces, positions, accelerations), size=_size(robot, 3))

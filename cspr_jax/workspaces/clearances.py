@@ -63,7 +63,7 @@ def nearer_exits(
     yield from exits - distance * unit_vectors(gradients)
 
 
-def flags(distances: Clearances) -> Float[np.ndarray, "n"]:
+def flags(distances: Clearances) -> Int[np.ndarray, "n"]:
     """Flags of the reasons why poses are not free of interference."""
     verdict = np.zeros(len(distances.clearance), FLAGS)
     for values, flag in (

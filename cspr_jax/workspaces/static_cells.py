@@ -63,7 +63,7 @@ class RestCells:
 
     def __call__(
         self, origins: Float[np.ndarray, "n 3"], half: Float[np.ndarray, "n 3"], *, depth: int = DEPTH
-    ) -> tuple[Float[np.ndarray, "n"], Int[np.ndarray, "n"]]:
+    ) -> tuple[Int[np.ndarray, "n"], Int[np.ndarray, "n"]]:
         """Tell which cells are proved to lie wholly on one side of the workspace."""
         sides, reasons = np.zeros(len(origins), np.int16), np.zeros(len(origins), np.int16)
         numbers = np.array([OPEN_CONDITIONS.index(name) for name in self._names])
@@ -91,7 +91,7 @@ class RestCells:
         is_open = (verdict & ~FLAGS(OPEN.value)) == 0
         return np.where(verdict == 0, 1, np.where(is_open, 0, -1))
 
-    def verdicts(self, positions: Float[np.ndarray, "n 3"], verdict: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
+    def verdicts(self, positions: Float[np.ndarray, "n 3"], verdict: Int[np.ndarray, "n"]) -> Int[np.ndarray, "n"]:
         """Verdicts about all robots."""
         if self._all_robots is None:
             return verdict

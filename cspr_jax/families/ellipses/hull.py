@@ -14,7 +14,7 @@ from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.point_mass import SPATIAL, PointMassRobot, plane_normal, spool_radius
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Float, Int
 
 # Spools count as in one plane within this part of the size of the robot.
 IN_PLANE = 1e-9
@@ -56,7 +56,7 @@ def formula_hull(robot: AnyRobot) -> SpoolHull | None:
         return None
 
 
-def edge_ends(points: Float[np.ndarray, "n_cables 3"], dof: int) -> Float[np.ndarray, "n_edges dof-1"]:
+def edge_ends(points: Float[np.ndarray, "n_cables 3"], dof: int) -> Int[np.ndarray, "n_edges dof-1"]:
     """Spools at the ends of the edges of the hull."""
     count = len(points)
     if count == dof:

@@ -25,7 +25,7 @@ from cspr_jax.robots.statics.wrench_sets import spanning
 from cspr_jax.schema.limits import LIMITS
 
 if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
+    from jaxtyping import Float, Int
 
 BATCH, BATCH_OF_SEARCH = 4096, 16
 Rule = Literal["optimum", "thesis"]
@@ -57,7 +57,7 @@ class Durations:
     up: np.ndarray
     down: np.ndarray
 
-    def part(self, rows: Bool[np.ndarray, "n"]) -> "Durations":
+    def part(self, rows: Int[np.ndarray, "n"]) -> "Durations":
         """Durations of some of the lines."""
         return Durations(**{name: value[rows] for name, value in vars(self).items()})
 

@@ -25,7 +25,7 @@ from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.proved_verdicts import Verdicts, plain_slack
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Float, Int
 
 # Margins nearer to zero, over gravity or a limit's size, are undecided; rest with a smaller margin does not count.
 TOLERANCE = 1e-12
@@ -104,7 +104,7 @@ def _at_ends(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> tuple[np
 
 def limits_at_rest(
     problem: Problem, starts: Float[np.ndarray, "n 3"], ends: Float[np.ndarray, "n 3"]
-) -> Float[np.ndarray, "n"]:
+) -> Int[np.ndarray, "n"]:
     """Limits that rest at either end breaks."""
     _, flags, _ = _at_ends(problem, starts, ends)
     limits = {

@@ -10,10 +10,10 @@ import numpy as np
 from cspr_jax.families.swings.hypocycloid import Segment
 
 if TYPE_CHECKING:
-    from jaxtyping import Float, Num
+    from jaxtyping import Int, Num
 
 
-def pick(parities: dict[int, Segment], rows: Float[np.ndarray, "m"], arcs: Num[np.ndarray, "m"]) -> Segment:
+def pick(parities: dict[int, Segment], rows: Int[np.ndarray, "m"], arcs: Num[np.ndarray, "m"]) -> Segment:
     """Pick segments, each of the parity of its number of arcs."""
     if parities[0] is parities[1]:
         return jax.tree.map(lambda leaf: np.asarray(leaf)[rows], parities[0])
@@ -25,7 +25,7 @@ def pick(parities: dict[int, Segment], rows: Float[np.ndarray, "m"], arcs: Num[n
     return jax.tree.map(choose, parities[0], parities[1])
 
 
-def rows_of(parities: dict[int, Segment], rows: Float[np.ndarray, "m"]) -> dict[int, Segment]:
+def rows_of(parities: dict[int, Segment], rows: Int[np.ndarray, "m"]) -> dict[int, Segment]:
     """Pick segments, of both parities."""
     return {
         parity: jax.tree.map(lambda leaf: np.asarray(leaf)[rows], segments) for parity, segments in parities.items()

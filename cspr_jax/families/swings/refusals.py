@@ -18,14 +18,14 @@ from cspr_jax.robots.model.limits import NO_LIMITS
 from cspr_jax.verification.fewest_limits import FewestLimits, Refused
 
 if TYPE_CHECKING:
-    from jaxtyping import Float, Num
+    from jaxtyping import Bool, Float, Num
 
 
 def refusals(
     problem: Problem,
     parities: dict[int, Segment],
     upper: Float[np.ndarray, "n max_arcs"],
-    known: Float[np.ndarray, "n max_arcs n_criteria"],
+    known: Bool[np.ndarray, "n max_arcs n_criteria"],
 ) -> Refused:
     """Limits that refuse segments whose cables some number of arcs keeps taut."""
     fewest, alive = FewestLimits(len(upper), flags(problem.limits)), upper >= -SMALLEST_MARGIN
@@ -83,8 +83,8 @@ def unavoidable(
     problem: Problem,
     parities: dict[int, Segment],
     upper: Num[np.ndarray, "n max_arcs"],
-    suspects: Num[np.ndarray, "n n_criteria"],
-) -> Num[np.ndarray, "n n_criteria"]:
+    suspects: Bool[np.ndarray, "n n_criteria"],
+) -> Bool[np.ndarray, "n n_criteria"]:
     """Criteria that every number of arcs breaks."""
     suspects, left = suspects.copy(), upper > -np.inf
     while True:

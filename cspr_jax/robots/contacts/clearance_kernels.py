@@ -28,7 +28,7 @@ from cspr_jax.robots.contacts.clearance_lanes import (
 )
 
 if TYPE_CHECKING:
-    from jaxtyping import Complex, Float
+    from jaxtyping import Complex, Float, Int
 
 __all__ = [
     "Ball",
@@ -138,7 +138,7 @@ def _cables(points: Points, poses: PoseLanes) -> tuple[Sequence[Vector], Sequenc
     return ends, [tuple(poses.position[i] + arms[k][i] - ends[k][i] for i in range(3)) for k in range(count)]
 
 
-def of_cables(points: Points, poses: PoseLanes, pairs: Float[np.ndarray, "n_pairs 2"]) -> Complex[Array, "n"]:
+def of_cables(points: Points, poses: PoseLanes, pairs: Int[np.ndarray, "n_pairs 2"]) -> Complex[Array, "n"]:
     """The nearest two cables."""
     return _nearest_pair(points, *_lines(points, poses), pairs)
 

@@ -17,7 +17,7 @@ SMALLEST_LEVEL_RATIO = 1e-3
 AT_P0 = 1e-9
 
 
-def spread(points: Float[np.ndarray, "n m"]) -> Float[np.ndarray, "n m"]:
+def spread(points: Float[np.ndarray, "n m"]) -> np.ndarray:
     """Spread of points about their centroid along their principal axes."""
     return np.linalg.svd(points - points.mean(0), compute_uv=False)
 

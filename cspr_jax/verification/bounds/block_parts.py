@@ -46,7 +46,7 @@ class TimeBlocks(NamedTuple):
         return ~((self.slacks.low > 0.0) | (self.slacks.high < 0.0))
 
     def rest(
-        self, level: Float[np.ndarray, "k n_criteria"], matters: Bool[np.ndarray, "k n_criteria"], *, has_upper: bool
+        self, level: np.ndarray, matters: Bool[np.ndarray, "k n_criteria"], *, has_upper: bool
     ) -> tuple[np.ndarray, np.ndarray]:
         """Part of each block outside of which no lower line is below a level, or the upper one is below zero."""
         low, high, low_rise, high_rise = self.slacks

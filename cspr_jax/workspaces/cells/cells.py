@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
+    from jaxtyping import Float, Int
 
 # Rounding may have added this share of the sizes to a sum of up to some hundred products of float64 (2.2e-16 each),
 # with room for rays, arms and rotations that are rounded themselves.
@@ -65,7 +65,7 @@ class Cells(NamedTuple):
         """Lower bound of the lengths over the cells, (n, n_cables), m; not positive where nothing is known."""
         return (self.lengths - self.radius[:, None]) * (1.0 - ROUNDING) - self.rounding - self.moves
 
-    def take(self, chosen: Bool[np.ndarray, "k"]) -> "Cells":
+    def take(self, chosen: Int[np.ndarray, "k"]) -> "Cells":
         """Some of the cells."""
         return Cells(*(values[chosen] for values in self))
 

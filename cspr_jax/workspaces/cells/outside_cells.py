@@ -29,7 +29,7 @@ import numpy as np
 from cspr_jax.workspaces.cells.cells import ROUNDING, Cells, inverse_factor, least_quadratic, norm_reach, reach
 
 if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
+    from jaxtyping import Bool, Float, Int
 
 
 class Products(NamedTuple):
@@ -60,7 +60,7 @@ class Products(NamedTuple):
 def are_beyond(
     cells: Cells,
     normals: Float[np.ndarray, "n m"],
-    held: Float[np.ndarray, "n m-1"] | None,
+    held: Int[np.ndarray, "n m-1"] | None,
     wrenches: Float[np.ndarray, "n m"],
     low: Float[np.ndarray, "n_cables"],
     high: Float[np.ndarray, "n_cables"],
@@ -83,7 +83,7 @@ def are_beyond(
 
 
 def are_one_sided(
-    cells: Cells, normals: Float[np.ndarray, "n m"], held: Float[np.ndarray, "n m-1"] | None
+    cells: Cells, normals: Float[np.ndarray, "n m"], held: Int[np.ndarray, "n m-1"] | None
 ) -> Bool[np.ndarray, "n"]:
     """Tell whether cables fail to resist every wrench at every position of cells."""
     with np.errstate(all="ignore"):
@@ -103,7 +103,7 @@ def _others(cells: Cells, held: np.ndarray | None) -> np.ndarray:
 def products_of(
     cells: Cells,
     normals: Float[np.ndarray, "n m"],
-    held: Float[np.ndarray, "n m-1"] | None,
+    held: Int[np.ndarray, "n m-1"] | None,
     wrenches: Float[np.ndarray, "n m"],
 ) -> Products:
     """Products of a normal that moves with the cables S."""

@@ -78,6 +78,6 @@ def leaving_points(
     return in_batches(lambda x: geometry.exit_points(robot, pulleys, *x), poses, size=BATCH)
 
 
-def unit_changes(reach: Float[np.ndarray, "n k"], length: Float[np.ndarray, "n k"]) -> Float[np.ndarray, "n k"]:
+def unit_changes(reach: Float[np.ndarray, "n k"], length: np.ndarray) -> np.ndarray:
     """Bound of the changes of unit vectors."""
     return np.where(length > 0.0, np.minimum(reach / np.where(length > 0.0, length, 1.0), 2.0), 2.0)

@@ -11,7 +11,7 @@ from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.workspaces.search import WorkspaceAnswers
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Bool, Float, Int
 
 # Cells that are proved at a time.
 ROUND = 65536
@@ -64,8 +64,8 @@ def proved_sides(
     conditions: CellConditions,
     positions: Float[np.ndarray, "n 3"],
     half: Float[np.ndarray, "n 3"],
-    sides: Float[np.ndarray, "n"],
-    held: Float[np.ndarray, "n n_conditions"],
+    sides: Int[np.ndarray, "n"],
+    held: Bool[np.ndarray, "n n_conditions"],
     depth: int,
 ) -> CellSides:
     """Tell which cells lie wholly on the side of their centres, open ones halved as often as `depth` allows."""
@@ -93,6 +93,6 @@ def proved_sides(
     return result
 
 
-def sides_of(answers: WorkspaceAnswers) -> Float[np.ndarray, "n"]:
+def sides_of(answers: WorkspaceAnswers) -> Int[np.ndarray, "n"]:
     """Sides of poses."""
     return np.where(answers.verdict == 0, 1, np.where(answers.verdict == Verdict.WRENCH_INFEASIBLE, -1, 0))

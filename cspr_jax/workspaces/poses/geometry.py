@@ -25,7 +25,7 @@ from cspr_jax.robots.model.pulleys import Pulleys, exit_lanes, exits
 from cspr_jax.robots.model.state import State
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Bool, Float
 
 
 def wrench_columns(
@@ -109,7 +109,7 @@ def _columns(
     return [*(units[i] for i in row.forces), *(component / length for component in about)]
 
 
-def scales(robot: AnyRobot) -> Float[np.ndarray, "dof"]:
+def scales(robot: AnyRobot) -> Bool[np.ndarray, "dof"]:
     """Mask of the components of a wrench that are moments."""
     row = PATTERNS[robot.pattern]
     return np.arange(robot.dof) >= len(row.forces)

@@ -30,7 +30,7 @@ from cspr_jax.workspaces.poses.facet_normals import (
 from cspr_jax.workspaces.poses.margins import BLOCK_ROUNDING, ROUNDING, CocircuitLimits, Wrenches, length, one_norm
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Float, Shaped
 
 # Up to so many cocircuits the loop is unrolled.
 UNROLLED = 10
@@ -60,7 +60,7 @@ def by_normals(
     *,
     measure: str,
     is_bounded: bool,
-) -> Float[Array, "..."]:
+) -> Shaped[Array, "..."]:
     """Margins of poses of any robot, by the normals to dof - 1 cables."""
     dof, template = len(components), components[0][0]
     lanes = wrenches._replace(
@@ -190,7 +190,7 @@ def _joined(tensions: tuple[list[list[Array]], Array], wrench: Column, loss: Arr
 @partial(jax.jit, static_argnames=("measure", "is_bounded"))
 def by_null_space(
     space: NullSpace, tension_limits: TensionLimits, choices: CableSubsets, *, measure: str, is_bounded: bool
-) -> Float[Array, "..."]:
+) -> Shaped[Array, "..."]:
     """Margins of poses by the relations among rows of the null space."""
     template = space.loss
     finite = jnp.where(jnp.isinf(tension_limits.high), 0.0, jnp.abs(tension_limits.high)) + jnp.abs(tension_limits.low)

@@ -128,7 +128,7 @@ class OrientationSteps:
         height = np.where(np.abs(height) < least, 2.0 * least * self._side - height, 0.0)
         return OrientationSamples(share / self._reference, gaps, directions + height[..., None] * self._contacts.normal)
 
-    def regular(self, samples: OrientationSamples) -> Float[np.ndarray, "n"]:
+    def regular(self, samples: OrientationSamples) -> Bool[np.ndarray, "n"]:
         """Orientations that are not beyond a singularity."""
         return is_regular(samples.share)
 

@@ -13,7 +13,7 @@ from jax import Array, lax
 from cspr_jax.motion.amplitudes import Amplitude
 
 if TYPE_CHECKING:
-    from jaxtyping import Float, Num
+    from jaxtyping import Float, Int, Num
 
 # Intervals between the samples of one block.
 INTERVALS = 16
@@ -23,7 +23,7 @@ STEP = 32
 
 def blocks(
     amplitude: Amplitude, max_arcs: int, *, density: int = 1, least: int = 1
-) -> tuple[Num[np.ndarray, "n_rows n_edges"], Float[np.ndarray, "n_rows"]]:
+) -> tuple[Num[np.ndarray, "n_rows n_edges"], Int[np.ndarray, "n_rows"]]:
     """Edges of about density (p + 4) blocks for each number of arcs p, none across a knot."""
     pieces = list(itertools.pairwise([0.0, *np.asarray(amplitude.knots).tolist(), 1.0]))
     n_rows = _rounded(max_arcs + 1)
@@ -45,7 +45,7 @@ def _rounded(count: int) -> int:
 
 def over_blocks(
     edges: Float[Array, "n_rows n_edges"],
-    counts: Float[Array, "n_rows"],
+    counts: Int[Array, "n_rows"],
     arcs: Num[Array, "n"],
     first,
     step,

@@ -25,7 +25,7 @@ from cspr_jax.numerics.linear.lanes import smallest_of_each
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
 if TYPE_CHECKING:
-    from jaxtyping import Float, Num
+    from jaxtyping import Bool, Int, Num
 
 SAMPLES = 32
 # Tolerances by which a sample must lie below zero: twice as far as where `families.swings.proof.verdicts` refutes a
@@ -52,7 +52,7 @@ class LimitSieve:
         self._unseen = alive.copy() if n_limits else np.zeros_like(alive)
         self.alive, self.broken = alive.copy(), np.zeros((*alive.shape, BASIC + n_limits), bool)
 
-    def look(self, rows: Float[np.ndarray, "m"]) -> Float[np.ndarray, "k"]:
+    def look(self, rows: Int[np.ndarray, "m"]) -> Int[np.ndarray, "k"]:
         """Look at candidates until none that comes first is refuted."""
         while True:
             rows = rows[self.alive[rows].any(1)]
@@ -70,14 +70,14 @@ class LimitSieve:
 
 def broken_at_samples(
     problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]
-) -> Float[np.ndarray, "n n_criteria"]:
+) -> Bool[np.ndarray, "n n_criteria"]:
     """Limits that some sample breaks by more than rounding; a quick refutation."""
     lowest, near = in_batches(partial(_lowest, problem), (segments, np.asarray(arcs, float)), size=BATCH)
     return np.concatenate([np.zeros((len(lowest), BASIC), bool), lowest < -FAR * near[:, None]], axis=1)
 
 
 def upcoming(
-    candidates: Num[np.ndarray, "n max_arcs"], rows: Float[np.ndarray, "m"]
+    candidates: Bool[np.ndarray, "n max_arcs"], rows: Int[np.ndarray, "m"]
 ) -> tuple[Num[np.ndarray, "k"], Num[np.ndarray, "k"]]:
     """Next candidates of segments: one each, or as many as fit into a batch, which takes as long whatever it holds."""
     left = candidates[rows]

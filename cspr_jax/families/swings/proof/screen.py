@@ -28,7 +28,7 @@ from cspr_jax.numerics.elementary import lesser, sincospi
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
 if TYPE_CHECKING:
-    from jaxtyping import Float, Num
+    from jaxtyping import Float, Int, Num
 
 SAMPLES = 32
 BATCH = 2048
@@ -51,7 +51,7 @@ def sample_table(
 
 
 def smallest_sampled(
-    amplitude: Amplitude, segments: Segment, arcs: Float[np.ndarray, "n_arcs"], tau: Float[np.ndarray, "n_samples"]
+    amplitude: Amplitude, segments: Segment, arcs: Int[np.ndarray, "n_arcs"], tau: Float[np.ndarray, "n_samples"]
 ) -> Float[Array, "n_arcs n"]:
     """Smallest normalised pseudotension, or depth ratio, over samples, for several numbers of arcs of one parity."""
     dtype = segments.rate.dtype

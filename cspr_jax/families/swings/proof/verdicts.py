@@ -114,7 +114,7 @@ def prove(
     segments: Segment,
     arcs: Num[np.ndarray, "n"],
     *,
-    ignored: Float[np.ndarray, "n n_criteria"] | None = None,
+    ignored: Bool[np.ndarray, "n n_criteria"] | None = None,
     look: tuple[np.ndarray, ...] | None = None,
 ) -> Proof:
     """Decide segments, each with a given number of arcs."""

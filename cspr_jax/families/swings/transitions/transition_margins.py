@@ -20,7 +20,7 @@ from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.elementary import sincospi
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Float, Int
 
 
 def _extreme_pseudotensions(robot, limits, amplitude: Amplitude, segment: Segment, arcs: Array, tau: Array):
@@ -41,7 +41,7 @@ def _extreme_pseudotensions(robot, limits, amplitude: Amplitude, segment: Segmen
 
 
 def transition_margins(
-    problem: Problem, segments: Segment, arcs: Float[np.ndarray, "n"]
+    problem: Problem, segments: Segment, arcs: Int[np.ndarray, "n"]
 ) -> Float[np.ndarray, "n n_criteria"]:
     """Smallest slack of each criterion along each transition, as `margins` gives them.
 

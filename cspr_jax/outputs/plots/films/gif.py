@@ -11,7 +11,7 @@ from PIL import Image
 from cspr_jax.outputs.plots.films.moving_figure import MovingFigure
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Int
 
 # Pictures from which the colours come, and how many of these are exact: white, grey and the like cover most of them.
 SAMPLES, EXACT, COLOURS = 8, 32, 256
@@ -40,7 +40,7 @@ class GifWriter(AbstractMovieWriter):
         first.save(self.outfile, "gif", save_all=True, append_images=others, duration=round(1000 / self.fps), loop=0)
 
 
-def shared_colours(pictures: list[np.ndarray]) -> Float[np.ndarray, "n 3"]:
+def shared_colours(pictures: list[np.ndarray]) -> Int[np.ndarray, "n 3"]:
     """Colours for pictures: their most frequent ones as they are, and means of the others."""
     numbers, counts = np.unique(np.stack([_number(picture) for picture in pictures]), return_counts=True)
     order = np.argsort(-counts, kind="stable")

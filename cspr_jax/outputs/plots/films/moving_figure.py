@@ -13,7 +13,7 @@ from matplotlib.legend import Legend
 from PIL import Image
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Int
 
 
 class MovingFigure(Figure):
@@ -29,7 +29,7 @@ class MovingFigure(Figure):
         self._agg.draw()
         self._background = self._agg.copy_from_bbox(self.bbox)
 
-    def picture(self) -> Float[np.ndarray, "height width 4"]:
+    def picture(self) -> Int[np.ndarray, "height width 4"]:
         """The figure as it is now."""
         self._agg.restore_region(self._background)
         renderer = self._agg.get_renderer()

@@ -15,7 +15,7 @@ from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.reading.result import Result
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Int
 
 AXES = ("torsion", "tilt_azimuth", "tilt")
 SECTIONS = 17
@@ -24,7 +24,7 @@ _ACCESSIBLE, _ATTAINED = ("#b0b0b0", 2.6), (COLOURS[0], 1.0)
 
 
 def envelope_figure(
-    result: Result, verdicts: Float[np.ndarray, "n_torsions n_azimuths n_tilts"], fixed: list[str]
+    result: Result, verdicts: Int[np.ndarray, "n_torsions n_azimuths n_tilts"], fixed: list[str]
 ) -> Figure:
     """Outlines of the accessible and of the attained orientations, at some torsions."""
     torsion, azimuth, tilt = (result.axes[name] for name in AXES)

@@ -30,7 +30,7 @@ from cspr_jax.outputs.plots.style.word_ticks import worded
 from cspr_jax.store.reading.result import Result
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Int
 
 LINES = len(COLOURS)
 # Mark of a point of a margin that other conditions exclude.
@@ -135,7 +135,7 @@ def _ticks(panel: Axes, result: Result, across: str, groups: list[list[PlottedLi
 
 
 def lines_of(
-    result: Result, data: Float[np.ndarray, "n_across n_by"], excluded: np.ndarray, across: str, by: str
+    result: Result, data: Int[np.ndarray, "n_across n_by"], excluded: np.ndarray, across: str, by: str
 ) -> list[PlottedLine]:
     """The lines of one panel, one for each point of an axis, at most six."""
     points = result.axes[by]

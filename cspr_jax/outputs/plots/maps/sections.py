@@ -35,7 +35,7 @@ from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.store.reading.result import Result
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Int
 
 # Azimuth and tilt of an orientation: a polar plane.
 POLAR = ("tilt_azimuth", "tilt")
@@ -69,7 +69,7 @@ class PlaneSection(NamedTuple):
 def section_figure(
     result: Result,
     section: PlaneSection,
-    data: Float[np.ndarray, "n_first n_second n_panels"],
+    data: Int[np.ndarray, "n_first n_second n_panels"],
     informative: np.ndarray | None = None,
 ) -> Figure:
     """Sections of a map, one in each panel."""

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Int
 
 # Quantities whose extremes are instructive.
 EXTREME = ("margin", "duration", "arcs", "oscillations")
 
 
-def telling(data: dict[str, np.ndarray], verdict: Float[np.ndarray, "..."], count: int) -> list[tuple[int, ...]]:
+def telling(data: dict[str, np.ndarray], verdict: Int[np.ndarray, "..."], count: int) -> list[tuple[int, ...]]:
     """Cells to look at, all of them feasible.
 
     First come the extremes of margins, durations and counts, and for each count the cell with the smallest margin;

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Int
 
 # Names of the typed arrays of browsers, by NumPy's names.
 TYPES = {"uint8": "Uint8Array", "uint16": "Uint16Array", "int32": "Int32Array", "float32": "Float32Array"}
 
 
-def packed(values: Float[np.ndarray, "..."]) -> dict[str, Any]:
+def packed(values: Int[np.ndarray, "..."]) -> dict[str, Any]:
     """Values for a page."""
     values = np.asarray(values)
     if values.dtype.kind == "f":
@@ -29,7 +29,7 @@ def packed(values: Float[np.ndarray, "..."]) -> dict[str, Any]:
     return {"type": TYPES[name], "data": base64.b64encode(data).decode("ascii")}
 
 
-def unpacked(array: dict[str, Any]) -> Float[np.ndarray, "n"]:
+def unpacked(array: dict[str, Any]) -> Int[np.ndarray, "n"]:
     """Values of a page, as a browser has them."""
     name = next(name for name, other in TYPES.items() if other == array["type"])
     data = gzip.decompress(base64.b64decode(array["data"]))

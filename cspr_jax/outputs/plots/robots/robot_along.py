@@ -16,7 +16,7 @@ from cspr_jax.robots.model.shapes import Hull, rotation_matrix
 from cspr_jax.schema.limits import LIMITS
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Int
 
 
 class Moving(NamedTuple):
@@ -40,7 +40,7 @@ class Moving(NamedTuple):
 def moving(
     columns: Mapping[str, np.ndarray],
     robot_file: RobotFile | None,
-    rows: Float[np.ndarray, "n"],
+    rows: Int[np.ndarray, "n"],
     keys: PlanFile | None = None,
 ) -> Moving:
     """The robot at rows of its motion."""

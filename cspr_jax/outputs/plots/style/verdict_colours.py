@@ -9,7 +9,7 @@ import numpy as np
 from cspr_jax.schema.verdicts import NO_REASON, Verdict
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Int
 
 # Deeper reasons come first, and refutations before open verdicts. The colours are Okabe and
 # Ito's, and greys.
@@ -37,7 +37,7 @@ REASONS = {
 FEASIBLE_COLOUR = "#009E73"
 
 
-def reasons(verdicts: Float[np.ndarray, "..."], unflagged: str) -> tuple[np.ndarray, list[str], list[str]]:
+def reasons(verdicts: Int[np.ndarray, "..."], unflagged: str) -> tuple[np.ndarray, list[str], list[str]]:
     """Verdicts as numbers of reasons."""
     flags = verdicts.astype(int) & ~NO_REASON.value
     numbers = np.zeros(flags.shape, int)

@@ -16,15 +16,13 @@ from cspr_jax.schema.meanings import meanings_of
 from cspr_jax.store.reading.result import Result
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Int
 
 # Okabe and Ito's colours, too; if there are more words, the colours follow each other.
 MORE = (*COLOURS, "#F0E442", "#000000")
 
 
-def worded(
-    result: Result, name: str, values: Float[np.ndarray, "..."]
-) -> tuple[np.ndarray, list[str], list[str]] | None:
+def worded(result: Result, name: str, values: Int[np.ndarray, "..."]) -> tuple[np.ndarray, list[str], list[str]] | None:
     """Words that the values of a quantity stand for."""
     quantity = quantity_of(result.attributes.get("map"), name)
     if quantity.unflagged:
