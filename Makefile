@@ -37,9 +37,10 @@ thorough: $(TESTS)
 tests: $(TESTS)
 	$(PYTEST) --record build/durations/tests.jsonl -m "not soak and not prose"
 
-# Full counts, and new cases of what Hypothesis draws.
+# Full counts, new cases of what Hypothesis draws, and the shapes in signatures beside those of all calls.
 soak: $(TESTS)
 	$(BIN)/python -m pytest -m "soak or drawn"
+	CSPR_TESTS_SHAPES=1 $(PYTEST) -m "not soak and not thorough and not prose"
 
 check: $(TESTS)
 	$(BIN)/ruff format --check cspr_jax tests benchmarks docs/gallery hatch_build.py
