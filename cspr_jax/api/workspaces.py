@@ -10,6 +10,7 @@ from cspr_jax.api.arguments.kernel_arguments import check_in_plane, check_point_
 from cspr_jax.errors import InputError
 from cspr_jax.errors.suggestions import one_of
 from cspr_jax.motion.given_limits import limits_over
+from cspr_jax.motion.limits import touchable_limits
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.robots.model.limits import Limits
@@ -238,6 +239,7 @@ class AvailableAccelerations:
     of_largest: np.ndarray
     _robot: PointMassRobot
     _faces: Faces
+    _allowed: Faces
     _frame: Frame
 
     @checked
@@ -264,7 +266,8 @@ class AvailableAccelerations:
             accelerations: as for `margin`.
 
         Returns:
-            (n,) flags of `Verdict`; 0 is feasible. A margin within 1e-9 of gravity, or of its rounding, is undecided.
+            (n,) flags of `Verdict`; 0 is feasible. A margin within 1e-9 of gravity, or of its rounding, is undecided,
+            unless limits may be touched.
 
         Raises:
             InputError: the wrong shape, or not finite.
@@ -280,7 +283,7 @@ class AvailableAccelerations:
             raise InputError("accelerations", "y not 0", "y = 0: the plane of a planar robot")
         turned = np.asarray(self._frame.turned(np.broadcast_to(vectors, self.positions.shape)))
         with double_precision():
-            return judged(self._robot, self._faces, self._frame.inward(self.positions), turned)
+            return judged(self._robot, self._faces, self._allowed, self._frame.inward(self.positions), turned)
 
 
 @checked
@@ -308,7 +311,8 @@ def available_accelerations(
     with double_precision():
         limits = limits_over(robot, Limits(tension_min=tension_min, tension_max=tension_max))
         prepared_robot, frame = prepared(robot)
-        faces = faces_of(prepared_robot, limits, frame.inward(places))
+        allowed = touchable_limits(prepared_robot, limits)
+        faces, wider = (faces_of(prepared_robot, each, frame.inward(places)) for each in (limits, allowed))
     cables = np.tile(spanning(robot.n_cables, robot.dof), (2, 1))
     normals, offsets, of_largest = map(np.asarray, (frame.turned(faces.normals), faces.offsets, faces.of_largest))
-    return AvailableAccelerations(places, normals, offsets, cables, of_largest, prepared_robot, faces, frame)
+    return AvailableAccelerations(places, normals, offsets, cables, of_largest, prepared_robot, faces, wider, frame)

@@ -66,7 +66,7 @@ def _motion(region: Region, rng: np.random.Generator) -> Spline:
 
 def _decided(proofs: list[MotionProof]) -> None:
     # A rate counts nothing that is left open.
-    if any(not (proof.proof.low > 0.0).all() and not proof.broken.any() for proof in proofs):
+    if any(not proof.is_feasible and not proof.broken.any() for proof in proofs):
         raise SelfCheckError("a motion of the bench is neither proved nor refuted")
 
 

@@ -9,7 +9,8 @@ import numpy as np
 from cspr_jax.errors import ConfigError, shown
 from cspr_jax.motion.waypoints import Waypoints
 from cspr_jax.numerics.linear.frames import IDENTITY, Frame
-from cspr_jax.numerics.linear.rotations import UNIT_TOLERANCE, cylindrical_frames, from_tilt_torsion
+from cspr_jax.numerics.linear.rotations import cylindrical_frames, from_tilt_torsion
+from cspr_jax.numerics.tolerances import UNIT_NORM
 
 if TYPE_CHECKING:
     from jaxtyping import Float
@@ -26,7 +27,7 @@ def given_quaternion(quaternion: list[float] | None, key: str, file: object) -> 
     """An orientation given as a quaternion, which may miss length 1 by rounding."""
     unit_quaternion = np.asarray(IDENTITY if quaternion is None else quaternion)
     size = float(np.linalg.norm(unit_quaternion))
-    if abs(size - 1.0) > UNIT_TOLERANCE:
+    if abs(size - 1.0) > UNIT_NORM:
         raise ConfigError(file, f"{key} = {shown(quaternion)}: must have length 1 (it has {size:.7g})")
     return unit_quaternion / size
 

@@ -18,7 +18,7 @@ LARGEST_SPAN, LARGEST_MASS = 300.0, 1000.0  # m, kg
 # A body's radius of gyration is near its size. Grams for kilograms or millimetres for metres miss by 1e3 at least.
 INERTIA_RATIOS = (1e-5, 1e3)
 # Part of the distances between the points of a platform; tables of points are rounded.
-ROUNDING = 1e-3
+ROUNDED_BY_HAND = 1e-3
 
 
 def robot_hints(robot_file: RobotFile) -> list[str]:
@@ -55,7 +55,7 @@ def _unbalanced(robot_file: RobotFile) -> list[str]:
         points = np.vstack([points, np.zeros(3)])
     extent = float(np.ptp(points, axis=0).max())
     away = _distance_to_hull((points - centre)[:, axes] / extent) * extent if extent > 0.0 else 0.0
-    if away <= ROUNDING * extent:
+    if away <= ROUNDED_BY_HAND * extent:
         return []
     return [
         f"robot.centre_of_mass = {shown(centre.tolist())}: {away:.3g} m outside the hull of platform_points: is it "
@@ -65,7 +65,7 @@ def _unbalanced(robot_file: RobotFile) -> list[str]:
 
 def _distance_to_hull(points: np.ndarray) -> float:
     # Return how far the origin is from the hull of points (n, axes), of size 1. One heavy row holds the sum of weights.
-    if np.linalg.norm(points.mean(axis=0)) <= ROUNDING:
+    if np.linalg.norm(points.mean(axis=0)) <= ROUNDED_BY_HAND:
         return 0.0
     from scipy.optimize import nnls  # takes long to import, and the mean mostly suffices
 

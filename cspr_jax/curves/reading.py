@@ -24,7 +24,7 @@ from cspr_jax.numerics.linear import rotations
 
 # Shares of the largest coefficient by which pieces may miss each other, and by which windows may.
 MEETING, WINDOWS_MEETING = 1e-6, 1e-9
-ROUNDING = 1e-12  # of coefficients, in their largest
+COEFFICIENT_ERROR = 1e-12  # of coefficients, in their largest
 # Columns of curves, as indices of x, y, z and the quaternion.
 _WIDTHS = {2: (0, 2), 3: (0, 1, 2), 7: (0, 1, 2, 3, 4, 5, 6)}
 
@@ -135,7 +135,7 @@ def _check_joins(name: str, table: np.ndarray, width: np.ndarray, knots: np.ndar
         ("rate", starts[:, 0] / width, ends[:, 0] / width, np.abs(np.diff(table, axis=1) / width[:, None]).max()),
     ):
         jumps = np.linalg.norm(first[1:] - last[:-1], axis=1)
-        rounding = ROUNDING * np.abs(table).max() / (1.0 if words == "value" else width.min())
+        rounding = COEFFICIENT_ERROR * np.abs(table).max() / (1.0 if words == "value" else width.min())
         far = np.flatnonzero(jumps > MEETING * size * max(degree, 1) + rounding)
         if len(far):
             fault = f"its {words} jumps by {jumps[far[0]]:.3g} at t = {knots[far[0] + 1]:.6g} s"

@@ -20,12 +20,12 @@ LEAST_ROWS = 5
 LOWEST = -8.0  # power of ten of the weight of the second derivative, in steps, with which curves pass through samples
 HIGHEST = 24.0
 STEPS = 4.0  # of the power, in which an upper bound is sought
-TOLERANCE = 1e-4  # of the power
+POWER_ERROR = 1e-4  # of the power
 REFINEMENTS = 3  # of solutions, whose matrices are badly conditioned where weights are large
 # An end moves if a polynomial at rest there misses samples so many times more, squared, than one that is not, of which
 # so many standard deviations are noise, and if rest takes so many times the second derivatives, squared.
 FACTOR, SURE, COSTS = 2.0, 4.0, 1.03
-FITS, ROUNDING = 1.2, 1e-9  # part of their noise by which polynomials miss samples; of the samples
+FITS, SAMPLE_ERROR = 1.2, 1e-9  # part of their noise by which polynomials miss samples; of the samples
 _COUNTS = np.unique(np.geomspace(6.0, 256.0, 20).astype(int))  # of samples that tell the speed at an end
 REST, MOVING = (1, 2), ()  # derivatives that are 0 at an end
 
@@ -158,7 +158,7 @@ class _Fit:
         if self.degree == 5 or relaxed.count(REST[:1]) != 2 or self.is_periodic:
             return smoothest
         through = self._solved(LOWEST, self._space(relaxed), values)
-        is_within = _rms(self.design @ smoothest - values) <= deviation * (1.0 + TOLERANCE)
+        is_within = _rms(self.design @ smoothest - values) <= deviation * (1.0 + POWER_ERROR)
         if is_within and self._bending(smoothest) <= self._bending(through):
             return smoothest
         return self._weighed(deviation, self._space(relaxed), values)
@@ -175,7 +175,7 @@ class _Fit:
             high += STEPS
         if high >= HIGHEST:
             return self._solved(HIGHEST, space, values)
-        return self._solved(float(brentq(excess, high - STEPS, high, xtol=TOLERANCE)), space, values)
+        return self._solved(float(brentq(excess, high - STEPS, high, xtol=POWER_ERROR)), space, values)
 
     def _solved(self, power: float, space: csr_array, values: np.ndarray) -> np.ndarray:
         weight, design, bending = 10.0**power, self.design @ space, self.bending @ space
@@ -269,7 +269,7 @@ def _moves(times: np.ndarray, values: np.ndarray) -> bool:
         powers = (times[:count, None] / times[count - 1]) ** np.arange(5)
         both = [_missed(powers[:, chosen], values[:count]) for chosen in ([0, 1, 2, 3], [0, 2, 3, 4])]
         freedom = (count - 4) * values.shape[1]
-        spread = noise**2 * SURE * math.sqrt(2.0 * freedom) + (ROUNDING * float(np.abs(values[:count]).max())) ** 2
+        spread = noise**2 * SURE * math.sqrt(2.0 * freedom) + (SAMPLE_ERROR * float(np.abs(values[:count]).max())) ** 2
         if count > _COUNTS[0] and min(both) > FITS**2 * noise**2 * freedom + spread:
             break
         missed = both[1], FACTOR * both[0] + spread

@@ -13,7 +13,9 @@ from cspr_jax.config.hints import axis_question
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
+from cspr_jax.motion.problem import touchable
 from cspr_jax.numerics.linear.frames import frame_of
+from cspr_jax.numerics.tolerances import TOUCHED
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.point_mass import AT_P0, plane_normal, rest_point, spool_radius
 from cspr_jax.schema.tiles import Grid
@@ -23,9 +25,7 @@ if TYPE_CHECKING:
     from jaxtyping import Bool, Float
 
 # How far a refined margin may lie below the bound proved for it.
-ROUNDING = 1e-8
-# Limits may be touched: a slack within the tolerances of proofs counts as met.
-TOUCHED = 3.1e-6
+CHECK_ERROR = 1e-8
 _OF_TARGETS = ("x", "y", "radius", "azimuth", "z")
 
 
@@ -121,9 +121,23 @@ class GridMap(abc.ABC):
         shape = tuple(len(points) for points in axes.values())
         return Grid(axes, shape).cells(tuple(slice(0, n) for n in shape))
 
+    @property
+    def _missed(self) -> float:
+        # By how much slacks of limits may be below zero where limits are touched: of tensions over the weight a cable,
+        # of depths over z0, at least a tenth of the robot's size.
+        limits, weight = self._problem.limits, self._weight
+        tensions = np.ravel([x for x in (limits.tension_min, limits.tension_max) if x is not None])
+        return 10.0 * TOUCHED * max(1.0, float(np.max(tensions[np.isfinite(tensions)], initial=0.0)) / weight)
+
+    @property
+    def _weight(self) -> float:
+        # The weight that a cable carries if all carry the same, N.
+        robot = self._problem.robot
+        return float(robot.mass * robot.gravity) / robot.n_cables
+
     def _refuse_out_of_reach(self, points: np.ndarray, key: str) -> None:
         depth = points @ np.asarray(plane_normal(self._problem.robot))
-        floor = self._problem.limits.floor
+        floor = touchable(self._problem).limits.floor
         if not (depth > 0.0).any():
             level = np.abs(depth) <= AT_P0 * float(spool_radius(self._problem.robot))
             places = {True: "in the spool plane", False: "above the spool plane"}
@@ -154,12 +168,12 @@ class PlatformMap(GridMap):
         margin = answers["margin"]
         smallest = margin if self._is_redundant else np.minimum(margin, answers["det_margin"])
         return {
-            "a feasible cell with a margin below zero": feasible & ~(smallest > 0.0),
-            "a feasible cell that breaks a limit": feasible & ~(answers["limit_margin"] > -TOUCHED),
+            "a feasible cell with a margin below zero": feasible & ~(smallest > -self._missed * self._is_redundant),
+            "a feasible cell that breaks a limit": feasible & ~(answers["limit_margin"] > -self._missed),
             "a margin below its proved bound": exceeds(answers["margin_bound"], margin),
             "an infeasible cell whose verdict is 0": ~feasible & (answers["verdict"] == 0),
             "a feasible cell without a duration": feasible & ~(answers["duration"] > 0.0),
-            "a feasible cell that touches an obstacle": feasible & (answers.get("clearance", margin) <= -ROUNDING),
+            "a feasible cell that touches an obstacle": feasible & (answers.get("clearance", margin) <= -CHECK_ERROR),
         }
 
 
@@ -186,16 +200,16 @@ class PointMassMap(GridMap):
         unsure = FLAGS(Verdict.FEWER_ARCS_UNDECIDED.value)
         lasts = np.isfinite(answers["duration"]) & (answers["duration"] > 0.0)
         return {
-            "a feasible cell with a margin below zero": feasible & ~(margin > -ROUNDING),
+            "a feasible cell with a margin below zero": feasible & ~(margin > -max(CHECK_ERROR, self._missed)),
             "a feasible cell whose verdict is not": feasible & ((verdict & ~unsure) != 0),
             "an infeasible cell whose verdict is 0": ~feasible & (verdict == 0),
             "a margin below its proved bound": exceeds(answers["margin_bound"], margin),
             "a feasible cell without a duration": feasible & ~lasts,
-            "a feasible cell that touches an obstacle": feasible & (answers.get("clearance", margin) <= -ROUNDING),
+            "a feasible cell that touches an obstacle": feasible & (answers.get("clearance", margin) <= -CHECK_ERROR),
         }
 
 
 def exceeds(bound: Float[np.ndarray, "n"], margin: Float[np.ndarray, "n"]) -> Bool[np.ndarray, "n"]:
     """Tell where a bound is above its margin, but for rounding; cables that span too little have a margin of -inf."""
     with np.errstate(invalid="ignore"):
-        return bound > margin + ROUNDING * (1.0 + np.abs(margin))
+        return bound > margin + CHECK_ERROR * (1.0 + np.abs(margin))

@@ -12,7 +12,7 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
 from cspr_jax.maps.from_places import check_place
-from cspr_jax.maps.grid_map import ROUNDING, GridMap, exceeds
+from cspr_jax.maps.grid_map import CHECK_ERROR, GridMap, exceeds
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.schema.tiles import Grid
@@ -71,9 +71,9 @@ class ProvedMap(GridMap):
             "a feasible cell without a duration": feasible & ~(duration >= 0.0),
             "an infeasible cell with a duration": ~feasible & np.isfinite(duration),
             "a duration below its proved bound": feasible & exceeds(answers["lower_bound"], duration),
-            "a feasible cell with a margin below zero": feasible & ~(margin > -ROUNDING),
+            "a feasible cell with a margin below zero": feasible & ~(margin > -self._missed * self._weight),
             "a margin below its proved bound": exceeds(answers["tension_margin_bound"], margin),
-            "a feasible cell that touches an obstacle": feasible & (answers["clearance"] <= -ROUNDING),
+            "a feasible cell that touches an obstacle": feasible & (answers["clearance"] <= -CHECK_ERROR),
         }
 
 

@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.numerics.tolerances import BOUNDARY
 from cspr_jax.robots.model.limits import NO_LIMITS, Limits
 from cspr_jax.robots.model.point_mass import PointMassRobot, is_planar, plane_normal
 from cspr_jax.robots.statics.wrench_sets import Faces, acceleration_faces, tension_range
@@ -22,8 +23,6 @@ from cspr_jax.schema.verdicts import Verdict
 if TYPE_CHECKING:
     from jaxtyping import Float, Int
 
-# Margins nearer to zero than this, over gravity, are undecided.
-TOLERANCE = 1e-9
 # Components of unit normals below this count as zero.
 LEVEL = 1e-12
 
@@ -34,17 +33,20 @@ def faces_at(robot: PointMassRobot, limits: Limits, position: Float[Array, "3"])
 
 
 def verdict(
-    robot: PointMassRobot, faces: Faces, position: Float[Array, "3"], acceleration: Float[Array, "3"]
+    robot: PointMassRobot, faces: Faces, wider: Faces, position: Float[Array, "3"], acceleration: Float[Array, "3"]
 ) -> Int[Array, ""]:
-    """Verdict of an acceleration at one place."""
-    margin = faces.margin(acceleration)
-    doubt = jnp.maximum(TOLERANCE * robot.gravity, faces.rounding(acceleration))
-    broken = faces.slacks(acceleration) < -doubt
-    is_out = margin < -doubt
+    """Verdict of an acceleration at one place, from the faces, and from those of limits as proofs take them."""
+    rounding, slacks = wider.rounding(acceleration), wider.slacks(acceleration)
+    # Faces of limits may be touched.
+    doubt = jnp.where(wider.offsets < faces.offsets, rounding, jnp.maximum(BOUNDARY * robot.gravity, rounding))
+    # A flat set has its margin beside its faces.
+    flat = jnp.where(wider.is_regular, jnp.inf, wider.margin(acceleration))
+    broken, is_beside = slacks < -doubt, flat < -jnp.max(doubt)
+    is_out = jnp.where(wider.is_regular, broken.any(), is_beside)
     over = is_out & (broken & faces.of_largest).any()
     slack = is_out & ((broken & ~faces.of_largest).any() | ~over)
     above = is_out & ~(plane_normal(robot) @ position > 0.0)
-    doubtful = ~is_out & (margin <= doubt)
+    doubtful = ~is_out & (jnp.where(wider.is_regular, (slacks <= doubt).any(), flat <= jnp.max(doubt)))
     flags = (
         (slack, Verdict.SLACK_CABLE),
         (over, Verdict.OVER_TENSION),
@@ -80,7 +82,7 @@ class AccelerationReach(NamedTuple):
     downward_acceleration: Array
 
 
-def reach(robot: PointMassRobot, limits: Limits, position: Float[Array, "3"]) -> AccelerationReach:
+def reach(robot: PointMassRobot, limits: Limits, allowed: Limits, position: Float[Array, "3"]) -> AccelerationReach:
     """Feasible accelerations at one place."""
     faces, cone = faces_at(robot, limits, position), faces_at(robot, NO_LIMITS, position)
     still = jnp.zeros_like(position)
@@ -93,7 +95,7 @@ def reach(robot: PointMassRobot, limits: Limits, position: Float[Array, "3"]) ->
 
     across = jnp.linalg.norm(faces.normals[:, :2], axis=1)
     return AccelerationReach(
-        verdict=verdict(robot, faces, position, still),
+        verdict=verdict(robot, faces, faces_at(robot, allowed, position), position, still),
         acceleration_margin=margin,
         static_margin=cone.margin(still),
         closure_margin=cone.closure,
@@ -119,7 +121,7 @@ def _largest_level(faces: Faces, planar: bool) -> Array:
     is_line = jnp.isfinite(offset) & (size > LEVEL)
     alone = normal * (jnp.where(is_line, offset, 0.0) / jnp.where(is_line, size, 1.0) ** 2)[:, None]
     points, counts = jnp.concatenate([corner, alone]), jnp.concatenate([crosses, is_line])
-    room = TOLERANCE * (1.0 + jnp.linalg.norm(points, axis=1))
+    room = BOUNDARY * (1.0 + jnp.linalg.norm(points, axis=1))
     inside = counts & (points @ normal.T - offset[None] >= -room[:, None]).all(1)
     # The section is unbounded if one can go along the edge of a face without end.
     if planar:
@@ -147,6 +149,8 @@ def along(
 
 
 @jax.jit
-def reaches(robot: PointMassRobot, limits: Limits, positions: Float[Array, "n 3"]) -> AccelerationReach:
+def reaches(
+    robot: PointMassRobot, limits: Limits, allowed: Limits, positions: Float[Array, "n 3"]
+) -> AccelerationReach:
     """Feasible accelerations at many places."""
-    return jax.vmap(lambda position: reach(robot, limits, position))(positions)
+    return jax.vmap(lambda position: reach(robot, limits, allowed, position))(positions)

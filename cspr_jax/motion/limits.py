@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
+from cspr_jax.numerics.tolerances import TOUCHED
 from cspr_jax.robots import cables
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.robots.model.state import State
 from cspr_jax.schema.limits import LIMITS, Limit
 
@@ -22,6 +26,21 @@ if TYPE_CHECKING:
 def limits_set(limits: Limits) -> tuple[Limit, ...]:
     """Rows of the limits that are set, in the order of their slacks."""
     return tuple(row for row in LIMITS if getattr(limits, row.name) is not None)
+
+
+def allowance(row: Limit, limit: np.ndarray | float, robot: AnyRobot) -> np.ndarray | float:
+    """By how much a motion may miss a limit and keep it: a share of it, of the floor one of the robot's size."""
+    return TOUCHED * (np.asarray(spool_radius(robot)) if row.is_height else limit)
+
+
+def touchable_limits(robot: AnyRobot, limits: Limits) -> Limits:
+    """Limits as proofs take them, wider by `allowance`: to touch a limit is to keep it."""
+    values = {row: np.asarray(getattr(limits, row.name), float) for row in limits_set(limits)}
+    signs = {"most": 1.0, "least": -1.0}
+    wider: dict[str, Any] = {
+        row.name: limit + signs[row.sense] * allowance(row, limit, robot) for row, limit in values.items()
+    }
+    return dataclasses.replace(limits, **wider)
 
 
 class Values(NamedTuple):

@@ -3,6 +3,7 @@
 from typing import Generic, NamedTuple, TypeVar
 
 from cspr_jax.motion.amplitudes import Amplitude
+from cspr_jax.motion.limits import touchable_limits
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import PointMassRobot
@@ -22,3 +23,8 @@ class Problem(NamedTuple, Generic[RobotKind]):
     robot: RobotKind
     limits: Limits
     amplitude: Amplitude
+
+
+def touchable(problem: Problem[RobotKind]) -> Problem[RobotKind]:
+    """The problem with its limits as proofs take them; see `limits.touchable_limits`."""
+    return problem._replace(limits=touchable_limits(problem.robot, problem.limits))

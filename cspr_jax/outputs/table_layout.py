@@ -16,7 +16,7 @@ LEGEND = (
 _HEADS = {"feasible_at_infinity": "p to infinity", "T": "T (s)", "proportion": "proportion (%)"}
 # A table of more columns than the first is shown so many columns at a time.
 WIDEST, SIDE_BY_SIDE = 10, 6
-ROUNDING = 1e-9  # of a number and of half a unit of its last digit
+DIGIT_ERROR = 1e-9  # of a number and of half a unit of its last digit
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Cell:
         if self.published is None:
             return False
         half = 0.5 * 10.0 ** -_decimals(self.printed)
-        return self.computed is None or abs(self.computed - self.published) > half * (1.0 + ROUNDING) + ROUNDING
+        return self.computed is None or abs(self.computed - self.published) > half * (1.0 + DIGIT_ERROR) + DIGIT_ERROR
 
 
 def grid(

@@ -17,6 +17,7 @@ from cspr_jax.numerics.search.minima import followed, lowest_samples, vertex_val
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.verification.bounds.block_parts import TimeBlocks
 from cspr_jax.verification.bounds.block_slacks import block_slacks
+from cspr_jax.verification.criteria import levels
 from cspr_jax.verification.proved_answers import MotionProof, ProvedAnswers, margins_of
 from cspr_jax.verification.robustness.motion_tolerances import instant_states
 
@@ -57,7 +58,8 @@ def attained(
     smallest, tau = _minima(slacks, _blocks(proof.near, proof.high, columns, duration), np.asarray(motion.breaks()))
     high, when = proof.high.copy(), proof.when.copy()
     # A touch between two floats is proved but not attained.
-    is_seen = np.isfinite(smallest) & ~((high[columns] < 0.0) & (smallest >= 0.0))
+    level = levels(case.criteria)[columns]
+    is_seen = np.isfinite(smallest) & ~((high[columns] < level) & (smallest >= level))
     high[columns[is_seen]], when[columns[is_seen]] = smallest[is_seen], duration * tau[is_seen]
     return case._replace(proof=dataclasses.replace(proof, high=high, when=when))
 

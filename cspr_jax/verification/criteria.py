@@ -12,17 +12,20 @@ In natural units (N, m, m/s, m/s^2), with n cables:
                 corners of its shape, if that is known
 """
 
+from collections.abc import Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-from cspr_jax.motion.limits import limits_set
+from cspr_jax.motion.limits import allowance, limits_set
+from cspr_jax.numerics.tolerances import TOUCHED
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.robots.contacts.contact_bodies import default_scene, meetings
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import RIGID, PlatformRobot
+from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.robots.statics.wrench_balance import SINGULAR
 from cspr_jax.robots.statics.wrench_sets import tension_range
 from cspr_jax.schema.verdicts import Verdict
@@ -49,6 +52,7 @@ class Criterion(NamedTuple):
         obstacle: number of the obstacle from 0 on; None: no obstacle is concerned.
         allowed: the least, or the most, that the quantity may be.
         sense: whether it must be at least or at most so large.
+        allowance: by how much it may miss that: limits may be touched.
     """
 
     flag: Verdict
@@ -57,6 +61,7 @@ class Criterion(NamedTuple):
     obstacle: int | None = None
     allowed: float = 0.0
     sense: Literal["least", "most"] = "least"
+    allowance: float = 0.0
 
     def value(self, slack: float) -> float:
         """Value of the quantity that is bounded."""
@@ -66,13 +71,17 @@ class Criterion(NamedTuple):
 def criteria(robot: AnyRobot, limits: Limits, scene: Scene | None = None) -> list[Criterion]:
     """Criteria, in the order of their slacks."""
     numbers = range(robot.n_cables)
+    low, high = (np.broadcast_to(side, robot.n_cables).tolist() for side in tension_range(robot, limits))
     if robot.n_cables > robot.dof:
-        rows = [Criterion(Verdict.WRENCH_INFEASIBLE, (), "N")]
+        # All tensions together miss their limits by one number: no smallest one by more than its share.
+        rows = [Criterion(Verdict.WRENCH_INFEASIBLE, (), "N", allowance=TOUCHED * min(low))]
     else:
-        low, high = (np.broadcast_to(side, robot.n_cables).tolist() for side in tension_range(robot, limits))
-        rows = [Criterion(Verdict.SLACK_CABLE, (k,), "N", allowed=low[k]) for k in numbers]
+        rows = [Criterion(Verdict.SLACK_CABLE, (k,), "N", allowed=low[k], allowance=TOUCHED * low[k]) for k in numbers]
         if limits.tension_max is not None:
-            rows += [Criterion(Verdict.OVER_TENSION, (k,), "N", allowed=high[k], sense="most") for k in numbers]
+            rows += [
+                Criterion(Verdict.OVER_TENSION, (k,), "N", allowed=high[k], sense="most", allowance=TOUCHED * high[k])
+                for k in numbers
+            ]
     for row in limits_set(limits):
         if row.quantity == "tension":
             continue
@@ -80,13 +89,18 @@ def criteria(robot: AnyRobot, limits: Limits, scene: Scene | None = None) -> lis
         values = np.broadcast_to(values, robot.n_cables if row.per_cable else 1).tolist()
         cables = [(k,) if row.per_cable else () for k in range(len(values))]
         rows += [
-            Criterion(row.flag, each, row.unit, allowed=value, sense=row.sense)
+            Criterion(row.flag, each, row.unit, None, value, row.sense, float(allowance(row, value, robot)))
             for each, value in zip(cables, values, strict=True)
         ]
     is_regular, is_below = judged_poses(robot)
     rows += [Criterion(Verdict.SINGULAR, (), "1", allowed=SINGULAR)] if is_regular else []
     rows += [Criterion(Verdict.ABOVE_SPOOLS, (), "m")] if is_below else []
     return rows + contact_criteria(robot, limits, scene)
+
+
+def levels(rows: Sequence[Criterion]) -> np.ndarray:
+    """Slacks above which criteria are met, and below which they are broken, (n_criteria,) in their units."""
+    return np.array([-row.allowance for row in rows])
 
 
 def contact_criteria(robot: AnyRobot, limits: Limits, scene: Scene | None = None) -> list[Criterion]:
@@ -96,7 +110,8 @@ def contact_criteria(robot: AnyRobot, limits: Limits, scene: Scene | None = None
         bodies = [k for k in (cable, other if kind == "cables" else -1) if k >= 0]
         rows.append(Criterion(FLAGS[kind], tuple(bodies), "m", other if FLAGS[kind] == Verdict.OBSTACLE else None))
     if limits.floor is not None and has_extent(robot, around):
-        rows.append(Criterion(Verdict.BELOW_FLOOR, (), "m", allowed=float(limits.floor), sense="most"))
+        allowed, missed = float(limits.floor), TOUCHED * float(spool_radius(robot))
+        rows.append(Criterion(Verdict.BELOW_FLOOR, (), "m", allowed=allowed, sense="most", allowance=missed))
     return rows
 
 

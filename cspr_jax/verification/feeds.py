@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cspr_jax.numerics.tolerances import TOUCHED
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.bounds.block_slacks import BlockSlacks, speed_slacks
 from cspr_jax.verification.criteria import Criterion
@@ -29,9 +30,10 @@ def feed_proof(motion: Any, feeds: Float[np.ndarray, "m"]) -> tuple[Criterion, T
             *(np.where(is_one, rise, 0.0) for rise in rises),
         )
 
-    proof = time_proof(slacks, float(knots[-1]), jumps=knots[1:-1][feeds[1:] != feeds[:-1]])
+    missed = TOUCHED * float(feeds.min())
+    proof = time_proof(slacks, float(knots[-1]), jumps=knots[1:-1][feeds[1:] != feeds[:-1]], level=-missed)
     allowed = float(feeds[np.searchsorted(knots, proof.when[0], side="right") - 1])
-    return Criterion(Verdict.OVER_FEED, (), "m/s", allowed=allowed, sense="most"), proof
+    return Criterion(Verdict.OVER_FEED, (), "m/s", allowed=allowed, sense="most", allowance=missed), proof
 
 
 def _extremes(

@@ -21,7 +21,7 @@ from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.bounds.block_parts import TimeBlocks
 from cspr_jax.verification.bounds.block_slacks import BlockSlacks, block_slacks
-from cspr_jax.verification.criteria import AT_INSTANTS, Criterion, contact_criteria, criteria
+from cspr_jax.verification.criteria import AT_INSTANTS, Criterion, contact_criteria, criteria, levels
 from cspr_jax.verification.robustness.motion_tolerances import instant_states, motion_tolerances
 from cspr_jax.verification.time_proof import TimeProof, time_proofs
 
@@ -53,9 +53,16 @@ class MotionProof(NamedTuple):
     feeds: np.ndarray | None = None
 
     @property
+    def is_feasible(self) -> bool:
+        """Tell whether every criterion is proved."""
+        return bool((self.proof.low > levels(self.criteria)).all())
+
+    @property
     def broken(self) -> np.ndarray:
         """Mask (n_criteria,) of the criteria that fail at some instant."""
-        return (self.proof.high < 0.0) | np.array([len(intervals) > 0 for intervals in self.proof.failing])
+        return (self.proof.high < levels(self.criteria)) | np.array(
+            [len(intervals) > 0 for intervals in self.proof.failing]
+        )
 
     @property
     def verdict(self) -> Verdict:
@@ -63,7 +70,7 @@ class MotionProof(NamedTuple):
         flags = Verdict.FEASIBLE
         for row, is_broken in zip(self.criteria, self.broken, strict=True):
             flags |= row.flag if is_broken else Verdict.FEASIBLE
-        if flags or bool((self.proof.low > 0.0).all()):
+        if flags or self.is_feasible:
             return flags
         return Verdict.UNDECIDED
 
@@ -112,7 +119,7 @@ class MotionProof(NamedTuple):
 
     def causes(self, frame: Frame) -> tuple[Cause, ...]:
         """The worst cable of each criterion that fails, the worst one first; else of the criterion nearest to it."""
-        order = np.argsort(self.proof.high / self.scales).tolist()
+        order = np.argsort((self.proof.high - levels(self.criteria)) / self.scales).tolist()
         if not self.broken.any():
             return (dataclasses.replace(cause_of(self, order[0], frame), criterion=Verdict.UNDECIDED.text),)
         order = [k for k in order if self.broken[k]]
@@ -220,7 +227,7 @@ def proofs_of(
     # Answers tell the nearest contact of each kind alone.
     names = [(row.flag, () if row.flag in AT_INSTANTS else row.cables) for row in rows]
     groups = np.array([names.index(name) for name in names])
-    proofs = time_proofs(slacks, durations, jumps=jumps, groups=groups, intervals=intervals)
+    proofs = time_proofs(slacks, durations, jumps=jumps, groups=groups, level=levels(rows), intervals=intervals)
     return [_proof(problem, rows, proof, scene) for proof in proofs]
 
 
@@ -278,7 +285,7 @@ def sampled_proof(
         problem.robot, problem.limits, lambda start, end: states, tau, tau, scene, contacts_alone=contacts_alone
     ).high
     times = tau * float(motion.duration())
-    failing = [_runs(times, column < 0.0) for column in high.T]
+    failing = [_runs(times, column) for column in (high < levels(rows)).T]
     whole = np.array([[0.0, times[-1]]])
     proof = TimeProof(
         low=np.full(high.shape[1], -np.inf),

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cspr_jax.motion.problem import Problem, touchable
+
 if TYPE_CHECKING:
     from jaxtyping import Float
 
+# Slack of limits within which the motion may touch one.
+NEARLY = 1e-4
 # Limits whose slacks are proved of squares.
 SPEEDS = ("cable_speed_max", "speed_max")
 
@@ -35,6 +40,14 @@ class Verdicts:
         """Replace the verdicts of some of the motions."""
         for name, values in vars(part).items():
             getattr(self, name)[rows] = values
+
+
+def with_touched(problem: Problem, strict: Verdicts, judged: Callable[[Problem, np.ndarray], Verdicts]) -> Verdicts:
+    """Verdicts, of which those of motions that may touch a limit are by the wider limits of proofs; margins stay."""
+    rows = np.flatnonzero((strict.verdict != 0) & (np.abs(strict.room) < NEARLY))
+    if len(rows):
+        strict.verdict[rows] = judged(touchable(problem), rows).verdict
+    return strict
 
 
 def plain_slack(

@@ -1,8 +1,9 @@
 """Proof of any motion over its whole time: blocks are cut until each criterion is decided on each of them.
 
-A criterion is met throughout a block if the lower bound of its slack is positive, and broken throughout if the upper
-bound is negative. What is left when blocks are as short as the resolution are the ends of intervals in which a
-criterion fails, or instants that are undecided. Open blocks of all motions are bounded together.
+A criterion is met throughout a block if the lower bound of its slack is above its level, which is zero or, of limits,
+which may be touched, a little less, and broken throughout if the upper bound is below it. What is left when blocks are
+as short as the resolution are the ends of intervals in which a criterion fails, or instants that are undecided. Open
+blocks of all motions are bounded together.
 """
 
 from __future__ import annotations
@@ -58,10 +59,13 @@ def time_proof(
     duration: float,
     resolution: float = 5e-7,
     jumps: np.ndarray | None = None,
+    level: np.ndarray | float = 0.0,
 ) -> TimeProof:
     """Decide criteria over a whole motion."""
     at_jumps = [] if jumps is None else [jumps]
-    return time_proofs(lambda _, start, end: slacks(start, end), np.array([duration]), resolution, at_jumps)[0]
+    return time_proofs(
+        lambda _, start, end: slacks(start, end), np.array([duration]), resolution, at_jumps, level=level
+    )[0]
 
 
 def time_proofs(
@@ -71,6 +75,7 @@ def time_proofs(
     jumps: Sequence[np.ndarray] = (),
     groups: Int[np.ndarray, "n_criteria"] | None = None,
     *,
+    level: np.ndarray | float = 0.0,
     intervals: bool = True,
 ) -> list[TimeProof]:
     """Decide criteria over several whole motions at once."""
@@ -83,20 +88,20 @@ def time_proofs(
     totals, leaves, fails = np.full(count, FIRST), [], np.zeros(count, bool)
     at_jumps = np.concatenate([np.empty(0, complex), *(i + 1j * np.asarray(row) for i, row in enumerate(jumps))])
     while len(blocks.start):
-        undecided = blocks.undecided()
+        undecided = blocks.undecided(np.asarray(level))
         is_open = undecided.any(1) & (blocks.end - blocks.start > resolution)
         if not intervals:
-            fails |= np.bincount(blocks.motion, (blocks.slacks.high < 0.0).any(1), count) > 0.0
+            fails |= np.bincount(blocks.motion, (blocks.slacks.high < level).any(1), count) > 0.0
             is_open &= ~fails[blocks.motion]
         is_open &= (totals + 2 * np.bincount(blocks.motion[is_open], minlength=count))[blocks.motion] <= MOST
         leaves.append(blocks.taken(~is_open))
-        first, last = blocks.rest(np.zeros(1), undecided, has_upper=True)
+        first, last = blocks.rest(np.asarray(level), undecided, has_upper=True)
         outside, inner = blocks.taken(is_open).cut(first[is_open], last[is_open], at_jumps)
         leaves.append(outside)
         blocks = _bounded(slacks, *inner)
         totals += np.bincount(blocks.motion, minlength=count)
     narrow, more = _narrowed(slacks, joined(leaves), _usual(start.slacks.high, count), resolution, at_jumps, groups)
-    return _proofs(narrow.taken(np.lexsort((narrow.start, narrow.motion))), totals + more)
+    return _proofs(narrow.taken(np.lexsort((narrow.start, narrow.motion))), totals + more, level)
 
 
 def _bounded(slacks, motion: np.ndarray, start: np.ndarray, end: np.ndarray, whole: BlockSlacks | None) -> TimeBlocks:
@@ -160,11 +165,11 @@ def _grouped(least: np.ndarray, groups: np.ndarray | None) -> np.ndarray:
     return smallest[:, groups]
 
 
-def _proofs(blocks: TimeBlocks, totals: np.ndarray) -> list[TimeProof]:
+def _proofs(blocks: TimeBlocks, totals: np.ndarray, level: np.ndarray | float) -> list[TimeProof]:
     count = len(totals)
     low, high = (_least(blocks.motion, side, count) for side in blocks.slacks[:2])
-    failing = [_merged(blocks, column < 0.0, count) for column in blocks.slacks.high.T]
-    is_open = [_merged(blocks, column, count) for column in blocks.undecided().T]
+    failing = [_merged(blocks, column, count) for column in (blocks.slacks.high < level).T]
+    is_open = [_merged(blocks, column, count) for column in blocks.undecided(np.asarray(level)).T]
     proofs, firsts = [], np.searchsorted(blocks.motion, np.arange(count + 1))
     for i, (first, last) in enumerate(itertools.pairwise(firsts)):
         when = 0.5 * (blocks.start + blocks.end)[first + blocks.slacks.high[first:last].argmin(0)]

@@ -35,10 +35,10 @@ class Stretching(NamedTuple):
 def least_stretching(proved: Callable[[float], MotionProof]) -> Stretching:
     """Find the least stretching that is proved feasible; at one shorter by `CLOSE` nothing is proved."""
     first = proved(1.0)
-    if _is_feasible(first):
+    if first.is_feasible:
         return Stretching(1.0, first, is_static=False)
     slowest = proved(SLOWEST)
-    is_static = _is_feasible(slowest)
+    is_static = slowest.is_feasible
     feasible = _any_feasible(proved, slowest) if not is_static else _doubled(proved)
     if feasible is None:
         return Stretching(math.nan, slowest, is_static)
@@ -47,15 +47,11 @@ def least_stretching(proved: Callable[[float], MotionProof]) -> Stretching:
     while high - low > CLOSE * high:
         middle = 0.5 * (low + high)
         trial = proved(middle)
-        if _is_feasible(trial):
+        if trial.is_feasible:
             high, proof = middle, trial
         else:
             low = middle
     return Stretching(high, proof, is_static)
-
-
-def _is_feasible(proof: MotionProof) -> bool:
-    return bool((proof.proof.low > 0.0).all())
 
 
 def _doubled(proved: Callable[[float], MotionProof]) -> tuple[float, MotionProof] | None:
@@ -63,7 +59,7 @@ def _doubled(proved: Callable[[float], MotionProof]) -> tuple[float, MotionProof
     while factor < SLOWEST:
         factor *= 2.0
         proof = proved(factor)
-        if _is_feasible(proof):
+        if proof.is_feasible:
             return factor, proof
     return None
 
@@ -85,7 +81,7 @@ def _any_feasible(proved: Callable[[float], MotionProof], slowest: MotionProof) 
     values = worst(left), worst(right)
     for _ in range(STEPS):
         for u, proof in best.items():
-            if _is_feasible(proof):
+            if proof.is_feasible:
                 return 1.0 / math.sqrt(u), proof
         if values[0] < values[1]:
             low, left, right = left, right, left + GOLDEN * (high - left)

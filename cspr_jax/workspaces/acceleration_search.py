@@ -9,6 +9,7 @@ import jax
 import numpy as np
 
 from cspr_jax.motion.acceleration_sets import AccelerationReach, faces_at, reaches, verdict
+from cspr_jax.motion.limits import touchable_limits
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.point_mass import PointMassRobot
@@ -28,7 +29,8 @@ def _size(robot: PointMassRobot, power: int) -> int:
 
 def reach_of(robot: PointMassRobot, limits: Limits, positions: Float[np.ndarray, "n 3"]) -> AccelerationReach:
     """Sizes of the sets of feasible accelerations at many places."""
-    return in_batches(partial(reaches, robot, limits), positions, size=_size(robot, 6))
+    kernel = partial(reaches, robot, limits, touchable_limits(robot, limits))
+    return in_batches(kernel, positions, size=_size(robot, 6))
 
 
 @jax.jit
@@ -43,14 +45,18 @@ def faces_of(robot: PointMassRobot, limits: Limits, positions: Float[np.ndarray,
 
 @jax.jit
 def _judged(robot: PointMassRobot, arguments):
-    def one(faces, position, acceleration):
-        return faces.margin(acceleration), verdict(robot, faces, position, acceleration)
+    def one(faces, wider, position, acceleration):
+        return faces.margin(acceleration), verdict(robot, faces, wider, position, acceleration)
 
     return jax.vmap(one)(*arguments)
 
 
 def judged(
-    robot: PointMassRobot, faces: Faces, positions: Float[np.ndarray, "n 3"], accelerations: Float[np.ndarray, "n 3"]
-) -> tuple[Int[np.ndarray, "n"], Int[np.ndarray, "n"]]:
-    """Margins and verdicts of accelerations, one at each place."""
-    return in_batches(partial(_judged, robot), (faces, positions, accelerations), size=_size(robot, 3))
+    robot: PointMassRobot,
+    faces: Faces,
+    wider: Faces,
+    positions: Float[np.ndarray, "n 3"],
+    accelerations: Float[np.ndarray, "n 3"],
+) -> tuple[Float[np.ndarray, "n"], Int[np.ndarray, "n"]]:
+    """Margins and verdicts of accelerations, one at each place, from faces as `verdict` takes them."""
+    return in_batches(partial(_judged, robot), (faces, wider, positions, accelerations), size=_size(robot, 3))

@@ -6,7 +6,7 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
 from cspr_jax.maps.grid_map import PointMassMap
-from cspr_jax.motion.acceleration_sets import TOLERANCE
+from cspr_jax.numerics.tolerances import BOUNDARY
 from cspr_jax.schema.tiles import Grid
 from cspr_jax.schema.verdicts import FLAGS
 from cspr_jax.workspaces.acceleration_search import reach_of
@@ -38,12 +38,12 @@ class FeasibleAccelerationMap(PointMassMap):
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
         feasible, margin = answers["verdict"] == 0, answers["acceleration_margin"]
-        room = TOLERANCE * float(np.asarray(self._problem.robot.gravity))
+        room, mass = (float(np.asarray(x)) for x in (BOUNDARY * self._problem.robot.gravity, self._problem.robot.mass))
         level, most = answers["level_acceleration"], answers["level_acceleration_max"]
         return {
-            "a feasible cell with a margin below zero": feasible & ~(margin > 0.0),
+            "a feasible cell with a margin below zero": feasible & ~(margin > -self._missed * self._weight / mass),
             "an infeasible cell with a margin above zero": ~feasible & (margin > room) & (answers["verdict"] != 2048),
             "a margin that limits of the tensions make larger": margin > answers["static_margin"] + room,
-            "a level acceleration above the largest": level > most * (1.0 + TOLERANCE) + room,
+            "a level acceleration above the largest": level > most * (1.0 + BOUNDARY) + room,
             "a number that is none": sum(np.isnan(values) for values in answers.values()) > 0,
         }

@@ -18,6 +18,7 @@ from cspr_jax.errors import InputError
 from cspr_jax.numerics.batches import in_batches, in_parts
 from cspr_jax.numerics.elementary import leaf
 from cspr_jax.numerics.linear.frames import IDENTITY
+from cspr_jax.numerics.tolerances import BOUNDARY, FORMULAS_UNDECIDED, TOUCHED
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot
@@ -31,9 +32,6 @@ from cspr_jax.workspaces.requirements import CLOSURE, Requirement
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# A pose is on the boundary if its margin is nearer to zero than this part of the largest limit of the tensions, or of
-# the wrench.
-BOUNDARY = 1e-9
 # Bounds of a margin in single precision may lie this far apart, as part of the largest limit.
 APART = 1e-3
 PART = 1 << 18
@@ -57,7 +55,8 @@ class WorkspaceAnswers(Columns):
 
     Fields:
         verdict: (n,) flags of `Verdict`; 0: the pose belongs to the workspace. Singular: the cables do not span a
-            wrench that they must supply. Undecided: on the boundary, within 1e-9 of the limits.
+            wrench that they must supply. Undecided: on the boundary, within 1e-9 of the limits, unless these may be
+            touched.
         margin: (n,) distance that tensions can keep from their limits, N, negative outside; inf where nothing bounds
             it, -inf where the cables do not span the wrench. For wrench closure a pure number in [-1, 1].
         is_exact: (n,) whether the pose was answered by singular values.
@@ -140,6 +139,7 @@ class WorkspaceSearch:
         margin, is_exact, is_outside = (np.concatenate(x) for x in zip(*parts, strict=True))
         verdict = np.where(margin > 0.0, 0, Verdict.WRENCH_INFEASIBLE)
         verdict = np.where(np.abs(margin) <= self._boundary, Verdict.UNDECIDED, verdict)
+        verdict[self._touching(poses, margin)] = 0
         verdict = np.where(is_outside, Verdict.SINGULAR, verdict)
         verdict = np.where(np.isnan(margin), Verdict.NOT_FINITE, verdict)
         return WorkspaceAnswers(verdict.astype(FLAGS), margin, is_exact)
@@ -282,7 +282,19 @@ class WorkspaceSearch:
             points, None if required.box is None else leaf(required.box), [leaf(x) for x in required.ellipsoids]
         )
 
-    def _exactly(self, poses: Poses) -> tuple[np.ndarray, np.ndarray]:
+    def _touching(self, poses: Poses, margin: np.ndarray) -> np.ndarray:
+        # Poses whose tensions touch limits, or nearly do: they keep limits that are wider by as much as these may be
+        # missed.
+        low, high = self.requirement.low, self.requirement.high
+        rows = np.flatnonzero(np.abs(margin) <= TOUCHED / BOUNDARY * self._boundary)
+        if self._measure == "closure" or not (low.any() or np.isfinite(high).any()) or not len(rows):
+            return rows[:0]
+        wider = low * (1.0 - TOUCHED), high * (1.0 + TOUCHED)
+        return rows[self._exactly(poses.rows(rows), wider)[0] > FORMULAS_UNDECIDED / BOUNDARY * self._boundary]
+
+    def _exactly(
+        self, poses: Poses, limits: tuple[np.ndarray, np.ndarray] | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         matrices = self._matrices(poses.positions, poses.quaternions)
         measure = self._normals_unit if self._measure == "capacity" else None
         margins, is_outside = np.full(len(matrices), np.nan), np.zeros(len(matrices), bool)
@@ -294,7 +306,7 @@ class WorkspaceSearch:
                 is_outside[i] = exact.cocircuits(columns)[2].shape[1] < len(columns)
             else:
                 required = self._wrenches if poses.wrenches is None else self._wrenches.about(poses.wrenches[i])
-                low, high = self.requirement.low, self.requirement.high
+                low, high = limits or (self.requirement.low, self.requirement.high)
                 margins[i] = exact.wrench_margin(columns, required, low, high, measure)
                 is_outside[i] = margins[i] == -np.inf
         return margins, is_outside

@@ -11,7 +11,7 @@ from cspr_jax.schema.tiles import Grid
 from cspr_jax.workspaces.poses.geometry import mass_centres
 from cspr_jax.workspaces.sensitivities import SensitivitySearch
 
-ROUNDING = 1e-9
+CHECK_ERROR = 1e-9
 
 
 class SensitivityMap(GridMap):
@@ -42,6 +42,6 @@ class SensitivityMap(GridMap):
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
         return {
-            "a displacement smaller than the error of the cables": ~(answers["sigma_p"] >= 1.0 - ROUNDING),
+            "a displacement smaller than the error of the cables": ~(answers["sigma_p"] >= 1.0 - CHECK_ERROR),
             "a negative turn": answers["sigma_r"] < 0.0,
         }

@@ -52,7 +52,7 @@ class RestCells:
         self._names = ["closure" if name == CLOSURE else "tensions" for name, each in searches.items() for _ in each]
         self._has_contacts = poses.around is not None and bool(poses.around.meetings)
         self._names += ["clearances"] * self._has_contacts
-        self._names += [LIMITS[name] for name, _, _ in poses.limited(np.zeros((1, 3)), self._turns(1))]
+        self._names += [LIMITS[name] for name, *_ in poses.limited(np.zeros((1, 3)), self._turns(1))]
 
     def _mass_proofs(self, searches: MassSearch) -> tuple[CellProofs, CellProofs, WorkspaceSearch]:
         # Proofs that cells are inside, and outside, and the search for what may be outside.
@@ -144,14 +144,14 @@ class RestCells:
         poses, turns = self._poses, self._turns(len(positions))
         if poses.around is not None and self._has_contacts:
             yield self._clearances(poses.around, mass_positions, half, moved, sides)
-        for name, _, slack in poses.limited(positions, turns):
+        for name, _, slack, missed in poses.limited(positions, turns):
             change = moved.robot[:, None]
             low, high = slack - change, slack + change
             if name == "length_margin":
                 low, high = low - self._spools, high - self._spools
             if name == "speed_margin" and poses.speeds is not None:
                 low, high = self._speeds(poses.speeds, positions, mass_positions, moved, slack)
-            yield low.min(1), high.min(1)
+            yield (low + missed).min(1), (high + missed).min(1)
 
     def _speeds(
         self, speeds: CableSpeeds, positions: np.ndarray, mass_positions: np.ndarray, moved: Shifts, slack: np.ndarray

@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.tolerances import TOUCHED
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.robots.contacts.contact_bodies import shape_corners
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.platform import PlatformRobot
+from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.schema.verdicts import FLAGS, OPEN, Verdict, conjunction
 from cspr_jax.workspaces.cells.speeds import CableSpeeds
 from cspr_jax.workspaces.clearances import at_rest, flags, nearest_bodies
@@ -88,8 +90,8 @@ class RestPoses:
             columns |= {"clearance": distances.clearance, NEAREST: nearest_bodies(self.around, distances)}
             columns |= {name: getattr(distances, of) for name, of in CLEARANCES.items()}
             verdict |= flags(distances)
-        for name, flag, slack in self.limited(origins, quaternions):
-            verdict |= np.where((slack < 0.0).any(1), flag, 0).astype(FLAGS)
+        for name, flag, slack, missed in self.limited(origins, quaternions):
+            verdict |= np.where((slack < -missed).any(1), flag, 0).astype(FLAGS)
             columns[name] = slack.min(1)
         return {"verdict": conjunction(verdict), **columns}
 
@@ -111,16 +113,19 @@ class RestPoses:
 
     def limited(
         self, origins: Float[np.ndarray, "n 3"], quaternions: Float[np.ndarray, "n 4"]
-    ) -> Iterator[tuple[str, Verdict, np.ndarray]]:
-        """Slacks of the limits."""
+    ) -> Iterator[tuple[str, Verdict, np.ndarray, np.ndarray]]:
+        """Quantity, flag and slacks of each limit, and by how much it may be missed."""
         places = mass_centres(self.robot, origins, quaternions)
         if self.limits.floor is not None:
-            yield "floor_margin", Verdict.BELOW_FLOOR, float(self.limits.floor) - self._depths(places, quaternions)
+            slack, size = float(self.limits.floor) - self._depths(places, quaternions), spool_radius(self.robot)
+            yield "floor_margin", Verdict.BELOW_FLOOR, slack, TOUCHED * np.asarray(size)
         if self.limits.cable_length_max is not None:
-            slack = np.asarray(self.limits.cable_length_max) - self._lengths(places, quaternions)
-            yield "length_margin", Verdict.CABLE_TOO_LONG, slack
+            longest = np.asarray(self.limits.cable_length_max)
+            slack = longest - self._lengths(places, quaternions)
+            yield "length_margin", Verdict.CABLE_TOO_LONG, slack, TOUCHED * longest
         if self.speeds is not None:
-            yield "speed_margin", Verdict.CABLE_TOO_FAST, self.speeds.margins(origins, quaternions)
+            slack = self.speeds.margins(origins, quaternions)
+            yield "speed_margin", Verdict.CABLE_TOO_FAST, slack, TOUCHED * self.speeds.most
 
 
 def over_orientations(

@@ -26,11 +26,11 @@ def test_numbers_come_back(values):
     np.testing.assert_array_equal(np.stack(whole)[:, 0], values)
     size = np.abs(np.clip(values, -packed_arrays.LARGEST, packed_arrays.LARGEST))
     off = np.abs(np.stack(rough)[:6, 0] - np.clip(values, -packed_arrays.LARGEST, packed_arrays.LARGEST))
-    assert (off <= packed_arrays.ROUNDING * size + 1.2e-38).all()  # below that float32 has nothing
+    assert (off <= packed_arrays.SINGLE_ERROR * size + 1.2e-38).all()  # below that float32 has nothing
     np.testing.assert_array_equal(np.stack(rough)[6:], 0.0)
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, -0.0, 1.0 + packed_arrays.ROUNDING * 0.99])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, -0.0, 1.0 + packed_arrays.SINGLE_ERROR * 0.99])
 def test_extreme_numbers(value):
     """What is no number stays none; what is too large becomes the largest, of its sign."""
     rough, _ = _there_and_back([jnp.full(2, x) for x in (1.5, value)])
@@ -48,7 +48,7 @@ def test_bernstein_coefficients_of_rounded_values_are_still_bounds():
     between = 3.0 * (far[:, None] - place) ** 2 + 1e-9
     rough = np.stack([np.asarray(packed_arrays.unpacked(packed_arrays.packed([v]))[0]) for v in values])
     bound = (chebyshev.bernstein() @ rough).min(0)
-    allowed = chebyshev.LEBESGUE * packed_arrays.ROUNDING * np.abs(rough).max(0)
+    allowed = chebyshev.LEBESGUE * packed_arrays.SINGLE_ERROR * np.abs(rough).max(0)
     assert (bound - allowed <= between.min(0)).all()
     off = np.polynomial.chebyshev.chebval(far, np.polynomial.chebyshev.chebfit(x, rough - values, chebyshev.DEGREE)).T
     assert 0.1 * allowed.max() < np.abs(off).max() and (np.abs(off).max(0) <= allowed).all()

@@ -18,9 +18,10 @@ from cspr_jax.families.swings.proof import verdicts as proof
 from cspr_jax.families.swings.proof.blocks import blocks
 from cspr_jax.families.swings.proof.limit_slacks import least_lengths, pace_bounds
 from cspr_jax.families.swings.proof.slacks import instant, row_bounds, stretch, taut_bounds
-from cspr_jax.families.swings.proof.verdicts import SMALL, SMALLEST_MARGIN, prove, tolerance
+from cspr_jax.families.swings.proof.verdicts import SMALL, prove, tolerance
 from cspr_jax.motion.amplitudes import named
 from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.tolerances import SMALLEST_MARGIN
 from cspr_jax.robots.model import point_mass
 from cspr_jax.robots.model.limits import NO_LIMITS, Limits
 

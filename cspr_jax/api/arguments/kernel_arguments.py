@@ -18,7 +18,7 @@ from cspr_jax.motion.given_limits import limits_over
 from cspr_jax.motion.motion import Placed
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.linear.frames import IDENTITY, Frame
-from cspr_jax.numerics.linear.rotations import UNIT_TOLERANCE
+from cspr_jax.numerics.tolerances import UNIT_NORM
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import PLANAR, PointMassRobot
@@ -126,7 +126,7 @@ def quaternions(key: str, orientations, count: int) -> Float[np.ndarray, "count 
     if orientations is None:
         return np.tile(IDENTITY, (count, 1))
     values = np.asarray(orientations, float)
-    if values.shape != (count, 4) or not np.abs(np.linalg.norm(values, axis=1) - 1.0).max() <= UNIT_TOLERANCE:
+    if values.shape != (count, 4) or not np.abs(np.linalg.norm(values, axis=1) - 1.0).max() <= UNIT_NORM:
         raise InputError(key, f"shape {values.shape}", f"({count}, 4) unit quaternions, scalar first")
     return values / np.linalg.norm(values, axis=1, keepdims=True)
 

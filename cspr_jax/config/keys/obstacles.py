@@ -10,11 +10,10 @@ from cspr_jax.config.reading import Table
 from cspr_jax.config.wording import fault
 from cspr_jax.errors import InputError
 from cspr_jax.numerics.linear.frames import IDENTITY
+from cspr_jax.numerics.tolerances import UNIT_NORM
 from cspr_jax.robots.model import shapes
 
 MOST_OBSTACLES, MOST_CORNERS = 1000, 1000
-# A unit quaternion may miss the norm 1 by this much; `numerics.linear.rotations`, which needs jax, has the same number.
-UNIT_TOLERANCE = 1e-6
 Extent = Annotated[float, Field(ge=0.0, le=shapes.LARGEST_LENGTH)]
 Radius = Annotated[float, Field(gt=0.0, le=shapes.LARGEST_LENGTH), NotTiny]
 Size = Annotated[list[Extent], Field(min_length=3, max_length=3)]
@@ -164,4 +163,4 @@ def _check_corners(key: str, corners: list[list[float]]) -> None:
 
 
 def _is_unit(quaternion: list[float]) -> bool:
-    return abs(sum(x * x for x in quaternion) ** 0.5 - 1.0) <= UNIT_TOLERANCE
+    return abs(sum(x * x for x in quaternion) ** 0.5 - 1.0) <= UNIT_NORM

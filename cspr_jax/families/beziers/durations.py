@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from functools import partial
 from typing import TYPE_CHECKING
@@ -13,9 +14,9 @@ import numpy as np
 from cspr_jax.families.beziers.duration_roots import Ends, critical_durations
 from cspr_jax.families.beziers.margins import smallest_margins
 from cspr_jax.families.beziers.motion import Bezier
-from cspr_jax.families.beziers.verdicts import BATCH, verdicts
+from cspr_jax.families.beziers.verdicts import BATCH, verdicts_within
 from cspr_jax.motion.limits import limits_set
-from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.robots.model.point_mass import PointMassRobot, plane_normal, spool_radius
 from cspr_jax.robots.statics.force_balance import adjugate
@@ -110,17 +111,18 @@ def least_duration(
 
         return least_proved_duration(problem, ends, z0, slowest(problem, np.concatenate([ends.start, ends.end])))
 
-    def judged(times: np.ndarray) -> Verdicts:
+    def judged(times: np.ndarray, allowed: Problem = problem) -> Verdicts:
         many = Ends(*(np.repeat(x, len(times), axis=0) for x in ends))
         motions = Bezier(many.start, many.middles(times), many.end, times, np.full(len(times), z0))
-        return verdicts(problem, motions)
+        return verdicts_within(allowed, motions)
 
-    for first, last in intervals:
+    # Limits that every duration touches are no reason to touch others.
+    for allowed, (first, last) in itertools.product((problem, touchable(problem)), intervals):
         widest = max(WIDEST * first, slowest(problem, np.concatenate([ends.start, ends.end])))
         times = np.geomspace(first, min(last, widest), TRIED)
-        good = np.flatnonzero(judged(times).verdict == 0)
+        good = np.flatnonzero(judged(times, allowed).verdict == 0)
         if len(good):
-            return _narrowed(judged, times, int(good[0]))
+            return _narrowed(partial(judged, allowed=allowed), times, int(good[0]))
     # Nothing is feasible, so the duration that comes nearest stands in.
     size = np.abs(np.concatenate([ends.end - ends.start, ends.middle - ends.start])).sum()
     unit = np.sqrt(max(size, np.abs(ends.start).sum() * 1e-3) / float(problem.robot.gravity))

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from jaxtyping import Float
 
 # Rounding errors are below so many units of the sum of the sizes of all terms.
-ROUNDING = 64.0
+EPSILONS = 64.0
 
 
 class Margins(NamedTuple):
@@ -77,7 +77,7 @@ def smallest_margins(robot: PointMassRobot, motion: Bezier) -> Margins:
     place = square + slope + rest
     force = (np.pi / motion.time) ** 2 * (6.0 * square + slope) + robot.gravity
     terms = force * (jnp.sum(jnp.abs(rows), axis=1) + place * jnp.sum(jnp.abs(arms), axis=1))
-    epsilon = ROUNDING * jnp.finfo(place.dtype).eps
+    epsilon = EPSILONS * jnp.finfo(place.dtype).eps
     return Margins(
         smallest_cubic(cubics(robot, motion).T),
         smallest_quadratic(depth_quadratic(robot, motion)),

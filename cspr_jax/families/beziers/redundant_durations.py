@@ -20,7 +20,7 @@ from cspr_jax.families.beziers.duration_roots import Ends
 from cspr_jax.families.beziers.motion import Bezier
 from cspr_jax.families.beziers.redundant_verdicts import instant_slacks, proofs, verdicts_and_proofs
 from cspr_jax.motion.amplitudes import named
-from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.robots.model.limits import NO_LIMITS
 from cspr_jax.robots.model.point_mass import PointMassRobot, spool_radius
@@ -57,7 +57,7 @@ class _Segment:
         return Bezier(start, Ends(start, end, *rest).middles(times), end, times, np.full(len(times), self._z0))
 
     def sampled(self, times: np.ndarray) -> np.ndarray:
-        return in_batches(partial(_sampled, self._problem), self._motions(times), size=BATCH)
+        return in_batches(partial(_sampled, touchable(self._problem)), self._motions(times), size=BATCH)
 
     def is_proved(self, time: float) -> bool:
         return bool(verdicts_and_proofs(self._problem, self._motions(np.array([time])))[0].verdict[0] == 0)

@@ -14,18 +14,17 @@ from cspr_jax.families.beziers.motion import Bezier
 from cspr_jax.motion.limits import limits_set
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.tolerances import FORMULAS_UNDECIDED
 from cspr_jax.robots.model.point_mass import rest_point
 from cspr_jax.robots.statics.force_balance import pseudotensions
 from cspr_jax.schema.verdicts import FLAGS, Verdict
-from cspr_jax.verification.proved_verdicts import SPEEDS, Verdicts, plain_slack
+from cspr_jax.verification.proved_verdicts import SPEEDS, Verdicts, plain_slack, with_touched
 
 if TYPE_CHECKING:
     from jaxtyping import Float
 
 # Segments judged together: of a plan, and of arrays.
 BATCH, MANY = 256, 8192
-# Slacks of limits nearer to zero are undecided.
-TOLERANCE = 1e-12
 
 
 @jax.jit
@@ -48,6 +47,15 @@ def verdicts(problem: Problem, motions: Bezier) -> Verdicts:
         from cspr_jax.families.beziers.redundant_verdicts import verdicts_and_proofs
 
         return verdicts_and_proofs(problem, motions)[0]
+
+    def judged(allowed: Problem, rows: np.ndarray) -> Verdicts:
+        return verdicts_within(allowed, jax.tree.map(lambda x: np.asarray(x)[rows], motions))
+
+    return with_touched(problem, verdicts_within(problem, motions), judged)
+
+
+def verdicts_within(problem: Problem, motions: Bezier) -> Verdicts:
+    """Verdicts, on as many cables as degrees of freedom, of which none that touches a limit is feasible."""
     size = BATCH if len(motions.time) <= BATCH else MANY
     margins = in_batches(partial(_margins, problem.robot), motions, size=size)
     slack = np.concatenate([margins.taut, margins.below[:, None]], axis=1)
@@ -63,9 +71,9 @@ def verdicts(problem: Problem, motions: Bezier) -> Verdicts:
         proved = limit_slacks(problem, motions, kappa, bound[:, -1] > 0.0)
         known = np.isfinite(proved.attained)
         broken |= np.bitwise_or.reduce(
-            np.where(known & (proved.attained < -TOLERANCE), [row.flag.value for row in rows], 0), axis=1
+            np.where(known & (proved.attained < -FORMULAS_UNDECIDED), [row.flag.value for row in rows], 0), axis=1
         )
-        is_open |= ~(proved.bound > TOLERANCE).all(1)
+        is_open |= ~(proved.bound > FORMULAS_UNDECIDED).all(1)
         shown = [
             plain_slack(row.name, x, (*SPEEDS, "acceleration_max"))
             for row, x in zip(rows, proved.attained.T, strict=True)

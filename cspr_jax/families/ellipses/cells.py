@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from jaxtyping import Float
 
 # Roundings of a margin, in parts of the largest number in it, with room.
-ROUNDINGS = 256.0 * float(np.finfo(float).eps)
+MARGIN_ERROR = 256.0 * float(np.finfo(float).eps)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -105,7 +105,7 @@ def _margins(
         rise, far = slope * (a + b) / depth, 1.0 + slope * centre / depth
         e = 1.0 + frequencies**2 * depth / float(hull.gravity)
         size = (1.0 + steepest * centre) * (1.0 + rise * (1.0 + e)) + e * steepest * (a + b)
-        rounding = ROUNDINGS * far * (1.0 + steepest * float(spool_radius(robot))) * size
+        rounding = MARGIN_ERROR * far * (1.0 + steepest * float(spool_radius(robot))) * size
     return margins, np.nan_to_num(rounding, nan=np.inf)[:, None]
 
 

@@ -20,7 +20,7 @@ from cspr_jax.families.ellipses import harmonics
 from cspr_jax.families.ellipses.harmonics import Ellipse
 from cspr_jax.families.ellipses.hull import formula_hull
 from cspr_jax.families.ellipses.rotation import Rotation, rotation_state
-from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.bounds.affine_bounds import constant
 from cspr_jax.robots.bounds.state_bounds import StateBounds
 from cspr_jax.robots.contacts.clearance import Scene
@@ -59,10 +59,18 @@ def chosen_frequency(
             return natural
         low, high = max(low, first), min(high, last)
 
-    def slack(frequencies: np.ndarray) -> np.ndarray:
-        return sampled_slacks(problem, ellipse, frequencies, scene, rotation)
-
-    return searched_frequency(slack, low, high, natural, rule)
+    # Limits that every frequency touches are no reason to touch others.
+    for allowed in (problem, touchable(problem)):
+        frequency = searched_frequency(
+            lambda rates, allowed=allowed: sampled_slacks(allowed, ellipse, rates, scene, rotation),
+            low,
+            high,
+            natural,
+            rule,
+        )
+        if frequency != natural:
+            break
+    return frequency
 
 
 def searched_frequency(slack: Callable, low: float, high: float, natural: float, rule: str) -> float:

@@ -18,7 +18,7 @@ from cspr_jax.schema.verdicts import Verdict
 
 MOST_CABLES = 250
 # By how much ends of intervals may be off, in parts of themselves.
-ROUNDING = 1e-9
+CHECK_ERROR = 1e-9
 
 
 class EllipseMap(PointMassMap):
@@ -67,7 +67,10 @@ class EllipseMap(PointMassMap):
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
         feasible, margin, used = answers["verdict"] == 0, answers["margin"], answers["used_frequency"]
-        low, high = answers["lowest_frequency"] * (1.0 - ROUNDING), answers["highest_frequency"] * (1.0 + ROUNDING)
+        low, high = (
+            answers["lowest_frequency"] * (1.0 - CHECK_ERROR),
+            answers["highest_frequency"] * (1.0 + CHECK_ERROR),
+        )
         natural, tension = answers["natural_frequency"], answers["tension_margin"]
         is_open = feasible | (answers["verdict"] == Verdict.UNDECIDED.value)
         by_formula, by_proof = formula_hull(self._problem.robot) is not None, ~np.isnan(tension)
@@ -77,7 +80,9 @@ class EllipseMap(PointMassMap):
             "a feasible cell with a margin below zero": feasible & by_formula & ~(margin > 0.0),
             "a feasible frequency out of its interval": feasible & by_formula & ~((used >= low) & (used <= high)),
             "an infeasible cell with a margin above zero": ~is_open & ~by_proof & (margin > 0.0),
-            "a feasible cell with a tension out of its limits": feasible & by_proof & ~(tension > 0.0),
+            "a feasible cell with a tension out of its limits": feasible
+            & by_proof
+            & ~(tension > -self._missed * self._weight),
         }
 
     def _check_plane(self) -> None:

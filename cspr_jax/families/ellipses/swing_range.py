@@ -36,7 +36,7 @@ SHORTEST, LOOKS, AROUND, NARROWED = 0.003, 513, 33, 8
 # Share of its room that an ellipse keeps from the plane of the spools and from the floor.
 KEPT = 1e-6
 # Bound of the rounding of margins.
-ROUNDING = 1e-13
+MARGIN_ERROR = 1e-13
 # Halvings that find a nearest point, and cells at a time.
 HALVINGS, TOGETHER = 80, 256
 # Slopes of the plane of the spools that count as none.
@@ -110,10 +110,10 @@ def swing_range(
     nothing = np.zeros_like(centres)
     still = harmonics.of_many(harmonics.least_margin, hull, Ellipse(centres, nothing, nothing), rates)
     margin = harmonics.of_many(harmonics.least_margin, hull, ellipse, rates)
-    is_found = np.isfinite(speed) & (margin > ROUNDING)
+    is_found = np.isfinite(speed) & (margin > MARGIN_ERROR)
     lost = np.where(below > 0.0, 0, Verdict.ABOVE_SPOOLS.value) | np.where(above > 0.0, 0, Verdict.BELOW_FLOOR.value)
     lost = np.where(still > 0.0, np.where(lost == 0, Verdict.UNDECIDED.value, lost), Verdict.SLACK_CABLE.value)
-    lost = np.where(np.abs(still) > ROUNDING, lost, Verdict.UNDECIDED.value)
+    lost = np.where(np.abs(still) > MARGIN_ERROR, lost, Verdict.UNDECIDED.value)
     lost = np.where(depth > 0.0, lost, Verdict.ABOVE_SPOOLS.value)
     # The larger half-axis, from the eigenvalues of a a + b b.
     squares = [np.sum(one * other, axis=1) for one, other in ((ellipse[1],) * 2, (ellipse[2],) * 2, ellipse[1:])]

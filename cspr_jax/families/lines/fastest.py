@@ -11,10 +11,11 @@ import numpy as np
 
 from cspr_jax.families.lines.any_limits import LONGER
 from cspr_jax.families.lines.durations import Durations, Rule, by_cells, by_formula, by_search, moving
-from cspr_jax.families.lines.verdicts import TOLERANCE, acceleration_slack, limits_at_rest, verdicts
+from cspr_jax.families.lines.verdicts import acceleration_slack, limits_at_rest, verdicts
 from cspr_jax.motion.limits import limits_set
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_parts
+from cspr_jax.numerics.tolerances import FORMULAS_UNDECIDED
 from cspr_jax.robots.model.point_mass import in_one_plane, spool_radius
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import FLAGS, Verdict
@@ -119,7 +120,7 @@ def _at_rest(
     problem: Problem, starts: np.ndarray, ends: np.ndarray, timings: Durations
 ) -> tuple[Verdicts, np.ndarray, np.ndarray]:
     # Tell why there can be no motion, where there can be one, and where both ends keep the limits on places.
-    doubt = TOLERANCE * float(np.asarray(problem.robot.gravity))
+    doubt = FORMULAS_UNDECIDED * float(np.asarray(problem.robot.gravity))
     size = float(np.abs(np.asarray(problem.robot.base_points)).max())
     is_same = np.linalg.norm(ends - starts, axis=1) <= SAME_PLACE * size
     above, slack = ~(timings.depth > 0.0), timings.rest < -doubt

@@ -16,19 +16,17 @@ from cspr_jax.families.lines.slacks import TAUT
 from cspr_jax.motion.acceleration_sets import faces_at
 from cspr_jax.motion.amplitudes import Amplitude
 from cspr_jax.motion.limits import limits_set, scales, slack
-from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.tolerances import FORMULAS_UNDECIDED
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.schema.verdicts import FLAGS, Verdict
-from cspr_jax.verification.proved_verdicts import Verdicts, plain_slack
+from cspr_jax.verification.proved_verdicts import Verdicts, plain_slack, with_touched
 
 if TYPE_CHECKING:
     from jaxtyping import Float, Int
-
-# Margins nearer to zero, over gravity or a limit's size, are undecided; rest with a smaller margin does not count.
-TOLERANCE = 1e-12
 
 
 @jax.jit
@@ -69,18 +67,38 @@ def verdicts(
     sharp: bool,
 ) -> Verdicts:
     """Verdicts of motions whose durations are known."""
+
+    def judged(allowed: Problem, rows: np.ndarray) -> Verdicts:
+        parts = starts[rows], ends[rows], timings.part(rows)
+        return _verdicts(allowed, *parts, law=law, max_acceleration=max_acceleration, sharp=sharp)
+
+    return with_touched(problem, judged(problem, np.arange(len(starts))), judged)
+
+
+def _verdicts(
+    problem: Problem,
+    starts: np.ndarray,
+    ends: np.ndarray,
+    timings: Durations,
+    *,
+    law: str,
+    max_acceleration: float,
+    sharp: bool,
+) -> Verdicts:
     gravity = float(np.asarray(problem.robot.gravity))
     lines = lines_of(problem, starts, ends)
-    enough = np.inf if sharp else TOLERANCE
+    enough = np.inf if sharp else FORMULAS_UNDECIDED
     proved = smallest_slacks(lines, laws_of(law, timings.ratio), timings.duration, gravity, enough=enough)
-    doubt = TOLERANCE * np.array([gravity if name in lines.low else 1.0 for name in lines.names])
+    doubt = FORMULAS_UNDECIDED * np.array([gravity if name in lines.low else 1.0 for name in lines.names])
     own_flags = {row.name: row.flag.value for row in LIMITS} | {TAUT: Verdict.SLACK_CABLE.value}
     flags = np.where(proved.attained < -doubt, [own_flags[name] for name in lines.names], 0)
     room, broken, doubtful = _at_ends(problem, starts, ends)
     for name, values in zip(lines.names[1:], proved.attained.T[1:], strict=True):
         room = np.minimum(room, plain_slack(name, values / gravity if name.startswith("tension") else values))
     broken |= np.bitwise_or.reduce(flags, axis=1)
-    is_within = acceleration_slack(starts, ends, timings, law=law, max_acceleration=max_acceleration) > TOLERANCE
+    is_within = (
+        acceleration_slack(starts, ends, timings, law=law, max_acceleration=max_acceleration) > FORMULAS_UNDECIDED
+    )
     is_open = ~(proved.bound > doubt).all(1) | doubtful | ~is_within
     verdict = np.where(broken > 0, broken, np.where(is_open, Verdict.UNDECIDED.value, 0)).astype(FLAGS)
     return Verdicts(verdict, proved.attained[:, 0], proved.bound[:, 0], room)
@@ -98,14 +116,18 @@ def _at_ends(problem: Problem, starts: np.ndarray, ends: np.ndarray) -> tuple[np
         if not row.of_motion:
             limit: Any = np.asarray(getattr(problem.limits, row.name))
             smallest = np.asarray(slack(row, limit, each[row.quantity], scale)).min((1, 2))
-            room, flags = np.minimum(room, smallest), flags | np.where(smallest < -TOLERANCE, row.flag.value, 0)
-    return room, flags, ~(room > TOLERANCE)
+            room, flags = (
+                np.minimum(room, smallest),
+                flags | np.where(smallest < -FORMULAS_UNDECIDED, row.flag.value, 0),
+            )
+    return room, flags, ~(room > FORMULAS_UNDECIDED)
 
 
 def limits_at_rest(
     problem: Problem, starts: Float[np.ndarray, "n 3"], ends: Float[np.ndarray, "n 3"]
 ) -> Int[np.ndarray, "n"]:
-    """Limits that rest at either end breaks."""
+    """Limits that rest at either end breaks, not those that it touches."""
+    problem = touchable(problem)
     _, flags, _ = _at_ends(problem, starts, ends)
     limits = {
         row.name: getattr(problem.limits, row.name) for row in limits_set(problem.limits) if row.quantity == "tension"
@@ -124,7 +146,7 @@ def _fails_at_rest(problem: Problem, starts: np.ndarray, ends: np.ndarray, limit
     # Tell whether rest at either end breaks limits of the tensions, or taut cables, (n,).
     limited = problem._replace(limits=Limits(**limits))
     margins = [in_batches(partial(_at_rest, limited), places, size=BATCH) for places in (starts, ends)]
-    return np.min(margins, axis=0) < -TOLERANCE * float(np.asarray(problem.robot.gravity))
+    return np.min(margins, axis=0) < -FORMULAS_UNDECIDED * float(np.asarray(problem.robot.gravity))
 
 
 @jax.jit

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 # Sizes of batches for few and for many cases: a batch is always full, and every size is compiled for.
 FEW, MANY = 256, 2048
-TOLERANCE = 1e-7
 TOUCH = 1e-6  # part of the platform's size: poses of a plan must not be nearer to a contact
 BESIDE_KNOT = 1e-12
 BASIC = 3  # criteria that are no limits

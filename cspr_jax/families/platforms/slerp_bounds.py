@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from jaxtyping import Float, Num
 
 # Rounding of the derivatives that recurrences give, in parts of their size or of 1, is less.
-ROUNDING = 1e-12
+DERIVATIVE_ERROR = 1e-12
 # No derivative in y = r^2 of cos r, and of sin r / r of orders 0 to 2, bends more: the n-th derivative of the latter is
 # a spherical Bessel function, (-1/2)^n j_n(r) / r^n, and largest at 0, where it is (-1/2)^n / (1 3 5 ... (2 n + 1)).
 _BENDS = (1.0 / 12.0, 1.0 / 60.0, 1.0 / 840.0, 1.0 / 15120.0)
@@ -67,7 +67,8 @@ def _angle_ratio(s: AffineBounds) -> Bounds3:
     middle = angle_ratio(s.middle, 1.0 - s.middle**2, orders=4)
     steepest = angle_ratio(low, 1.0 - low**2, orders=5)
     w, w1, w2 = (
-        _widened(bent(s, middle[j], middle[j + 1], (1.0 + ROUNDING) * steepest[j + 2]), middle[j]) for j in range(3)
+        _widened(bent(s, middle[j], middle[j + 1], (1.0 + DERIVATIVE_ERROR) * steepest[j + 2]), middle[j])
+        for j in range(3)
     )
     return w, w1, w2
 
@@ -95,4 +96,4 @@ def _sinc(y: AffineBounds) -> tuple[AffineBounds, ...]:
 
 
 def _widened(f: AffineBounds, size: Array) -> AffineBounds:
-    return f._replace(radius=f.radius + ROUNDING * jnp.abs(size))
+    return f._replace(radius=f.radius + DERIVATIVE_ERROR * jnp.abs(size))

@@ -19,7 +19,7 @@ from cspr_jax.families.swings.hypocycloid import Segment
 from cspr_jax.families.swings.proof import screen
 from cspr_jax.motion.amplitudes import boundary_errors
 from cspr_jax.motion.answers import Answers, joined
-from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches, in_parts, room
 from cspr_jax.robots.model.point_mass import AT_P0, LARGEST_LENGTH, PointMassRobot, spool_radius
 from cspr_jax.runtime.persistent_jit import persistent_jit
@@ -124,5 +124,5 @@ def _sieved(problem: Problem, even: Segment, odd: Segment, max_arcs: int, dtype:
     cast = jax.tree.map(lambda x: np.asarray(x, dtype), (even, odd))
     kernel = partial(screen.upper_bounds, max_arcs=max_arcs)
     upper = in_batches(lambda pair: kernel(problem.amplitude, *pair), cast, size=screen.BATCH).astype(float)
-    at_ends = in_batches(partial(end_slacks, problem, 3.0), odd, size=screen.BATCH)
+    at_ends = in_batches(partial(end_slacks, touchable(problem), 3.0), odd, size=screen.BATCH)
     return np.where(np.isnan(upper), -np.inf, upper), at_ends

@@ -25,12 +25,13 @@ from cspr_jax.families.swings.proof.enclosures import tolerated_by_point_masses
 from cspr_jax.families.swings.proof.limit_screen import LimitSieve
 from cspr_jax.families.swings.proof.margins import each_margin, margins
 from cspr_jax.families.swings.proof.screen import upper_bounds
-from cspr_jax.families.swings.proof.verdicts import SMALLEST_MARGIN, first_look, prove
+from cspr_jax.families.swings.proof.verdicts import first_look, prove
 from cspr_jax.families.swings.refusals import refusals, unavoidable
 from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.limits import limits_set
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.tolerances import SMALLEST_MARGIN
 from cspr_jax.robots.model.limits import NO_LIMITS
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.verdicts import FLAGS, Verdict

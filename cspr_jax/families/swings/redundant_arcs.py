@@ -20,7 +20,7 @@ from cspr_jax.families.swings.hypocycloid import Hypocycloid, Segment
 from cspr_jax.families.swings.parities import pick
 from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.limits import other_limits, other_slacks
-from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.elementary import leaf
 from cspr_jax.numerics.search.minima import narrowed
@@ -90,11 +90,12 @@ def redundant_arcs(
             _try(problem, parities, np.flatnonzero(is_tried), number, trials)
     tried = np.where(trials.arcs > 0, trials.arcs, np.where(trials.undecided > 0, trials.undecided, trials.best))
     chosen = pick(parities, np.arange(count), tried)
-    least = np.concatenate(
-        [least_slacks(problem, chosen, np.array([i]), int(tried[i]), MANY, is_narrowed=True) for i in range(count)]
-    )
+    measured = partial(_measured, segments=chosen, tried=tried)
+    least, refused = measured(problem, rows=np.arange(count)), np.flatnonzero(trials.arcs == 0)
     flags = (Verdict.WRENCH_INFEASIBLE, Verdict.ABOVE_SPOOLS, *(row.flag for row in other_limits(problem.limits)))
-    broken = np.bitwise_or.reduce(np.where(least <= 0.0, np.array([flag.value for flag in flags]), 0), axis=1)
+    broken = np.zeros(count, int)
+    is_broken = measured(touchable(problem), rows=refused) <= 0.0
+    broken[refused] = np.bitwise_or.reduce(np.where(is_broken, [flag.value for flag in flags], 0), axis=1)
     none = np.where(trials.undecided > 0, Verdict.UNDECIDED.value, broken | Verdict.NO_ARCS.value)
     fewer = np.where(trials.undecided > 0, Verdict.FEWER_ARCS_UNDECIDED.value, 0)
     duration = np.array([float(_motion(problem, chosen, i, int(tried[i])).duration()) for i in range(count)])
@@ -113,11 +114,17 @@ def redundant_arcs(
     return answers, chosen
 
 
+def _measured(problem: Problem, *, segments: Segment, tried: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    # Smallest slacks of some of the segments with the numbers of arcs that are tried.
+    each = [least_slacks(problem, segments, np.array([i]), int(tried[i]), MANY, is_narrowed=True) for i in rows]
+    return np.concatenate([np.empty((0, BASIC + len(other_limits(problem.limits)))), *each])
+
+
 def _try(problem: Problem, parities: dict[int, Segment], rows: np.ndarray, number: int, trials: _Trials) -> None:
     # Try a number of arcs for some of the segments.
     segments = parities[number % 2]
     for samples in (FEW, MANY):
-        least = least_slacks(problem, segments, rows, number, samples).min(1)
+        least = least_slacks(touchable(problem), segments, rows, number, samples).min(1)
         better = least > trials.reached[rows]
         trials.best[rows[better]], trials.reached[rows[better]] = number, least[better]
         rows = rows[least > 0.0]

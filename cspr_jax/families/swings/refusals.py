@@ -11,9 +11,10 @@ from cspr_jax.families.swings.hypocycloid import Segment
 from cspr_jax.families.swings.parities import pick
 from cspr_jax.families.swings.proof.criteria import BASIC, flags
 from cspr_jax.families.swings.proof.limit_screen import broken_at_samples, upcoming
-from cspr_jax.families.swings.proof.verdicts import SMALL, SMALLEST_MARGIN, first_look, is_met_at_samples, prove
+from cspr_jax.families.swings.proof.verdicts import SMALL, first_look, is_met_at_samples, prove
 from cspr_jax.motion.limits import limits_set
 from cspr_jax.motion.problem import Problem
+from cspr_jax.numerics.tolerances import SMALLEST_MARGIN
 from cspr_jax.robots.model.limits import NO_LIMITS
 from cspr_jax.verification.fewest_limits import FewestLimits, Refused
 

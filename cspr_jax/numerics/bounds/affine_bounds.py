@@ -15,14 +15,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jax import Array
+
+from cspr_jax.numerics.tolerances import ROUNDING
 
 if TYPE_CHECKING:
     from jaxtyping import Bool, Float
-
-# A few roundings of an operation, in parts of the largest number in it.
-ROUNDING = 8.0 * float(np.finfo(float).eps)
 
 
 class AffineBounds(NamedTuple):

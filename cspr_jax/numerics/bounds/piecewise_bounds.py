@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cspr_jax.numerics.bounds.affine_bounds import ROUNDING, AffineBounds
+from cspr_jax.numerics.bounds.affine_bounds import AffineBounds
+from cspr_jax.numerics.tolerances import ROUNDING
 
 if TYPE_CHECKING:
     from jaxtyping import Float

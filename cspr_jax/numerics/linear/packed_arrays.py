@@ -10,7 +10,7 @@ import numpy as np
 from jax import Array, lax
 
 # Rounding to float32 changes a number by this part of it; numbers above the largest become the largest.
-ROUNDING = 2.0**-24
+SINGLE_ERROR = 2.0**-24
 LARGEST = float(np.finfo(np.float32).max)
 WIDTH = 4
 _HALF = 32  # bits

@@ -12,9 +12,6 @@ from jax import Array
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# A given quaternion is normalised if its length differs from 1 by no more than this.
-UNIT_TOLERANCE = 1e-6
-
 
 def from_tilt_torsion(angles: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "... 4"]:
     """Orientations of tilt-and-torsion angles, Z_phi X_theta Z_(sigma - phi), thesis section 3.10.2."""

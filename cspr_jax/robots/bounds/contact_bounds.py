@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from jaxtyping import Float
 
 # Rounding of the corners of shapes, over the size of a scene; cosines up to which directions point away from a sector.
-ROUNDING, POLAR = 1e-14, 1e-12
+CORNER_ERROR, POLAR = 1e-14, 1e-12
 
 Range = tuple[Array, Array]
 
@@ -66,7 +66,7 @@ def contact_bounds(robot: AnyRobot, bodies: Bodies, state: StateBounds, cables: 
     if not parts:
         return jnp.zeros(0), jnp.zeros(0)
     low, high = (jnp.concatenate([side.ravel() for side in sides]) for sides in zip(*parts, strict=True))
-    allowance = ROUNDING * bodies.size
+    allowance = CORNER_ERROR * bodies.size
     return low - allowance, high + allowance
 
 

@@ -9,8 +9,9 @@ from typing import NamedTuple
 
 import jax.numpy as jnp
 
-from cspr_jax.numerics.bounds.affine_bounds import ROUNDING, AffineBounds, constant, cross, dot, norm_squared, squared
+from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, constant, cross, dot, norm_squared, squared
 from cspr_jax.numerics.bounds.function_bounds import arc_sine, reciprocal, reciprocal_root
+from cspr_jax.numerics.tolerances import ROUNDING
 from cspr_jax.robots.model.pulleys import Pulleys
 
 

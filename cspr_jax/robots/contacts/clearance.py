@@ -29,7 +29,7 @@ FEW = 4096
 LEAVE_DIAMETERS, LEAVE_SIZE = 10.0, 0.01
 # Rounding of a clearance, over machine epsilon and the largest coordinate of pose, robot and obstacles; the largest
 # value that was met is 2.2.
-ROUNDING = 16.0
+EPSILONS = 16.0
 
 Kind = Literal["cables", "obstacle", "platform", "platform-obstacle"]
 
@@ -194,7 +194,7 @@ def _all(scene: Scene, all_poses: _CheckedPoses, threshold: float, dtype: np.dty
     terms = list(_terms(scene, origin, dtype))
     extent = max(float(np.abs(x).max()) for x in (scene.base_points - origin, scene.platform_points))
     reach = max([extent] + [_reach(shape, origin) for shape in scene.obstacles])
-    bound, count = ROUNDING * float(np.finfo(dtype).eps), len(all_poses.place)
+    bound, count = EPSILONS * float(np.finfo(dtype).eps), len(all_poses.place)
     size = FEW if count <= FEW else BATCH
 
     def one(part: slice) -> Clearances:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 # Edges at a smaller angle than about this count as parallel: their common normal is not well known.
 PARALLEL_SQUARE = 1e-8
 TINY = 1e-200
-ROUNDING = 1e-14
+DISTANCE_ERROR = 1e-14
 
 
 class Solid(NamedTuple):
@@ -120,12 +120,12 @@ def along(line: AffineBounds, vectors: AffineBounds) -> Float[Array, ""]:
     middle, turn = line.middle, line.slope
     low = jnp.min(dot(line.each(lambda x: x[None]), vectors).low())
     size = jnp.sqrt(jnp.dot(middle, middle) + jnp.dot(turn, turn) + 2.0 * jnp.abs(jnp.dot(middle, turn)))
-    return jnp.where(low > 0.0, low * (1.0 - ROUNDING) / size, -jnp.inf)
+    return jnp.where(low > 0.0, low * (1.0 - DISTANCE_ERROR) / size, -jnp.inf)
 
 
 def distance_bound(first: AffineBounds, second: AffineBounds) -> Float[Array, ""]:
     """Largest distance of two points."""
-    return jnp.sqrt(norm_squared(second - first).high()) * (1.0 + ROUNDING)
+    return jnp.sqrt(norm_squared(second - first).high()) * (1.0 + DISTANCE_ERROR)
 
 
 def depth_bound(body: Solid, planes: FacePlanes) -> Float[Array, ""]:

@@ -26,7 +26,7 @@ COUNT = 6
 # Tolerance, as part of the size (the largest distance of a spool from the centroid of all): for cables of a pair to be
 # parallel, and for the mass centre to lie on the line between them; as part of this line, the distance that the mass
 # centre must keep from its ends.
-TOLERANCE = 1e-6
+SAME_LINE = 1e-6
 # Below this determinant of unit moments cables let the platform turn; and how far around the spools this is tested.
 SMALLEST_MOMENTS = 1e-6
 _PLACES = np.array([[0.3, 0.2, 1.0], [-0.5, 0.4, 0.7], [0.1, -0.7, -1.1]])
@@ -67,7 +67,7 @@ def parallel_pairs(base_points, platform_points) -> ParallelPairs:
     base, platform = np.asarray(base_points, float), np.asarray(platform_points, float)
     if len(base) != COUNT:
         raise _fault(f"{len(base)} cables")
-    room = TOLERANCE * float(np.linalg.norm(base - base.mean(0), axis=1).max())
+    room = SAME_LINE * float(np.linalg.norm(base - base.mean(0), axis=1).max())
     cables = _matched(base - platform, room)
     shares = np.array([_shares(platform, first, second, room) for first, second in cables.tolist()])
     exits = (shares[:, :, None] * base[cables]).sum(1)
@@ -119,7 +119,7 @@ def _shares(platform: np.ndarray, first: int, second: int, room: float) -> tuple
     names = f"platform_points[{first}] and platform_points[{second}]"
     if not beside <= room:
         raise _fault(f"the mass centre lies {beside:.3g} m beside the line of {names} (at most {room:.2g} m)")
-    if not TOLERANCE < place < 1.0 - TOLERANCE:
+    if not SAME_LINE < place < 1.0 - SAME_LINE:
         raise _fault(
             f"the mass centre does not lie between {names}: it is {place:.3g} of the way from one to the other"
         )

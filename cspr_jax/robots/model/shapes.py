@@ -10,15 +10,13 @@ import numpy as np
 
 from cspr_jax.errors import InputError
 from cspr_jax.numerics.linear.frames import IDENTITY, Frame
+from cspr_jax.numerics.tolerances import UNIT_NORM
 
 if TYPE_CHECKING:
     from jaxtyping import Bool, Float
 
 # Squares of larger lengths lose their meaning; the same number as in `robots.model.point_mass`, which imports jax.
 LARGEST_LENGTH = 1e6
-# The length of a unit quaternion may differ from 1 by this; the same number as in `numerics.linear.rotations`, which
-# imports jax.
-UNIT_TOLERANCE = 1e-6
 # Points nearer to a plane than this part of their extent lie in it.
 FLAT = 1e-9
 # Rounding of coordinates of some metres, m.
@@ -114,7 +112,7 @@ def box(centre, size, quaternion=IDENTITY, *, name: str = "box") -> Box:
     lengths, components = _point("size", size), np.asarray(quaternion, float)
     if not (lengths >= 0.0).all():
         raise InputError("size", size, "three lengths, none negative")
-    if components.shape != (4,) or not abs(np.linalg.norm(components) - 1.0) <= UNIT_TOLERANCE:
+    if components.shape != (4,) or not abs(np.linalg.norm(components) - 1.0) <= UNIT_NORM:
         raise InputError("quaternion", quaternion, "four numbers of a unit quaternion, scalar first")
     rotation = rotation_matrix(components / np.linalg.norm(components))
     return Box(_point("centre", centre), 0.5 * lengths, rotation, name)

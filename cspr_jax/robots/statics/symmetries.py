@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 LARGEST_FOLD = 6
 # Points nearer to each other than this part of the robot's size are the same.
 SAME = 1e-9
-ROUNDING = 1e-9
+ANGLE_ERROR = 1e-9
 KEY_DIGITS = 9
 
 
@@ -54,7 +54,7 @@ def folded(symmetry: Symmetries, azimuths: Float[np.ndarray, "n"]) -> Float[np.n
     """Azimuths that represent all others at which the robot can do the same."""
     width = 2.0 * math.pi / symmetry.fold
     images = np.mod(np.stack([azimuths, *(2.0 * mirror - azimuths for mirror in symmetry.mirrors)]), width)
-    return np.where(width - images < ROUNDING, 0.0, images).min(0)
+    return np.where(width - images < ANGLE_ERROR, 0.0, images).min(0)
 
 
 def alike(
@@ -62,7 +62,7 @@ def alike(
 ) -> Int[np.ndarray, "n"]:
     """Orientations that represent others: at a place on a mirror plane, the plane joins orientations in pairs."""
     azimuths, stands = np.arctan2(places[:, 1], places[:, 0]), np.arange(len(places))
-    mirrored = np.flatnonzero((np.abs(np.sin(azimuths[:, None] - np.asarray(symmetry.mirrors))) < ROUNDING).any(1))
+    mirrored = np.flatnonzero((np.abs(np.sin(azimuths[:, None] - np.asarray(symmetry.mirrors))) < ANGLE_ERROR).any(1))
     if not len(mirrored):
         return stands
     # The axis of the tilt is no vector: phi becomes pi - phi, and sigma -sigma.

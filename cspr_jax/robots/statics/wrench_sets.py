@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 FLAT = 1e-12
 # Rounding of a slack, over the size of the numbers of which it is the difference; to be divided by the volume of the
 # face's columns.
-ROUNDING = 1e-14
+SLACK_ERROR = 1e-14
 
 
 @jax.tree_util.register_dataclass
@@ -74,7 +74,7 @@ class Faces:
         """Bound of the rounding error of the smallest slack."""
         size = jnp.linalg.norm(values, axis=-1)[..., None]
         offsets = jnp.abs(jnp.where(jnp.isfinite(self.offsets), self.offsets, 0.0))
-        each = ROUNDING * (size + offsets + jnp.linalg.norm(self.apex, axis=-1)[..., None])
+        each = SLACK_ERROR * (size + offsets + jnp.linalg.norm(self.apex, axis=-1)[..., None])
         finite = jnp.isfinite(self.offsets) & (self.volumes > FLAT)
         smallest = jnp.min(jnp.where(finite, self.slacks(values), jnp.inf), axis=-1, keepdims=True)
         # A face counts if it may be the nearest one.

@@ -23,6 +23,7 @@ from jax import Array, lax
 
 from cspr_jax.errors import InputError
 from cspr_jax.numerics.elementary import solved
+from cspr_jax.numerics.tolerances import TOUCHED
 from cspr_jax.robots.statics.wrench_sets import FLAT, beside_faces, face_distances, one_sided_faces
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 
 # A limit counts as kept within the first of these parts of the largest tension; for points that are compared, within
 # the second.
-WITHIN, ROUNDING = 1e-9, 1e-11
+WITHIN, TENSION_ERROR = TOUCHED, 1e-11
 # A unit vector depends on others if its component normal to them is shorter than this.
 DEPENDENT = 1e-10
 # Largest number of steps of the search for the limits that are reached, over the number of cables; random cases take
@@ -173,7 +174,7 @@ def _shortest(solutions: AllTensions, low: Array, high: Array) -> Array:
     points, is_point = _candidates(solutions, low, high)
     tensions = solutions.least[None] + points @ solutions.kernel
     excess = jnp.max(jnp.abs(beyond(tensions, low[None], high[None])), axis=1)
-    is_within = is_point & (excess <= ROUNDING * jnp.max(jnp.abs(tensions), axis=1))
+    is_within = is_point & (excess <= TENSION_ERROR * jnp.max(jnp.abs(tensions), axis=1))
     # If the limits leave only one point, rounding can leave none.
     worse = jnp.where(is_within.any(), jnp.where(is_within, jnp.sum(points**2, axis=1), jnp.inf), excess)
     return points[jnp.argmin(jnp.where(is_point, worse, jnp.inf))]
@@ -228,7 +229,7 @@ def _limits_reached(solutions: AllTensions, low: Array, high: Array) -> Array:
     def is_open(search):
         tensions = solutions.tensions(search.point)
         worst = jnp.max(jnp.abs(beyond(tensions, low, high)))
-        is_beyond = worst > ROUNDING * jnp.max(jnp.abs(tensions))
+        is_beyond = worst > TENSION_ERROR * jnp.max(jnp.abs(tensions))
         return (search.is_seeking | is_beyond) & ~search.is_stuck & (search.steps < LONGEST * count)
 
     none, no = jnp.zeros(count), jnp.asarray(False)

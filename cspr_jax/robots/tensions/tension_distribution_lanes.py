@@ -19,7 +19,7 @@ from cspr_jax.numerics.batches import in_batches, in_parts, room
 from cspr_jax.numerics.elementary import lesser
 from cspr_jax.numerics.linear.lanes import stored
 from cspr_jax.robots.statics.wrench_sets import FLAT
-from cspr_jax.robots.tensions.tension_distribution import ROUNDING, WITHIN, Distribution
+from cspr_jax.robots.tensions.tension_distribution import TENSION_ERROR, WITHIN, Distribution
 
 if TYPE_CHECKING:
     from jaxtyping import Float
@@ -119,7 +119,7 @@ def _on_line(least: Lanes, kernel: Sequence[Lanes], low: Lanes, high: Lanes, siz
     for limit in (low[0], high[0]):
         reach = (limit - least[0]) * inverse
         values = [t + reach * (a * x + b * y) for t, x, y in zip(least[1:], others, more, strict=True)]
-        first, last = _interval(values, rates, low[1:], high[1:], ROUNDING * size)
+        first, last = _interval(values, rates, low[1:], high[1:], TENSION_ERROR * size)
         along = _nearest(first, last)
         length = (reach * reach + along * along) * square
         is_point = (first <= last) & jnp.isfinite(limit) & (square > FLAT**2) & (length < shortest)
@@ -131,7 +131,7 @@ def _on_line(least: Lanes, kernel: Sequence[Lanes], low: Lanes, high: Lanes, siz
 @jax.jit
 def _in_interval(least: Lanes, kernel: Sequence[Lanes], low: Lanes, high: Lanes, size: Array) -> Array:
     # Return the shortest x of one component.
-    first, last = _interval(least, kernel[0], low, high, ROUNDING * size)
+    first, last = _interval(least, kernel[0], low, high, TENSION_ERROR * size)
     along = jnp.where(first <= last, _nearest(first, last), jnp.inf)
     return lax.complex(along, jnp.zeros_like(along))
 
@@ -146,7 +146,7 @@ def _size(least: Lanes, low: Lanes) -> Array:
 
 @jax.jit
 def _shortest(least: Lanes, low: Lanes, high: Lanes, size: Array, points: Sequence[Array]) -> Array:
-    within, rounding = jnp.full_like(least[0], True, bool), ROUNDING * size
+    within, rounding = jnp.full_like(least[0], True, bool), TENSION_ERROR * size
     for tension, lowest, highest in zip(least, low, high, strict=True):
         within = within & (tension >= lowest - rounding) & (tension <= highest + rounding)
     best = points[0]

@@ -21,7 +21,7 @@ from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.elementary import double_precision, solved
 from cspr_jax.robots.model.tension_rule_table import TENSION_RULES
 from cspr_jax.robots.tensions.tension_distribution import (
-    ROUNDING,
+    TENSION_ERROR,
     AllTensions,
     Distribution,
     all_tensions,
@@ -90,7 +90,7 @@ def improved_closed_form(
         excess = beyond(solutions.tensions(point), tension_min, tension_max)
         free = jnp.where(sides == 0.0, jnp.abs(excess), 0.0)
         worst = jnp.argmax(free)
-        is_worst = (jnp.arange(count) == worst) & (free[worst] > ROUNDING * jnp.max(tension_max))
+        is_worst = (jnp.arange(count) == worst) & (free[worst] > TENSION_ERROR * jnp.max(tension_max))
         sides = jnp.where(is_worst, jnp.sign(excess), sides)
         limits = jnp.where(sides > 0.0, tension_min, tension_max)
         offsets = jnp.where(sides == 0.0, 0.0, limits - solutions.least)
@@ -127,7 +127,7 @@ def p_norm(
     largest = jnp.where(jnp.isfinite(tension_max), tension_max, FAR * size)
     start, room = centred(matrix, wrench, tension_min, largest)
     # If the limits leave only one point, that point is the answer.
-    is_open = room > ROUNDING * size
+    is_open = room > TENSION_ERROR * size
     tensions = jnp.where(
         is_open,
         _along_barriers(solutions, start.tensions, tension_min, tension_max, reference, exponent),

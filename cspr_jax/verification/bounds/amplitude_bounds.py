@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cspr_jax.motion.amplitudes import Amplitude
-from cspr_jax.numerics.bounds.affine_bounds import ROUNDING, AffineBounds
+from cspr_jax.numerics.bounds.affine_bounds import AffineBounds
 from cspr_jax.numerics.bounds.piecewise_bounds import bernstein_of_powers, overlaps, piecewise_bounds
+from cspr_jax.numerics.tolerances import ROUNDING
 
 if TYPE_CHECKING:
     from jaxtyping import Float

@@ -1,7 +1,7 @@
 """Blocks of several motions with bounds of their slacks, and the parts into which they are cut.
 
 Over a block a slack lies between two lines. Each leaves what it decides: the part in which the lower line is above a
-level, or the upper one below zero, needs no second look. Where the rest is a small part of the block, the block is cut
+level, or the upper one below it, needs no second look. Where the rest is a small part of the block, the block is cut
 there; the rest shrinks with the square of its length at a simple root, while halves would take a step for each digit.
 """
 
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cspr_jax.numerics.bounds.affine_bounds import ROUNDING
+from cspr_jax.numerics.tolerances import ROUNDING
 from cspr_jax.verification.bounds.block_slacks import BlockSlacks
 
 if TYPE_CHECKING:
@@ -41,18 +41,18 @@ class TimeBlocks(NamedTuple):
         slacks = BlockSlacks(*(bounds[chosen] for bounds in self.slacks))
         return TimeBlocks(self.motion[chosen], self.start[chosen], self.end[chosen], slacks)
 
-    def undecided(self) -> Bool[np.ndarray, "k n_criteria"]:
-        """Tell which criteria are neither met nor broken throughout."""
-        return ~((self.slacks.low > 0.0) | (self.slacks.high < 0.0))
+    def undecided(self, level: Float[np.ndarray, "n_criteria"]) -> Bool[np.ndarray, "k n_criteria"]:
+        """Tell which slacks are neither above nor below a level throughout."""
+        return ~((self.slacks.low > level) | (self.slacks.high < level))
 
     def rest(
         self, level: np.ndarray, matters: Bool[np.ndarray, "k n_criteria"], *, has_upper: bool
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Part of each block outside of which no lower line is below a level, or the upper one is below zero."""
+        """Part of each block outside of which no lower line is below a level, or the upper one is below it."""
         low, high, low_rise, high_rise = self.slacks
         sides = [_below(low + np.maximum(-low_rise, 0.0) - level, low_rise)]
         if has_upper:
-            sides.append(_below(np.maximum(high_rise, 0.0) - high, -high_rise))
+            sides.append(_below(np.maximum(high_rise, 0.0) - high + level, -high_rise))
         first = np.where(matters, np.max([side[0] for side in sides], axis=0), 1.0).min(1)
         last = np.where(matters, np.min([side[1] for side in sides], axis=0), 0.0).max(1)
         first, last = first - WIDER, last + WIDER

@@ -13,9 +13,6 @@ import numpy as np
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Share of a limit by which it may be missed, so that a limit that is just touched counts as met.
-TOUCHED = 2e-6
-
 
 class Distances(NamedTuple):
     """Distances that shrink as spools move, m.

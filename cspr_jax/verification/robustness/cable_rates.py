@@ -8,7 +8,7 @@ import numpy as np
 
 from cspr_jax.numerics.elementary import unit_vectors
 from cspr_jax.robots.model.limits import Limits
-from cspr_jax.verification.bounds.enclosures import TOUCHED, Enclosure, Influence
+from cspr_jax.verification.bounds.enclosures import Enclosure, Influence
 
 if TYPE_CHECKING:
     from jaxtyping import Bool, Float
@@ -43,7 +43,7 @@ def _limits_of_rates(limits: Limits) -> tuple[np.ndarray, np.ndarray] | None:
     rate_limits = limits.cable_speed_max, limits.cable_acceleration_max
     if all(x is None for x in rate_limits):
         return None
-    speed, acceleration = (np.array(np.inf) if x is None else np.asarray(x) * (1.0 + TOUCHED) for x in rate_limits)
+    speed, acceleration = (np.array(np.inf) if x is None else np.asarray(x) for x in rate_limits)
     return speed, acceleration
 
 

@@ -14,7 +14,7 @@ import jax
 import numpy as np
 
 from cspr_jax.motion.motion import BoundedMotion, Motion, common_shape
-from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds.affine_bounds import constant
 from cspr_jax.robots.bounds.state_bounds import StateBounds
@@ -106,6 +106,6 @@ def motion_tolerances(
         np.concatenate([np.linspace(0.0, duration, FIRST + 1), jumps[(jumps > 0.0) & (jumps < duration)]])
     )
     blocks = Blocks(np.zeros(len(edges) - 1, int), edges[:-1], edges[1:])
-    bodies = bodies_of(problem.robot, scene or default_scene(problem.robot))
+    bodies, problem = bodies_of(problem.robot, scene or default_scene(problem.robot)), touchable(problem)
     pool = _pool(problem, bodies, motion, blocks, contacts_alone=contacts_alone)
     return tolerated_by(pool, np.array([len(blocks.row) / FIRST]))

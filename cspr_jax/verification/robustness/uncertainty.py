@@ -19,21 +19,20 @@ from typing import TYPE_CHECKING, NamedTuple
 import jax
 import numpy as np
 
-from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.elementary import unit_vectors
+from cspr_jax.numerics.tolerances import SIX_CABLES_UNDECIDED
 from cspr_jax.robots.model.limits import Limits, Uncertainty
-from cspr_jax.verification.bounds.enclosures import TOUCHED, Enclosure, Influence, inverted, structure
+from cspr_jax.verification.bounds.enclosures import Enclosure, Influence, inverted, structure
 from cspr_jax.verification.robustness.cable_rates import rates_fail, rates_hold
 
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Tolerance as a part of the slacks of taut cables, as in other proofs.
-TOLERANCE = 1e-6
 # Blocks of which nothing is known have infinite bounds and no inverse: NaN proves nothing, and refutes nothing.
 UNKNOWN = np.errstate(invalid="ignore", divide="ignore", over="ignore")
 # Largest relative error of solving for a deviation, and of the tensions.
-ROUNDING = 1e-9
+SOLVING_ERROR = 1e-9
 # Rounds in which functionals are corrected, and the relative surplus of each correction.
 ROUNDS, SPARE = 8, 0.01
 
@@ -45,7 +44,7 @@ class Requirements:
     Fields:
         mass: kg.
         slack: tension per mass and length over the slack of a taut cable, g / (n z0), 1/s^2, (n,) for each motion.
-        limits: the limits, NumPy.
+        limits: the limits as proofs take them, NumPy.
         uncertainty: the uncertainty.
     """
 
@@ -57,7 +56,7 @@ class Requirements:
 
 def requirements_of(problem: Problem, slack: Float[np.ndarray, "n"]) -> Requirements:
     """Return the requirements on all robots within the uncertainty of a problem."""
-    limits = jax.tree.map(np.asarray, problem.limits)
+    limits = jax.tree.map(np.asarray, touchable(problem).limits)
     if limits.uncertainty is None:
         raise ValueError("limits of robots within an uncertainty have none")
     return Requirements(float(problem.robot.mass), slack, limits, limits.uncertainty)
@@ -123,7 +122,7 @@ def deviations(
     """Largest differences between tensions of robots and the planned ones, at the same instant of a block."""
     far = _reaches(known, influence, spools, centre)
     within, displaced = _changes(known, influence, influence.spools, far)
-    rest = (displaced @ known.high[..., None])[..., 0] + ROUNDING * known.high + far.centre
+    rest = (displaced @ known.high[..., None])[..., 0] + SOLVING_ERROR * known.high + far.centre
     return _solved(within + displaced, rest)
 
 
@@ -160,7 +159,7 @@ def closer_changes(
     far = _reaches(known, influence, spools, centre)
     within, displaced = _changes(known, influence, influence.spools, far)
     diagonal = np.eye(displaced.shape[1])[None] * displaced
-    rest = np.sum(within * off[:, None], axis=2) + far.centre + ROUNDING * known.high
+    rest = np.sum(within * off[:, None], axis=2) + far.centre + SOLVING_ERROR * known.high
     down = _largest_sum(known, influence, displaced - diagonal, far) + rest + np.sum(diagonal, axis=2) * least
     is_valid = (known.low - down > least).all(1)
     up = _largest_sum(known, influence, displaced, far) + rest if upwards else np.full_like(down, np.inf)
@@ -173,7 +172,7 @@ def _largest_sum(known: Enclosure, influence: Influence, weights: np.ndarray, fa
     for _ in range(ROUNDS):
         functional = np.einsum("kij,kjlx->kilx", weights + more, influence.spools)
         moved, shifted = _changes(known, influence, functional, far)
-        more, last = (moved + shifted) * (1.0 + SPARE) + ROUNDING * np.max(weights, axis=2, keepdims=True), more
+        more, last = (moved + shifted) * (1.0 + SPARE) + SOLVING_ERROR * np.max(weights, axis=2, keepdims=True), more
     # The last correction is enough for the functional of the round before; it must be enough for its own.
     functional = np.einsum("kij,kjlx->kilx", weights + last, influence.spools)
     moved, shifted = _changes(known, influence, functional, far)
@@ -188,7 +187,7 @@ def _solved(matrix: np.ndarray, rest: np.ndarray) -> np.ndarray:
     count = matrix.shape[1]
     system = np.where(is_finite[:, None, None], np.eye(count) - matrix, np.eye(count))
     system = np.where((np.linalg.det(system) != 0.0)[:, None, None], system, np.eye(count))
-    x = np.linalg.solve(system, np.where(is_finite[:, None], rest, 0.0)[..., None])[..., 0] * (1.0 + ROUNDING)
+    x = np.linalg.solve(system, np.where(is_finite[:, None], rest, 0.0)[..., None])[..., 0] * (1.0 + SOLVING_ERROR)
     holds = is_finite & (x > 0.0).all(1) & (rest > 0.0).all(1)
     holds &= ((matrix @ x[..., None])[..., 0] + rest <= x).all(1)
     return np.where(holds[:, None], x, np.inf)
@@ -221,14 +220,12 @@ def holds(
 
 def _least(known: Enclosure, influence: Influence, requirements: Requirements, share: _Share) -> np.ndarray:
     # Return the smallest tensions per mass and length that are allowed within blocks.
-    least = np.repeat(TOLERANCE * requirements.slack[:, None], influence.lengths.shape[1], axis=1)
+    least = np.repeat(SIX_CABLES_UNDECIDED * requirements.slack[:, None], influence.lengths.shape[1], axis=1)
     limit = requirements.limits.tension_min
     if limit is None:
         return least
     near = influence.lengths - known.moved
-    return np.maximum(
-        least, (limit - _unit(requirements)[:, None]) / (near * (requirements.mass / share.factor)[:, None])
-    )
+    return np.maximum(least, limit / (near * (requirements.mass / share.factor)[:, None]))
 
 
 def _tensions_hold(
@@ -241,12 +238,7 @@ def _tensions_hold(
     near, far = influence.lengths - known.moved, influence.lengths + known.moved
     longest = far / np.sqrt(1.0 - np.minimum(share.spools[:, None] / near, 1.0) ** 2)
     most = (known.high + changes.up) * longest * (requirements.mass * share.factor)[:, None]
-    return is_met & (most <= limit + _unit(requirements)[:, None]).all(1)
-
-
-def _unit(requirements: Requirements) -> np.ndarray:
-    # Return the tension by which limits may be missed, as in proofs of the planned motion.
-    return TOUCHED * requirements.mass * requirements.slack
+    return is_met & (most <= limit).all(1)
 
 
 class WorstDisplacements(NamedTuple):
@@ -295,12 +287,12 @@ def fails(
     broken = np.zeros(len(multiple), bool)
     for spools, centre in zip(*worst, strict=True):
         mu, lengths = tensions(known, share.spools[:, None, None] * spools, share.centre[:, None] * centre)
-        broken |= (mu < -TOLERANCE * requirements.slack[:, None]).any(1)
-        pull, unit = requirements.mass * mu * lengths, _unit(requirements)[:, None]
+        broken |= (mu < -SIX_CABLES_UNDECIDED * requirements.slack[:, None]).any(1)
+        pull = requirements.mass * mu * lengths
         if limits.tension_min is not None:
-            broken |= (pull / share.factor[:, None] < limits.tension_min - unit).any(1)
+            broken |= (pull / share.factor[:, None] < limits.tension_min).any(1)
         if limits.tension_max is not None:
-            broken |= (pull * share.factor[:, None] > limits.tension_max * (1.0 + TOUCHED) + unit).any(1)
+            broken |= (pull * share.factor[:, None] > limits.tension_max).any(1)
     if float(requirements.uncertainty.spool_positions) > 0.0:
         broken |= known.distances.fail(share.spools)
         broken |= rates_fail(known, influence, limits, share.spools)

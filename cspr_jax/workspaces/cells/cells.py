@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 # Rounding may have added this share of the sizes to a sum of up to some hundred products of float64 (2.2e-16 each),
 # with room for rays, arms and rotations that are rounded themselves.
-ROUNDING = 1e-12
+CELL_ERROR = 1e-12
 
 
 class Cells(NamedTuple):
@@ -63,7 +63,7 @@ class Cells(NamedTuple):
     @property
     def shortest(self) -> np.ndarray:
         """Lower bound of the lengths over the cells, (n, n_cables), m; not positive where nothing is known."""
-        return (self.lengths - self.radius[:, None]) * (1.0 - ROUNDING) - self.rounding - self.moves
+        return (self.lengths - self.radius[:, None]) * (1.0 - CELL_ERROR) - self.rounding - self.moves
 
     def take(self, chosen: Int[np.ndarray, "k"]) -> "Cells":
         """Some of the cells."""
@@ -84,7 +84,7 @@ def cells_about(
         steps = rays * half[:, None] / lengths[..., None]
     matrices = (rays.transpose(0, 2, 1)[:, :, None] * wrenches).sum(1)
     spans = np.linalg.norm(exits, axis=2) + np.linalg.norm(centres, axis=1)[:, None]
-    rounding = ROUNDING * np.sqrt((wrenches**2).sum((0, 1))) * spans
+    rounding = CELL_ERROR * np.sqrt((wrenches**2).sum((0, 1))) * spans
     changes, each = half[:, :, None, None] * wrenches, np.broadcast_to(wrenches, (len(centres), *wrenches.shape))
     return Cells(matrices, changes, rays, steps, lengths, np.linalg.norm(half, axis=1), rounding, moves, each)
 

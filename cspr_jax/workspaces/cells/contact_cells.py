@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 BATCH = 512
 # Over the largest coordinate: far above the rounding of bounds, far below what anybody measures.
-ROUNDING = 1e-12
+DISTANCE_ERROR = 1e-12
 # The second derivative of r / |r| is no longer than this over |r|^2; half of it counts.
 UNIT_CURVATURE = 0.5 * np.sqrt(4.0 / 3.0)
 SIGNS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
@@ -132,7 +132,7 @@ def _of_cell(bodies: Bodies, cell: _CellLanes) -> Range:
         solids = jax.tree.map(lambda array: array[None], placed)
         parts.append(_from_obstacles(bodies, solids, lambda points: Solid(points, shape.edges, shape.faces), planes))
     low, high = (jnp.min(jnp.concatenate([side.ravel() for side in sides])) for sides in zip(*parts, strict=True))
-    allowance = ROUNDING * (bodies.size + jnp.max(jnp.abs(cell.position)))
+    allowance = DISTANCE_ERROR * (bodies.size + jnp.max(jnp.abs(cell.position)))
     return low - allowance, high + allowance
 
 

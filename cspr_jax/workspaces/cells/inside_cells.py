@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cspr_jax.workspaces.cells.cells import (
-    ROUNDING,
+    CELL_ERROR,
     Cells,
     inverse_factor,
     least_quadratic,
@@ -80,7 +80,7 @@ def tension_bounds(
         weights = np.minimum(tensions - low, high - tensions) / cells.lengths
         way = _way(cells, densities, weights, wrench)
         least, most = _tension_range(cells, densities, weights, way)
-        lost = ROUNDING * (np.abs(tensions) + np.abs(low) + np.where(np.isfinite(high), np.abs(high), 0.0))
+        lost = CELL_ERROR * (np.abs(tensions) + np.abs(low) + np.where(np.isfinite(high), np.abs(high), 0.0))
         is_known = ((weights > 0.0) & (cells.shortest > 0.0) & np.isfinite(way.rest)).all(1, keepdims=True)
         return np.where(is_known, least - lost, -np.inf), np.where(is_known, most + lost, np.inf)
 
@@ -97,7 +97,7 @@ def _way(cells: Cells, densities: np.ndarray, weights: np.ndarray, wrench: np.nd
     # Bound C^-1 Z0 D U^T - I and C^-1 (Z0 f0 - w), which are not zero because of rounding.
     size = np.linalg.norm(inverse, axis=(1, 2))
     parts = np.linalg.norm(weighted, axis=(1, 2)) + norm_reach(cells.changes * weights[:, None, None])
-    lost = size * np.linalg.norm(rows, axis=(1, 2)) * (ROUNDING * parts + _length(cells.rounding * weights))
+    lost = size * np.linalg.norm(rows, axis=(1, 2)) * (CELL_ERROR * parts + _length(cells.rounding * weights))
     defect = np.linalg.norm(rows @ back - np.eye(rows.shape[1]), axis=(1, 2))
     off, exits = np.zeros(len(size)), np.zeros((*densities.shape, densities.shape[1], 3))
     if cells.moves.any():
@@ -109,7 +109,7 @@ def _way(cells: Cells, densities: np.ndarray, weights: np.ndarray, wrench: np.nd
     defect = defect + lost
     supplied = (cells.matrices @ densities[..., None])[..., 0]
     sizes = np.abs(cells.matrices) @ np.abs(densities)[..., None]
-    hidden = ROUNDING * (_length(sizes[..., 0]) + _length(wrench)) + (cells.rounding * np.abs(densities)).sum(1)
+    hidden = CELL_ERROR * (_length(sizes[..., 0]) + _length(wrench)) + (cells.rounding * np.abs(densities)).sum(1)
     residual = _length((inverse @ (supplied - wrench)[..., None])[..., 0]) + size * hidden
     norm, start = norm_reach(operators) + defect, norm_reach(first)
     after = np.where(norm < 1.0, 1.0 / (1.0 - norm), np.inf)

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cspr_jax.workspaces.cells.cells import ROUNDING, Cells, inverse_factor, least_quadratic, norm_reach, reach
+from cspr_jax.workspaces.cells.cells import CELL_ERROR, Cells, inverse_factor, least_quadratic, norm_reach, reach
 
 if TYPE_CHECKING:
     from jaxtyping import Bool, Float, Int
@@ -79,7 +79,7 @@ def are_beyond(
         cost = np.where(others, room * wrong * cells.lengths / cells.shortest, 0.0).sum(1)
         slack = least_slacks(cells, products, limits) - cost
         size = (np.abs(limits) * np.abs(products.value[:, :-1])).sum(1) + np.abs(products.value[:, -1])
-        return is_kept & (cells.shortest > 0.0).all(1) & (slack > ROUNDING * size)
+        return is_kept & (cells.shortest > 0.0).all(1) & (slack > CELL_ERROR * size)
 
 
 def are_one_sided(
@@ -89,7 +89,7 @@ def are_one_sided(
     with np.errstate(all="ignore"):
         products = products_of(cells, normals, held, np.zeros_like(normals))
         least = products.ends[0][:, :-1]
-        is_proved = (~_others(cells, held) | (least > ROUNDING * np.abs(products.value[:, :-1]))).all(1)
+        is_proved = (~_others(cells, held) | (least > CELL_ERROR * np.abs(products.value[:, :-1]))).all(1)
         return is_proved & (cells.shortest > 0.0).all(1)
 
 
@@ -115,7 +115,7 @@ def products_of(
     rounding = np.concatenate(
         [(cells.rounding + cells.column_changes) / cells.lengths, np.zeros((len(normals), 1))], axis=1
     )
-    rounding = rounding + ROUNDING * np.maximum(np.linalg.norm(units, axis=1), 1.0)
+    rounding = rounding + CELL_ERROR * np.maximum(np.linalg.norm(units, axis=1), 1.0)
     if held is None:
         return _still(normals, units, changes, rounding)
     return _moving(normals, held, units, changes, rounding)
@@ -125,7 +125,7 @@ def _still(normals: np.ndarray, units: np.ndarray, changes: np.ndarray, rounding
     # Return the products of a normal c that does not move, which are affine.
     value, linear = (normals[:, None] @ units)[:, 0], -(normals[:, None, None] @ changes)[:, :, 0]
     nothing = np.zeros((*value.shape, 3, 3))
-    return Products(value, linear.transpose(0, 2, 1), nothing, rounding + ROUNDING * np.abs(linear).sum(1))
+    return Products(value, linear.transpose(0, 2, 1), nothing, rounding + CELL_ERROR * np.abs(linear).sum(1))
 
 
 def _moving(
@@ -138,7 +138,7 @@ def _moving(
     moved = np.take_along_axis(changes, held[:, None, None], axis=3) @ inverse[:, None, :-1]
     operators = rows[:, None] @ moved  # K_k
     size, count = np.linalg.norm(inverse, axis=(1, 2)), frame.shape[2]
-    lost = np.linalg.norm(rounding[:, :-1], axis=1) + ROUNDING * norm_reach(changes)
+    lost = np.linalg.norm(rounding[:, :-1], axis=1) + CELL_ERROR * norm_reach(changes)
     defect = np.linalg.norm(rows @ rows.transpose(0, 2, 1) - np.eye(count), axis=(1, 2)) + np.sqrt(count) * size * lost
     columns, shifts = rows @ units, rows[:, None] @ changes
     first = operators @ columns[:, None] - shifts  # v_j

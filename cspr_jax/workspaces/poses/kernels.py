@@ -27,7 +27,7 @@ from cspr_jax.workspaces.poses.facet_normals import (
     product,
     relation,
 )
-from cspr_jax.workspaces.poses.margins import BLOCK_ROUNDING, ROUNDING, CocircuitLimits, Wrenches, length, one_norm
+from cspr_jax.workspaces.poses.margins import BLOCK_EPSILONS, EPSILONS, CocircuitLimits, Wrenches, length, one_norm
 
 if TYPE_CHECKING:
     from jaxtyping import Float, Shaped
@@ -66,7 +66,7 @@ def by_normals(
     lanes = wrenches._replace(
         points=[[jnp.broadcast_to(x, template.shape) for x in point] for point in wrenches.points]
     )
-    noise = jnp.asarray(ROUNDING * jnp.finfo(template.dtype).eps, template.dtype) * loss
+    noise = jnp.asarray(EPSILONS * jnp.finfo(template.dtype).eps, template.dtype) * loss
     reach = jnp.where(jnp.isinf(tension_limits.high), 0.0, jnp.abs(tension_limits.high)) + jnp.abs(tension_limits.low)
     size = _size(wrenches)
 
@@ -176,7 +176,7 @@ def _joined(tensions: tuple[list[list[Array]], Array], wrench: Column, loss: Arr
     rows = [[*others[j], *(-common if i == j else zero for i in range(count))] for j in range(count)]
     inverse = 1.0 / common
     held = [x * inverse for x in last]
-    rounding = jnp.asarray(BLOCK_ROUNDING * jnp.finfo(common.dtype).eps, common.dtype) * loss * scale
+    rounding = jnp.asarray(BLOCK_EPSILONS * jnp.finfo(common.dtype).eps, common.dtype) * loss * scale
     most_held = largest([jnp.abs(x) for x in held])
     size = sum((jnp.abs(x) for x in wrench), zero)
     uncertain = rounding * (size + most_held) * jnp.abs(inverse)

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 # Allowances for errors, in units of rounding: of a product of unit columns, and of the numbers of a block of six
 # cables. They are estimates, not proofs; wherever tests look, margins by singular values lie between the bounds.
-ROUNDING = 64.0
-BLOCK_ROUNDING = 8.0
+EPSILONS = 64.0
+BLOCK_EPSILONS = 8.0
 
 
 class Wrenches(NamedTuple):

@@ -17,7 +17,8 @@ from cspr_jax.families.paths.geometry.arcs import arc_of, elements_of
 from cspr_jax.families.paths.geometry.corners import Corners, tracks_of
 from cspr_jax.families.paths.geometry.section import Section, Track, half_angles, section_of, turn
 from cspr_jax.families.paths.geometry.through_points import chords, through_points
-from cspr_jax.numerics.linear.rotations import UNIT_TOLERANCE, products
+from cspr_jax.numerics.linear.rotations import products
+from cspr_jax.numerics.tolerances import UNIT_NORM
 
 if TYPE_CHECKING:
     from jaxtyping import Float
@@ -130,7 +131,7 @@ def orientations(table: PathTable, count: int) -> Float[np.ndarray, "count 4"] |
         allowed = f"must be one, or {count}" if count > 1 else "must be one"
         raise InputError("orientations", None, allowed, fault=f"{len(units)} of them")
     sizes = np.linalg.norm(units, axis=1, keepdims=True)
-    odd = np.flatnonzero(np.abs(sizes[:, 0] - 1.0) > UNIT_TOLERANCE)
+    odd = np.flatnonzero(np.abs(sizes[:, 0] - 1.0) > UNIT_NORM)
     if len(odd):
         i = int(odd[0])
         raise InputError(f"orientations[{i}]", units[i].tolist(), f"of length 1 (it has {float(sizes[i, 0]):.7g})")

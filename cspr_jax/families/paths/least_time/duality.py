@@ -29,7 +29,8 @@ from cspr_jax.families.paths.least_time.constraints import still, unit_wrenches
 from cspr_jax.families.paths.least_time.discrete import Discrete
 from cspr_jax.families.paths.least_time.nodes import Places, places_on, state_at
 from cspr_jax.numerics.batches import in_batches
-from cspr_jax.numerics.bounds.affine_bounds import ROUNDING, AffineBounds, cross, dot, norm_squared, squared, turned
+from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, cross, dot, norm_squared, squared, turned
+from cspr_jax.numerics.tolerances import ROUNDING
 from cspr_jax.robots.bounds.state_bounds import CableBounds, StateBounds, balance_bounds, balanced_part, cable_bounds
 from cspr_jax.robots.cables import AnyRobot, cable_motion, wrench_units
 from cspr_jax.robots.model.limits import Limits

@@ -19,15 +19,7 @@ import numpy as np
 
 from cspr_jax.families.platforms.beta_hat import LARGEST, options
 from cspr_jax.families.platforms.end_acceleration import AT_REST
-from cspr_jax.families.platforms.motion_checker import (
-    BASIC,
-    BESIDE_KNOT,
-    FEW,
-    TOLERANCE,
-    TOUCH,
-    MotionChecker,
-    PlatformChecks,
-)
+from cspr_jax.families.platforms.motion_checker import BASIC, BESIDE_KNOT, FEW, TOUCH, MotionChecker, PlatformChecks
 from cspr_jax.families.platforms.motions import Motions, rows
 from cspr_jax.families.platforms.platform_segment import PlatformMotion, PlatformSegment
 from cspr_jax.families.platforms.redundant.crossings import CableVectors, passed_over
@@ -37,6 +29,7 @@ from cspr_jax.motion.platform_kind import USUAL, PlatformMotionKind
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.search.minima import narrowed_places
+from cspr_jax.numerics.tolerances import SAMPLES_UNDECIDED
 from cspr_jax.robots.model.platform import pairs_apart
 from cspr_jax.schema.verdicts import Verdict, conjunction
 from cspr_jax.verification.proved import proved
@@ -78,7 +71,7 @@ class MarginSieve:
             if not len(alive):
                 break
             least = self._least(rows(segments, alive), arcs, tau[start : start + CHUNK])
-            is_refuted[alive] = ~(least[:, : None if limits else 1] > -TOLERANCE).all(1)
+            is_refuted[alive] = ~(least[:, : None if limits else 1] > -SAMPLES_UNDECIDED).all(1)
         return is_refuted
 
     def _least(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
@@ -162,7 +155,7 @@ class RedundantChecker(MotionChecker):
 
     def breaks(self, slack: np.ndarray) -> np.ndarray:
         """Criteria that are broken for certain; see `MotionChecker.breaks`."""
-        return slack <= -TOLERANCE
+        return slack <= -SAMPLES_UNDECIDED
 
     def sampled(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
         """Smallest slacks at some instants; see `MotionChecker.sampled`."""
@@ -212,7 +205,7 @@ class RedundantChecker(MotionChecker):
         samples = self.values(motions, np.tile(tau, (len(motions.arcs), 1)))
         counted = np.ones(len(self.flags), bool) if ignored is None else ~ignored
         first = samples[:, :, :-1][:, :, np.append(True, counted[BASIC:])]
-        is_open = np.logical_or(whole, (first.min((1, 2)) > -TOLERANCE))
+        is_open = np.logical_or(whole, (first.min((1, 2)) > -SAMPLES_UNDECIDED))
         checks = self.nothing(len(motions.arcs))
         checks.verdict[~is_open] = Verdict.WRENCH_INFEASIBLE.value
         if not is_open.any():
@@ -259,12 +252,13 @@ class RedundantChecker(MotionChecker):
         verdict = Verdict.CABLE_CABLE.value * (met | (free <= -self._touch))
         verdict |= np.where(~met & (np.abs(free) < self._touch), Verdict.UNDECIDED.value, 0)
         verdict |= np.where(np.isneginf(margin), Verdict.SINGULAR.value, 0)
-        is_short = np.isfinite(margin) & (margin <= -TOLERANCE)
+        is_short = np.isfinite(margin) & (margin <= -SAMPLES_UNDECIDED)
         verdict |= np.where(is_short, Verdict.WRENCH_INFEASIBLE.value, 0)
         for row, value, counts in zip(self._rows, others.T, counted, strict=True):
-            verdict |= np.where(counts & (value <= -TOLERANCE), row.flag.value, 0)
-        close = (np.abs(least[:, :-1]) <= TOLERANCE) & np.append(True, counted)
-        verdict |= np.where(close.any(1), Verdict.UNDECIDED.value, 0)
+            verdict |= np.where(counts & (value <= -SAMPLES_UNDECIDED), row.flag.value, 0)
+        # Limits that are nearly touched are for the proof of the motion.
+        is_strict = float(np.min(self._requirement.low)) == 0.0
+        verdict |= np.where(is_strict & (np.abs(margin) <= SAMPLES_UNDECIDED), Verdict.UNDECIDED.value, 0)
         verdict = conjunction(verdict)
         is_finite = ~np.isnan(least).any(1) & (duration > 0.0)
         return PlatformChecks(
@@ -278,9 +272,9 @@ class RedundantChecker(MotionChecker):
 def _refuted_at(least: np.ndarray, when: np.ndarray) -> np.ndarray:
     # Take smallest values (n, n_values), the margin first, and the instants at which they are attained. Return the
     # instant of the margin if it is negative, else of the worst other value if that is negative, else NaN.
-    worst = np.where(least[:, 0] <= -TOLERANCE, 0, least.argmin(1))
+    worst = np.where(least[:, 0] <= -SAMPLES_UNDECIDED, 0, least.argmin(1))
     row = np.arange(len(least))
-    return np.where(least[row, worst] <= -TOLERANCE, when[row, worst], np.nan)
+    return np.where(least[row, worst] <= -SAMPLES_UNDECIDED, when[row, worst], np.nan)
 
 
 def _in_order(values: np.ndarray) -> np.ndarray:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from jaxtyping import Float, Int
 
 # Rounding may move F, or a height, by this part of the product of the sizes of its factors.
-ROUNDING = 1e-13
+PRODUCT_ERROR = 1e-13
 
 
 class CablesOfStep(NamedTuple):
@@ -98,7 +98,7 @@ def cables_hit(
 
 def _sign_changes(values: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, ...]:
     # Return the steps, blocks and pairs (or cables) in which values (m, n, ...) change their sign, beyond rounding.
-    is_high, is_low = values > ROUNDING * sizes, values < -ROUNDING * sizes
+    is_high, is_low = values > PRODUCT_ERROR * sizes, values < -PRODUCT_ERROR * sizes
     return np.nonzero((is_high[:-1] & is_low[1:]) | (is_low[:-1] & is_high[1:]))
 
 

@@ -30,15 +30,18 @@ from cspr_jax.families.platforms.six_cable_proof.slack_lanes import moving_slack
 from cspr_jax.families.platforms.six_cable_proof.slacks import flags
 from cspr_jax.families.platforms.six_cable_proof.tension_blocks import of_motion
 from cspr_jax.families.platforms.six_cable_proof.tension_proof import Certifier, TensionProof
-from cspr_jax.families.platforms.six_cable_proof.work_list import TOLERANCE, allowance
+from cspr_jax.motion.limits import allowance, limits_set, scales
 from cspr_jax.motion.platform_kind import USUAL, PlatformMotionKind
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches, in_threads
 from cspr_jax.numerics.linear.lanes import dot, smallest
+from cspr_jax.numerics.tolerances import SIX_CABLES_UNDECIDED
 from cspr_jax.robots.contacts import interference_lanes
 from cspr_jax.robots.model.limits import Limits
-from cspr_jax.robots.statics.wrench_lanes import cable_lanes
+from cspr_jax.robots.model.point_mass import spool_radius
+from cspr_jax.robots.statics.wrench_lanes import CABLES, cable_lanes
 from cspr_jax.runtime.persistent_jit import persistent_jit
+from cspr_jax.schema.limits import Limit
 from cspr_jax.schema.verdicts import Verdict
 from cspr_jax.verification.robustness.tolerances import Tolerated
 
@@ -95,14 +98,15 @@ class PlatformChecker(MotionChecker):
         self.flags = flags(problem.limits)
         knots = np.asarray(problem.amplitude.knots)
         count, count_checks = partial(self._count, "sieve"), partial(self._count, "checks")
-        self.sieve = TensionSieve(problem.robot, problem.amplitude, kind, -TOLERANCE, FIRST * batch, count)
+        self.sieve = TensionSieve(problem.robot, problem.amplitude, kind, -SIX_CABLES_UNDECIDED, FIRST * batch, count)
         self._tensions = Certifier(problem, kind, batch=min(batch, BLOCKS), count_instants=count_checks)
         self._places = PlaceCertifier(problem, kind, batch=min(batch, BLOCKS), count_instants=count_checks)
         self._robustness = None
         if problem.limits.uncertainty is not None:
             self._robustness = Robustness(problem, kind, batch=min(batch, BLOCKS), count_instants=count_checks)
         self._knots = np.concatenate([knots - BESIDE_KNOT, knots + BESIDE_KNOT])
-        self._allowed = allowance(np.arange(len(self.flags)) >= len(flags(Limits())))
+        basic, missed = flags(Limits()), [_missed(problem, row) for row in limits_set(problem.limits)]
+        self._missed = np.array([SIX_CABLES_UNDECIDED] * len(basic) + missed)
         # Place of each criterion in a list that has the criteria of the motion first, then those of the pose alone.
         self._order = np.array(order(problem.limits))
         self._n_moving = 1 + len(of_motion(problem))
@@ -124,7 +128,7 @@ class PlatformChecker(MotionChecker):
 
     def breaks(self, slack: np.ndarray) -> np.ndarray:
         """Criteria that are broken for certain; see `MotionChecker.breaks`."""
-        return slack + self._allowed < -TOLERANCE
+        return slack < -self._missed
 
     def sampled(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
         """Smallest slacks at some instants; see `MotionChecker.sampled`."""
@@ -224,7 +228,7 @@ class PlatformChecker(MotionChecker):
         broken = self.breaks(least.T) & (True if ignored is None else ~ignored)
         for flag, column in zip(self.flags, broken.T, strict=True):
             verdict |= np.where(column, flag.value, 0)
-        return np.where(is_proved | (verdict != 0), verdict, Verdict.UNDECIDED.value)
+        return np.where(is_proved, 0, np.where(verdict == 0, Verdict.UNDECIDED.value, verdict))
 
     def _attained(self, moving: np.ndarray, still: np.ndarray) -> np.ndarray:
         # Return (n_criteria + 1, n) in the order of the flags, then the distance between cables. Proofs have the
@@ -257,6 +261,14 @@ class PlatformChecker(MotionChecker):
             least[:, rows] = np.fmin(least[:, rows], values_at(rows, np.full(len(rows), tau)))
         for one in samples:
             narrowed(values_at, least, one, selected)
+
+
+def _missed(problem: Problem, row: Limit) -> float:
+    # Slack below which a limit counts as broken; that of a depth is over z0, at least a tenth of the robot's size.
+    robot, limit = problem.robot, float(np.min(getattr(problem.limits, row.name)))
+    units = scales(CABLES, robot.mass * robot.gravity, 0.1 * spool_radius(robot))
+    factor, size = units.get(row.quantity, (1.0, limit))
+    return 2.0 * factor * float(allowance(row, limit, robot) / size)
 
 
 def _samples(criteria: np.ndarray, proof: TensionProof | PlaceProof, rows: np.ndarray) -> Samples:

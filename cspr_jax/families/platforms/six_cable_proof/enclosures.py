@@ -19,7 +19,7 @@ from cspr_jax.families.platforms.platform_segment_lanes import StateLanes, squar
 from cspr_jax.families.platforms.six_cable_proof.complex_bounds import Reach, instant_beside, middle_of, reach
 from cspr_jax.families.platforms.six_cable_proof.tension_proof import Certifier
 from cspr_jax.motion.platform_kind import PlatformMotionKind
-from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.elementary import unit_vectors
 from cspr_jax.numerics.linear.lanes import stored
@@ -29,7 +29,7 @@ from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.statics.wrench_lanes import CABLES
 from cspr_jax.verification.bounds.blocks import Blocks, parts_of_arcs
-from cspr_jax.verification.bounds.enclosures import TOUCHED, Distances, Enclosure, Rates, largest_moves
+from cspr_jax.verification.bounds.enclosures import Distances, Enclosure, Rates, largest_moves
 from cspr_jax.verification.robustness.tolerances import Tolerated, tolerated
 from cspr_jax.verification.robustness.uncertainty import requirements_of
 
@@ -196,9 +196,9 @@ def _distances(problem: Problem, pairs: tuple, middle: _Middle, within: _Within,
         e, height = unit_vectors(left[:, k]), np.linalg.norm(left[:, k], axis=1)
         change = np.abs(np.sum(e * within.way[:, k], axis=1)) + within.bent[:, k]
         columns.add(-np.sum(e * middle.rays[:, k], axis=1), change, 1.0, height, 1.0)
-    longest = problem.limits.cable_length_max
+    longest = touchable(problem).limits.cable_length_max
     for k, length in enumerate([] if longest is None else np.asarray(longest).tolist()):
-        room = length * (1.0 + TOUCHED) - np.linalg.norm(middle.rays[:, k], axis=1)
+        room = length - np.linalg.norm(middle.rays[:, k], axis=1)
         columns.add(room, within.moved[:, k], 1.0, room, 1.0)
     return columns.distances()
 

@@ -19,7 +19,7 @@ from jax import Array, lax
 from cspr_jax.families.platforms.platform_segment import PlatformSegment
 from cspr_jax.families.platforms.platform_segment_lanes import StateLanes, state
 from cspr_jax.families.platforms.six_cable_proof.complex_bounds import instant_beside, middle_of, reach
-from cspr_jax.families.platforms.six_cable_proof.work_list import allowance, least_nodes
+from cspr_jax.families.platforms.six_cable_proof.work_list import least_nodes
 from cspr_jax.motion.limits import limits_set, scales
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.motion.problem import Problem
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 STEPS = 4
 PLACES = np.linspace(-1.0, 1.0, STEPS + 1)
 # Lengths and heights may be wrong by this part of the size of coordinates.
-ROUNDING = 1e-13
+POSE_ERROR = 1e-13
 TINY = 1e-30
 
 
@@ -121,11 +121,11 @@ def place_blocks(
     if margins:
         attained, place = jnp.stack(nodes, axis=1), jnp.zeros_like(half)
     else:
-        attained, place = least_nodes(nodes, allowance(np.arange(len(nodes) - 1) >= 1), PLACES)
+        attained, place = least_nodes(nodes, len(nodes) - 1, PLACES)
     size = jnp.max(jnp.abs(problem.robot.base_points)) + segments.hub[:, 2]
     return PlaceBounds(
-        jnp.min(jnp.real(first), axis=0) - ROUNDING * size,
-        jnp.stack([jnp.min(x, axis=0) - step - ROUNDING for x, step in zip(nodes[:-1], steps, strict=True)]),
+        jnp.min(jnp.real(first), axis=0) - POSE_ERROR * size,
+        jnp.stack([jnp.min(x, axis=0) - step - POSE_ERROR for x, step in zip(nodes[:-1], steps, strict=True)]),
         attained,
         place,
         jnp.stack(bends),
@@ -202,7 +202,9 @@ def _steps(problem: Problem, segments: PlatformSegment, bends: _Bends) -> list[A
     for row in of_pose(problem):
         limit = getattr(problem.limits, row.name)
         if row.quantity == "depth":
-            steps.append((bends.centre + jnp.max(arms) * bends.arm) * factor / size)
+            # The mass centre swings in a plane: on level ways it keeps its depth.
+            steep = jnp.sqrt(jnp.sum(segments.plane[:, 2] ** 2, axis=1))
+            steps.append((steep * bends.centre + jnp.max(arms) * bends.arm) * factor / size)
         else:
             steps.append(largest([(bends.centre + arms[k] * bends.arm) / limit[k] for k in range(CABLES)]))
     return steps

@@ -21,10 +21,11 @@ from cspr_jax.families.platforms.platform_segment_lanes import state
 from cspr_jax.families.platforms.six_cable_proof.cable_contacts import CablesOfStep, cables_hit, cables_meet
 from cspr_jax.families.platforms.six_cable_proof.complex_bounds import instant_beside, middle_of
 from cspr_jax.families.platforms.six_cable_proof.pose_blocks import PLACES, PlaceBounds, of_pose, place_blocks
-from cspr_jax.families.platforms.six_cable_proof.work_list import BlockBounds, WorkList
+from cspr_jax.families.platforms.six_cable_proof.work_list import LIMITS_UNDECIDED, BlockBounds, WorkList
 from cspr_jax.motion.platform_kind import PlatformMotionKind
-from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
+from cspr_jax.numerics.tolerances import SIX_CABLES_UNDECIDED
 from cspr_jax.robots.contacts import interference_lanes
 from cspr_jax.robots.contacts.interference import contacts
 from cspr_jax.robots.statics.wrench_lanes import cable_lanes
@@ -99,12 +100,12 @@ class PlaceCertifier:
         self, problem: Problem, kind: PlatformMotionKind, *, batch: int, count_instants: Callable[[int], None]
     ) -> None:
         """Find which cables can meet each other or the platform."""
-        self._problem, self._kind, self._batch, self._count = problem, kind, batch, count_instants
+        self._problem, self._kind, self._batch, self._count = touchable(problem), kind, batch, count_instants
         near, points = contacts(problem.robot), np.asarray(problem.robot.platform_points)
         self.pairs = tuple((int(i), int(j)) for i, j in near.pairs)
         self._near, self._arms = near, np.linalg.norm(points, axis=1)
         self._knots = np.asarray(problem.amplitude.knots)
-        self._limits = np.arange(1 + len(of_pose(problem))) >= 1
+        self._undecided = np.array([SIX_CABLES_UNDECIDED] + [LIMITS_UNDECIDED] * len(of_pose(problem)))
         self._parts = PARTS, growing(problem.amplitude, *(FROM_REST if kind.from_rest else BETWEEN))
 
     def prove(
@@ -116,7 +117,10 @@ class PlaceCertifier:
         ignored: Bool[np.ndarray, "n_criteria"] | None = None,
     ) -> PlaceProof:
         """Prove motions, or refute them."""
-        blocks, work = parts_of_arcs(arcs, self._knots, self._parts[not margins]), WorkList(arcs, self._limits, ignored)
+        blocks, work = (
+            parts_of_arcs(arcs, self._knots, self._parts[not margins]),
+            WorkList(arcs, self._undecided, ignored),
+        )
         met, hit, touch = np.zeros(len(arcs), bool), np.zeros(len(arcs), bool), TOUCH * float(self._arms.max())
 
         def look(part: Blocks, level: int) -> BlockBounds:

@@ -34,7 +34,7 @@ from cspr_jax.families.platforms.six_cable_proof.limit_blocks import (
     at_most,
     ratio,
 )
-from cspr_jax.families.platforms.six_cable_proof.work_list import allowance, least_nodes
+from cspr_jax.families.platforms.six_cable_proof.work_list import least_nodes
 from cspr_jax.motion.limits import limits_set, scales
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.motion.problem import Problem
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
 # A value at a node may be wrong by this part of its bound on real time (tests find a tenth of that), times Lebesgue's
 # constant for the polynomial through such values. Computing the Bernstein coefficients adds a part of the values.
-ROUNDING = 1e-13 * chebyshev.LEBESGUE
+NODE_ERROR = 1e-13 * chebyshev.LEBESGUE
 COEFFICIENTS = 2.0 * np.finfo(float).eps * (chebyshev.DEGREE + 1) * float(np.abs(chebyshev.bernstein()).sum(1).max())
 REGULAR = CABLES  # the place of D among the values
 BASIC = 2  # criteria that are no limits
@@ -102,7 +102,7 @@ def tension_blocks(
     if margins:
         nodes[1] = nodes[1] * taken.values[:, len(taken.rests)]
     if least:
-        node_values, place = least_nodes(nodes, allowance(np.arange(len(nodes)) >= BASIC), chebyshev.nodes())
+        node_values, place = least_nodes(nodes, len(nodes), chebyshev.nodes())
     else:
         node_values, place = jnp.stack(nodes, axis=1), jnp.zeros_like(bound[0])
     return TensionBounds(node_values, place, jnp.stack(bound), *_allowances(taken))
@@ -186,7 +186,7 @@ def _taken(
         bounds = _sizes(problem, block, Reach(*packed_arrays.parts(pairs)), along * half, lengths)
         return packed_arrays.paired([jnp.where(jnp.isnan(x), jnp.inf, x) * factor for x in bounds])
 
-    factors = np.append(chebyshev.remainders(radii), ROUNDING)
+    factors = np.append(chebyshev.remainders(radii), NODE_ERROR)
     sizes = jnp.stack(packed_arrays.parts(lax.map(sizes_on, (axes[:, 0], lax.map(reach_on, axes), factors))))
     amplified = jnp.max(values[:, REGULAR + 1], axis=0) ** 1.5
     largest = jnp.max(jnp.abs(values[:, : len(sizes)]), axis=0)
@@ -194,7 +194,7 @@ def _taken(
     rounding = sizes[:, -1] * amplified[None] + COEFFICIENTS * largest
     rests = jnp.min(sizes[:, :-1], axis=1) + rounding
     if single_precision:
-        rests = rests + chebyshev.LEBESGUE * packed_arrays.ROUNDING * largest
+        rests = rests + chebyshev.LEBESGUE * packed_arrays.SINGLE_ERROR * largest
     return _Taken(block, values, rests, rounding)
 
 

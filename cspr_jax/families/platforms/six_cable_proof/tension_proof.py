@@ -6,7 +6,8 @@ Every block of a motion (`tension_blocks`) is proved, or refuted by an instant, 
     refuted      if some instant breaks a criterion by more than the tolerance
     undecided    if a block still holds zero where its slack is known to half the tolerance, or after many halvings
 
-A limit that is touched counts as met, as with point masses: limits are allowed twice the tolerance.
+A limit that is touched counts as met: the slacks of limits are those of `problem.touchable`, and undecided within
+rounding alone.
 """
 
 from __future__ import annotations
@@ -29,11 +30,12 @@ from cspr_jax.families.platforms.six_cable_proof.tension_blocks import (
     tension_blocks,
     tension_ranges,
 )
-from cspr_jax.families.platforms.six_cable_proof.work_list import TOLERANCE, BlockBounds, WorkList
+from cspr_jax.families.platforms.six_cable_proof.work_list import LIMITS_UNDECIDED, BlockBounds, WorkList
 from cspr_jax.motion.platform_kind import PlatformMotionKind
-from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds import chebyshev
+from cspr_jax.numerics.tolerances import SIX_CABLES_UNDECIDED
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.statics.wrench_lanes import CABLES
 from cspr_jax.schema.limits import LIMITS
@@ -94,9 +96,10 @@ class Certifier:
         self, problem: Problem, kind: PlatformMotionKind, *, batch: int, count_instants: Callable[[int], None]
     ) -> None:
         """Order the cables."""
+        problem = touchable(problem)
         self._kind, self._batch, self._count = kind, batch, count_instants
         self._knots, self._orders = np.asarray(problem.amplitude.knots), _orders(problem)
-        self._limits = np.arange(BASIC + len(of_motion(problem))) >= BASIC
+        self._is_limit = np.arange(BASIC + len(of_motion(problem))) >= BASIC
         ramp = FROM_REST if kind.from_rest else BETWEEN
         self._parts = WITH_MARGINS[not kind.from_rest], growing(problem.amplitude, ramp, ramp)
 
@@ -119,16 +122,35 @@ class Certifier:
             nodes, bound = np.asarray(bounds.nodes), np.asarray(bounds.bound)
             return BlockBounds(nodes, bound, tau, lambda least: bound[0] >= near * np.maximum(least[part.row, 0], 0.0))
 
-        work = WorkList(arcs, self._limits, ignored)
+        work = WorkList(
+            arcs,
+            np.where(self._is_limit, LIMITS_UNDECIDED if margins else SIX_CABLES_UNDECIDED, SIX_CABLES_UNDECIDED),
+            ignored,
+        )
         first = work.work_off(blocks, look)
         is_proved = ~work.is_refuted & ~work.is_stuck
-        return TensionProof(is_proved, work.is_refuted, work.attained, work.bound, work.instant, blocks.row, first)
+        proof = TensionProof(is_proved, work.is_refuted, work.attained, work.bound, work.instant, blocks.row, first)
+        if not margins:
+            self._look_closer(proof, segments, arcs, np.flatnonzero(work.is_stuck & ~work.is_refuted), ignored)
+        return proof
+
+    def _look_closer(
+        self, proof: TensionProof, segments: PlatformSegment, arcs: np.ndarray, stuck: np.ndarray, ignored
+    ) -> None:
+        # Values in single precision do not decide limits that are nearly touched.
+        is_near = (proof.attained[stuck][:, self._is_limit] < SIX_CABLES_UNDECIDED).any(1)
+        is_near &= (proof.attained[stuck][:, ~self._is_limit] > SIX_CABLES_UNDECIDED).all(1)
+        if is_near.any():
+            again = stuck[is_near]
+            closer = self.prove(rows(segments, again), arcs[again], margins=True, ignored=ignored)
+            for name in ("is_proved", "is_refuted", "attained", "bound", "instant"):
+                getattr(proof, name)[again] = getattr(closer, name)
 
     def _looked_at(self, blocks: Blocks, motions, *, margins: bool) -> TensionBounds:
         bounds = self.bounds(0, blocks, motions, margins=margins, least=not margins)
         for k in range(1, len(self._orders)):
             # These blocks stay open because the first three cables lie nearly in one plane.
-            open_ones = np.flatnonzero(_rounding_matters(bounds) & ~(bounds.bound > TOLERANCE).all(0))
+            open_ones = np.flatnonzero(_rounding_matters(bounds) & ~(bounds.bound > SIX_CABLES_UNDECIDED).all(0))
             if not len(open_ones):
                 break
             better = self.bounds(k, blocks.part(open_ones), motions, margins=margins, least=not margins)
@@ -180,7 +202,7 @@ class Certifier:
 def _rounding_matters(bounds: TensionBounds | TensionRange) -> np.ndarray:
     # Tell where rounding matters: elsewhere another order of the cables gives no better bounds, only shorter blocks do.
     rounding, allowed = np.asarray(bounds.rounding), np.asarray(bounds.allowed)
-    return (rounding > 0.25 * TOLERANCE) & (rounding >= MATTERS * allowed)
+    return (rounding > 0.25 * SIX_CABLES_UNDECIDED) & (rounding >= MATTERS * allowed)
 
 
 def _orders(problem: Problem) -> list[_Order]:

@@ -11,14 +11,18 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.numerics.linear.lanes import smallest
+from cspr_jax.numerics.tolerances import SIX_CABLES_UNDECIDED
 from cspr_jax.verification.bounds.blocks import Blocks
 
 if TYPE_CHECKING:
-    from jaxtyping import Bool, Float
+    from jaxtyping import Float
 
-TOLERANCE = 1e-6
+# Slacks of limits nearer to zero are undecided, where double precision bounds them.
+LIMITS_UNDECIDED = 1e-12
 # A block is halved so many times at most, and so many blocks of an arc may be open.
 HALVINGS, OPEN = 21, 64
+# How many times more blocks may be open where nothing is missed by more than other criteria are undecided.
+TOUCHING = 64
 # How many times blocks are halved at once: in the first round, in the second, and in all later ones, where few blocks
 # are open and a batch of them costs as much as a full one.
 AT_ONCE = (1, 2, 3)
@@ -46,7 +50,7 @@ class WorkList:
 
     Args:
         arcs: (n,) numbers of arcs.
-        limits: (n_criteria,) mask of slacks of limits, which may be touched.
+        near: (n_criteria,) how near to zero slacks are undecided.
         ignored: (n_criteria,) mask of criteria that neither refute nor need be proved; None: all count.
 
     Fields:
@@ -58,13 +62,13 @@ class WorkList:
             NaN where nothing does.
     """
 
-    def __init__(self, arcs: np.ndarray, limits: np.ndarray, ignored: np.ndarray | None = None) -> None:
+    def __init__(self, arcs: np.ndarray, near: np.ndarray, ignored: np.ndarray | None = None) -> None:
         """Start with nothing known."""
-        self._ignored = np.zeros(len(limits), bool) if ignored is None else ignored
-        self._arcs, self._allowed = arcs, np.where(self._ignored, np.inf, allowance(limits))
+        self._ignored = np.zeros(len(near), bool) if ignored is None else ignored
+        self._arcs, self._near = arcs, np.where(self._ignored, np.inf, near)
         self.is_refuted, self.is_stuck = np.zeros(len(arcs), bool), np.zeros(len(arcs), bool)
-        self.bound, self.instant = np.full((len(arcs), len(limits)), np.inf), np.full(len(arcs), np.nan)
-        self.attained, self._worst = np.zeros((len(arcs), 0)), np.full(len(arcs), -TOLERANCE)
+        self.bound, self.instant = np.full((len(arcs), len(near)), np.inf), np.full(len(arcs), np.nan)
+        self.attained, self._worst = np.zeros((len(arcs), 0)), np.zeros(len(arcs))
 
     def work_off(self, blocks: Blocks, look: Callable[[Blocks, int], BlockBounds]) -> BlockBounds:
         """Bound blocks, and the halves of blocks that stay open."""
@@ -73,7 +77,9 @@ class WorkList:
         halved = 0
         for more in itertools.chain(AT_ONCE, itertools.repeat(AT_ONCE[-1])):
             is_open = self._take_in(blocks, bounds, last=halved >= HALVINGS)
-            self.is_stuck |= np.bincount(blocks.row[is_open], minlength=len(self._arcs)) > OPEN * self._arcs
+            # All along ways on which a limit is touched, as on level ones along the floor, blocks stay open for long.
+            share = np.where((bounds.bound > -SIX_CABLES_UNDECIDED).all(0), 1.0 / TOUCHING, 1.0)
+            self.is_stuck |= np.bincount(blocks.row, share * is_open, len(self._arcs)) > OPEN * self._arcs
             is_open &= ~self.is_stuck[blocks.row]
             if not is_open.any():
                 break
@@ -98,18 +104,18 @@ class WorkList:
         slack = least[:, : low.shape[1]]
         # NaN refutes nothing, and proves nothing.
         self._note_instants(blocks, bounds)
-        self.is_refuted[blocks.row[(slack + self._allowed < -TOLERANCE).any(1)]] = True
-        is_above = (low > TOLERANCE - self._allowed) | self._ignored
+        self.is_refuted[blocks.row[(slack < -self._near).any(1)]] = True
+        is_above = (low > self._near) | self._ignored
         is_proved = is_above.all(1) & bounds.is_enough(self.attained)
         with np.errstate(invalid="ignore"):  # infinities: singular poses, blocks without a bound
-            is_known = ((slack - low <= 0.5 * TOLERANCE) & ~is_above).any(1)
+            is_known = ((slack - low <= 0.5 * self._near) & ~is_above).any(1)
         is_done = is_proved | is_known | last | np.isnan(least).any(1)
         self.is_stuck[blocks.row[is_done & ~is_proved]] = True
         _lower(self.bound, blocks.row[is_done], low[is_done])
         return ~is_done & ~(self.is_refuted | self.is_stuck)[blocks.row]
 
     def _note_instants(self, blocks: Blocks, bounds: BlockBounds) -> None:
-        worst = (bounds.nodes[:, : len(self._allowed)] + self._allowed[None, :, None]).min(1)
+        worst = (bounds.nodes[:, : len(self._near)] + self._near[None, :, None]).min(1)
         place = worst.argmin(0)
         value, tau = worst[place, np.arange(len(place))], bounds.tau[place, np.arange(len(place))]
         breaks = np.flatnonzero(value < self._worst[blocks.row])
@@ -124,16 +130,11 @@ def _lower(values: np.ndarray, row: np.ndarray, others: np.ndarray) -> None:
         values[row[first]] = np.minimum(values[row[first]], np.minimum.reduceat(others, first))
 
 
-def allowance(limits: Bool[np.ndarray, "n_criteria"]) -> Float[np.ndarray, "n_criteria"]:
-    """How far below zero slacks may be: limits may be touched, all other criteria must be met strictly."""
-    return 2.0 * TOLERANCE * limits
-
-
 def least_nodes(
-    nodes: Sequence[Array], allowed: Float[np.ndarray, "n_slacks"], places: Float[np.ndarray, "m"]
+    nodes: Sequence[Array], n_slacks: int, places: Float[np.ndarray, "m"]
 ) -> tuple[Float[Array, "1 n_criteria n"], Float[Array, "n"]]:
-    """Reduce the node values of n blocks to the few numbers that a verdict needs."""
-    worst = smallest([x + extra for x, extra in zip(nodes, allowed, strict=False)])
+    """Reduce the node values of n blocks to the few numbers that a verdict needs; slacks are the first of them."""
+    worst = smallest(list(nodes[:n_slacks]))
     is_there = worst == jnp.min(worst, axis=0)[None]
     first = jnp.min(jnp.where(is_there, places[:, None], jnp.inf), axis=0)
     return jnp.stack([jnp.min(x, axis=0) for x in nodes])[None], jnp.where(first <= 1.0, first, jnp.nan)

@@ -14,10 +14,10 @@ from cspr_jax.families.swings.hypocycloid import Segment, duration, motion
 from cspr_jax.families.swings.proof.blocks import INTERVALS
 from cspr_jax.families.swings.proof.limit_slacks import pace_bounds
 from cspr_jax.families.swings.proof.slacks import instant, row_bounds, stretch, taut_bounds
-from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.verification.bounds.blocks import Blocks, parts_of_arcs
-from cspr_jax.verification.bounds.enclosures import TOUCHED, Distances, Enclosure, Rates, largest_moves
+from cspr_jax.verification.bounds.enclosures import Distances, Enclosure, Rates, largest_moves
 from cspr_jax.verification.robustness.tolerances import Tolerated, tolerated
 from cspr_jax.verification.robustness.uncertainty import requirements_of
 
@@ -90,8 +90,8 @@ def enclosure(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"], b
     half = 0.5 * (blocks.stop - blocks.start)
     way = (half * in_batches(_durations, items[:2], size=BATCH))[:, None] * known.velocity
     moved = largest_moves(way, known.bent)[:, None]
-    lengths, longest = np.linalg.norm(known.rays, axis=2), problem.limits.cable_length_max
-    room = np.zeros((count, 0)) if longest is None else np.asarray(longest) * (1.0 + TOUCHED) - lengths
+    lengths, longest = np.linalg.norm(known.rays, axis=2), touchable(problem).limits.cable_length_max
+    room = np.zeros((count, 0)) if longest is None else np.asarray(longest) - lengths
     once = np.ones(room.shape)
     changes = [np.repeat(x[:, None], n_cables, axis=1) for x in (known.velocity_change, known.acceleration_change)]
     vectors = [np.broadcast_to(x[:, None], each) for x in (known.velocity, known.acceleration)]

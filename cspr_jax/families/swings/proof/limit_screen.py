@@ -19,7 +19,7 @@ from cspr_jax.families.swings.parities import pick
 from cspr_jax.families.swings.proof.criteria import BASIC, slacks
 from cspr_jax.families.swings.proof.verdicts import BATCH, tolerance
 from cspr_jax.motion.limits import limits_set
-from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.linear.lanes import smallest_of_each
 from cspr_jax.runtime.persistent_jit import persistent_jit
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 SAMPLES = 32
 # Tolerances by which a sample must lie below zero: twice as far as where `families.swings.proof.verdicts` refutes a
 # limit.
-FAR = 4.0
+FAR = 2.0
 
 
 class LimitSieve:
@@ -72,7 +72,7 @@ def broken_at_samples(
     problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]
 ) -> Bool[np.ndarray, "n n_criteria"]:
     """Limits that some sample breaks by more than rounding; a quick refutation."""
-    lowest, near = in_batches(partial(_lowest, problem), (segments, np.asarray(arcs, float)), size=BATCH)
+    lowest, near = in_batches(partial(_lowest, touchable(problem)), (segments, np.asarray(arcs, float)), size=BATCH)
     return np.concatenate([np.zeros((len(lowest), BASIC), bool), lowest < -FAR * near[:, None]], axis=1)
 
 
@@ -91,5 +91,5 @@ def _lowest(problem: Problem, arguments) -> tuple[Array, Array]:
     segments, arcs = arguments
     tau = jnp.broadcast_to(((jnp.arange(SAMPLES, dtype=arcs.dtype) + 0.5) / SAMPLES)[:, None], (SAMPLES, len(arcs)))
     values = jax.vmap(jax.vmap(partial(slacks, *problem)), in_axes=(None, None, 0))(segments, arcs, tau)
-    near = jax.vmap(partial(tolerance, problem.amplitude))(segments, arcs)
+    near = jax.vmap(partial(tolerance, problem.amplitude, least=0.0))(segments, arcs)
     return jnp.stack(smallest_of_each(values[BASIC:]), axis=1), near

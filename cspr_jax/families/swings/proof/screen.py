@@ -37,7 +37,7 @@ UNROLL = 4
 # Below this T^2 lambda a segment has no duration (p = 1, psi -> 0) and is no trajectory.
 SMALLEST_PERIOD = 1e-9
 # Units of rounding of the largest term by which a sampled value is raised to be an upper bound.
-ROUNDING = 256.0
+EPSILONS = 256.0
 
 
 def sample_table(
@@ -111,6 +111,6 @@ def upper_bounds(
         arcs = numbers[first::2]
         if len(arcs):
             terms = jax.vmap(scale, in_axes=(None, 0))(segments, jnp.asarray(arcs, dtype))
-            guard = ROUNDING * jnp.finfo(dtype).eps * jnp.where(jnp.isfinite(terms), terms, 0.0)
+            guard = EPSILONS * jnp.finfo(dtype).eps * jnp.where(jnp.isfinite(terms), terms, 0.0)
             bounds = bounds.at[first::2].set(smallest_sampled(amplitude, segments, arcs, tau) + guard)
     return bounds.T

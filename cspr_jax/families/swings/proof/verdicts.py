@@ -9,8 +9,8 @@ intervals; M comes from the closed form, one for each block. A segment is
     cut finer          otherwise, only where it is open; each cut into quarters divides the gap by 16,
     undecided          if the gap has closed to the tolerance and zero is still inside.
 
-The tolerance covers rounding (see `tolerance`). A limit that is touched exactly, such as a target
-on the floor, counts as met: limits are allowed twice the tolerance.
+The tolerance covers rounding (see `tolerance`). A limit that is touched, such as a target on the floor, counts as met:
+the slacks of limits are those of the wider limits of `problem.touchable`, and their tolerance is rounding alone.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ from cspr_jax.families.swings.proof.criteria import BASIC, curvatures, slacks
 from cspr_jax.families.swings.proof.slacks import largest_term
 from cspr_jax.motion.amplitudes import Amplitude
 from cspr_jax.motion.limits import limits_set
-from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.linear.lanes import smallest_of_each
+from cspr_jax.numerics.tolerances import SMALLEST_MARGIN
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
 if TYPE_CHECKING:
     from jaxtyping import Bool, Float, Num
 
-SMALLEST_MARGIN = 1e-9
 BATCH = 1024
 # Length of the batches of few segments: with limits, for which a whole batch would take several times as long, and of
 # plans, which have up to so many.
@@ -69,10 +69,18 @@ class Proof:
     bound: np.ndarray
 
 
-def tolerance(amplitude: Amplitude, segment: Segment, arcs: Num[Array, ""]) -> Float[Array, ""]:
-    """Distance from zero within which a slack is undecided."""
+def tolerance(
+    amplitude: Amplitude, segment: Segment, arcs: Num[Array, ""], least: float = SMALLEST_MARGIN
+) -> Float[Array, ""]:
+    """Distance from zero within which a slack is undecided: `least`, and what rounding may be."""
     terms = largest_term(amplitude, segment, arcs)
-    return SMALLEST_MARGIN + 512.0 * jnp.finfo(terms.dtype).eps * terms
+    return least + 512.0 * jnp.finfo(terms.dtype).eps * terms
+
+
+def tolerances(problem: Problem, segment: Segment, arcs: Array) -> Array:
+    """Tolerance of each criterion of one segment, (n_criteria,)."""
+    rounding = tolerance(problem.amplitude, segment, arcs, 0.0)
+    return jnp.stack([rounding + SMALLEST_MARGIN] * BASIC + [rounding] * len(limits_set(problem.limits)))
 
 
 def block_bounds(
@@ -99,7 +107,7 @@ def _first_look(problem: Problem, edges: Array, counts: Array, arguments) -> tup
     n_criteria = BASIC + len(limits_set(problem.limits))
     nothing = (jnp.full_like(arcs, jnp.inf),) * (2 * n_criteria)
     minima = over_blocks(edges, counts, arcs, nothing, step, together=TOGETHER)
-    near = jax.vmap(partial(tolerance, problem.amplitude))(segments, arcs)
+    near = jax.vmap(partial(tolerances, problem))(segments, arcs)
     return jnp.stack(minima[:n_criteria], axis=1), jnp.stack(minima[n_criteria:], axis=1), near
 
 
@@ -121,9 +129,8 @@ def prove(
     arcs = np.asarray(arcs, float)
     table = blocks(problem.amplitude, int(arcs.max()))
     sampled, bound, near = first_look(problem, segments, arcs) if look is None else look
-    allowed = _allowance(sampled.shape[1], near)
     counted = ~(np.zeros(sampled.shape, bool) if ignored is None else ignored)
-    met, broken = bound + allowed > near[:, None], ~(sampled + allowed >= -near[:, None])
+    met, broken = bound > near, ~(sampled >= -near)
     feasible, infeasible = (met | ~counted).all(1), (broken & counted).any(1)
     open_ones = np.flatnonzero(~feasible & ~infeasible)
     if len(open_ones):
@@ -145,23 +152,19 @@ def is_met_at_samples(
     """Criteria that no sample of a first look breaks."""
     arcs = np.asarray(arcs, float)
     sampled, _, near = first_look(problem, segments, arcs)
-    return sampled + _allowance(sampled.shape[1], near) >= -near[:, None]
+    return sampled >= -near
 
 
 def first_look(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]) -> tuple[np.ndarray, ...]:
-    """A first look at segments: smallest samples and proved bounds of all criteria."""
+    """A first look at segments: smallest samples and proved bounds of all criteria, and their tolerances."""
     table = blocks(problem.amplitude, int(arcs.max()))
     order = np.argsort(arcs, kind="stable")
     back = np.argsort(order, kind="stable")
     arguments = jax.tree.map(lambda x: x[order], (segments, arcs))
-    look = in_batches(partial(_first_look, problem, *table), arguments, size=length(problem, len(arcs), OF_PLANS))
+    look = in_batches(
+        partial(_first_look, touchable(problem), *table), arguments, size=length(problem, len(arcs), OF_PLANS)
+    )
     return jax.tree.map(lambda x: x[back], look)
-
-
-def _allowance(n_criteria: int, near: np.ndarray) -> np.ndarray:
-    # Limits may be touched; cables may not be slack, and the spool plane may not be reached.
-    is_limit = np.arange(n_criteria) >= 2
-    return 2.0 * near[:, None] * is_limit
 
 
 def _cut(
@@ -169,7 +172,7 @@ def _cut(
 ) -> tuple[np.ndarray, np.ndarray]:
     # Return which segments are proved (n,), and which criteria that count are broken (n, n_criteria). Items are blocks
     # of segments that are still open: owner, start, stop.
-    edges, counts = table
+    problem, (edges, counts) = touchable(problem), table
     broken, stuck = np.zeros(counted.shape, bool), np.zeros(len(arcs), bool)
     count = counts[arcs.astype(int)]
     owner = np.repeat(np.arange(len(arcs)), count)
@@ -179,12 +182,12 @@ def _cut(
     for _ in range(FINEST_CUT):
         items = (*jax.tree.map(lambda x, o=owner: x[o], (segments, arcs)), start, stop)
         sampled, proved = in_batches(partial(_closer_look, problem), items, size=length(problem, len(owner)))
-        limit, allowed = near[owner, None], _allowance(sampled.shape[1], near[owner])
-        fails: np.ndarray = ~(sampled + allowed >= -limit) & counted[owner]
+        limit = near[owner]
+        fails: np.ndarray = ~(sampled >= -limit) & counted[owner]
         failing = np.flatnonzero(fails.any(1))
         np.logical_or.at(broken, owner[failing], fails[failing])
         refuted = np.asarray(broken.any(1))
-        unproved = ~(proved + allowed > limit) & counted[owner]
+        unproved = ~(proved > limit) & counted[owner]
         closed = (unproved & (sampled - proved <= 0.5 * limit)).any(1)
         np.logical_or.at(stuck, owner, closed)
         keep = unproved.any(1) & ~refuted[owner] & ~stuck[owner]

@@ -18,7 +18,7 @@ from cspr_jax.numerics.batches import in_batches
 from cspr_jax.schema.tiles import Grid
 
 # How far an envelope may lie below zero at the number of oscillations that keeps it above.
-_ROUNDING = 1e-7
+_CHECK_ERROR = 1e-7
 
 
 @jax.jit
@@ -73,4 +73,4 @@ class TransitionEnvelopesMap(MinimumOscillationsMap):
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
-        return {"an envelope below zero at its own number of oscillations": answers["lower_envelope"] < -_ROUNDING}
+        return {"an envelope below zero at its own number of oscillations": answers["lower_envelope"] < -_CHECK_ERROR}

@@ -27,7 +27,7 @@ from cspr_jax.families.swings.transitions.transition_margins import transition_m
 from cspr_jax.motion.amplitudes import Amplitude, derivatives
 from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.limits import limits_set
-from cspr_jax.motion.problem import Problem
+from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.runtime.stages import stage
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 # Instants of the sieve; odd, so that they do not fall on the zeros of an oscillation.
 SAMPLES = 61
-ROUNDING = 1e-12
+ENVELOPE_ERROR = 1e-12
 
 
 @dataclasses.dataclass(frozen=True)
@@ -136,7 +136,7 @@ def _upper_bounds(amplitude: Amplitude, loads: tuple[jax.Array, jax.Array, jax.A
         h = ((bend - size * end) * cosine - 2.0 * omega * slope * sine) / period
         worst = jnp.maximum(high[:, None] * h[None], low[:, None] * h[None])
         lowest = jnp.min(1.0 + v[:, None] * size[None] * cosine[None] - worst, axis=1)
-        guard = ROUNDING * (1.0 + jnp.abs(v) + jnp.maximum(high, -low) * jnp.max(jnp.abs(h)))
+        guard = ENVELOPE_ERROR * (1.0 + jnp.abs(v) + jnp.maximum(high, -low) * jnp.max(jnp.abs(h)))
         return jnp.where(period > 0.0, lowest + guard, -jnp.inf)
 
     return lax.map(one, jnp.arange(1.0, largest + 1.0)).T
@@ -181,7 +181,7 @@ def minimum_oscillations(
     kernel = partial(_upper_bounds, problem.amplitude, largest=largest)
     upper = np.full((len(v), 2 * largest), -np.inf)
     upper[:, 1::2] = in_batches(kernel, extreme, size=BATCH)
-    at_ends = in_batches(partial(end_slacks, problem, 4.0), segments, size=BATCH)
+    at_ends = in_batches(partial(end_slacks, touchable(problem), 4.0), segments, size=BATCH)
     if steady is not None:
         upper[steady, 1::2], real[steady], gain[steady] = np.inf, 0.0, 0.0
     infinity = _infinity(problem, v)

@@ -94,7 +94,7 @@ def acceleration_set(result: Result, file: str, at: dict[str, float]) -> Acceler
             words = f"{value(result, 't', result.axes['t'][place])} (smallest margin)"
         here = slice(place, place + 1)
         faces = faces_of(robot, limits, positions[here])
-        margin = judged(robot, faces, positions[here], motion[here])[0]
+        margin = judged(robot, faces, faces, positions[here], motion[here])[0]
     if not np.asarray(faces.is_regular)[0]:
         raise InputError("--at", words, "an instant at which the cables span the space, or the plane of a planar robot")
     upward = np.array([*frame.signs[:2], -1.0])
@@ -121,7 +121,8 @@ def _tightest(robot: PointMassRobot, limits: Limits, positions: np.ndarray, moti
     margins = []
     for first in range(0, len(positions), ROWS):
         here, accelerations = positions[first : first + ROWS], motion[first : first + ROWS]
-        margins.append(judged(robot, faces_of(robot, limits, here), here, accelerations)[0])
+        faces = faces_of(robot, limits, here)
+        margins.append(judged(robot, faces, faces, here, accelerations)[0])
     return int(np.nanargmin(np.concatenate(margins)))
 
 

@@ -10,9 +10,10 @@ from cspr_jax.config.keys.workspace import WorkspaceTable
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.errors import InputError
 from cspr_jax.numerics.linear.frames import IDENTITY
+from cspr_jax.numerics.tolerances import UNIT_NORM
 from cspr_jax.outputs.plots.robots.cable_paths import cable_ways
 from cspr_jax.outputs.plots.style.fixed_axes import table
-from cspr_jax.robots.model.shapes import FLAT, UNIT_TOLERANCE, hull, is_flat, rotation_matrix
+from cspr_jax.robots.model.shapes import FLAT, hull, is_flat, rotation_matrix
 from cspr_jax.store.reading.result import Result
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def posed(result: Result, place: Float[np.ndarray, "3"], angles: dict[str, float
     rotation = _about("z", azimuth) @ _about("x", tilt) @ _about("z", torsion - azimuth)
     quaternion = np.array(workspace_of(result).orientation or IDENTITY)
     size = np.linalg.norm(quaternion)
-    if abs(size - 1.0) > UNIT_TOLERANCE:
+    if abs(size - 1.0) > UNIT_NORM:
         raise InputError("workspace.orientation", quaternion.tolist(), "of length 1")
     rotation = rotation @ rotation_matrix(quaternion / size)
     base = np.array(robot_file.base_points, float)
