@@ -145,6 +145,7 @@ def clear(planned, keys, samples=2000):
     return float(np.min(cables)) - radius
 
 
+@pytest.mark.thorough
 def test_a_motion_leads_round_what_is_in_its_way():
     """Within all limits, clear by an oracle; the fastest motion without the sphere passes through it."""
     keys = BESIDE | {"obstacle": [IN_THE_WAY]}

@@ -38,6 +38,7 @@ def turning():
     return motion, question, duration, planned
 
 
+@pytest.mark.thorough
 def test_it_follows_and_ends_at_the_poses(turning):
     motion, question, duration, planned = turning
     tau = np.linspace(0.0, 1.0, 501)
