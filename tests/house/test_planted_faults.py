@@ -23,7 +23,7 @@ QUICK, THOROUGH = "not soak and not thorough", "not soak"
 def copy(tmp_path_factory):
     """The package and its tests, elsewhere."""
     folder, skipped = tmp_path_factory.mktemp("copy"), shutil.ignore_patterns("__pycache__")
-    for name in ("cspr_jax", "tests", "sweeps", "results"):
+    for name in ("cspr_jax", "docs", "tests", "sweeps", "results"):
         shutil.copytree(ROOT / name, folder / name, ignore=skipped)
     shutil.copy(ROOT / "pyproject.toml", folder)
     return folder
