@@ -71,16 +71,19 @@ def planned(keys: dict, **limits):
     return cspr_jax.plan(keys | {"schema": 1, "limits": keys.get("limits", {}) | limits})
 
 
+def with_arcs(keys: dict, bare) -> dict:
+    """The poses of a plan with the number of arcs that it has found, if its family has one."""
+    arcs = int(bare.answers.tried_arcs[0])
+    return {"pose": [keys["pose"][0], keys["pose"][1] | {"arcs": arcs}]} if arcs else {}
+
+
 @pytest.mark.parametrize("name", families(MOTIONS))
 def test_motions_that_reach_a_limit_are_feasible(name):
     """At each limit, to rounding; a millionth beyond it they are refused, by this limit alone."""
     keys = {"family": name, **MOTIONS[name]}
     bare = planned(keys)
     robot = bare.robot_file
-    segments = bare.to_dict()["segments"]
-    arcs = int(bare.answers.tried_arcs[0])
-    if arcs:
-        keys |= {"pose": [keys["pose"][0], keys["pose"][1] | {"arcs": arcs}]}
+    segments, keys = bare.to_dict()["segments"], keys | with_arcs(keys, bare)
     values = {}
     for limit, column in COLUMNS.items():
         each = [segment[column] for segment in segments]
@@ -106,7 +109,7 @@ def test_the_least_tension_of_redundant_cables(name):
     keys = {"family": name, **MOTIONS[name]}
     bare = planned(keys, tension_min=1.0)
     (margin,) = {row["margin"] for row in bare.to_dict()["segments"]}
-    unit = bare.to_dict()["segments"][0]["margin_unit"]
+    unit, keys = bare.to_dict()["segments"][0]["margin_unit"], keys | with_arcs(keys, bare)
     robot = bare.problem.robot
     least = 1.0 + margin * (1.0 if unit == "N" else float(robot.mass) * GRAVITY / robot.n_cables)
     for share, verdict in ((-SMALL, True), (0.0, True), (SMALL, False)):
