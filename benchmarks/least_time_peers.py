@@ -45,7 +45,7 @@ def work(rng, kind, count):
     robot, reference, ranges, _ = any_motion_cases.random_robot(rng, kind)
     prepared, frame = centred(robot_of(robot))
     weight = robot["mass"] * robot["gravity"]
-    low, high = (leaf(np.full(prepared.n_cables, share * weight)) for share in TENSIONS)
+    low, high = (leaf(np.full(prepared.n_cables, fraction * weight)) for fraction in TENSIONS)
     sections = []
     for _ in range(count):
         points = reference + 0.5 * ranges * rng.uniform(-1.0, 1.0, (6, 3))
@@ -140,8 +140,8 @@ def compared(kind, args):
     if toppra is None:
         return
     rows = []
-    for path, solution, bend in list(zip(paths, solutions, still, strict=True))[: args.toppra]:
-        gravity, run = float(problem.robot.gravity), run_of(solution, path, bend)
+    for path, solution, second_derivative in list(zip(paths, solutions, still, strict=True))[: args.toppra]:
+        gravity, run = float(problem.robot.gravity), run_of(solution, path, second_derivative)
         ours = np.inf if run is None else cell_times(run, path.grid.width).sum()
         theirs = by_toppra(path.grid.nodes, *half_planes(path, gravity))
         rows.append((ours * np.sqrt(gravity / path.grid.nodes[-1]), *theirs))

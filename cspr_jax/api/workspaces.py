@@ -281,9 +281,9 @@ class AvailableAccelerations:
             raise InputError("accelerations", f"shape {vectors.shape}", allowed)
         if self._robot.dof == PLANAR and vectors[..., 1].any():
             raise InputError("accelerations", "y not 0", "y = 0: the plane of a planar robot")
-        turned = np.asarray(self._frame.turned(np.broadcast_to(vectors, self.positions.shape)))
+        rotated = np.asarray(self._frame.rotated(np.broadcast_to(vectors, self.positions.shape)))
         with double_precision():
-            return judged(self._robot, self._faces, self._allowed, self._frame.inward(self.positions), turned)
+            return judged(self._robot, self._faces, self._allowed, self._frame.inward(self.positions), rotated)
 
 
 @checked
@@ -314,5 +314,5 @@ def available_accelerations(
         allowed = touchable_limits(prepared_robot, limits)
         faces, wider = (faces_of(prepared_robot, each, frame.inward(places)) for each in (limits, allowed))
     cables = np.tile(spanning(robot.n_cables, robot.dof), (2, 1))
-    normals, offsets, of_largest = map(np.asarray, (frame.turned(faces.normals), faces.offsets, faces.of_largest))
+    normals, offsets, of_largest = map(np.asarray, (frame.rotated(faces.normals), faces.offsets, faces.of_largest))
     return AvailableAccelerations(places, normals, offsets, cables, of_largest, prepared_robot, faces, wider, frame)

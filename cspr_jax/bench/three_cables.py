@@ -79,15 +79,15 @@ def _numpy_checks(base: np.ndarray, ends: np.ndarray) -> np.ndarray:
     # Return the smallest pseudotension of each segment and number of arcs: (segments, MAX_ARCS).
     tau = (np.arange(screen.SAMPLES) + 0.5) / screen.SAMPLES
     amplitude = (10 * tau**3 - 15 * tau**4 + 6 * tau**5, 30 * tau**2 - 60 * tau**3 + 30 * tau**4)
-    bend = 60 * tau - 180 * tau**2 + 120 * tau**3
-    hub, start, g = rest_point(Z0), np.array(START), 9.81
-    v1, v2 = start - hub, ends - hub
+    second_derivative = 60 * tau - 180 * tau**2 + 120 * tau**3
+    center, start, g = rest_point(Z0), np.array(START), 9.81
+    v1, v2 = start - center, ends - center
     r1, r2 = np.linalg.norm(v1), np.linalg.norm(v2, axis=1)[:, None]
     q1 = v1 / r1
     across = v2 - (v2 @ q1)[:, None] * q1
     q2 = across / np.linalg.norm(across, axis=1)[:, None]
     psi = np.arctan2(np.linalg.norm(across, axis=1), v2 @ q1)[:, None]
-    r, slope, curve = r1 + (r2 - r1) * amplitude[0], (r2 - r1) * amplitude[1], (r2 - r1) * bend
+    r, slope, curve = r1 + (r2 - r1) * amplitude[0], (r2 - r1) * amplitude[1], (r2 - r1) * second_derivative
     smallest = []
     for p in range(1, MAX_ARCS + 1):
         theta = psi + (-1) ** (p - 1) * 2.0 * math.pi * math.ceil((p - 1) / 2)  # (2.34)
@@ -100,7 +100,7 @@ def _numpy_checks(base: np.ndarray, ends: np.ndarray) -> np.ndarray:
         u2, v2d = -k * theta * (cs + (n - 1.0) * cf), -k * theta * (ss - (n - 1.0) * sf)
         rate = g / Z0 / (theta**2 * (n - 1.0))  # 1 / T^2
         along, side = rate * (curve * u + 2 * slope * u1 + r * u2), rate * (curve * v + 2 * slope * v1d + r * v2d)
-        place = [hub[i] + q1[i] * (r * u) + q2[:, i, None] * (r * v) for i in range(3)]
+        place = [center[i] + q1[i] * (r * u) + q2[:, i, None] * (r * v) for i in range(3)]
         force = [q1[i] * along + q2[:, i, None] * side - (g if i == 2 else 0.0) for i in range(3)]
         smallest.append(np.min([_kappa(base, k, place, force).min(1) for k in range(3)], axis=0))
     return np.stack(smallest, axis=1)

@@ -20,7 +20,7 @@ def orientations(
     frame: Frame, points: Float[np.ndarray, "n 3"], angles: Float[np.ndarray, "n 3"]
 ) -> Float[np.ndarray, "n 4"]:
     """Orientations of tilt and torsion in the cylindrical frame of their places, (3.98), in the kernels' axes."""
-    return frame.turned_quaternions(from_tilt_torsion(angles + cylindrical_frames(frame.turned(points))))
+    return frame.turned_quaternions(from_tilt_torsion(angles + cylindrical_frames(frame.rotated(points))))
 
 
 def given_quaternion(quaternion: list[float] | None, key: str, file: object) -> Float[np.ndarray, "4"]:
@@ -32,11 +32,12 @@ def given_quaternion(quaternion: list[float] | None, key: str, file: object) -> 
     return unit_quaternion / size
 
 
-def pose_quaternions(stops: Waypoints, points: Float[np.ndarray, "n_poses 3"]) -> Float[np.ndarray, "n_poses 4"]:
+def pose_quaternions(waypoints: Waypoints, points: Float[np.ndarray, "n_poses 3"]) -> Float[np.ndarray, "n_poses 4"]:
     """Orientations of way-points, by their quaternions or by tilt and torsion, in the kernels' axes."""
-    frame, poses = stops.frame, stops.poses
+    frame, poses = waypoints.frame, waypoints.poses
     units = [
-        given_quaternion(pose.quaternion, f"{stops.name(i)}.quaternion", stops.path) for i, pose in enumerate(poses)
+        given_quaternion(pose.quaternion, f"{waypoints.name(i)}.quaternion", waypoints.path)
+        for i, pose in enumerate(poses)
     ]
     angles = np.array([pose.tilt_torsion or [0.0] * 3 for pose in poses])
     is_tilted = np.array([pose.tilt_torsion is not None for pose in poses])

@@ -14,7 +14,7 @@ from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.contacts.clearance import Scene, scene
 from cspr_jax.robots.model.patterns import PATTERNS
-from cspr_jax.robots.model.shapes import Body, Obstacle, inward, rotated, turned
+from cspr_jax.robots.model.shapes import Body, Obstacle, in_kernel_axes, inward, rotated
 
 if TYPE_CHECKING:
     from jaxtyping import Float
@@ -29,7 +29,7 @@ def surroundings(
 ) -> Scene:
     """A robot among the bodies that its cables can meet."""
     diameter = 0.0 if robot.cable_diameter is None else np.asarray(robot.cable_diameter)
-    kernel_body = None if body is None else turned(body, frame)
+    kernel_body = None if body is None else in_kernel_axes(body, frame)
     if kernel_body is not None and rotation is not None:
         kernel_body = rotated(kernel_body, rotation)
     return scene(robot, diameter=diameter, obstacles=[inward(one, frame) for one in obstacles], body=kernel_body)

@@ -121,12 +121,12 @@ def _status(options: argparse.Namespace) -> int:
     if options.json:
         print_json(state)
         return ExitCode.DONE
-    last, share = state["last"] or {}, 100.0 * state["cells_done"] / state["cells"]
+    last, fraction = state["last"] or {}, 100.0 * state["cells_done"] / state["cells"]
     cells = f"{state['cells_done']:,} of {state['cells']:,} cells, {state['shards']} of {state['tiles']} tiles"
     for line in (
         f"{state['directory']}: {state['sweep']}, identity {state['identity'][:12]}",
         f"  {state['state_text']}",
-        f"  {share:.0f} % done: {cells}",
+        f"  {fraction:.0f} % done: {cells}",
         *_pace(state),
         f"  result: {state['result'] or 'not yet'}",
         f"  last: {last.get('event', '-')} at {last.get('time', '-')}",

@@ -131,7 +131,7 @@ def placed_inward(
     moved = dataclasses.replace(spline, position=leaf(frame.inward(spline.position)), quaternion=turning)
     if centre is None or not np.any(centre) or turning is None:
         return moved
-    return dataclasses.replace(moved, offset=leaf(_rotation(reference).apply(frame.turned(centre))))
+    return dataclasses.replace(moved, offset=leaf(_rotation(reference).apply(frame.rotated(centre))))
 
 
 def centre_from(robot_file: RobotFile, point: str | None) -> Float[np.ndarray, "3"] | None:

@@ -161,8 +161,8 @@ def _of_rates(table: MotionTable) -> Spline:
         quaternion = hermite(since, turning)
     elif table.quaternions is not None:
         plain = _without_joins(table)
-        turned = interpolated(plain.times, plain.positions, plain.quaternions, interpolation="cubic")
-        quaternion = np.asarray(turned.quaternion)
+        rotated = interpolated(plain.times, plain.positions, plain.quaternions, interpolation="cubic")
+        quaternion = np.asarray(rotated.quaternion)
     curve = Spline(leaf(knots), leaf(hermite(since, derivatives)), None, interpolation="hermite")
     return curve if quaternion is None else dataclasses.replace(curve, quaternion=leaf(quaternion))
 

@@ -12,7 +12,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.curves.blocks import spline_bounds
-from cspr_jax.numerics.bounds.affine_bounds import cross, turned
+from cspr_jax.numerics.bounds.affine_bounds import cross, rotated
 from cspr_jax.numerics.elementary import leaf
 from cspr_jax.numerics.linear import rotations
 from cspr_jax.robots.bounds.state_bounds import StateBounds
@@ -61,9 +61,9 @@ class Spline:
         t = tau * knots[-1]
         piece = jnp.clip(jnp.searchsorted(knots, t, side="right") - 1, 0, len(knots) - 2)
         width = knots[piece + 1] - knots[piece]
-        share = (t - knots[piece]) / width
+        fraction = (t - knots[piece]) / width
         quaternion = None if self.quaternion is None else jnp.asarray(self.quaternion)[piece]
-        return piece_state(jnp.asarray(self.position)[piece], quaternion, share, width, self.offset)
+        return piece_state(jnp.asarray(self.position)[piece], quaternion, fraction, width, self.offset)
 
     def padded(self) -> "Spline":
         """The same motion of a usual number of pieces: the first one is repeated at its start, without a duration."""
@@ -87,7 +87,7 @@ class Spline:
         """Breaks; see `Motion.breaks`."""
         return self.knots[1:-1] / self.knots[-1]
 
-    def jumps(self, share: float = SAME) -> Float[np.ndarray, "n"]:
+    def jumps(self, fraction: float = SAME) -> Float[np.ndarray, "n"]:
         """Instants at which the acceleration jumps."""
         width = np.diff(np.asarray(self.knots))[:, None]
         is_jump = np.zeros(len(width) - 1, bool)
@@ -96,7 +96,7 @@ class Spline:
             if table is not None and degree >= 2:
                 bends = np.diff(np.asarray(table), 2, axis=1) * (degree * (degree - 1)) / width[:, None] ** 2
                 size = np.abs(bends).max(initial=0.0)
-                is_jump |= (np.abs(bends[1:, 0] - bends[:-1, -1]) > share * size).any(1)
+                is_jump |= (np.abs(bends[1:, 0] - bends[:-1, -1]) > fraction * size).any(1)
         return np.asarray(self.knots)[1:-1][is_jump]
 
     def bounds(self, start: np.ndarray, end: np.ndarray) -> StateBounds:
@@ -116,7 +116,7 @@ def moved(bounds: StateBounds, offset: Float[Array, "3"]) -> StateBounds:
     """Bounds of another point of a platform, over k blocks."""
 
     def one(state: StateBounds) -> StateBounds:
-        arm = turned(state.rotation, offset)
+        arm = rotated(state.rotation, offset)
         swing = cross(state.angular_velocity, arm)
         pull = cross(state.angular_acceleration, arm) + cross(state.angular_velocity, swing)
         return state._replace(
@@ -150,15 +150,15 @@ def chained(splines: Sequence[Spline]) -> Spline:
 def piece_state(
     position: Float[Array, "degree+1 3"],
     quaternion: Float[Array, "degree+1 4"] | None,
-    share: Float[Array, ""],
+    fraction: Float[Array, ""],
     width: Float[Array, ""],
     offset: Array | None = None,
 ) -> State:
     """State on one piece of a spline."""
-    place, velocity, acceleration = piece_values(position, share, width)
+    place, velocity, acceleration = piece_values(position, fraction, width)
     if quaternion is None:
         return State(place, velocity, acceleration)
-    rotation, spin, spin_rate, unit = turning_of(*piece_values(quaternion, share, width))
+    rotation, spin, spin_rate, unit = turning_of(*piece_values(quaternion, fraction, width))
     if offset is not None:
         arm = rotation @ offset
         swing = jnp.cross(spin, arm)
@@ -168,19 +168,19 @@ def piece_state(
 
 
 def piece_values(
-    coefficients: Float[Array, "degree+1 n"], share: Float[Array, ""], width: Float[Array, ""]
+    coefficients: Float[Array, "degree+1 n"], fraction: Float[Array, ""], width: Float[Array, ""]
 ) -> tuple[Float[Array, "n"], Float[Array, "n"], Float[Array, "n"]]:
     """Value and first two derivatives on one piece."""
     degree = coefficients.shape[0] - 1
     first = jnp.diff(coefficients, axis=0) * (degree / width)
     second = jnp.diff(first, axis=0) * (max(degree - 1, 0) / width)
-    return _bernstein(coefficients, share), _bernstein(first, share), _bernstein(second, share)
+    return _bernstein(coefficients, fraction), _bernstein(first, fraction), _bernstein(second, fraction)
 
 
-def _bernstein(coefficients: Array, share: Array) -> Array:
+def _bernstein(coefficients: Array, fraction: Array) -> Array:
     # By the steps of de Casteljau.
     while coefficients.shape[0] > 1:
-        coefficients = coefficients[:-1] + share * jnp.diff(coefficients, axis=0)
+        coefficients = coefficients[:-1] + fraction * jnp.diff(coefficients, axis=0)
     return coefficients.sum(0)
 
 

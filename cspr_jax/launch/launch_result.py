@@ -93,7 +93,7 @@ class LaunchOutcome(LegOutcome):
         if not math.isfinite(self.flight_time):
             return {}
         t = np.linspace(0.0, self.flight_time, FLIGHT_ROWS)
-        down = self.frame.turned(np.array([0.0, 0.0, float(self.robot.gravity)]))
+        down = self.frame.rotated(np.array([0.0, 0.0, float(self.robot.gravity)]))
         position = self.position + self.velocity * t[:, None] + 0.5 * down * t[:, None] ** 2
         columns = {"flight_t": self.time + t, "flight_position": position}
         if self.scatter is not None:
@@ -105,7 +105,7 @@ class LaunchOutcome(LegOutcome):
         """Scatter of the landings."""
         kernel_scatter = scatter(self.robot, self.throw, errors)
         # Axes of the file are turned against those of the kernels about x.
-        signs = np.asarray(self.frame.turned(np.ones(3)))[:2]
+        signs = np.asarray(self.frame.rotated(np.ones(3)))[:2]
         both = np.outer(signs, signs)
         landings, covariance, first_order = dataclasses.astuple(kernel_scatter)
         return Scatter(landings * signs, covariance * both, first_order * both)
@@ -129,7 +129,7 @@ def launch_outcome(
     launch = LaunchOutcome(
         segment=table.segment,
         position=np.asarray(frame.outward(np.asarray(state.position))),
-        velocity=np.asarray(frame.turned(np.asarray(state.velocity))),
+        velocity=np.asarray(frame.rotated(np.asarray(state.velocity))),
         time=time,
         control_points=control_points,
         landing=np.asarray(frame.outward(np.asarray(landing))),

@@ -34,7 +34,7 @@ def parabola_of(table: LaunchTable, frame: Frame, gravity: float, path: Path) ->
     """Flight that a table asks for."""
     target = np.asarray(frame.inward(table.target))
     point = None if table.point is None else np.asarray(frame.inward(table.point))
-    velocity = None if table.velocity is None else np.asarray(frame.turned(np.asarray(table.velocity)))
+    velocity = None if table.velocity is None else np.asarray(frame.rotated(np.asarray(table.velocity)))
     if point is None or velocity is None:
         return Parabola(target, point, velocity, table.time)
     nearest = nearest_time(point, target, velocity, gravity)

@@ -100,7 +100,7 @@ class GridMap(abc.ABC):
             return self._frame.inward(np.stack([cells["x"], cells["y"], cells["z"]], axis=1))
         radius, azimuth = cells["radius"], cells["azimuth"]
         level = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), np.zeros_like(radius)], axis=1)
-        return np.c_[self._frame.turned(level)[:, :2], self._frame.depth(cells["z"])]
+        return np.c_[self._frame.rotated(level)[:, :2], self._frame.depth(cells["z"])]
 
     def _start_places(self, cells: dict[str, np.ndarray]) -> np.ndarray:
         # In the kernels' coordinates, of axes and of `trajectory.from`.
@@ -112,7 +112,7 @@ class GridMap(abc.ABC):
     def _corners(self, grid: Grid, names: tuple[str, ...]) -> dict[str, np.ndarray]:
         # Return cells among which depths and heights have their extremes. Among azimuths the one down the slope of the
         # spool plane stands for all: no other target is deeper below it.
-        slope = self._frame.turned(plane_normal(self._problem.robot))
+        slope = self._frame.rotated(plane_normal(self._problem.robot))
         axes = {
             name: np.array([points.min(), points.max()]) if name != "azimuth" else np.arctan2(slope[1:2], slope[:1])
             for name, points in grid.axes.items()

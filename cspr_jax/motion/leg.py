@@ -49,28 +49,30 @@ class Leg(abc.ABC):
     step: ClassVar[int] = 0
     point: str | None = None  # whose positions the files of the leg have, where they say it
 
-    def __init__(self, stops: Waypoints) -> None:
+    def __init__(self, waypoints: Waypoints) -> None:
         """Keep the poses; a family refuses what it cannot join."""
-        self.stops = stops
+        self.waypoints = waypoints
 
     def _refuse(self, *keys: str) -> None:
         # Refuse keys of poses that other families take; at its first pose another leg may have taken them.
-        for i, pose in enumerate(self.stops.poses[1:], start=1):
+        for i, pose in enumerate(self.waypoints.poses[1:], start=1):
             for key in keys:
                 if getattr(pose, key) is not None:
-                    name = f"{self.stops.name(i)}.{key}"
-                    raise ConfigError(self.stops.path, f'{name}: must be absent with family = "{self.stops.family}"')
+                    name = f"{self.waypoints.name(i)}.{key}"
+                    raise ConfigError(
+                        self.waypoints.path, f'{name}: must be absent with family = "{self.waypoints.family}"'
+                    )
 
     def __len__(self) -> int:
-        return len(self.stops)
+        return len(self.waypoints)
 
     def check(self, problem: Problem) -> None:  # noqa: B027
         """Refuse poses at which no motion can begin or end; called before z0 is chosen."""
 
     @classmethod
-    def for_searches(cls, stops: Waypoints) -> "Leg":
+    def for_searches(cls, waypoints: Waypoints) -> "Leg":
         """The leg of the family over poses of another one, from whose motions a search can begin."""
-        return cls(stops)
+        return cls(waypoints)
 
     def begin_with(self, others: "Sequence[Leg]") -> None:  # noqa: B027
         """Take legs of other families over the same poses, from whose motions a search can begin."""

@@ -79,9 +79,9 @@ def lowest_depth(robot: AnyRobot, state: State, corners: Float[Array, "m 3"] | N
 
 
 def _values(robot: AnyRobot, state: State, tensions: Array) -> Values:
-    length, rate, bend = cables.cable_motion(robot, state)
+    length, rate, second_derivative = cables.cable_motion(robot, state)
     speed, pull = jnp.linalg.norm(state.velocity), jnp.linalg.norm(state.acceleration)
-    return Values(tensions, lowest_depth(robot, state), length, jnp.abs(rate), jnp.abs(bend), speed, pull)
+    return Values(tensions, lowest_depth(robot, state), length, jnp.abs(rate), jnp.abs(second_derivative), speed, pull)
 
 
 def scales(n_cables: int, weight: Float[Array, ""], z0: Float[Array, "..."]) -> dict[str, tuple[float, Array]]:
@@ -94,8 +94,8 @@ def slack(
 ) -> Float[Array, "..."]:
     """Slack of a limit: positive exactly while it is met, and free of units."""
     if row.quantity not in scale:
-        share = value / limit
-        return 1.0 - share if row.sense == "most" else share - 1.0
+        fraction = value / limit
+        return 1.0 - fraction if row.sense == "most" else fraction - 1.0
     factor, size = scale[row.quantity]
     return (limit - value if row.sense == "most" else value - limit) * factor / size
 

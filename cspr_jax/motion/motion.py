@@ -199,7 +199,7 @@ def inward(frame: Frame, state: State) -> State:
 
 def outward(frame: Frame, state: State) -> State:
     """State in the axes of a robot file."""
-    vector, tensor, quaternion = frame.turned, frame.turned_tensor, frame.turned_quaternions
+    vector, tensor, quaternion = frame.rotated, frame.turned_tensor, frame.turned_quaternions
     # In the order of the fields of a state; a point mass has no orientation.
     changes: tuple[Callable[..., Any], ...] = (frame.outward, vector, vector, tensor, vector, vector, quaternion)
     return State(*(value if value is None else change(value) for change, value in zip(changes, state, strict=True)))

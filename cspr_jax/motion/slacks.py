@@ -59,16 +59,19 @@ def flags(problem: Problem) -> tuple[Verdict, ...]:
 
 
 def _of_point_mass(robot: PointMassRobot, state: State, z0: Array) -> list[Array]:
-    hub = rest_point(z0)
+    center = rest_point(z0)
     if robot.pulleys is not None:
-        return [_per_length(robot, state) / _per_length(robot, State(hub, jnp.zeros_like(hub), jnp.zeros_like(hub)))]
-    at_rest = force_balance.pseudotensions(robot, hub, jnp.zeros_like(hub))
+        return [
+            _per_length(robot, state)
+            / _per_length(robot, State(center, jnp.zeros_like(center), jnp.zeros_like(center)))
+        ]
+    at_rest = force_balance.pseudotensions(robot, center, jnp.zeros_like(center))
     return [force_balance.pseudotensions(robot, state.position, state.acceleration) / at_rest]
 
 
 def _of_platform(robot: PlatformRobot, state: State, z0: Array) -> list[Array]:
-    hub = rest_point(z0)
-    at_rest = wrench_balance.normalised_determinant(robot, hub, jnp.eye(3))
+    center = rest_point(z0)
+    at_rest = wrench_balance.normalised_determinant(robot, center, jnp.eye(3))
     here = wrench_balance.normalised_determinant(robot, state.position, state.rotation)
     with_pulleys = robot.pulleys is not None
     per_length = _per_length(robot, state) if with_pulleys else wrench_balance.tensions_per_length(robot, state)

@@ -11,9 +11,9 @@ _GROUPS, _MOUNTED = Path("/proc/self/cgroup"), Path("/sys/fs/cgroup")
 
 def cores() -> int:
     """Number of cores that this process computes on."""
-    share = os.environ.get(SHARE, "")
-    if share.isascii() and share.isdigit() and int(share) > 0:
-        return int(share)
+    fraction = os.environ.get(SHARE, "")
+    if fraction.isascii() and fraction.isdigit() and int(fraction) > 0:
+        return int(fraction)
     affinity = getattr(os, "sched_getaffinity", None)  # not on macOS
     count = len(affinity(0)) if affinity is not None else os.cpu_count() or 1
     return max(1, math.ceil(min(count, quota())))

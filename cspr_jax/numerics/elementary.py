@@ -54,7 +54,7 @@ def sincospi(x: Float[Array, "..."]) -> tuple[Float[Array, "..."], Float[Array, 
     return sign * (math.pi * angle) * sine, sign * cosine
 
 
-def lesser(a: Float[Array, "..."], b: Float[Array, "..."]) -> Float[Array, "..."]:
+def nan_ignoring_min(a: Float[Array, "..."], b: Float[Array, "..."]) -> Float[Array, "..."]:
     """The smaller of two numbers in one machine instruction; XLA's minimum takes four, for the sake of NaN."""
     return jnp.where(a < b, a, b)
 
@@ -109,10 +109,10 @@ def leaf(value) -> Array:
 
 def vertex(left: Array, middle: Array, right: Array) -> tuple[Array, Array]:
     """Vertex of the parabola through three equidistant values: its place, and the value there."""
-    bend = left - 2.0 * middle + right
-    move = 0.5 * (left - right) / jnp.where(bend > 0.0, bend, 1.0)
-    move = jnp.clip(jnp.where(bend > 0.0, move, jnp.sign(left - right)), -1.0, 1.0)
-    return move, middle + 0.5 * move * (right - left) + 0.5 * move**2 * bend
+    second_derivative = left - 2.0 * middle + right
+    move = 0.5 * (left - right) / jnp.where(second_derivative > 0.0, second_derivative, 1.0)
+    move = jnp.clip(jnp.where(second_derivative > 0.0, move, jnp.sign(left - right)), -1.0, 1.0)
+    return move, middle + 0.5 * move * (right - left) + 0.5 * move**2 * second_derivative
 
 
 @jax.jit

@@ -47,5 +47,5 @@ def _of_sections(sections: list[dict[str, Any]], to: int) -> list[str]:
     return words + ([f"somewhere it must be as fast as {max(speeds):.3g} m/s"] if speeds else [])
 
 
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} %" if share < 0.1 else f"{100.0 * share:.0f} %"
+def _percent(fraction: float) -> str:
+    return f"{100.0 * fraction:.2g} %" if fraction < 0.1 else f"{100.0 * fraction:.0f} %"

@@ -30,15 +30,15 @@ DEPTHS = 200
 
 def chosen_depth(problem: Any, sequence: PlanLegs) -> float:
     """The plan's z0, given or chosen."""
-    stops = sequence.stops
-    keys, path, targets = stops.keys, stops.path, stops.targets
-    if keys.z0 is None and not _needs_depth(stops):
+    waypoints = sequence.waypoints
+    keys, path, targets = waypoints.keys, waypoints.path, waypoints.targets
+    if keys.z0 is None and not _needs_depth(waypoints):
         return float("nan")
-    _check_depth_keys(stops)
+    _check_depth_keys(waypoints)
     if isinstance(keys.z0, float):
         if keys.z0 > LARGEST_LENGTH:
             raise ConfigError(path, f"z0 = {shown(keys.z0)}: must be at most 1e6 m")
-        _check_rest(problem.robot, stops, keys.z0)
+        _check_rest(problem.robot, waypoints, keys.z0)
         return keys.z0
     for i, pose in enumerate(keys.pose):
         if pose.rest and pose.position is not None:
@@ -46,7 +46,7 @@ def chosen_depth(problem: Any, sequence: PlanLegs) -> float:
     if not len(targets):
         raise ConfigError(path, "z0 = { choose = ... }: must be a number where every pose is at rest")
     if not isinstance(keys.z0, DepthRule):
-        return _depth_of_inclination(problem, stops)
+        return _depth_of_inclination(problem, waypoints)
     if keys.z0.choose == "mean":
         z0 = depths.mean_depth(problem.robot, targets)
     elif keys.z0.choose == "conservative":
@@ -55,23 +55,23 @@ def chosen_depth(problem: Any, sequence: PlanLegs) -> float:
         with within("fastest z0"):
             z0 = _fastest_depth(problem, sequence)
     if not 0.0 < z0 <= LARGEST_LENGTH:
-        hint = "".join(f" ({line})" for line in plan_hints(keys, stops.robot_file))
+        hint = "".join(f" ({line})" for line in plan_hints(keys, waypoints.robot_file))
         why = f"since no z0 in ]0, 1e6] m follows from the poses{hint}"
         raise ConfigError(path, f'z0.choose = "{keys.z0.choose}": must be a number here, {why}')
     return z0
 
 
-def _needs_depth(stops: Waypoints) -> bool:
+def _needs_depth(waypoints: Waypoints) -> bool:
     # Rests elsewhere than in P0 need no depth of P0.
-    keys = stops.keys
+    keys = waypoints.keys
     anywhere = all(FAMILIES[name].rests_anywhere for name in keys.families)
     return (
         not anywhere or keys.inclination is not None or any(pose.position is None and pose.rest for pose in keys.pose)
     )
 
 
-def _check_depth_keys(stops: Waypoints) -> None:
-    keys, path = stops.keys, stops.path
+def _check_depth_keys(waypoints: Waypoints) -> None:
+    keys, path = waypoints.keys, waypoints.path
     if keys.z0 is None and keys.inclination is None:
         other = ", or inclination" if set(keys.families) == {"transition"} else ""
         raise ConfigError(
@@ -81,39 +81,39 @@ def _check_depth_keys(stops: Waypoints) -> None:
         raise ConfigError(path, "z0, inclination: must be one of them")
 
 
-def _check_rest(robot: Robot, stops: Waypoints, z0: float) -> None:
+def _check_rest(robot: Robot, waypoints: Waypoints, z0: float) -> None:
     at_rest, near = rest_point(np.asarray(z0)), AT_P0 * float(spool_radius(robot))
-    for i, pose in enumerate(stops.poses):
-        if not pose.rest or pose.position is None or _rests_anywhere(stops, i):
+    for i, pose in enumerate(waypoints.poses):
+        if not pose.rest or pose.position is None or _rests_anywhere(waypoints, i):
             continue
-        if np.linalg.norm(stops.frame.inward(pose.position) - at_rest) > near:
-            place = [float(f"{value:.12g}") for value in stops.frame.outward(at_rest)]
+        if np.linalg.norm(waypoints.frame.inward(pose.position) - at_rest) > near:
+            place = [float(f"{value:.12g}") for value in waypoints.frame.outward(at_rest)]
             raise ConfigError(
-                stops.path, f"pose[{i}].position = {shown(pose.position)}: must be P0 = {place} at rest, or absent"
+                waypoints.path, f"pose[{i}].position = {shown(pose.position)}: must be P0 = {place} at rest, or absent"
             )
 
 
-def nearly_resting(stops: Waypoints, z0: float) -> list[str]:
+def nearly_resting(waypoints: Waypoints, z0: float) -> list[str]:
     """Poses that are P0 but for their last digits."""
     lines = [
-        almost_at_rest(f"{stops.name(i)}.position", pose.position, z0, stops.robot_file)
-        for i, pose in enumerate(stops.poses)
-        if not pose.rest and pose.position is not None and not _rests_anywhere(stops, i)
+        almost_at_rest(f"{waypoints.name(i)}.position", pose.position, z0, waypoints.robot_file)
+        for i, pose in enumerate(waypoints.poses)
+        if not pose.rest and pose.position is not None and not _rests_anywhere(waypoints, i)
     ]
     return [f"hint: {line}" for line in lines if line]
 
 
-def _rests_anywhere(stops: Waypoints, i: int) -> bool:
-    segments = range(max(i - 1, 0), min(i + 1, len(stops)))
-    return all(FAMILIES[stops.keys.family_of(segment)].rests_anywhere for segment in segments)
+def _rests_anywhere(waypoints: Waypoints, i: int) -> bool:
+    segments = range(max(i - 1, 0), min(i + 1, len(waypoints)))
+    return all(FAMILIES[waypoints.keys.family_of(segment)].rests_anywhere for segment in segments)
 
 
-def _depth_of_inclination(problem: Problem, stops: Waypoints) -> float:
-    targets, path, inclination = stops.targets, stops.path, stops.keys.inclination
+def _depth_of_inclination(problem: Problem, waypoints: Waypoints) -> float:
+    targets, path, inclination = waypoints.targets, waypoints.path, waypoints.keys.inclination
     if inclination == "best":
         if (targets != targets[0]).any():
             raise ConfigError(path, 'inclination = "best": must be a number in a plan with more than one target')
-        v = _best_inclination(problem, stops)
+        v = _best_inclination(problem, waypoints)
     else:
         v = float(inclination or 0.0)
     levels = [float(depth_for(problem.robot, jnp.asarray(target), jnp.asarray(v))) for target in targets]
@@ -122,18 +122,18 @@ def _depth_of_inclination(problem: Problem, stops: Waypoints) -> float:
             path, f"inclination = {v:g}: must be replaced by z0, since the targets lie at different depths"
         )
     if not levels[0] > 0.0:
-        hint = "".join(f" ({line})" for line in plan_hints(stops.keys, stops.robot_file))
+        hint = "".join(f" ({line})" for line in plan_hints(waypoints.keys, waypoints.robot_file))
         why = f"since the targets are not below the spool plane{hint}"
         raise ConfigError(path, f"inclination: must be replaced by z0, {why}")
     return levels[0]
 
 
-def _best_inclination(problem: Problem, stops: Waypoints) -> float:
-    target = stops.targets[0]
+def _best_inclination(problem: Problem, waypoints: Waypoints) -> float:
+    target = waypoints.targets[0]
     if problem.robot.n_cables > problem.robot.dof:
         from cspr_jax.families.swings.transitions.oscillations import best_inclinations
 
-        return float(best_inclinations(problem, target[None], max_arcs=stops.max_arcs)[0])
+        return float(best_inclinations(problem, target[None], max_arcs=waypoints.max_arcs)[0])
     # The weights do not depend on the depth of P0.
     one = transition(problem.robot, problem.amplitude, jnp.asarray(target), jnp.asarray(1.0))
     return float(best_inclination(problem.amplitude, weights(one))[0])
@@ -141,8 +141,8 @@ def _best_inclination(problem: Problem, stops: Waypoints) -> float:
 
 def _fastest_depth(problem: Problem, sequence: PlanLegs) -> float:
     # The duration grows with the root of z0 between changes of the arcs: a coarse look, then a fine one at the best.
-    least = max(depths.least_depth(problem.robot, sequence.stops.targets), 1e-3)
-    safe = depths.conservative_depth(problem.robot, sequence.stops.targets)
+    least = max(depths.least_depth(problem.robot, sequence.waypoints.targets), 1e-3)
+    safe = depths.conservative_depth(problem.robot, sequence.waypoints.targets)
     trial = np.linspace(0.5 * least, max(1.5 * least, safe if np.isfinite(safe) else 0.0), DEPTHS)
     for _ in range(2):
         table = sequence.table(problem, trial)
@@ -160,9 +160,9 @@ def best_amplitude(problem: Any, sequence: PlanLegs, z0: float) -> tuple[Amplitu
     """The amplitude function whose epsilon gives the shortest plan; among equals, the largest margin."""
     ranked: list[tuple[float, float, int, Amplitude, float]] = []
     for epsilon in EPSILONS:
-        amplitude = build_amplitude(sequence.stops.keys, sequence.stops.path, epsilon=float(epsilon))
+        amplitude = build_amplitude(sequence.waypoints.keys, sequence.waypoints.path, epsilon=float(epsilon))
         trial = problem._replace(amplitude=amplitude)
-        depth = chosen_depth(trial, sequence) if sequence.stops.keys.inclination == "best" else z0
+        depth = chosen_depth(trial, sequence) if sequence.waypoints.keys.inclination == "best" else z0
         with within(f"epsilon {epsilon:.2f} of {EPSILONS[-1]:.2f}"):
             table = sequence.table(trial, np.array([depth]))
         cost = np.where(table["feasible"], table["duration"], np.inf).sum()

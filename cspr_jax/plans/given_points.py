@@ -30,7 +30,7 @@ def with_mass_centres(robot_file: RobotFile, keys: PlanFile, path: Path) -> Plan
     places = np.zeros((len(keys.pose), 3))
     for i in placed:
         places[i] = frame.inward(keys.pose[i].position)
-    arm, units = frame.turned(centre), None
+    arm, units = frame.rotated(centre), None
     shifts = np.broadcast_to(arm, places.shape)  # of a platform that only translates
     if robot_file.is_platform and placed:
         units = pose_quaternions(Waypoints(robot_file, keys, path, frame, keys.family, 0, len(places) - 1), places)

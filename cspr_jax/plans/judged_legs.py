@@ -78,7 +78,7 @@ class JudgedLeg(Leg):
 
     def __init__(self, leg: Leg) -> None:
         """Keep the leg of the family."""
-        super().__init__(leg.stops)
+        super().__init__(leg.waypoints)
         self._leg = leg
 
     def check(self, problem: Problem) -> None:
@@ -100,10 +100,17 @@ class JudgedLeg(Leg):
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the poses by motions that are proved, if there are such; see `Leg.join`."""
-        stops, plain, prescribed = self.stops, _from_points(problem), self.stops.arcs
+        waypoints, plain, prescribed = self.waypoints, _from_points(problem), self.waypoints.arcs
         judge = Judge(
             problem,
-            scene_of(problem.robot, stops.robot_file, stops.frame, stops.keys, stops.path, trajectory=stops.keys),
+            scene_of(
+                problem.robot,
+                waypoints.robot_file,
+                waypoints.frame,
+                waypoints.keys,
+                waypoints.path,
+                trajectory=waypoints.keys,
+            ),
         )
         robot, joined = problem.robot, dict[bytes, tuple[Answers, list[Motion]]]()
 
@@ -120,9 +127,9 @@ class JudgedLeg(Leg):
 
         is_determined, has_pulleys = robot.n_cables == robot.dof, judge.has_pulleys
         is_searched = is_determined or not has_pulleys
-        if stops.robot_file.is_platform:  # whose motion depends on those before and behind it
+        if waypoints.robot_file.is_platform:  # whose motion depends on those before and behind it
             is_searched = not has_pulleys and len(self) == 1
-        most = stops.max_arcs if is_searched else 0
+        most = waypoints.max_arcs if is_searched else 0
         judged = judge.smallest(join, prescribed, step=self._leg.step, max_arcs=most)
         motions = join(np.arange(len(self)), judged.arcs)[1]
         from cspr_jax.verification.attained import attained
@@ -135,13 +142,13 @@ class JudgedLeg(Leg):
 
     def _with(self, arcs: np.ndarray) -> Leg:
         leg = copy.copy(self._leg)
-        leg.stops = dataclasses.replace(self.stops, fixed=arcs)
+        leg.waypoints = dataclasses.replace(self.waypoints, fixed=arcs)
         return leg
 
 
 def judged(leg: Leg, *, surroundings: bool, pulleys: bool) -> Leg:
     """A leg whose verdicts take surroundings and pulleys into account."""
-    row = FAMILIES[leg.stops.family]
+    row = FAMILIES[leg.waypoints.family]
     is_known = (row.knows_obstacles or not surroundings) and (row.knows_pulleys or not pulleys)
     return leg if is_known else JudgedLeg(leg)
 

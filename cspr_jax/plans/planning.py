@@ -150,13 +150,13 @@ def plan_of(keys: PlanFile, path: Path) -> PlannedMotions:
     if isinstance(keys.amplitude, NamedAmplitude) and keys.amplitude.epsilon == "best":
         amplitude, z0 = best_amplitude(problem, sequence, z0)
         problem = problem._replace(amplitude=amplitude)
-    legs = tuple(JoinedLeg(leg.stops.family, *leg.join(problem, z0)) for leg in sequence.legs)
+    legs = tuple(JoinedLeg(leg.waypoints.family, *leg.join(problem, z0)) for leg in sequence.legs)
     _refuse_jumps(problem, sequence, legs)
-    frame = sequence.stops.frame
-    legs = tuple(_attained(problem, leg, sequence.stops) for leg in legs)
+    frame = sequence.waypoints.frame
+    legs = tuple(_attained(problem, leg, sequence.waypoints) for leg in legs)
     why, extremes = _judged(problem, robot_file, frame, legs, keys)
     lines = [line for leg in sequence.legs for line in leg.warnings(problem)]
-    lines += nearly_resting(sequence.stops, z0)
+    lines += nearly_resting(sequence.waypoints, z0)
     lines += _missed(keys, np.concatenate([leg.answers.feasible for leg in legs]), extremes)
     return PlannedMotions(
         robot_file=robot_file,
@@ -180,7 +180,7 @@ def _point(keys: PlanFile, sequence: PlanLegs) -> str:
     return keys.point or (points.pop() if len(points) == 1 else None) or "mass-centre"
 
 
-def _attained(problem: Problem, leg: JoinedLeg, stops: Waypoints) -> JoinedLeg:
+def _attained(problem: Problem, leg: JoinedLeg, waypoints: Waypoints) -> JoinedLeg:
     # The leg with margins and causes that its motions attain, where proofs bound them.
     if not hasattr(leg.answers, "proof"):
         return leg
@@ -189,8 +189,8 @@ def _attained(problem: Problem, leg: JoinedLeg, stops: Waypoints) -> JoinedLeg:
     from cspr_jax.verification.attained import with_attained
 
     answers: Any = leg.answers
-    keys = stops.keys
-    scene = scene_of(problem.robot, stops.robot_file, stops.frame, keys, stops.path, trajectory=keys)
+    keys = waypoints.keys
+    scene = scene_of(problem.robot, waypoints.robot_file, waypoints.frame, keys, waypoints.path, trajectory=keys)
     return dataclasses.replace(leg, answers=with_attained(problem, answers, leg.motions, scene))
 
 
@@ -226,13 +226,13 @@ def _shape(problem: Problem, robot_file: RobotFile, frame: Frame, keys: PlanFile
 
 def _points(sequence: PlanLegs, legs: tuple[JoinedLeg, ...], z0: float) -> np.ndarray:
     # Return the places of all poses in the axes of the robot file, also of those that the motion before them decides.
-    stops = sequence.stops
-    points = np.array(stops.frame.outward(stops.points(z0)))
+    waypoints = sequence.waypoints
+    points = np.array(waypoints.frame.outward(waypoints.points(z0)))
     motions = [motion for leg in legs for motion in leg.motions]
-    for i in stops.keys.resulting_poses:
+    for i in waypoints.keys.resulting_poses:
         # The place of the first pose is where the motion begins.
         segment, end = (i - 1, 1.0) if i else (0, 0.0)
-        points[i] = stops.frame.outward(states_at(motions[segment], np.array([end])).position[0])
+        points[i] = waypoints.frame.outward(states_at(motions[segment], np.array([end])).position[0])
     return points
 
 
@@ -303,7 +303,7 @@ def _refuse_jumps(problem: Problem, sequence: PlanLegs, legs: tuple[JoinedLeg, .
             jump = float(np.abs(np.asarray(a) - np.asarray(b)).max())
             if not jump <= CONTINUOUS * scale:
                 raise ConfigError(
-                    sequence.stops.path,
-                    f'pose[{leg.stops.first + 1}].family = "{after.family}": must be one whose {name} goes on from '
-                    f'"{before.family}": it jumps by {jump:.2g} at pose[{leg.stops.first}]',
+                    sequence.waypoints.path,
+                    f'pose[{leg.waypoints.first + 1}].family = "{after.family}": must be one whose {name} goes on from '
+                    f'"{before.family}": it jumps by {jump:.2g} at pose[{leg.waypoints.first}]',
                 )

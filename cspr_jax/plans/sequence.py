@@ -47,7 +47,7 @@ class PlanLegs:
         _check_keys(keys, path)
         _check_poses(robot_file, keys, path)
         frame, last = frame_of(robot_file.base_points, robot_file.z_axis), len(keys.pose) - 1
-        self.stops = Waypoints(robot_file, keys, path, frame, keys.family, 0, last)
+        self.waypoints = Waypoints(robot_file, keys, path, frame, keys.family, 0, last)
         changes = [i for i in range(1, last) if keys.family_of(i) != keys.family_of(i - 1)]
         self.legs: list[Leg] = []
         for first, after in zip([0, *changes], [*changes, last], strict=True):
@@ -55,7 +55,7 @@ class PlanLegs:
             leg = FAMILIES[family].leg(robot_file.own_pattern)
             plain = leg(Waypoints(robot_file, keys, path, frame, family, first, after))
             if FAMILIES[family].is_searched:
-                plain.begin_with(_others(plain.stops))
+                plain.begin_with(_others(plain.waypoints))
             self.legs.append(_judged(plain))
 
     def table(self, problem: Problem, depths: Float[np.ndarray, "n_depths"]) -> dict[str, np.ndarray]:
@@ -68,17 +68,19 @@ class PlanLegs:
 
 
 def _judged(leg: Leg) -> Leg:
-    stops = leg.stops
-    return judged(leg, surroundings=bool(stops.keys.surroundings), pulleys=stops.robot_file.pulley_radius is not None)
+    waypoints = leg.waypoints
+    return judged(
+        leg, surroundings=bool(waypoints.keys.surroundings), pulleys=waypoints.robot_file.pulley_radius is not None
+    )
 
 
-def _others(stops: Waypoints) -> list[Leg]:
+def _others(waypoints: Waypoints) -> list[Leg]:
     # Legs over the same poses of the families from whose motions searches begin.
-    pattern, legs = stops.robot_file.own_pattern, list[Leg]()
+    pattern, legs = waypoints.robot_file.own_pattern, list[Leg]()
     for row in FAMILIES.values():
         if row.begins_searches and pattern in row.legs:
             with contextlib.suppress(ConfigError):  # of poses that the family does not join
-                legs.append(_judged(row.leg(pattern).for_searches(dataclasses.replace(stops, family=row.name))))
+                legs.append(_judged(row.leg(pattern).for_searches(dataclasses.replace(waypoints, family=row.name))))
     return legs
 
 

@@ -46,7 +46,7 @@ def _case() -> tuple[Sides, float]:
     # Bounds of the path acceleration of the test case, and the largest one.
     keys = read_plan(read_text(CASE), CASE)
     robot_file = resolve_robot(keys.robot, CASE, CASE.parent)
-    start, end = PlanLegs(robot_file, keys, CASE).stops.points(float("nan"))
+    start, end = PlanLegs(robot_file, keys, CASE).waypoints.points(float("nan"))
     largest = float(keys.max_acceleration or np.inf) / float(np.linalg.norm(end - start))
     robot = kernel_robot(robot_file, keys, CASE, any_cables=True)
     return jax.tree.map(np.asarray, _bounds(robot, start, end, jnp.asarray(largest))), largest
@@ -128,12 +128,12 @@ def _passed(upper: PublishedLine, lower: PublishedLine, largest: float) -> tuple
     edges = np.concatenate([np.zeros_like(time)[:, None], laws.knots, np.ones_like(time)[:, None]], axis=1)
     spans = np.stack([edges[:, :-1] - laws.origins, edges[:, 1:] - laws.origins])
     s = np.moveaxis(laws.coefficients, -1, 0)  # (4, n, n_pieces) about the origin of each piece
-    bend = np.stack([2.0 * s[2], 6.0 * s[3], 0.0 * s[0], 0.0 * s[0]]) / time[:, None] ** 2
+    second_derivative = np.stack([2.0 * s[2], 6.0 * s[3], 0.0 * s[0], 0.0 * s[0]]) / time[:, None] ** 2
 
     def beyond(line: PublishedLine) -> np.ndarray:
         constant = np.zeros((4, 1, 1))
         constant[0] = line.start
-        return bend - line.slope * s - constant
+        return second_derivative - line.slope * s - constant
 
     level, shape = (PublishedLine(largest, 0.0), PublishedLine(-largest, 0.0)), (len(TIMES), len(PERIODS))
     over = np.maximum(_largest(beyond(upper), spans), _largest(beyond(level[0]), spans)).max(1)

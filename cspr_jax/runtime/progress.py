@@ -93,8 +93,8 @@ def _lines() -> Iterator[Callable[[int, int], None]]:
     def line() -> str:
         done, total = cells[-1]
         rate = "" if pace.rate is None else f", {pace.rate:,.3g} cells/s, {pace.left()}"
-        share = f"{100.0 * done / total:.0f} %, {done:,} of {total:,} cells" if total else "before the first tile"
-        return f"{share}{rate}"
+        fraction = f"{100.0 * done / total:.0f} %, {done:,} of {total:,} cells" if total else "before the first tile"
+        return f"{fraction}{rate}"
 
     with _every_minute(line):
         yield on_tile

@@ -120,10 +120,10 @@ def content_of(path: Path, begun: Callable[[Iterable[ReadableDataset]], None] = 
                 raise DamagedError("its content has changed")
             near_zero, mixed = (int(guard.numbers(file, name, "int64") or 0) for name in ("cells_near_zero", "mixed"))
             proved = guard.numbers(file, "proved", "float64")
-            share = None if proved is None else float(proved)
+            fraction = None if proved is None else float(proved)
     except (StoreError, *UNREADABLE, MemoryError) as error:
         raise DamagedError(f"it cannot be read: {reason(error)}") from error
-    return Content(identity(settings), settings, grid.size, len(grid.tiling), near_zero, bool(mixed), share)
+    return Content(identity(settings), settings, grid.size, len(grid.tiling), near_zero, bool(mixed), fraction)
 
 
 def _text(file: h5py.File, name: str) -> str:

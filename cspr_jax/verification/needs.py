@@ -125,9 +125,9 @@ def _values(
         reached, slacks = [jnp.atleast_1d(depth)], [jnp.atleast_1d(depth / z0)]
         if isinstance(robot, PlatformRobot) and robot.n_cables == robot.dof:
             here = wrench_balance.normalised_determinant(robot, state.position, state.rotation)
-            share = here / wrench_balance.normalised_determinant(robot, rest_point(z0), jnp.eye(3))
-            reached.append(jnp.atleast_1d(share))
-            slacks.append(jnp.atleast_1d(share))
+            fraction = here / wrench_balance.normalised_determinant(robot, rest_point(z0), jnp.eye(3))
+            reached.append(jnp.atleast_1d(fraction))
+            slacks.append(jnp.atleast_1d(fraction))
         if pairs and isinstance(robot, PlatformRobot):
             thick = 0.0 if robot.cable_diameter is None else robot.cable_diameter
             apart = jnp.sqrt(jnp.sum(gaps(robot, jnp.asarray(pairs), state.position, state.rotation) ** 2, axis=1))

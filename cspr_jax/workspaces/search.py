@@ -303,7 +303,7 @@ class WorkspaceSearch:
                 continue
             if self._measure == "closure":
                 margins[i] = exact.closure_margin(columns, self._choices)
-                is_outside[i] = exact.cocircuits(columns)[2].shape[1] < len(columns)
+                is_outside[i] = exact.facet_normals(columns)[2].shape[1] < len(columns)
             else:
                 required = self._wrenches if poses.wrenches is None else self._wrenches.about(poses.wrenches[i])
                 low, high = limits or (self.requirement.low, self.requirement.high)

@@ -213,7 +213,7 @@ def test_positions_of_the_origin_of_a_platform():
     angles = 0.1 * (1.0 - np.cos(np.pi * times / 2.0))
     zero = 0.0 * times
     quaternions = np.stack([np.cos(angles / 2.0), zero, np.sin(angles / 2.0), zero], axis=1)
-    turned = np.stack(
+    rotated = np.stack(
         [
             np.cos(angles) * centre[0] + np.sin(angles) * centre[2],
             centre[1] + zero,
@@ -224,7 +224,7 @@ def test_positions_of_the_origin_of_a_platform():
     origin = np.tile([0.5, 0.0, 2.0], (401, 1))
     limits = {"tension_min": 100.0, "tension_max": 500.0}
     by_origin = cspr_jax.check("cogiro", times, origin, quaternions, point="origin", limits=limits)
-    by_centre = cspr_jax.check("cogiro", times, origin + turned, quaternions, limits=limits)
+    by_centre = cspr_jax.check("cogiro", times, origin + rotated, quaternions, limits=limits)
     other = cspr_jax.check("cogiro", times, origin, quaternions, limits=limits)
     assert by_origin.margin == pytest.approx(by_centre.margin, rel=1e-3)
     assert other.margin != pytest.approx(by_centre.margin, rel=1e-2) and "mass centre" in other.plan.warnings[0]
@@ -233,13 +233,13 @@ def test_positions_of_the_origin_of_a_platform():
 
 
 @pytest.mark.parametrize("share", [-1e-7, 1e-7])
-def test_a_motion_on_its_limit_says_so(share):
+def test_a_motion_on_its_limit_says_so(fraction):
     """A plumb swing that falls as fast as it can, by a ten-millionth slower or faster: its rows tell no more.
 
     Its acceleration changes least where it is largest, so that pieces between rows hardly miss that.
     """
     rate, times = 4.0, np.linspace(0.0, 4.0, 101)
-    size = 9.81 * (1.0 + share) / rate**2
+    size = 9.81 * (1.0 + fraction) / rate**2
 
     def check(times):
         phase = rate * times
@@ -249,7 +249,7 @@ def test_a_motion_on_its_limit_says_so(share):
         return cspr_jax.check("prototype", times, columns[0], velocities=columns[1], accelerations=columns[2])
 
     coarse, fine = check(times), check(np.linspace(0.0, 4.0, 3201))
-    assert fine.feasible == (share < 0.0)
+    assert fine.feasible == (fraction < 0.0)
     (row,) = coarse.to_dict()["on_limit"]
     assert row["criterion"] == "slack_cable" and abs(row["needed"]) < 1e-7 < row["tolerance"] < 1e-5
     assert any(line.startswith("on its limit") for line in coarse.lines())

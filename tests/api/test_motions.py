@@ -49,8 +49,8 @@ def of_point_mass(base_points, z0, target):
 def of_platform(base_points, z0, target):
     """Sampled margin of a motion of four arcs of the MSSM, from rest to a tilted pose."""
     robot = dataclasses.replace(cspr_jax.load_robot("laval-mssm"), base_points=base_points)
-    turned = (np.array([1.0, 0.0, 0.0, 0.0]), np.array([np.cos(0.1), np.sin(0.1), 0.0, 0.0]))
-    motion = platform_motion(robot, None, target, z0=z0, arcs=4, orientations=turned, beta_hat=(-1.0, -1.3))
+    rotated = (np.array([1.0, 0.0, 0.0, 0.0]), np.array([np.cos(0.1), np.sin(0.1), 0.0, 0.0]))
+    motion = platform_motion(robot, None, target, z0=z0, arcs=4, orientations=rotated, beta_hat=(-1.0, -1.3))
     return sampled_margin(make_problem(robot), motion)
 
 
@@ -110,10 +110,10 @@ def test_derivatives_of_states():
     def position(t):
         return motion.state(t).position
 
-    slope, bend = jax.jit(lambda t: (jax.jacfwd(position)(t), jax.jacfwd(jax.jacfwd(position))(t)))(tau)
+    slope, second_derivative = jax.jit(lambda t: (jax.jacfwd(position)(t), jax.jacfwd(jax.jacfwd(position))(t)))(tau)
     state = state_of(motion, 0.37)
     np.testing.assert_allclose(slope / time, state.velocity, rtol=1e-9)
-    np.testing.assert_allclose(bend / time**2, state.acceleration, rtol=1e-8)
+    np.testing.assert_allclose(second_derivative / time**2, state.acceleration, rtol=1e-8)
 
 
 def test_tensions_balance_the_motion():

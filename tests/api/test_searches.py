@@ -69,8 +69,8 @@ def test_poses_are_those_of_a_plan():
     robot = cspr_jax.load_robot("laval-mssm")
     found = cspr_jax.minimum_pose_arcs(robot, PLACES, TURNS, z0=1.4, beta_hat="preferred", amplitude=EFFECTIVE)
     np.testing.assert_allclose(reached(found), PLACES, atol=1e-12)
-    turned = states_reached(found.motions(), 1.0).quaternion
-    np.testing.assert_allclose(np.abs(np.sum(np.asarray(turned) * TURNS, axis=1)), 1.0, atol=1e-12)
+    rotated = states_reached(found.motions(), 1.0).quaternion
+    np.testing.assert_allclose(np.abs(np.sum(np.asarray(rotated) * TURNS, axis=1)), 1.0, atol=1e-12)
     i = 1
     plan = cspr_jax.plan(
         {
@@ -94,7 +94,7 @@ def test_poses_are_those_of_a_plan():
 def test_z_up_and_far_away():
     """The same robot with z up, a hundred metres off: the same answers, and motions in its own axes."""
     robot, signs, offset = cspr_jax.load_robot("laval-mssm"), np.array([1.0, -1.0, -1.0]), np.array([100.0, -30.0, 5.0])
-    turned = cspr_jax.platform(
+    rotated = cspr_jax.platform(
         np.asarray(robot.base_points) * signs + offset,
         np.asarray(robot.platform_points) * signs,
         mass=float(robot.mass),
@@ -103,7 +103,7 @@ def test_z_up_and_far_away():
     )
     mirrored = TURNS * np.append(1.0, signs)
     here = cspr_jax.minimum_pose_arcs(robot, PLACES, TURNS, z0=1.4, amplitude=EFFECTIVE)
-    there = cspr_jax.minimum_pose_arcs(turned, PLACES * signs + offset, mirrored, z0=1.4, amplitude=EFFECTIVE)
+    there = cspr_jax.minimum_pose_arcs(rotated, PLACES * signs + offset, mirrored, z0=1.4, amplitude=EFFECTIVE)
     np.testing.assert_array_equal(here.arcs, there.arcs)
     np.testing.assert_allclose(here.margin, there.margin, rtol=1e-9)
     np.testing.assert_allclose(reached(there), PLACES * signs + offset, atol=1e-10)

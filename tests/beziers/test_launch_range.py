@@ -74,10 +74,14 @@ def states_of(points, duration, times):
     start, middle, end = points
     turn = np.pi / duration
     s, rate = 0.5 * (1.0 - np.cos(turn * times)), 0.5 * turn * np.sin(turn * times)
-    bend = 0.5 * turn**2 * np.cos(turn * times)
+    second_derivative = 0.5 * turn**2 * np.cos(turn * times)
     first = 2.0 * ((1.0 - s)[:, None] * (middle - start) + s[:, None] * (end - middle))
     place = ((1.0 - s) ** 2)[:, None] * start + (2.0 * s * (1.0 - s))[:, None] * middle + (s**2)[:, None] * end
-    return place, rate[:, None] * first, bend[:, None] * first + (2.0 * rate**2)[:, None] * (start - 2.0 * middle + end)
+    return (
+        place,
+        rate[:, None] * first,
+        second_derivative[:, None] * first + (2.0 * rate**2)[:, None] * (start - 2.0 * middle + end),
+    )
 
 
 def test_every_launch_found_is_thrown_again(result):

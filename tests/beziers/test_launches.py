@@ -19,7 +19,7 @@ from cspr_jax.launch.landings import LaunchErrors, Throw, scatter
 GRAVITY = 9.80665
 PLACES = [[0, 0, -0.5], [-0.05, -0.05, -0.7], [0.1, 0.15, -0.8], [-0.1, -0.3, -1.2]]
 SPOOLS = np.array([[0.35, 0.0, 0.0], [-0.175, 0.30310889132455354, 0.0], [-0.175, -0.30310889132455354, 0.0]])
-STATE = jax.jit(lambda curve, share: curve.state(share))
+STATE = jax.jit(lambda curve, fraction: curve.state(fraction))
 LAUNCH = {"segment": "3", "point": "[0, -0.15, -0.8]", "target": "[0.15, 0.05, -1.675]", "time": "0.5"}
 
 
@@ -47,10 +47,10 @@ def test_the_end_point_of_the_text():
 def test_the_segment_passes_the_release_with_its_velocity(seed):
     rng = np.random.default_rng(seed)
     start, place, velocity = rng.normal(size=(3, 3))
-    share, time = rng.uniform(0.05, 0.95), rng.uniform(0.3, 3.0)
-    middle, end = jax.jit(through)(start, place, velocity, share, time)
+    fraction, time = rng.uniform(0.05, 0.95), rng.uniform(0.3, 3.0)
+    middle, end = jax.jit(through)(start, place, velocity, fraction, time)
     position, speed, _ = oracle.states([start, middle, end], time, 2)  # shape only
-    state = STATE(Bezier(start, middle, end, time, 1.0), share)
+    state = STATE(Bezier(start, middle, end, time, 1.0), fraction)
     np.testing.assert_allclose(state.position, place, atol=1e-12)
     np.testing.assert_allclose(state.velocity, velocity, atol=1e-12)
     np.testing.assert_allclose(position[[0, 2]], [start, end], atol=1e-14)
@@ -129,10 +129,10 @@ def test_the_least_energy_and_the_earliest_landing(tmp_path):
         np.testing.assert_allclose(answer["launch"]["landing"], [0.15, 0.05, -1.675], atol=1e-9)
     # No launch near the earliest is earlier and feasible.
     own, rng = found["time"], np.random.default_rng(0)
-    share = own["launch"]["release"]["time"] / own["segments"][0]["duration"]
+    fraction = own["launch"]["release"]["time"] / own["segments"][0]["duration"]
     size = rng.normal(size=(3, 3000)) * np.repeat([0.1, 0.01, 0.001], 1000)
     flight, time = (own["launch"]["flight_time"] * np.exp(size[0]), own["segments"][0]["duration"] * np.exp(size[1]))
-    at = np.clip(share * np.exp(size[2]), 0.0, 1.0)
+    at = np.clip(fraction * np.exp(size[2]), 0.0, 1.0)
     start, place, target = (np.array(x, float) for x in (PLACES[-1], [0, -0.15, -0.8], [0.15, 0.05, -1.675]))
     velocity = (target - place) / flight[:, None] + 0.5 * GRAVITY * np.array([0, 0, 1.0]) * flight[:, None]
     middle, end = jax.jit(jax.vmap(through, (None, None, 0, 0, 0)))(start, place, velocity, at, time)
@@ -199,8 +199,8 @@ def test_landings_are_those_of_another_solver(throw):
     lengths, rates = random.normal(size=(20, 3)) * 0.01, random.normal(size=(20, 3)) * 0.05
     (motion,) = planned_throw.motions
     for own, (late,), more, faster in zip(found, instants, lengths, rates, strict=True):
-        share = 0.59 + late
-        p, v, a = (x[-1] for x in halfway([motion.start, motion.middle, motion.end], 1.6, share))
+        fraction = 0.59 + late
+        p, v, a = (x[-1] for x in halfway([motion.start, motion.middle, motion.end], 1.6, fraction))
         length, rate, _ = (x[0] for x in oracle.cable_states(SPOOLS, p[None], v[None], a[None]))
         place = fsolve(lambda x, want=length + more: np.linalg.norm(x - SPOOLS, axis=1) - want, p, xtol=1e-13)
         units = (place - SPOOLS) / np.linalg.norm(place - SPOOLS, axis=1, keepdims=True)

@@ -125,13 +125,13 @@ def test_the_least_duration_under_limits(limits, name):
 def test_the_least_total():
     """Shorter than one segment after the other, proved, and a little less is not feasible."""
     base, places = CASES["boralugoda-planar-three"]
-    stops = [[10.0, 0.0, 5.0], [30.0, 0.0, 10.0], [15.0, 0.0, 12.0]]
-    answer = plan_of("boralugoda-planar-three", stops, [None, None], least="total")
+    waypoints = [[10.0, 0.0, 5.0], [30.0, 0.0, 10.0], [15.0, 0.0, 12.0]]
+    answer = plan_of("boralugoda-planar-three", waypoints, [None, None], least="total")
     times = answer.answers.duration
     assert answer.feasible and min(least_distances(base, answer, 241)) > -1e-6 and len(places) == 3
     for shorter in ([0.999, 1.0], [1.0, 0.999], [0.999, 0.999]):
-        assert not plan_of("boralugoda-planar-three", stops, (times * shorter).tolist()).feasible
-    each = plan_of("boralugoda-planar-three", stops, [None, None])
+        assert not plan_of("boralugoda-planar-three", waypoints, (times * shorter).tolist()).feasible
+    each = plan_of("boralugoda-planar-three", waypoints, [None, None])
     assert not each.feasible or times.sum() <= each.answers.duration.sum() * (1.0 + 1e-9)
 
 

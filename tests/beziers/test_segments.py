@@ -206,7 +206,7 @@ def slack_of(name, limit, points, time, samples=4000):
     """Smallest slack of a limit by samples, without a unit, and whether it is met."""
     position, velocity, acceleration = oracle.states(points, time, samples)
     tension = oracle.tensions(SPOOLS, 0.7, GRAVITY, position, acceleration)
-    length, rate, bend = oracle.cable_states(SPOOLS, position, velocity, acceleration)
+    length, rate, second_derivative = oracle.cable_states(SPOOLS, position, velocity, acceleration)
     part = 3.0 / (0.7 * GRAVITY)
     return {
         "tension_min": lambda: (tension - limit).min() * part,
@@ -214,7 +214,7 @@ def slack_of(name, limit, points, time, samples=4000):
         "floor": lambda: (limit - position[:, 2]).min() / points[0, 2],
         "cable_length_max": lambda: 1.0 - length.max() / limit,
         "cable_speed_max": lambda: 1.0 - np.abs(rate).max() / limit,
-        "cable_acceleration_max": lambda: 1.0 - np.abs(bend).max() / limit,
+        "cable_acceleration_max": lambda: 1.0 - np.abs(second_derivative).max() / limit,
     }[name]()
 
 

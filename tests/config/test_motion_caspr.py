@@ -46,7 +46,7 @@ def values(pieces, table, times, order=0):
     return (curve.derivative(order) if order else curve)(times)
 
 
-def turned(pieces, times):
+def rotated(pieces, times):
     return Rotation.from_quat(values(pieces, pieces.quaternion, times), scalar_first=True)
 
 
@@ -54,8 +54,8 @@ def turned(pieces, times):
 COGIRO = [[-3.0, -1.0, 2.0, -0.5, 0.2, 0.3], [2.0, -3.0, 4.0, 0.2, -0.1, 0.1], [4.0, 2.0, 3.0, 0.5, 0.2, -0.2]]
 
 
-def smooth(share):
-    return share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+def smooth(fraction):
+    return fraction**3 * (10.0 - 15.0 * fraction + 6.0 * fraction**2)
 
 
 def test_a_platform_moves_and_turns_about_one_axis_from_point_to_point(tmp_path):
@@ -64,13 +64,13 @@ def test_a_platform_moves_and_turns_about_one_axis_from_point_to_point(tmp_path)
     pieces = caspr.read(written(tmp_path, element(points)))
     assert (pieces.knots[0], pieces.knots[-1], pieces.z_axis) == (0.0, 4.0, "up")
     for k, (first, last) in enumerate(itertools.pairwise(COGIRO)):
-        share = np.linspace(0.0, 1.0, 41)
-        times = np.minimum(2.0 * k + 2.0 * share, 4.0)
-        move, (start, end) = smooth(share), Rotation.from_euler("XYZ", [first[3:], last[3:]])
+        fraction = np.linspace(0.0, 1.0, 41)
+        times = np.minimum(2.0 * k + 2.0 * fraction, 4.0)
+        move, (start, end) = smooth(fraction), Rotation.from_euler("XYZ", [first[3:], last[3:]])
         expected = np.array(first[:3]) + move[:, None] * (np.array(last) - first)[:3]
         np.testing.assert_allclose(values(pieces, pieces.position, times), expected, atol=1e-13)
         turn = start * Rotation.from_rotvec(move[:, None] * (start.inv() * end).as_rotvec())
-        assert (turned(pieces, times).inv() * turn).magnitude().max() < 1e-10
+        assert (rotated(pieces, times).inv() * turn).magnitude().max() < 1e-10
     lengths = np.linalg.norm(values(pieces, pieces.quaternion, np.linspace(0.0, 4.0, 999)), axis=1)
     assert np.abs(lengths - 1.0).max() < 1e-10
 
@@ -102,12 +102,12 @@ def test_laws(tmp_path):
     def blend(t):
         k = int(t >= 5.0)
         width, part, since, step = (5.0, 0.5, t, q[1] - q[0]) if k == 0 else (6.0, 1.5, t - 5.0, q[2] - q[1])
-        bend = step / (part * (width - part))
+        second_derivative = step / (part * (width - part))
         if since < part:
-            return q[k] + bend * since**2 / 2.0
+            return q[k] + second_derivative * since**2 / 2.0
         if since < width - part:
-            return q[k] + bend * part**2 / 2.0 + bend * part * (since - part)
-        return q[k + 1] - bend * (width - since) ** 2 / 2.0
+            return q[k] + second_derivative * part**2 / 2.0 + second_derivative * part * (since - part)
+        return q[k + 1] - second_derivative * (width - since) ** 2 / 2.0
 
     expected = {
         "line": np.stack([np.interp(times, knots, column) for column in q.T], axis=1),
@@ -119,7 +119,7 @@ def test_laws(tmp_path):
         pieces = caspr.read(path, name)
         places = np.stack([poses[:, 0], 0.0 * times, poses[:, 1]], axis=1)
         np.testing.assert_allclose(values(pieces, pieces.position, times), places, atol=1e-13)
-        angles = turned(pieces, times).as_rotvec()
+        angles = rotated(pieces, times).as_rotvec()
         np.testing.assert_allclose(angles, np.outer(poses[:, 2], [0.0, 1.0, 0.0]), atol=1e-10)
 
 
@@ -147,7 +147,7 @@ def test_joints(tmp_path, joint, q, place, turn):
         assert pieces.quaternion is None
     else:
         expected = Rotation.from_euler(turn, q) if isinstance(turn, str) else Rotation.from_rotvec(turn)
-        assert (turned(pieces, [0.0])[0].inv() * expected).magnitude() < 1e-12
+        assert (rotated(pieces, [0.0])[0].inv() * expected).magnitude() < 1e-12
 
 
 def test_a_long_turn_is_divided_until_it_fits(tmp_path):
@@ -157,8 +157,8 @@ def test_a_long_turn_is_divided_until_it_fits(tmp_path):
     half = 20.0 * smooth(times)
     expected = np.stack([np.cos(half), 0.0 * half, np.sin(half), 0.0 * half], axis=1)
     assert np.abs(values(pieces, pieces.quaternion, times) - expected).max() < 2.0 * caspr.TURN_ERROR
-    bend = math.sqrt(np.abs(values(pieces, pieces.quaternion, times, 2)).max())
-    assert bend == pytest.approx(np.abs(20.0 * np.gradient(smooth(times), times)).max(), rel=1e-2)
+    second_derivative = math.sqrt(np.abs(values(pieces, pieces.quaternion, times, 2)).max())
+    assert second_derivative == pytest.approx(np.abs(20.0 * np.gradient(smooth(times), times)).max(), rel=1e-2)
 
 
 def test_turns_and_pieces_have_a_bound(tmp_path):

@@ -65,11 +65,11 @@ def test_directives_rates_and_planar_robots(tmp_path):
     np.testing.assert_allclose(found.accelerations, [[0.03, 0.0, 4.0]] * 2, rtol=1e-15)
     np.testing.assert_allclose(found.quaternions[0], [np.cos(0.25), 0.0, np.sin(0.25), 0.0], atol=1e-15)
     np.testing.assert_allclose(found.in_axes("down").positions, [[1.0, 0.0, -2.0]] * 2)
-    turned = found.in_axes("down")
+    rotated = found.in_axes("down")
     half = Rotation.from_rotvec([np.pi, 0.0, 0.0])
     expected = half * Rotation.from_quat(found.quaternions, scalar_first=True) * half.inv()
-    away = expected.inv() * Rotation.from_quat(turned.quaternions, scalar_first=True)
-    assert away.magnitude().max() < 1e-12 and turned.z_axis == "down"
+    away = expected.inv() * Rotation.from_quat(rotated.quaternions, scalar_first=True)
+    assert away.magnitude().max() < 1e-12 and rotated.z_axis == "down"
     assert found.in_axes("up") is found
     with pytest.raises(InputError, match='z_axis = "north": must be "down" or "up"'):
         found.in_axes("north")

@@ -132,8 +132,8 @@ def test_numbers_are_shown_as_typed():
     robot_file = checked(
         RobotFile, robot(z_axis="up", base_points=[[0.0, 1.0, 3.0], [1.0, 2.0, 3.0], [2.0, 3.0, 3.0]]), "in"
     )
-    turned = [[x, -y, -z] for x, y, z in robot_file.base_points]
-    line = robot_file.typed(InputError("base_points", turned, "three spools that are not on one line"))
+    rotated = [[x, -y, -z] for x, y, z in robot_file.base_points]
+    line = robot_file.typed(InputError("base_points", rotated, "three spools that are not on one line"))
     assert line.startswith("robot.base_points = [[0.0, 1.0, 3.0], ") and line.endswith("not on one line")
     assert robot_file.typed(InputError("gravity", -1.0, "> 0")) == "robot.gravity = -1.0: must be > 0"
     assert (

@@ -49,5 +49,5 @@ def test_bounds_shrink_with_the_square():
 def test_a_hull_of_the_whole_piece_would_not_do(monkeypatch):
     """Coefficients that are cut at the wrong share leave the band: the test above sees it."""
     split = piecewise_bounds._split
-    monkeypatch.setattr(piecewise_bounds, "_split", lambda table, share: split(table, 0.9 * share))
+    monkeypatch.setattr(piecewise_bounds, "_split", lambda table, fraction: split(table, 0.9 * fraction))
     assert excess(0, 5, 60)["acceleration"][0] > 1e-3

@@ -11,15 +11,15 @@ from cspr_jax.errors import InputError
 
 
 def least_jerk(t, duration):
-    share = np.clip(t / duration, 0.0, 1.0)
-    return share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+    fraction = np.clip(t / duration, 0.0, 1.0)
+    return fraction**3 * (10.0 - 15.0 * fraction + 6.0 * fraction**2)
 
 
-def trapezoid(t, bend, ramp):
+def trapezoid(t, second_derivative, ramp):
     """Speed up, go on, slow down, each for as long, and rest; its acceleration jumps."""
-    way = bend * ramp * ramp
-    down = 1.5 * way + bend * ramp * (t - 2.0 * ramp) - 0.5 * bend * (t - 2.0 * ramp) ** 2
-    pieces = [0.5 * bend * t * t, 0.5 * way + bend * ramp * (t - ramp), down, 2.0 * way]
+    way = second_derivative * ramp * ramp
+    down = 1.5 * way + second_derivative * ramp * (t - 2.0 * ramp) - 0.5 * second_derivative * (t - 2.0 * ramp) ** 2
+    pieces = [0.5 * second_derivative * t * t, 0.5 * way + second_derivative * ramp * (t - ramp), down, 2.0 * way]
     return np.select([t < ramp, t < 2.0 * ramp, t < 3.0 * ramp, t >= 3.0 * ramp], pieces)
 
 
@@ -120,8 +120,8 @@ def test_smoothing_finds_the_motion():
     assert np.sqrt(np.mean(taken**2)) == pytest.approx(1e-3, rel=0.02)
     assert np.sqrt(np.mean((found.positions - places) ** 2)) < 5e-4
     assert np.sqrt(np.mean((found.quaternions - turns) ** 2)) < 3e-4
-    bend = CubicSpline(times, found.positions)(times[50:-50], 2)
-    np.testing.assert_allclose(np.linalg.norm(bend, axis=1), 4.0 * np.pi**2, rtol=0.1)
+    second_derivative = CubicSpline(times, found.positions)(times[50:-50], 2)
+    np.testing.assert_allclose(np.linalg.norm(second_derivative, axis=1), 4.0 * np.pi**2, rtol=0.1)
     assert noise_notes(found) == []
     size = np.sqrt(np.mean(np.sum(taken**2, axis=1)))
     assert found.notes[0].startswith(f"smoothing moved positions by {size:.2g} m in the root mean square")

@@ -107,15 +107,15 @@ def test_rates_of_turning_and_legs_that_meet():
     """A body that turns about an axis that turns itself; its acceleration jumps where legs meet."""
     times = np.concatenate([np.linspace(0.0, 1.0, 26), np.linspace(1.0, 2.0, 26)])
     later = np.arange(52) >= 26
-    bend = np.where(later, -2.0, 2.0)
+    second_derivative = np.where(later, -2.0, 2.0)
     way = np.where(later, 1.0 - (2.0 - times) ** 2 + 1.0, times**2)
     rate = np.where(later, 2.0 * (2.0 - times), 2.0 * times)
     axis = np.array([1.0, 2.0, 2.0]) / 3.0
     # Rz(t) then a turn by 0.7 t about a fixed axis of the body: angular velocity in fixed axes.
     c, s = np.cos(times), np.sin(times)
-    turned = np.stack([c * axis[0] - s * axis[1], s * axis[0] + c * axis[1], 0 * times + axis[2]], axis=1)
-    spin = np.array([0.0, 0.0, 1.0]) + 0.7 * turned
-    bending = np.cross([0.0, 0.0, 1.0], 0.7 * turned)
+    rotated = np.stack([c * axis[0] - s * axis[1], s * axis[0] + c * axis[1], 0 * times + axis[2]], axis=1)
+    spin = np.array([0.0, 0.0, 1.0]) + 0.7 * rotated
+    bending = np.cross([0.0, 0.0, 1.0], 0.7 * rotated)
     half = 0.5 * times
     first = np.stack([np.cos(half), 0 * half, 0 * half, np.sin(half)], axis=1)
     second = np.concatenate([np.cos(0.7 * half)[:, None], np.sin(0.7 * half)[:, None] * axis], axis=1)
@@ -128,7 +128,7 @@ def test_rates_of_turning_and_legs_that_meet():
         way[:, None] * line,
         quaternions * np.where(np.arange(52) % 7 == 3, -1.0, 1.0)[:, None],
         rate[:, None] * line,
-        bend[:, None] * line,
+        second_derivative[:, None] * line,
         spin,
         bending,
     )

@@ -67,9 +67,9 @@ def smoothest(times, values, deviation, kind, ends):
 def test_a_quadratic_program_finds_no_smoother_curve(kind, ends):
     rng = np.random.default_rng(3)
     times = np.cumsum(rng.uniform(0.06, 0.14, size=40))
-    share = (times - times[0]) / np.ptp(times)
-    turn = 2.0 * np.pi * share
-    paths = {"rest": least_jerk(share, 1.0), "natural": share + 0.3 * np.sin(turn), "periodic": np.sin(turn)}
+    fraction = (times - times[0]) / np.ptp(times)
+    turn = 2.0 * np.pi * fraction
+    paths = {"rest": least_jerk(fraction, 1.0), "natural": fraction + 0.3 * np.sin(turn), "periodic": np.sin(turn)}
     values = np.stack([paths[ends], 0.5 * paths[ends] ** 2, 0.2 * paths[ends] + 2.0], axis=1)
     values += 2e-3 * rng.normal(size=values.shape)
     if ends == "periodic":
@@ -87,11 +87,11 @@ def state(curve, times, order):
     knots, table = np.asarray(curve.knots), np.asarray(curve.position)
     piece = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(knots) - 2)
     width, degree = np.diff(knots)[piece], table.shape[1] - 1
-    share, rows = (times - knots[piece]) / width, table[piece]
+    fraction, rows = (times - knots[piece]) / width, table[piece]
     for k in range(order):
         rows = (degree - k) * np.diff(rows, axis=1) / width[:, None, None]
     while rows.shape[1] > 1:
-        rows = rows[:, :-1] * (1.0 - share)[:, None, None] + rows[:, 1:] * share[:, None, None]
+        rows = rows[:, :-1] * (1.0 - fraction)[:, None, None] + rows[:, 1:] * fraction[:, None, None]
     return rows[:, 0]
 
 
@@ -177,7 +177,7 @@ def test_orientations_at_rest_and_in_motion():
         found = smoothed(table, 1e-4, angle=2e-4)
         assert found.ends == ("natural" if moves else None)
         curve = spline_of(found)
-        turned = np.asarray(curve.quaternion)
-        speeds = 3.0 * np.diff(turned, axis=1)[[0, -1], [0, -1]] / 0.01
+        rotated = np.asarray(curve.quaternion)
+        speeds = 3.0 * np.diff(rotated, axis=1)[[0, -1], [0, -1]] / 0.01
         largest = 0.1 if moves else 0.0
         np.testing.assert_allclose(np.linalg.norm(speeds, axis=1), largest, atol=0.005 if moves else 1e-9)

@@ -34,8 +34,8 @@ def test_angular_velocity_by_differences():
     spline, table = random_spline(7, tilt=0.5)
     times, step = np.linspace(0.5, table.x[-1] - 0.5, 40), 1e-4
     before, here, after = (states_of(spline, times + shift) for shift in (-step, 0.0, step))
-    turned = Rotation.from_matrix(after.rotation @ np.swapaxes(before.rotation, 1, 2)).as_rotvec()
-    np.testing.assert_allclose(here.angular_velocity, turned / (2.0 * step), atol=1e-6)
+    rotated = Rotation.from_matrix(after.rotation @ np.swapaxes(before.rotation, 1, 2)).as_rotvec()
+    np.testing.assert_allclose(here.angular_velocity, rotated / (2.0 * step), atol=1e-6)
     change = (after.angular_velocity - before.angular_velocity) / (2.0 * step)
     np.testing.assert_allclose(here.angular_acceleration, change, atol=1e-5)
 

@@ -178,8 +178,8 @@ def test_the_binding_cable_is_the_one_of_the_smallest_tension():
     for place, values in cells_of(result):
         at = np.array([place[axis] for axis in "xyz"]) + place["circle_radius"] * out
         needed = -(values["used_frequency"] ** 2) * place["circle_radius"] * out - [0.0, 0.0, 9.81]
-        share = np.linalg.solve(np.swapaxes(spools - at[:, None], 1, 2), needed[..., None])[..., 0]
-        least = share.min(0)
+        fraction = np.linalg.solve(np.swapaxes(spools - at[:, None], 1, 2), needed[..., None])[..., 0]
+        least = fraction.min(0)
         assert least[values["binding_cable"] - 1] <= least.min() * (1.0 + 1e-3)
     four = mapped(robot=FOUR, axes={"x": [0.7], "y": [0.2], "z": [-1.5], "circle_radius": [0.5], "frequency": [2.0]})
     # Towards x = 1 the mass hangs on cables 1 and 4, of which "all but 1, 4" get slack: the third of six pairs.

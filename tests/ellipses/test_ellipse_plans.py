@@ -149,11 +149,11 @@ def test_four_cables(height):
     limits = {"tension_min": 0.3, "tension_max": 8.0}
     found = cspr_jax.plan(made(spools, SWING, **limits))
     assert found.feasible
-    turned = np.array([1.0, 1.0, -1.0])  # that oracle's z points up
+    rotated = np.array([1.0, 1.0, -1.0])  # that oracle's z points up
     for motion, segment in zip(found.motions, found.to_dict()["segments"], strict=True):
         position, _, acceleration = (x[:: INSTANTS // 150] for x in sampled(motion))
         margin = min(
-            tension_margin(spools * turned, x * turned, a * turned, mass=MASS, gravity=GRAVITY, **limits)
+            tension_margin(spools * rotated, x * rotated, a * rotated, mass=MASS, gravity=GRAVITY, **limits)
             for x, a in zip(position, acceleration, strict=True)
         )
         assert 0.0 < segment["margin_bound"] <= margin + 1e-9 and margin == pytest.approx(segment["margin"], rel=0.02)

@@ -71,10 +71,10 @@ def test_rates_are_derivatives(motion):
 def test_bounds_hold_all_states(motion):
     start = np.linspace(0.0, TIME - 0.1, 64)
     bounds, states = motion.bounds(start, start + 0.1), partial(states_along, motion)
-    for share in np.linspace(0.0, 1.0, 7):
-        state = states((start + 0.1 * share) / TIME)
+    for fraction in np.linspace(0.0, 1.0, 7):
+        state = states((start + 0.1 * fraction) / TIME)
         for name, band in bounds._asdict().items():
-            line = band.middle + (2.0 * share - 1.0) * band.slope
+            line = band.middle + (2.0 * fraction - 1.0) * band.slope
             assert (np.abs(np.asarray(getattr(state, name)) - line) <= band.radius).all(), name
     assert np.asarray(bounds.rotation.radius).max() < 0.01
 
@@ -109,18 +109,18 @@ def test_rotation_at_a_natural_frequency_needs_no_other_tensions():
     inertia = np.diag([0.004, 0.005, 0.008])
     robot = dataclasses.replace(robot, inertia=leaf(inertia))
     problem, place = Problem(robot, NO_LIMITS, named("quintic")), np.array([0.05, -0.1, 0.9])
-    turned = np.asarray(rotations.matrix(jnp.asarray(unit(rng, 4) * 0.05 + np.array([0.95, 0.0, 0.0, 0.0]))))
-    turned = np.linalg.qr(turned)[0] * np.sign(np.diag(np.linalg.qr(turned)[1]))
-    natural = rotation_frequencies(problem, place, turned)
+    rotated = np.asarray(rotations.matrix(jnp.asarray(unit(rng, 4) * 0.05 + np.array([0.95, 0.0, 0.0, 0.0]))))
+    rotated = np.linalg.qr(rotated)[0] * np.sign(np.diag(np.linalg.qr(rotated)[1]))
+    natural = rotation_frequencies(problem, place, rotated)
     assert (np.diff(natural.frequencies) > 0.0).all()
     nothing = np.zeros(3)
-    rest = densities(robot, place, turned, nothing, nothing, nothing)
+    rest = densities(robot, place, rotated, nothing, nothing, nothing)
     for frequency, mode in zip(natural.frequencies, natural.modes, strict=True):
         changes = []
         for size in (1e-4, 2e-4):
             shift, delta = size * mode[:3], size * mode[3:]
             pulls = -(frequency**2) * shift, -(frequency**2) * delta
-            change = densities(robot, place + shift, turned, delta, *pulls) - rest
+            change = densities(robot, place + shift, rotated, delta, *pulls) - rest
             changes.append(np.abs(change).max() / rest.max())
         # What changes at all is of second order.
         assert changes[0] < 1e-6

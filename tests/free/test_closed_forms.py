@@ -168,7 +168,7 @@ def test_ctrl_c_keeps_what_is_proved(monkeypatch):
     """While other families are asked."""
 
     def interrupted(legs, *rest):
-        if any(FAMILIES[leg.stops.family].precedes_searches for leg in legs):
+        if any(FAMILIES[leg.waypoints.family].precedes_searches for leg in legs):
             return closed_forms(legs, *rest)  # lines are there before the search
         raise KeyboardInterrupt
 

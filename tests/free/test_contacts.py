@@ -247,10 +247,10 @@ def test_motions_are_bent_along_the_segments_in_question():
         tasks = FreeQuestion.of(problem, None, poses, FreeSettings()).tasks(24, 3)
         line = np.linspace(tasks.places[0, :, 0], tasks.places[0, :, 1], tasks.basis.controls, axis=1)[None]
         unknowns = started(tasks, line, np.ones((1, 3)))
-        bent = list(contacts._bent(tasks, unknowns, np.array([True, False, True])))
-        before, *after = (tasks.basis.places(tasks.controls(one))[0, ..., 0, :] for one in (unknowns, *bent))
+        deviation = list(contacts._bent(tasks, unknowns, np.array([True, False, True])))
+        before, *after = (tasks.basis.places(tasks.controls(one))[0, ..., 0, :] for one in (unknowns, *deviation))
     middle = [(one - before)[:, 12, 0] for one in after]
-    assert len(bent) == 8
+    assert len(deviation) == 8
     for change in middle:
         assert not change[1].any()
     lengths = [np.linalg.norm(change, axis=-1) for change in middle]

@@ -114,7 +114,9 @@ def test_equations_have_their_derivatives(searched):
     state = np.concatenate([places, *(np.broadcast_to(one, (1, 2, 6, 3, 1)) for one in scalars)], axis=-1)
     slopes = (times(transposed(one.slope), unknowns.multipliers) for one in (before, after))
     low, high = slopes
-    np.testing.assert_allclose(times(equations.bend, state), (high - low) / (2 * STEP), rtol=1e-4, atol=1e-4)
+    np.testing.assert_allclose(
+        times(equations.second_derivative, state), (high - low) / (2 * STEP), rtol=1e-4, atol=1e-4
+    )
     balances = (times(transposed(one.matrix), unknowns.multipliers[..., :3]) for one in (before, after))
     low, high = balances
     np.testing.assert_allclose(times(equations.mixed, state), (high - low) / (2 * STEP), rtol=1e-4, atol=1e-5)
@@ -149,9 +151,9 @@ def test_what_is_eliminated_is_that_of_the_whole_matrix(searched):
     np.testing.assert_allclose(first, push, atol=1e-9)
     second = times(by_values, change) + times(equations.slope, step) - soft.missed(multipliers)
     np.testing.assert_allclose(second, residual, atol=1e-9)
-    whole = times(equations.bend, step) + times(transposed(mixed), change)
+    whole = times(equations.second_derivative, step) + times(transposed(mixed), change)
     whole = whole + times(transposed(equations.slope), multipliers)
-    np.testing.assert_allclose(times(local.bend, step) + local.slope, whole, atol=1e-8)
+    np.testing.assert_allclose(times(local.second_derivative, step) + local.slope, whole, atol=1e-8)
 
 
 def test_values_make_up_for_what_equations_miss(searched):

@@ -56,8 +56,8 @@ def test_a_motion_is_proved_for_all_robots_and_samples_agree(nominal):
 
 def test_more_room_takes_more_time(nominal):
     durations = [nominal[0].duration]
-    for share in (0.5, 1.0):
-        off = uncertain(spool_positions=share * SPOOLS)
+    for fraction in (0.5, 1.0):
+        off = uncertain(spool_positions=fraction * SPOOLS)
         free, _ = solve(RING, LIMITS | {"uncertainty": off}, ASIDE)
         assert free.answers.feasible.all()
         durations.append(free.duration)
@@ -75,8 +75,8 @@ def test_too_large_an_uncertainty_is_told():
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("share", [0.01, 0.05])
-def test_near_the_plane_of_the_spools(share):
-    spools = share * 0.26
+def test_near_the_plane_of_the_spools(fraction):
+    spools = fraction * 0.26
     planned, frame = solve(PROTOTYPE, FAST, CLIMB, settings=FreeSettings())
     free, _ = solve(
         PROTOTYPE, FAST | {"uncertainty": uncertain(spool_positions=spools)}, CLIMB, settings=FreeSettings()

@@ -120,7 +120,7 @@ def test_derivatives_are_finite_differences(pattern, longest):
     slopes = np.stack([(after[1] - before[1])[0] / (2.0 * step) for before, after in sides], axis=-1)
     np.testing.assert_allclose(here.slope[0, :, :-1], slopes, atol=1e-6)
     bends = [multipliers[0] @ (after[0].slope - before[0].slope)[0, :, :-1] / (2.0 * step) for before, after in sides]
-    np.testing.assert_allclose(here.bend[0, :-1, :-1], bends, atol=1e-5)
+    np.testing.assert_allclose(here.second_derivative[0, :-1, :-1], bends, atol=1e-5)
     assert here.slope[0, -1, :d].any()
     assert not here.slope[0, -1, d:].any()
     assert here.residual[0, -1] == pytest.approx(-at_place(problem, place[0, 0]), rel=1e-12)

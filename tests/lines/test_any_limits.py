@@ -111,8 +111,8 @@ def test_a_line_beside_a_spool(height):
 
     def largest(duration):
         robot = cspr_jax.point_mass(RECTANGLE, mass=10.0, z_axis="up")
-        share = found.acceleration_time[0] / found.duration[0]
-        motion = cspr_jax.straight_line(robot, start, end, duration=duration, acceleration_time=share * duration)
+        fraction = found.acceleration_time[0] / found.duration[0]
+        motion = cspr_jax.straight_line(robot, start, end, duration=duration, acceleration_time=fraction * duration)
         position, velocity, acceleration = states_along(motion, np.linspace(0.0, 1.0, 200_001))[:3]
         ray = position - spool
         length = np.linalg.norm(ray, axis=1)
@@ -160,9 +160,9 @@ def test_no_motion_exceeds_the_largest_acceleration(law, limits):
     assert (answers.verdict == 0).all()
     shorter = np.minimum(answers.acceleration_time, answers.duration - answers.acceleration_time)
     peak = PEAKS[law] if law in PEAKS else 4.0 * answers.duration / shorter
-    share = np.linalg.norm(ends - starts, axis=1) * peak / answers.duration**2 / largest
-    assert (share <= 1.0).all()
-    assert (share > 1.0 - 1e-6).all()  # the limit binds
+    fraction = np.linalg.norm(ends - starts, axis=1) * peak / answers.duration**2 / largest
+    assert (fraction <= 1.0).all()
+    assert (fraction > 1.0 - 1e-6).all()  # the limit binds
 
 
 @pytest.mark.parametrize("law", ["quintic", "s-curve"])

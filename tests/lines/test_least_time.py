@@ -190,13 +190,16 @@ def sides_of(up, up_slope, down, down_slope):
 @pytest.mark.parametrize("name", ["quintic", "cubic"])
 def test_other_laws(name):
     rng, tau = np.random.default_rng(5), np.linspace(0.0, 1.0, 20_001)
-    s, _, bend = (np.asarray(x) for x in derivatives_of(fixed_law(name), jnp.asarray(tau)))
+    s, _, second_derivative = (np.asarray(x) for x in derivatives_of(fixed_law(name), jnp.asarray(tau)))
     for _ in range(4):
         bounds, _, _, bound = of(*box(rng), 25.0)
         least = of_law(fixed_law(name), bounds)
         lower, upper = functions(bounds)
         with np.errstate(divide="ignore"):
-            gain = min(np.min((upper(s) / bend)[bend > 0.0]), np.min((lower(s) / bend)[bend < 0.0]))
+            gain = min(
+                np.min((upper(s) / second_derivative)[second_derivative > 0.0]),
+                np.min((lower(s) / second_derivative)[second_derivative < 0.0]),
+            )
         assert float(least.duration) == pytest.approx(gain**-0.5, rel=1e-6) and least.duration > bound
 
 
@@ -228,7 +231,7 @@ def test_verdicts_are_proved(law):
         assert np.sign(bound) == np.sign(margin)
         slower = jax.vmap(type(motion)(motion.start, motion.direction, motion.law, duration).state)
         states = slower(jnp.concatenate([jnp.linspace(0.0, 1.0, 4001), jnp.asarray(motion.breaks())]))
-        places, accelerations = frame.outward(np.asarray(states.position)), frame.turned(states.acceleration)
+        places, accelerations = frame.outward(np.asarray(states.position)), frame.rotated(states.acceleration)
         sampled = cspr_jax.available_accelerations(robot, places).margin(np.asarray(accelerations)).min()
         assert margin <= sampled + 1e-9 and margin == pytest.approx(sampled, rel=1e-3)
         assert np.sign(sampled) == wanted
@@ -238,8 +241,8 @@ def test_spools_in_one_plane():
     assert in_one_plane(cspr_jax.load_robot("boralugoda-rectangle"))
     assert in_one_plane(cspr_jax.load_robot("prototype"))
     assert in_one_plane(cspr_jax.load_robot("boralugoda-planar-three"))
-    bent = cspr_jax.point_mass([[0, 0, 3], [4, 0, 3], [4, 4, 3.1], [0, 4, 3]], mass=1.0, z_axis="up")
-    assert not in_one_plane(bent)
+    deviation = cspr_jax.point_mass([[0, 0, 3], [4, 0, 3], [4, 4, 3.1], [0, 4, 3]], mass=1.0, z_axis="up")
+    assert not in_one_plane(deviation)
 
 
 def test_verdict_flags_of_answers():

@@ -45,8 +45,8 @@ def printed(text):
 
 def inside(rng, base=oracle.BASE):
     """A point inside the footprint and below the base."""
-    share = rng.dirichlet(np.ones(len(base)))
-    return share @ base - np.array([0.0, 0.0, rng.uniform(2.0, 28.0)])
+    fraction = rng.dirichlet(np.ones(len(base)))
+    return fraction @ base - np.array([0.0, 0.0, rng.uniform(2.0, 28.0)])
 
 
 def cone_planes(position):
@@ -150,8 +150,8 @@ def test_hull_against_linear_programs(cables, limits):
         if planar:
             rays[:, 1], position[1] = 0.0, 0.0
         units = rays / np.linalg.norm(rays, axis=1)[:, None]
-        share = rng.uniform(0.2, 0.8, cables) * 5.0 + least
-        push = share @ units - LIFT
+        fraction = rng.uniform(0.2, 0.8, cables) * 5.0 + least
+        push = fraction @ units - LIFT
         if planar:
             normals = np.cross(units, [0.0, 1.0, 0.0])
         else:
@@ -219,8 +219,8 @@ def test_path_limits_leave_no_margin(cables):
     s = np.array([[0.0, 0.3], [0.8, 1.0]])
     for limit in oracle.path_limits(base, start, end, s, **setup):
         assert limit.shape == s.shape
-        for here, bend in zip(s.ravel(), limit.ravel(), strict=True):
-            place, push = start + here * (end - start), bend * (end - start)
+        for here, second_derivative in zip(s.ravel(), limit.ravel(), strict=True):
+            place, push = start + here * (end - start), second_derivative * (end - start)
             assert oracle.tension_margin(base, place, push, **setup) == pytest.approx(0.0, abs=1e-7)
 
 
@@ -253,11 +253,11 @@ def test_s_curve_is_tables_3_2_and_3_3(p, duration):
     last = -(big**3) - 6 * big**2 * p + 12 * big**2 * t + 3 * big * p**2 - 12 * big * t**2 + 4 * t**3
     speed = [4 * t**2 / big / p**2, 1 / big - (3 * p - 2 * t) * (p - 2 * t) / big / p**2]
     speed.append(2 / big - 4 * (p - t) ** 2 / big / rest**2)
-    bend = [8 * t / big / p**2, 8 * (p - t) / big / p**2, 8 * (p - t) / big / rest**2]
+    second_derivative = [8 * t / big / p**2, 8 * (p - t) / big / p**2, 8 * (p - t) / big / rest**2]
     expected = [
         np.select(conditions, s, last / late),
         np.select(conditions, speed, 4 * (big - t) ** 2 / big / rest**2),
-        np.select(conditions, bend, -8 * (big - t) / big / rest**2),
+        np.select(conditions, second_derivative, -8 * (big - t) / big / rest**2),
     ]
     assert np.allclose(oracle.s_curve(t, p, duration), expected, atol=1e-11)
 
@@ -266,18 +266,18 @@ def test_energy_of_each_half_is_2_over_t_squared():
     p, duration = 2.5, 10.0
     for begin, end in ((0.0, p), (p, duration)):
         t = np.linspace(begin, end, 200_001)
-        s, _, bend = oracle.s_curve(t, p, duration)
-        assert abs(np.trapezoid(bend, s)) == pytest.approx(2.0 / duration**2, rel=1e-9)
+        s, _, second_derivative = oracle.s_curve(t, p, duration)
+        assert abs(np.trapezoid(second_derivative, s)) == pytest.approx(2.0 / duration**2, rel=1e-9)
 
 
 @pytest.mark.parametrize("law", [oracle.quintic, oracle.cubic, lambda t, duration: oracle.s_curve(t, 1.1, duration)])
 def test_laws_go_from_rest_to_rest(law):
-    s, speed, bend = law(np.array([0.0, 2.5]), 2.5)
+    s, speed, second_derivative = law(np.array([0.0, 2.5]), 2.5)
     assert np.allclose([s, speed], [[0.0, 1.0], [0.0, 0.0]], atol=1e-14)
     if law is oracle.cubic:
-        assert np.allclose(bend, [6.0 / 2.5**2, -6.0 / 2.5**2])
+        assert np.allclose(second_derivative, [6.0 / 2.5**2, -6.0 / 2.5**2])
     else:
-        assert np.allclose(bend, 0.0, atol=1e-14)
+        assert np.allclose(second_derivative, 0.0, atol=1e-14)
     t = np.linspace(0.1, 2.4, 50)
     before, here, after = law(t - 1e-5, 2.5), law(t, 2.5), law(t + 1e-5, 2.5)
     for order in (0, 1):
@@ -315,9 +315,9 @@ def test_least_duration_is_feasible_and_nothing_shorter_is(seed):
     duration, p = oracle.least_duration_of_s_curve(*settings)
 
     def worst(p, duration):
-        s, _, bend = oracle.s_curve(np.linspace(0.0, duration, 4001), p, duration)
+        s, _, second_derivative = oracle.s_curve(np.linspace(0.0, duration, 4001), p, duration)
         s = np.clip(s, 0.0, 1.0)
-        return max(np.max(bend - settings[1](s)), np.max(settings[0](s) - bend))
+        return max(np.max(second_derivative - settings[1](s)), np.max(settings[0](s) - second_derivative))
 
     assert worst(p, duration * (1 + 1e-6)) < 0.0
     shorter = duration * (1 - 1e-4)
@@ -375,15 +375,16 @@ def test_tension_couples_are_those_of_tensions():
 
 def test_tension_couples_of_the_test_case_stay_below_130_newtons():
     duration, p = corner_rule(*(line.c for line in oracle.case_lines()[::-1]))
-    s, _, bend = oracle.s_curve(np.linspace(0.0, duration, 2001), p, duration)
-    position, push = oracle.START + s[:, None] * STEP, bend[:, None] * STEP
+    s, _, second_derivative = oracle.s_curve(np.linspace(0.0, duration, 2001), p, duration)
+    position, push = oracle.START + s[:, None] * STEP, second_derivative[:, None] * STEP
     couples = oracle.tension_couples(position, push, **SIDES, **LOAD)
     assert couples.shape == (2001, 4)
     assert 0.0 < couples.max() < 130.0
     # 1-2 is nothing at t = p/2 and 2-3 at (T + p)/2, where (24) and (25) are touched.
     corner, late = (oracle.s_curve(at, p, duration) for at in (p / 2, (duration + p) / 2))
     touched = [
-        oracle.tension_couples(oracle.START + s * STEP, bend * STEP, **SIDES, **LOAD) for s, _, bend in (corner, late)
+        oracle.tension_couples(oracle.START + s * STEP, second_derivative * STEP, **SIDES, **LOAD)
+        for s, _, second_derivative in (corner, late)
     ]
     assert touched[0][0] == pytest.approx(0.0, abs=1e-9)
     assert touched[1][1] == pytest.approx(0.0, abs=1e-9)

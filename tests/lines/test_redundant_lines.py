@@ -43,7 +43,7 @@ def test_the_prover_of_any_motion_agrees(robot, family, limits):
     (line,) = planned.legs[0].motions
     with double_precision():
         slower, faster = (
-            proved(planned.problem, dataclasses.replace(line, time=line.time * share)) for share in (1.001, 0.999)
+            proved(planned.problem, dataclasses.replace(line, time=line.time * fraction)) for fraction in (1.001, 0.999)
         )
     assert slower.verdict == 0 and slower.bound > 0.0
     assert faster.verdict != 0 and faster.instant > 0.0

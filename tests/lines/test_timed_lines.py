@@ -252,9 +252,11 @@ def test_from_python():
     data = answers.to_xarray()
     assert data.least_duration.attrs["units"] == "s" and data.sizes == {"target": 2}
     line = cspr_jax.straight_line(robot, [1, 20, 7], [15, 28, 3], duration=T, acceleration_time=P)
-    s, pace, bend = (x[0] for x in oracle.s_curve(np.array([1.7]), P, T))
+    s, pace, second_derivative = (x[0] for x in oracle.s_curve(np.array([1.7]), P, T))
     state, way = line.state(1.7 / T), np.array([14.0, 8.0, -4.0])
-    for own, wanted in zip(state[:3], (np.array([1.0, 20.0, 7.0]) + s * way, pace * way, bend * way), strict=True):
+    for own, wanted in zip(
+        state[:3], (np.array([1.0, 20.0, 7.0]) + s * way, pace * way, second_derivative * way), strict=True
+    ):
         assert own == pytest.approx(wanted, abs=1e-9)
     assert cspr_jax.tensions(robot, state).shape == (4,) and float(cspr_jax.tensions(robot, state).min()) > 0.0
 

@@ -179,12 +179,12 @@ def test_labels_mass_and_axes_do_not_matter():
         return cspr_jax.available_accelerations(robot, places, tension_max=high).margin(accelerations)
 
     wanted = margin(points, places, accelerations, high)
-    turned, down = np.array([[0.6, 0.8, 0], [-0.8, 0.6, 0], [0, 0, 1.0]]), np.array([1.0, -1.0, -1.0])
+    rotated, down = np.array([[0.6, 0.8, 0], [-0.8, 0.6, 0], [0, 0, 1.0]]), np.array([1.0, -1.0, -1.0])
     shift = np.array([3.0, -2.0, 0.7])
     assert margin(points[order], places, accelerations, high[order]) == pytest.approx(wanted, abs=1e-10)
     assert margin(points, places, accelerations, 3.0 * high, mass=6.0) == pytest.approx(wanted, abs=1e-10)
     assert margin(points + shift, places + shift, accelerations, high) == pytest.approx(wanted, abs=1e-9)
-    assert margin(points @ turned, places @ turned, accelerations @ turned, high) == pytest.approx(wanted, abs=1e-10)
+    assert margin(points @ rotated, places @ rotated, accelerations @ rotated, high) == pytest.approx(wanted, abs=1e-10)
     flipped = margin(points * down, places * down, accelerations * down, high, z_axis="down")
     assert flipped == pytest.approx(wanted, abs=1e-10)
 

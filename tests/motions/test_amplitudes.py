@@ -47,8 +47,8 @@ def test_each_derivative_is_the_slope_of_the_one_before(name):
     size = np.asarray(CURVES[name].largest)
     for j in range(5):
         slope = (np.asarray(after[j]) - np.asarray(before[j])) / (2.0 * step)
-        bend = size[j + 3] if j < 3 else 500.0 * size[j]  # beyond the fifth no largest value is kept
-        np.testing.assert_allclose(now[j + 1], slope, rtol=0, atol=step**2 * bend + 1e-11 * size[j] / step)
+        second_derivative = size[j + 3] if j < 3 else 500.0 * size[j]  # beyond the fifth no largest value is kept
+        np.testing.assert_allclose(now[j + 1], slope, rtol=0, atol=step**2 * second_derivative + 1e-11 * size[j] / step)
 
 
 @pytest.mark.parametrize(

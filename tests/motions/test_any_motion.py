@@ -63,10 +63,10 @@ def proof_of(case):
     samples, limits = case.samples, dict(case.limits)
     floor = limits.pop("floor")
     limits = Limits(**limits, floor=np.asarray(frame.depth(floor)))
-    turned = samples.get("quaternions")
-    if turned is not None:
+    rotated = samples.get("quaternions")
+    if rotated is not None:
         # The axes of both, the robot's and the platform's, turn by half a turn about x, or not at all.
-        turned = turned * np.concatenate([[1.0], frame.signs])
+        rotated = rotated * np.concatenate([[1.0], frame.signs])
     rates = samples.get("rates")
     given = {}
     if rates is not None:
@@ -75,7 +75,7 @@ def proof_of(case):
     motion = interpolated(
         samples["times"],
         frame.inward(samples["positions"]),
-        turned,
+        rotated,
         **given,
         interpolation=samples["interpolation"],
         ends=samples["ends"],

@@ -38,11 +38,11 @@ def values(robot, motion, tau):
     batches = [states_along(motion, part) for part in np.resize(tau, (-(-len(tau) // MANY), MANY))]
     state = {name: np.concatenate([getattr(one, name) for one in batches])[: len(tau)]
              for name in batches[0]._fields if getattr(batches[0], name) is not None}  # fmt: skip
-    place, speed, bend = (state[name] for name in ("position", "velocity", "acceleration"))
+    place, speed, second_derivative = (state[name] for name in ("position", "velocity", "acceleration"))
     points, base = np.zeros((len(tau), 1, 3)), np.asarray(robot.base_points)
-    force = robot.mass * (bend - [0.0, 0.0, robot.gravity])
+    force = robot.mass * (second_derivative - [0.0, 0.0, robot.gravity])
     wrench, arms = force[:, :, None], np.zeros((len(tau), len(base), 3))
-    moved, pushed = speed[:, None], bend[:, None]
+    moved, pushed = speed[:, None], second_derivative[:, None]
     if "rotation" in state:
         turn, omega, alpha = state["rotation"], state["angular_velocity"], state["angular_acceleration"]
         centre = np.zeros(3) if robot.centre_of_mass is None else np.asarray(robot.centre_of_mass)
@@ -72,7 +72,7 @@ def values(robot, motion, tau):
         "speed_max": -np.abs(rate).max(1),
         "acceleration_max": -np.abs(second).max(1),
         "mass_centre_speed": -np.linalg.norm(speed, axis=1),
-        "mass_centre_acceleration": -np.linalg.norm(bend, axis=1),
+        "mass_centre_acceleration": -np.linalg.norm(second_derivative, axis=1),
     }
 
 

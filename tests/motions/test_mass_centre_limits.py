@@ -54,8 +54,8 @@ def test_platforms_too():
     """The mass centre of a platform that turns, and not another point of it."""
     quaternions = np.stack([np.cos(0.2 * LAW), 0.0 * LAW, 0.0 * LAW, np.sin(0.2 * LAW)], axis=1)
     motion = {"times": TIMES, "positions": [0.0, 0.0, 1.5] + WAY * LAW[:, None] * DIRECTION, "quaternions": quaternions}
-    for share, verdict in ((1.001, "feasible"), (0.999, "too_fast")):
-        assert cspr_jax.check("cogiro", **motion, limits={"speed_max": share * WAY * SPEED}).verdict == verdict
+    for fraction, verdict in ((1.001, "feasible"), (0.999, "too_fast")):
+        assert cspr_jax.check("cogiro", **motion, limits={"speed_max": fraction * WAY * SPEED}).verdict == verdict
 
 
 def test_tensions_keep_a_margin():

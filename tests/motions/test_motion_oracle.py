@@ -100,8 +100,8 @@ def test_cables_do_the_work_that_the_energy_takes_up(kind, pulleys):
         total = 0.5 * robot["mass"] * np.sum(state.velocity**2, axis=1)
         total -= robot["mass"] * state.position @ any_motion.gravity(robot)
         if robot["platform_points"] is not None:
-            turned = np.einsum("kji,kj->ki", state.rotation, state.omega)
-            total += 0.5 * np.einsum("ki,ij,kj->k", turned, robot["inertia"], turned)
+            rotated = np.einsum("kji,kj->ki", state.rotation, state.omega)
+            total += 0.5 * np.einsum("ki,ij,kj->k", rotated, robot["inertia"], rotated)
         return total
 
     before, after = nearby(case.motion, times)
@@ -119,8 +119,10 @@ def test_wrenches_change_the_momenta():
     times = inner_times(rng, case.motion)
 
     def momenta(state):
-        turned = np.einsum("kji,kj->ki", state.rotation, state.omega) @ case.robot["inertia"]
-        return np.concatenate([case.robot["mass"] * state.velocity, np.einsum("kij,kj->ki", state.rotation, turned)], 1)
+        rotated = np.einsum("kji,kj->ki", state.rotation, state.omega) @ case.robot["inertia"]
+        return np.concatenate(
+            [case.robot["mass"] * state.velocity, np.einsum("kij,kj->ki", state.rotation, rotated)], 1
+        )
 
     state = case.motion.state(times)
     _, wrench = any_motion.balance(case.robot, state, any_motion.cables(case.robot, state))
@@ -258,16 +260,16 @@ def test_clearances_are_those_of_minimisation(kind):
     found = any_motion.cables(robot, state)
     size = np.ptp(robot["base_points"][:, 0])
     d = robot["cable_diameter"]
-    turned = sampled_motion.rotations(rng.normal(size=(1, 4)))[0]
+    rotated = sampled_motion.rotations(rng.normal(size=(1, 4)))[0]
     for _ in range(3):
         centre = state.position[0] + 0.15 * size * rng.normal(size=3)
         ends = centre + 0.1 * size * rng.normal(size=(2, 3))
         half = size * rng.uniform(0.02, 0.1, 3)
-        corners = centre + (motion_clearance.clearance.corners(half[None])[0]) @ turned.T
+        corners = centre + (motion_clearance.clearance.corners(half[None])[0]) @ rotated.T
         solids = [
             ({"centre": centre, "radius": 0.02 * size}, centre[None]),
             ({"ends": ends, "radius": 0.02 * size}, ends),
-            ({"centre": centre, "half": half, "rotation": turned}, corners),
+            ({"centre": centre, "half": half, "rotation": rotated}, corners),
         ]
         for obstacle, points in solids:
             radius = obstacle.get("radius", 0.0)

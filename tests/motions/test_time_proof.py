@@ -89,7 +89,7 @@ def sampler(robot, limits: Limits):
 
     def one(spline, tau):
         state = spline.state(tau)
-        length, rate, bend = cables.cable_motion(robot, state)
+        length, rate, second_derivative = cables.cable_motion(robot, state)
         if robot.n_cables > robot.dof:
             matrix, wrench = robot.wrench_matrix(state) / unit[:, None], robot.inertial_wrench(state) / unit
             parts = [most_central(matrix, wrench, low, high)[1][None]]
@@ -100,7 +100,7 @@ def sampler(robot, limits: Limits):
         for value, limit in (
             (length, limits.cable_length_max),
             (abs(rate), limits.cable_speed_max),
-            (abs(bend), limits.cable_acceleration_max),
+            (abs(second_derivative), limits.cable_acceleration_max),
         ):
             parts += [] if limit is None else [limit - value]
         parts += of_pose(robot, state)

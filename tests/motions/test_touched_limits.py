@@ -57,13 +57,13 @@ def families(names):
     return [name if name in QUICK else pytest.param(name, marks=THOROUGH) for name in names]
 
 
-def beside(name: str, value: float, robot, share: float) -> float:
+def beside(name: str, value: float, robot, fraction: float) -> float:
     """A limit that is tighter than a value by a share of it, of the floor by one of the robot's size."""
     if name == "floor":
         base = np.asarray(robot.base_points)
         size = np.linalg.norm(base - base.mean(0), axis=1).max()
-        return value - share * size if robot.z_axis == "down" else value + share * size
-    return value * (1.0 + share if name == "tension_min" else 1.0 - share)
+        return value - fraction * size if robot.z_axis == "down" else value + fraction * size
+    return value * (1.0 + fraction if name == "tension_min" else 1.0 - fraction)
 
 
 def planned(keys: dict, **limits):
@@ -94,9 +94,9 @@ def test_motions_that_reach_a_limit_are_feasible(name):
     loose = {limit: beside(limit, value, robot, -0.1) for limit, value in values.items()}
     assert planned(keys, **loose).feasible
     for limit, value in values.items():
-        for share in (-SMALL, 0.0):
-            found = planned(keys, **loose | {limit: beside(limit, value, robot, share)})
-            assert found.feasible, (limit, share, [row["cause"] for row in found.to_dict()["segments"]])
+        for fraction in (-SMALL, 0.0):
+            found = planned(keys, **loose | {limit: beside(limit, value, robot, fraction)})
+            assert found.feasible, (limit, fraction, [row["cause"] for row in found.to_dict()["segments"]])
         refused = planned(keys, **loose | {limit: beside(limit, value, robot, SMALL)}).to_dict()["segments"]
         flags = {row["verdict"].removeprefix("no_arcs+").removesuffix("+no_arcs") for row in refused}
         assert flags - {"feasible"} == {FLAGS[limit]}, (limit, flags)
@@ -112,16 +112,16 @@ def test_the_least_tension_of_redundant_cables(name):
     unit, keys = bare.to_dict()["segments"][0]["margin_unit"], keys | with_arcs(keys, bare)
     robot = bare.problem.robot
     least = 1.0 + margin * (1.0 if unit == "N" else float(robot.mass) * GRAVITY / robot.n_cables)
-    for share, verdict in ((-SMALL, True), (0.0, True), (SMALL, False)):
-        assert planned(keys, tension_min=least * (1.0 + share)).feasible == verdict
+    for fraction, verdict in ((-SMALL, True), (0.0, True), (SMALL, False)):
+        assert planned(keys, tension_min=least * (1.0 + fraction)).feasible == verdict
 
 
 def test_general_proofs_agree_with_those_of_swings():
     """Of one swing to the floor: at it, a millionth above and below."""
     keys = {"family": "hypocycloid-standard", **MOTIONS["hypocycloid-standard"]}
     robot = cspr_jax.load_robot("prototype")
-    for share, feasible in ((-SMALL, True), (0.0, True), (SMALL, False)):
-        found = planned(keys, floor=beside("floor", 1.5, robot, share))
+    for fraction, feasible in ((-SMALL, True), (0.0, True), (SMALL, False)):
+        found = planned(keys, floor=beside("floor", 1.5, robot, fraction))
         proof = proof_of(found.problem, found.legs[0].motions[0])
         assert found.feasible == feasible == proof.is_feasible == (not proof.broken.any())
 
@@ -142,26 +142,29 @@ def tension_of_cables(spread: float, duration: float) -> np.ndarray:
     """Tensions of a quintic way up along z, rest to rest, by a solver of three equations."""
     s = np.linspace(0.0, 1.0, 20001)
     height = 1.4 - spread * s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
-    bend = -spread * 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / duration**2
+    second_derivative = -spread * 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / duration**2
     rays = BASE[None] - np.stack([0.0 * s, 0.0 * s, height], axis=1)[:, None]
     units = rays / np.linalg.norm(rays, axis=2, keepdims=True)
-    force = MASS * np.stack([0.0 * s, 0.0 * s, bend - GRAVITY], axis=1)
+    force = MASS * np.stack([0.0 * s, 0.0 * s, second_derivative - GRAVITY], axis=1)
     return np.linalg.solve(np.swapaxes(units, 1, 2), force[..., None])[..., 0]
 
 
 @pytest.mark.parametrize("share", [-SMALL, 0.0, SMALL])
-def test_cables_that_just_lose_their_tension_are_slack(share):
+def test_cables_that_just_lose_their_tension_are_slack(fraction):
     """On a way up whose braking is a free fall at one time: its largest downward acceleration is that of gravity."""
     spread = 0.3
     duration = np.sqrt(10.0 / np.sqrt(3.0) * spread / GRAVITY)
     assert abs(tension_of_cables(spread, duration).min()) < 1e-6
     poses = [
         {"position": [0.0, 0.0, 1.4]},
-        {"position": [0.0, 0.0, 1.4 - spread], "time": float(duration) * (1.0 - share)},
+        {"position": [0.0, 0.0, 1.4 - spread], "time": float(duration) * (1.0 - fraction)},
     ]
     found = planned({"family": "spline", "interpolation": "quintic", "robot": "prototype", "pose": poses})
     verdict = found.to_dict()["segments"][0]["verdict"]
-    assert verdict == {-SMALL: "feasible", 0.0: verdict, SMALL: "slack_cable"}[share] and (share < 0) == found.feasible
+    assert (
+        verdict == {-SMALL: "feasible", 0.0: verdict, SMALL: "slack_cable"}[fraction]
+        and (fraction < 0) == found.feasible
+    )
 
 
 def test_what_may_be_missed():
@@ -184,9 +187,9 @@ def test_poses_at_rest_that_touch_limits_are_inside():
     pull = weight / 3.0 * np.hypot(0.26, depth) / depth
     places, still = np.array([[0.0, 0.0, depth]]), np.zeros(3)
     robot = cspr_jax.load_robot("prototype")
-    for share, is_in in ((-SMALL, True), (0.0, True), (SMALL, False)):
-        for limits in ({"tension_max": pull * (1.0 - share)}, {"tension_min": pull * (1.0 + share)}):
+    for fraction, is_in in ((-SMALL, True), (0.0, True), (SMALL, False)):
+        for limits in ({"tension_max": pull * (1.0 - fraction)}, {"tension_min": pull * (1.0 + fraction)}):
             found = cspr_jax.workspace(robot, places, condition="wrench-feasible", **limits)
-            assert (found.verdict[0] == 0) == is_in, (share, limits)
+            assert (found.verdict[0] == 0) == is_in, (fraction, limits)
             sets = cspr_jax.available_accelerations(robot, places, **limits)
-            assert (sets.verdict(still)[0] == 0) == is_in, (share, limits)
+            assert (sets.verdict(still)[0] == 0) == is_in, (fraction, limits)

@@ -159,8 +159,10 @@ def demands(base, state):
     rays = state.position[:, None] - base
     length = np.linalg.norm(rays, axis=2)
     rate = np.sum(rays * state.velocity[:, None], axis=2) / length
-    bend = np.sum(state.velocity**2, axis=1)[:, None] + np.sum(rays * state.acceleration[:, None], axis=2) - rate**2
-    return length, np.abs(rate), np.abs(bend / length)
+    second_derivative = (
+        np.sum(state.velocity**2, axis=1)[:, None] + np.sum(rays * state.acceleration[:, None], axis=2) - rate**2
+    )
+    return length, np.abs(rate), np.abs(second_derivative / length)
 
 
 def test_slacks_of_light_and_heavy_robots():

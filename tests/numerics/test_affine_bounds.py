@@ -46,7 +46,7 @@ OPERATIONS = {
     "dot": lambda f, g, of: of.dot(f, g),
     "norm_squared": lambda f, g, of: of.norm_squared(f),
     "norm": lambda f, g, of: of.norm(f - 0.5 * g),
-    "turned": lambda f, g, of: of.turned(TURN, of.cross(f, g)),
+    "turned": lambda f, g, of: of.rotated(TURN, of.cross(f, g)),
 }
 # Operations whose bounds of functions with bands around parabolas have such bands.
 PARABOLAS = ("sum", "difference", "product", "constant", "square", "reciprocal", "reciprocal_root", "cross", "dot")
@@ -81,7 +81,7 @@ class Exact:
         return (f**2).sum(-1) ** 0.5
 
     @staticmethod
-    def turned(matrix, f):
+    def rotated(matrix, f):
         return f @ matrix.T
 
 
@@ -95,10 +95,10 @@ class Bounds:
     )
     arc_sine, sincospi = function_bounds.arc_sine, function_bounds.sincospi
     squared, norm, norm_squared = affine_bounds.squared, affine_bounds.norm, affine_bounds.norm_squared
-    cross, dot, turned = affine_bounds.cross, affine_bounds.dot, affine_bounds.turned
+    cross, dot, rotated = affine_bounds.cross, affine_bounds.dot, affine_bounds.rotated
 
 
-def excess(name: str, seed: int, width: float, share: float = 1.0, *, parabolas: bool = False):
+def excess(name: str, seed: int, width: float, fraction: float = 1.0, *, parabolas: bool = False):
     """How far the exact function leaves a share of the band, and the half height of the band."""
     f, f_bounds = functions(seed, width, parabolas=parabolas)
     g, g_bounds = functions(seed + 1000, width, parabolas=parabolas)
@@ -107,7 +107,7 @@ def excess(name: str, seed: int, width: float, share: float = 1.0, *, parabolas:
     s = S.reshape(-1, *(1,) * (exact.ndim - 1))
     square = 0.0 if band.square is None else band.square * s**2
     assert (exact >= np.asarray(band.low()) - 1e-15).all() and (exact <= np.asarray(band.high()) + 1e-15).all()
-    return (np.abs(exact - band.middle - band.slope * s - square) - share * band.radius).max(), band.radius.max()
+    return (np.abs(exact - band.middle - band.slope * s - square) - fraction * band.radius).max(), band.radius.max()
 
 
 @pytest.mark.parametrize("parabolas", [False, True])
@@ -164,7 +164,7 @@ def test_lengths_of_vectors_that_vanish():
 
 def test_nothing_is_known_where_a_function_may_vanish():
     near = AffineBounds(np.array(0.1), np.array(0.05), np.array(0.06))
-    curved = near._replace(square=np.array(-0.03), radius=np.array(0.03))
+    regularization = near._replace(square=np.array(-0.03), radius=np.array(0.03))
     for operation in (Bounds.reciprocal, Bounds.root, Bounds.reciprocal_root):
-        assert np.isnan(operation(near).radius) and np.isnan(operation(curved).radius)
+        assert np.isnan(operation(near).radius) and np.isnan(operation(regularization).radius)
     assert np.isnan(Bounds.arc_sine(near * 5.0 - 1.0).radius) and np.isfinite(Bounds.arc_sine(near).radius)

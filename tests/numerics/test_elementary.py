@@ -111,9 +111,9 @@ def test_bounds_hold_for_random_functions():
     assert_bounds(largest(f).combined(largest(g)), np.hypot(f, g))
     rate = 2.3
     vector = f + 1j * g
-    turned = np.stack([vector[0], vector[1] + 1j * rate * vector[0]])
-    turned = np.stack([*turned, vector[2] + 2j * rate * vector[1] - rate**2 * vector[0]])
-    assert_bounds(largest(f).combined(largest(g)).turned(jnp.asarray(rate)), turned)
+    rotated = np.stack([vector[0], vector[1] + 1j * rate * vector[0]])
+    rotated = np.stack([*rotated, vector[2] + 2j * rate * vector[1] - rate**2 * vector[0]])
+    assert_bounds(largest(f).combined(largest(g)).rotated(jnp.asarray(rate)), rotated)
 
 
 def test_bounds_are_attained():
@@ -125,7 +125,7 @@ def test_bounds_are_attained():
     np.testing.assert_allclose(f.times(-3.0), [3.0 * v for v in f], rtol=1e-13)
     np.testing.assert_allclose(f.combined(f.times(2.0)), [5.0**0.5 * v for v in f], rtol=1e-13)
     circle = Bounds(1.0, a, a**2)  # a vector that turns at rate a, seen from axes that turn against it
-    np.testing.assert_allclose(circle.turned(rate), [1.0, a + rate, (a + rate) ** 2], rtol=1e-13)
+    np.testing.assert_allclose(circle.rotated(rate), [1.0, a + rate, (a + rate) ** 2], rtol=1e-13)
 
 
 def test_smallest_of_each_array():

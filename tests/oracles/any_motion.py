@@ -58,8 +58,8 @@ def cables(robot, state):
         d = b - base
         length = np.sqrt(dot(d, d))
         rate = dot(d, db) / length
-        bend = (dot(db, db) + dot(d, ddb) - rate**2) / length
-        return Cables(length, rate, bend, -d / length[..., None], arms, np.broadcast_to(base, b.shape), b)
+        second_derivative = (dot(db, db) + dot(d, ddb) - rate**2) / length
+        return Cables(length, rate, second_derivative, -d / length[..., None], arms, np.broadcast_to(base, b.shape), b)
     r = np.asarray(robot["pulley_radius"], float)
     axes = np.asarray(robot["pulley_axes"], float)
     k = axes / np.linalg.norm(axes, axis=1)[:, None]

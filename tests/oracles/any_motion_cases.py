@@ -108,8 +108,8 @@ def random_robot(rng, kind, pulleys=False):
         radii = size * np.array([0.2, 0.2, 0.25]) * rng.uniform(0.5, 1.0, 3)
         shape = np.diag(radii**2)
         if not is_planar:
-            turned = sampled_motion.rotations(rng.normal(size=(1, 4)))[0]
-            shape = turned @ shape @ turned.T
+            rotated = sampled_motion.rotations(rng.normal(size=(1, 4)))[0]
+            shape = rotated @ shape @ rotated.T
         # An ellipsoid's inertia: tr(S) I - S is that of a body.
         robot["inertia"] = 0.2 * mass * (np.trace(shape) * np.eye(3) - shape)
         robot["centre_of_mass"] = size * 0.02 * rng.normal(size=3) * (1.0, 0.0 if is_planar else 1.0, 1.0)
@@ -126,11 +126,11 @@ def waves(rng, times, count):
     """Sums of two waves and their first two derivatives, (n, 3, count): values within -1 to 1."""
     period = times[-1] - times[0]
     values = np.zeros((len(times), 3, count))
-    for share in (0.6, 0.4):
+    for fraction in (0.6, 0.4):
         frequency = 2.0 * math.pi * rng.uniform(0.3, 1.5, count) / period
         angle = frequency * (times[:, None] - times[0]) + rng.uniform(0.0, 2.0 * math.pi, count)
         turns = (np.sin(angle), frequency * np.cos(angle), -(frequency**2) * np.sin(angle))
-        values += share * np.stack(turns, axis=1)
+        values += fraction * np.stack(turns, axis=1)
     return values
 
 
@@ -221,8 +221,8 @@ def random_case(rng, pulleys=False, kind=None):
     times = np.linspace(*motion.times, COARSE)
     quick = np.linalg.norm(motion.state(times).acceleration, axis=1).max()
     # In a time k as long: accelerations are 1 / k^2 of these. None is above the share of gravity drawn.
-    share = rng.choice([rng.uniform(0.02, 0.4), rng.uniform(0.4, 2.0)], p=[0.9, 0.1])
-    k = math.sqrt(quick / (share * robot["gravity"]))
+    fraction = rng.choice([rng.uniform(0.02, 0.4), rng.uniform(0.4, 2.0)], p=[0.9, 0.1])
+    k = math.sqrt(quick / (fraction * robot["gravity"]))
     samples["times"] = samples["times"] * k
     if "rates" in samples:
         samples["rates"] = samples["rates"] / k ** np.arange(1, 1 + samples["rates"].shape[1])[:, None]

@@ -17,8 +17,8 @@ def states(points, time, samples):
     s2 = np.pi**2 / (2.0 * time**2) * np.cos(np.pi * t / time)
     position = (1.0 - s) ** 2 * start + 2.0 * s * (1.0 - s) * middle + s**2 * end
     slope = 2.0 * ((s - 1.0) * start + (1.0 - 2.0 * s) * middle + s * end)
-    bend = 2.0 * (start - 2.0 * middle + end)
-    return position, slope * s1, bend * s1**2 + slope * s2
+    second_derivative = 2.0 * (start - 2.0 * middle + end)
+    return position, slope * s1, second_derivative * s1**2 + slope * s2
 
 
 def tensions(spools, mass, gravity, position, acceleration):
@@ -35,8 +35,8 @@ def cable_states(spools, position, velocity, acceleration):
     rays = position[:, None] - np.asarray(spools, float)[None]
     length = np.linalg.norm(rays, axis=2)
     rate = (rays * velocity[:, None]).sum(2) / length
-    bend = ((velocity**2).sum(1)[:, None] + (rays * acceleration[:, None]).sum(2) - rate**2) / length
-    return length, rate, bend
+    second_derivative = ((velocity**2).sum(1)[:, None] + (rays * acceleration[:, None]).sum(2) - rate**2) / length
+    return length, rate, second_derivative
 
 
 def depth(spools, points):

@@ -102,12 +102,12 @@ class Reach:
         if boxes is None:
             return True
         d = self.ends[1] - self.ends[0]
-        size, share = np.linalg.norm(d), np.linspace(1.0, 0.0, CELLS + 1)[:, None]
+        size, fraction = np.linalg.norm(d), np.linspace(1.0, 0.0, CELLS + 1)[:, None]
         d = d / size
 
         def excess(x):
             """What accelerations can do for constant and for growing weights, less what they have to do; or more."""
-            weights = (x[:3] + share * (d + x[3:] - d * (x[3:] @ d))) / size
+            weights = (x[:3] + fraction * (d + x[3:] - d * (x[3:] @ d))) / size
             # What is convex is below its chords.
             ends = self.largest(weights[:-1], *boxes), self.largest(weights[1:], *boxes)
             return 0.5 * np.sum(ends) / CELLS * time**2 - 1.0

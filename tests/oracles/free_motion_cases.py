@@ -68,7 +68,7 @@ def case(kind, seed, outside=False):
     depth = np.linalg.norm(reference - np.mean(robot["base_points"], axis=0))
     units = {"speed_max": math.sqrt(g * depth), "acceleration_max": 2.0 * g}
     for name in free_motions.BOUNDED:
-        share, is_drawn = rng.uniform(0.4, 1.0), rng.random() < 0.3
+        fraction, is_drawn = rng.uniform(0.4, 1.0), rng.random() < 0.3
         if is_drawn:
-            limits[name] = float(share * units[name.removeprefix("cable_")])
+            limits[name] = float(fraction * units[name.removeprefix("cable_")])
     return Case(robot, limits, start, end)

@@ -67,8 +67,8 @@ def middle(start, end):
     """Mean q_0 of two orientations, (4,), and their Gibbs vectors about it, (2, 3)."""
     both = sampled_motion.signed(np.array([start.quaternion, end.quaternion], float))
     mean = both.sum(0) / np.linalg.norm(both.sum(0))
-    turned = product(both, mean * [1.0, -1.0, -1.0, -1.0])
-    return mean, turned[:, 1:] / turned[:, :1]
+    rotated = product(both, mean * [1.0, -1.0, -1.0, -1.0])
+    return mean, rotated[:, 1:] / rotated[:, :1]
 
 
 def coordinates(robot):
@@ -245,12 +245,12 @@ def motion(robot, start, end, time, nodes):
     whole = np.zeros((*spline.coefficients.shape[:2], 6))
     whole[:, 0, :3] = start.position
     whole[..., moving] = spline.coefficients
-    turned = None
+    rotated = None
     if robot["platform_points"] is not None:
         quaternions = np.concatenate([np.zeros_like(whole[..., :1]), whole[..., 3:]], axis=2)
         quaternions[:, 0, 0] = 1.0
-        turned = sampled_motion.Spline(spline.knots, product(quaternions, middle(start, end)[0]))
-    return sampled_motion.Motion(sampled_motion.Spline(spline.knots, whole[..., :3]), turned)
+        rotated = sampled_motion.Spline(spline.knots, product(quaternions, middle(start, end)[0]))
+    return sampled_motion.Motion(sampled_motion.Spline(spline.knots, whole[..., :3]), rotated)
 
 
 def starts(robot, problem, count, rng):

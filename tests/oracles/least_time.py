@@ -97,9 +97,9 @@ class Problem:
         unit_u, unit_x = self.units
         step = self.nodes[i + 1] - self.nodes[i]
         parts = [(np.array([-0.0]), np.array([-1.0]), np.array([0.0]))]
-        for share, found in zip(self.shares, self.rows, strict=True):
+        for fraction, found in zip(self.shares, self.rows, strict=True):
             off = np.array([self.tighter[n][i] if n in self.tighter else 0.0 for n in found.names])
-            parts.append((found.a[i] + 2.0 * step * share * found.b[i], found.b[i], found.c[i] - off))
+            parts.append((found.a[i] + 2.0 * step * fraction * found.b[i], found.b[i], found.c[i] - off))
         a, b, c = (np.concatenate([part[k] for part in parts]) for k in range(3))
         scaled = a * unit_u, b * unit_x, c
         ahead = 2.0 * step * unit_u / unit_x
@@ -107,15 +107,15 @@ class Problem:
         return tuple(np.append(v, [r[k] for r in reach]) for k, v in enumerate(scaled))
 
 
-def places_of(path, nodes, share):
+def places_of(path, nodes, fraction):
     """Places in all cells, at a share of their lengths, with the derivatives on the cell's side."""
-    return path.at(nodes[:-1] + share * np.diff(nodes), 0.5 * (nodes[:-1] + nodes[1:]))
+    return path.at(nodes[:-1] + fraction * np.diff(nodes), 0.5 * (nodes[:-1] + nodes[1:]))
 
 
 def problem(robot, limits, path, count=200, scheme="interpolation", ends=(0.0, 0.0), **polygon):
     """Problem on about `count` cells; polygon: `sides` and `outer` of the circle of accelerations."""
     nodes, shares = path.nodes(count), SCHEMES[scheme]
-    made = tuple(path_rows.rows(robot, limits, places_of(path, nodes, share), **polygon) for share in shares)
+    made = tuple(path_rows.rows(robot, limits, places_of(path, nodes, fraction), **polygon) for fraction in shares)
     return Problem(robot, limits, path, nodes, shares, made, {}, ends, polygon)
 
 
@@ -210,9 +210,11 @@ def optimum(problem_, solution, rounds=15, gap=1e-6):
         if answer.status:
             raise RuntimeError(answer.message)
         below = max(below, time(x) + slope @ (answer.x - x))
-        share = minimize_scalar(lambda k, y=answer.x, x=x: time(x + k * (y - x)), bounds=(0.0, 1.0), method="bounded").x
-        if time(x + share * (answer.x - x)) < time(x):
-            x = x + share * (answer.x - x)
+        fraction = minimize_scalar(
+            lambda k, y=answer.x, x=x: time(x + k * (y - x)), bounds=(0.0, 1.0), method="bounded"
+        ).x
+        if time(x + fraction * (answer.x - x)) < time(x):
+            x = x + fraction * (answer.x - x)
         if time(x) - below < gap * time(x):
             break
     return below, time(x), x * unit_x
@@ -225,7 +227,7 @@ class ByTensions:
         self.robot, self.limits, self.path, self.ends = robot, limits, path, ends
         self.nodes = path.nodes(count)
         self.shares = SCHEMES[scheme]
-        places = [places_of(path, self.nodes, share) for share in self.shares]
+        places = [places_of(path, self.nodes, fraction) for fraction in self.shares]
         self.balances = [path_rows.balance(robot, place) for place in places]
         self.others = [self._stack(path_rows.kinematic_rows(robot, limits, place, sides)) for place in places]
         self.range = path_rows.tension_range(robot, limits)
@@ -240,8 +242,8 @@ class ByTensions:
         n, weight = len(self.range[0]), self.robot["mass"] * self.robot["gravity"]
         step, count = self.nodes[i + 1] - self.nodes[i], len(self.shares)
         equal, right, upper, most = [], [], [], []
-        for k, (share, found, other) in enumerate(zip(self.shares, self.balances, self.others, strict=True)):
-            ahead = 2.0 * step * share
+        for k, (fraction, found, other) in enumerate(zip(self.shares, self.balances, self.others, strict=True)):
+            ahead = 2.0 * step * fraction
             block = np.zeros((found.matrix.shape[1], 2 + count * n))
             block[:, 0] = -(found.a[i] + ahead * found.b[i]) * self.unit_u / weight
             block[:, 1] = -found.b[i] * self.unit_x / weight

@@ -84,10 +84,10 @@ def slacks(robot, limits, motion, times):
 def breaches(problem_, solution, shares=INNER):
     """By how much rows are broken in cells, the most of each name, dict of (N,): 0 where they hold."""
     steps, worst = np.diff(problem_.nodes), {}
-    for share in shares:
-        place = least_time.places_of(problem_.path, problem_.nodes, share)
+    for fraction in shares:
+        place = least_time.places_of(problem_.path, problem_.nodes, fraction)
         found = path_rows.rows(problem_.robot, problem_.limits, place, **problem_.polygon)
-        off = -path_rows.slack(found, solution.u, solution.x[:-1] + 2.0 * steps * share * solution.u)
+        off = -path_rows.slack(found, solution.u, solution.x[:-1] + 2.0 * steps * fraction * solution.u)
         names = np.array(found.names)
         for name in dict.fromkeys(found.names):
             broken = np.maximum(off[:, names == name].max(1), 0.0)
@@ -141,7 +141,7 @@ class Necessary:
 
 def aligned_rows(robot, limits, path, nodes):
     """Rows at the start, middle and end of cells, arrays (3, N, rows), smooth from one to the next."""
-    places = [least_time.places_of(path, nodes, share) for share in (0.0, 0.5, 1.0)]
+    places = [least_time.places_of(path, nodes, fraction) for fraction in (0.0, 0.5, 1.0)]
     made = [path_rows.kinematic_rows(robot, limits, place, FEW_SIDES) for place in places]
     parts = [[np.concatenate([p[k] for p in one.values()], 1)] if made[0] else [] for one in made for k in range(3)]
     found = [path_rows.normals(path_rows.balance(robot, place).matrix) for place in places]
@@ -189,11 +189,11 @@ def necessary(robot, limits, path, nodes, most):
     more = SAFETY * (0.5 * bends[0] * reach + 0.5 * bends[1] * top[:, None] + np.abs(slope_b) * reach * d / 6.0)
     factor = np.abs(b[1] - 0.5 * slope_a / d)
     tangents = []
-    for share in (0.0, 0.5, 1.0):
+    for fraction in (0.0, 0.5, 1.0):
         # r = D w share (1 - share), r' = D (1 - 2 share), with w = u_+ - u_- and u = u_- + w share.
         wide = (high - low)[:, None]
-        at = low[:, None] + wide * share
-        r, slope = d * wide * share * (1.0 - share), d * (1.0 - 2.0 * share)
+        at = low[:, None] + wide * fraction
+        r, slope = d * wide * fraction * (1.0 - fraction), d * (1.0 - 2.0 * fraction)
         tangents.append((a[1] - factor * slope, b[1], mean_c + more + factor * (r - slope * at)))
     return Necessary(*(np.concatenate([t[k] for t in tangents], axis=1) for k in range(3)), low, high, caps)
 

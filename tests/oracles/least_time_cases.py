@@ -74,10 +74,10 @@ def demands(robot, limits, path):
     motion = least_time_bounds.Timed(path, solution.nodes, solution.x)
     state = motion.state(np.linspace(*motion.times, 300))
     s, speed, u = motion.progress(np.linspace(*motion.times, 300))
-    _, rate, bend = path_rows.lengths(robot, path.at(s))
+    _, rate, second_derivative = path_rows.lengths(robot, path.at(s))
     return {
         "cable_speed_max": np.abs(rate * speed[:, None]).max(),
-        "cable_acceleration_max": np.abs(rate * u[:, None] + bend * speed[:, None] ** 2).max(),
+        "cable_acceleration_max": np.abs(rate * u[:, None] + second_derivative * speed[:, None] ** 2).max(),
         "speed_max": np.linalg.norm(state.velocity, axis=1).max(),
         "acceleration_max": np.linalg.norm(state.acceleration, axis=1).max(),
     }
@@ -109,7 +109,7 @@ def case(kind, seed, outside=False):
     limits = tension_limits(rng, robot, path)
     needs = demands(robot, limits, path)
     for name, (least, most) in SHARES.items():
-        share, is_drawn = rng.uniform(least, most), rng.random() < 0.4
+        fraction, is_drawn = rng.uniform(least, most), rng.random() < 0.4
         if is_drawn:
-            limits[name] = float(share * needs[name])
+            limits[name] = float(fraction * needs[name])
     return Case(kind, robot, limits, path)

@@ -96,9 +96,9 @@ def cable_rates(
     base: ArrayLike, start: ArrayLike, end: ArrayLike, law: Law, *, planar: bool = False
 ) -> tuple[Array, Array, Array]:
     """l, l' and l'' of every cable (last axis): l' = e.X', l'' = e.X'' + (X'.X' - l'^2)/l, e from the spool to X."""
-    s, speed, bend = (np.asarray(part, dtype=np.float64) for part in law)
+    s, speed, second_derivative = (np.asarray(part, dtype=np.float64) for part in law)
     lengths, slopes, curves = Line.of(base, start, end, planar=planar).cables(s)
-    return lengths, slopes * speed[..., None], slopes * bend[..., None] + curves * speed[..., None] ** 2
+    return lengths, slopes * speed[..., None], slopes * second_derivative[..., None] + curves * speed[..., None] ** 2
 
 
 def rates_mismatch(
@@ -114,9 +114,9 @@ def rates_mismatch(
         far = np.linalg.norm(first + places[..., None, None] * (last - first) - spools, axis=-1)
         first_rate = np.tensordot([1.0, -8.0, 0.0, 8.0, -1.0], far, 1) / (12 * h)
         second_rate = np.tensordot([-1.0, 16.0, -30.0, 16.0, -1.0], far, 1) / (12 * h**2)
-        _, speed, bend = cable_rates(base, start, end, law_of(motion, t), planar=planar)
-        worst = np.maximum(worst, [np.abs(speed - first_rate).max(), np.abs(bend - second_rate).max()])
-        largest = np.maximum(largest, [np.abs(speed).max(), np.abs(bend).max()])
+        _, speed, second_derivative = cable_rates(base, start, end, law_of(motion, t), planar=planar)
+        worst = np.maximum(worst, [np.abs(speed - first_rate).max(), np.abs(second_derivative - second_rate).max()])
+        largest = np.maximum(largest, [np.abs(speed).max(), np.abs(second_derivative).max()])
     return float(worst[0] / largest[0]), float(worst[1] / largest[1])
 
 
@@ -142,13 +142,13 @@ def margins(
     given = line.given
     if isinstance(law[0], str):
         law = law_of(law, np.union1d(np.linspace(0.0, law[1], samples), corners_of(law)))
-    s, _, bend = law
+    s, _, second_derivative = law
     lengths, speeds, bends = cable_rates(base, start, end, law, planar=given.planar)
     options = {name: getattr(given, name) for name in ("gravity", "tension_min", "tension_max")}
-    pushes = zip(line.start + s[:, None] * line.step, bend[:, None] * line.step, strict=True)
+    pushes = zip(line.start + s[:, None] * line.step, second_derivative[:, None] * line.step, strict=True)
     return {
         "tension": min(tension_margin(line.base, *push, mass=mass, **options) for push in pushes),
-        "acceleration": _share(given.max_acceleration, line.size * np.abs(bend)),
+        "acceleration": _share(given.max_acceleration, line.size * np.abs(second_derivative)),
         "cable_speed": _share(given.cable_speed_max, np.abs(speeds)),
         "cable_acceleration": _share(given.cable_acceleration_max, np.abs(bends)),
         "cable_length_min": float(np.min(lengths - given.cable_length_min)),
@@ -270,11 +270,11 @@ def _rest_at_ends(table: Table) -> bool:
 
 def _rates(line: Line, table: Table, motion: Motion, x: Array) -> tuple[Array, Array]:
     """The least and the largest q = 1/T^2 that the limits allow at the fractions x of a motion of T = 1."""
-    s, speed, bend = law_of(motion, x)
+    s, speed, second_derivative = law_of(motion, x)
     s, given = np.clip(s, 0.0, 1.0), line.given
     low, high = np.interp(s, table[0], table[1]), np.interp(s, table[0], table[2])
-    up, down = bend > 0.0, bend < 0.0
-    size = np.where(up | down, np.abs(bend), 1.0)
+    up, down = second_derivative > 0.0, second_derivative < 0.0
+    size = np.where(up | down, np.abs(second_derivative), 1.0)
     shut = ~up & ~down & ((low > 0.0) | (high < 0.0))
     with np.errstate(over="ignore", divide="ignore"):
         least = np.where(up, low, np.where(down, -high, -np.inf)) / size
@@ -282,7 +282,9 @@ def _rates(line: Line, table: Table, motion: Motion, x: Array) -> tuple[Array, A
         if np.any(np.isfinite([*np.ravel(given.cable_speed_max), *np.ravel(given.cable_acceleration_max)])):
             _, slopes, curves = line.cables(s)
             by_speed = (given.cable_speed_max / np.abs(slopes * speed[:, None])) ** 2
-            by_bend = given.cable_acceleration_max / np.abs(slopes * bend[:, None] + curves * speed[:, None] ** 2)
+            by_bend = given.cable_acceleration_max / np.abs(
+                slopes * second_derivative[:, None] + curves * speed[:, None] ** 2
+            )
             most = np.minimum(most, np.minimum(by_speed, by_bend).min(axis=1))
     return least, most
 

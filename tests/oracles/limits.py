@@ -37,16 +37,18 @@ class Case:
 
 def slacks(case: Case, arcs: int, tau: np.ndarray) -> np.ndarray:
     """Slacks of the criteria at instants, (n_criteria, n): taut, below the spools, then the limits that are given."""
-    hub = case.base.mean(0) + np.array([0.0, 0.0, case.z0])
+    center = case.base.mean(0) + np.array([0.0, 0.0, case.z0])
     normal = printed.plane_normal(case.base)
     settings = {"z0": case.z0, "normal": normal}
-    duration, p, v, a = printed.motion(case.start, case.end, hub, case.gravity, arcs, tau, case.amplitude, **settings)
+    duration, p, v, a = printed.motion(
+        case.start, case.end, center, case.gravity, arcs, tau, case.amplitude, **settings
+    )
     if not duration > 0.0:
         return np.full((2, len(tau)), -np.inf)
-    eta = printed.height_ratio(case.base, p, hub)
-    kappa = printed.normalised_pseudotensions(case.base, hub, p, a, case.gravity)
+    eta = printed.height_ratio(case.base, p, center)
+    kappa = printed.normalised_pseudotensions(case.base, center, p, a, case.gravity)
     rho, rate = printed.cable_lengths(case.base, p), printed.cable_rates(case.base, p, v)
-    bend = printed.cable_accelerations(case.base, p, v, a)
+    second_derivative = printed.cable_accelerations(case.base, p, v, a)
     # Tension over weight times depth: 3 z0 eta F = kappa rho.
     lift, weight = kappa * rho / (3.0 * case.z0), case.mass * case.gravity
     found = [kappa.min(1), eta]
@@ -60,7 +62,7 @@ def slacks(case: Case, arcs: int, tau: np.ndarray) -> np.ndarray:
                 "floor": lambda limit: (limit - p[:, 2:]) / case.z0,
                 "cable_length_max": lambda limit: (limit**2 - rho**2) / (2.0 * case.z0**2),
                 "cable_speed_max": lambda limit: rho**2 * (1.0 - (rate / limit) ** 2) / (2.0 * case.z0**2),
-                "cable_acceleration_max": lambda limit: rho**3 * (1.0 - np.abs(bend) / limit) / case.z0**3,
+                "cable_acceleration_max": lambda limit: rho**3 * (1.0 - np.abs(second_derivative) / limit) / case.z0**3,
                 "speed_max": lambda limit: 1.0 - (v**2).sum(1, keepdims=True) / limit**2,
                 "acceleration_max": lambda limit: 1.0 - (a**2).sum(1, keepdims=True) / limit**2,
             }[name](limit).min(1)

@@ -235,17 +235,17 @@ def s_curve(t: ArrayLike, p: float, duration: float) -> Law:
     piece = np.clip(np.searchsorted(knots, time, side="right") - 1, 0, 3)
     tau = time - knots[piece]
     place, speed, corner, jerk = places[piece], speeds[piece], corners[piece], jerks[piece]
-    bend = corner + jerk * tau
+    second_derivative = corner + jerk * tau
     return (
         place + tau * (speed + tau * (corner / 2 + tau * jerk / 6)),
         speed + tau * (corner + tau * jerk / 2),
-        bend,
+        second_derivative,
     )
 
 
 def _scaled(law: Callable[[Array], Law], t: ArrayLike, duration: float) -> Law:
-    place, speed, bend = law(np.asarray(t, dtype=np.float64) / duration)
-    return place, speed / duration, bend / duration**2
+    place, speed, second_derivative = law(np.asarray(t, dtype=np.float64) / duration)
+    return place, speed / duration, second_derivative / duration**2
 
 
 def quintic(t: ArrayLike, duration: float) -> Law:
@@ -262,11 +262,11 @@ def cubic(t: ArrayLike, duration: float) -> Law:
 
 def _rates(lower: Bound, upper: Bound, ratio: float, tau: Array) -> tuple[Array, Array]:
     """The least and the largest 1/T^2 that the limits allow the S-curve of p = ratio T at tau = t/T."""
-    s, _, bend = s_curve(tau, ratio, 1.0)
+    s, _, second_derivative = s_curve(tau, ratio, 1.0)
     s = np.clip(s, 0.0, 1.0)
     low, high = (np.broadcast_to(np.asarray(bound(s), dtype=np.float64), s.shape) for bound in (lower, upper))
-    up, down = bend > 0.0, bend < 0.0
-    size = np.where(up | down, np.abs(bend), 1.0)
+    up, down = second_derivative > 0.0, second_derivative < 0.0
+    size = np.where(up | down, np.abs(second_derivative), 1.0)
     with np.errstate(over="ignore"):
         least = np.where(up, low, np.where(down, -high, -np.inf)) / size
         most = np.where(up, high, np.where(down, -low, np.inf)) / size
@@ -453,8 +453,8 @@ def table_4_3(
         for column, p in enumerate(p_values):
             corners = [0.0, p / 2, p, (duration + p) / 2, duration]
             t = np.concatenate([np.linspace(*pair, samples) for pair in pairwise(corners)])
-            s, _, bend = s_curve(t, p, duration)
-            above[row, column] = np.max(bend - np.minimum(upper(s), most))
-            under = np.maximum(lower(s), -most) - bend
+            s, _, second_derivative = s_curve(t, p, duration)
+            above[row, column] = np.max(second_derivative - np.minimum(upper(s), most))
+            under = np.maximum(lower(s), -most) - second_derivative
             below[row, column] = np.max(under[t >= p] if after_p else under)
     return above, below

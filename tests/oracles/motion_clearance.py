@@ -68,8 +68,8 @@ def cables_and_obstacle(robot, found, obstacle):
     shape = found.leaving.shape
     a, u = found.leaving.reshape(-1, 3), (found.attachments - found.leaving).reshape(-1, 3)
     if "half" in obstacle:
-        turned = [x @ obstacle["rotation"] for x in (a - obstacle["centre"], u)]
-        apart = clearance.outside_box(*turned, np.broadcast_to(obstacle["half"], a.shape))
+        rotated = [x @ obstacle["rotation"] for x in (a - obstacle["centre"], u)]
+        apart = clearance.outside_box(*rotated, np.broadcast_to(obstacle["half"], a.shape))
     elif "ends" in obstacle:
         start, end = obstacle["ends"]
         apart = clearance.segments(a, u, np.broadcast_to(start, a.shape), np.broadcast_to(end - start, a.shape))

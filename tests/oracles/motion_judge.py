@@ -42,7 +42,7 @@ class Judgement:
         return found + [f"{name}: {value:.3g}" for name, value in self.smoothness.items() if not value <= rough]
 
 
-def turned(before, after):
+def rotated(before, after):
     """Vectors of the rotations from rotations (k, 3, 3) to others, by less than pi."""
     turn = after @ np.swapaxes(before, 1, 2)
     odd = 0.5 * np.stack(
@@ -70,7 +70,7 @@ def residuals(a, b, h):
     return {
         "position": b.position - a.position - stepped("velocity", "acceleration"),
         "velocity": b.velocity - a.velocity - stepped("acceleration"),
-        "rotation": turned(a.rotation, b.rotation) - stepped("omega", "alpha"),
+        "rotation": rotated(a.rotation, b.rotation) - stepped("omega", "alpha"),
         "omega": b.omega - a.omega - stepped("alpha"),
         "acceleration jump": b.acceleration - a.acceleration,
         "alpha jump": b.alpha - a.alpha,
@@ -145,7 +145,7 @@ def judged(robot, limits, state, duration, start, end, samples=any_motion.SAMPLE
     ends = {
         "position": largest(found.position[both] - poses) / away,
         "velocity": largest(found.velocity[both]) / max(largest(found.velocity), 1e-300),
-        "rotation": largest(turned(turns, found.rotation[both])),
+        "rotation": largest(rotated(turns, found.rotation[both])),
         "omega": largest(found.omega[both]) / max(largest(found.omega), 1e-300),
     }
     return Judgement(slacks, float(depth), ends, smoothness(state, times))

@@ -68,8 +68,8 @@ class Path:
 
     def changed(self, change):
         """The path with its splines changed by a function of a spline and of whether it is that of positions."""
-        turned = None if self.quaternions is None else change(self.quaternions, False)
-        return Path(change(self.positions, True), turned)
+        rotated = None if self.quaternions is None else change(self.quaternions, False)
+        return Path(change(self.positions, True), rotated)
 
     def backwards(self):
         """The path from its end to its start."""
@@ -235,14 +235,14 @@ def kinematic_rows(robot, limits, place, sides=SIDES, outer=True):
     about it (outer: longer by 1 / cos(pi / (2 sides)) at most) or in it.
     """
     made = {}
-    _, rate, bend = lengths(robot, place)
+    _, rate, second_derivative = lengths(robot, place)
     zero = np.zeros_like(rate)
     n = rate.shape[1]
     if limits.get("cable_speed_max") is not None:
         made["cable_speed_max"] = zero, rate**2, np.broadcast_to(limits["cable_speed_max"], n) ** 2 + zero
     if limits.get("cable_acceleration_max") is not None:
         most = np.broadcast_to(limits["cable_acceleration_max"], n) + zero
-        both = (np.concatenate([v, -v], axis=1) for v in (rate, bend))
+        both = (np.concatenate([v, -v], axis=1) for v in (rate, second_derivative))
         made["cable_acceleration_max"] = *both, np.concatenate([most, most], axis=1)
     ahead = np.linalg.norm(place.first, axis=1)[:, None]
     if limits.get("speed_max") is not None:

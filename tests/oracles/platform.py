@@ -95,13 +95,13 @@ def effective_c3(epsilon: float) -> Amplitude:
     return _piecewise(12 * m / epsilon**4 * Polynomial([0, epsilon**2, -2 * epsilon, 1]), m, epsilon)
 
 
-def _piecewise(bend: Polynomial, slope: float, epsilon: float) -> Amplitude:
+def _piecewise(second_derivative: Polynomial, slope: float, epsilon: float) -> Amplitude:
     """A'' = bend up to epsilon, a straight middle, the end mirrored; at a knot the outer piece is taken."""
 
     def amplitude(tau: Vec) -> Array:
         s = np.asarray(tau, dtype=float)
-        start = np.array([bend.integ(2).deriv(i)(s) for i in range(4)])
-        end = np.array([bend.integ(2).deriv(i)(1 - s) * (-1) ** (i + 1) for i in range(4)])
+        start = np.array([second_derivative.integ(2).deriv(i)(s) for i in range(4)])
+        end = np.array([second_derivative.integ(2).deriv(i)(1 - s) * (-1) ** (i + 1) for i in range(4)])
         end[0] += 1  # (1.108)
         middle = np.array([0.5 + slope * (s - 0.5), slope + 0 * s, 0 * s, 0 * s])
         return np.where(s <= epsilon, start, np.where(s >= 1 - epsilon, end, middle))
@@ -244,12 +244,12 @@ def envelope(segment: Segment, arcs: int, tau: Array) -> Array:
     angle = 2 * math.atan2(np.linalg.norm(start - end), np.linalg.norm(start + end))  # (3.60)
     if angle > math.pi - 1e-9:
         raise ValueError("the envelope's ends are opposite quaternions: (3.59) is not defined")
-    a, slope, bend = segment.amplitude(tau)[:3, :, None]
+    a, slope, second_derivative = segment.amplitude(tau)[:3, :, None]
     if angle < 1e-12:
-        return np.array([start * (1 - a) + end * a, (end - start) * slope, (end - start) * bend])
+        return np.array([start * (1 - a) + end * a, (end - start) * slope, (end - start) * second_derivative])
     value = (start * np.sin(angle * (1 - a)) + end * np.sin(angle * a)) / math.sin(angle)  # (3.59)
     by_a = angle * (end * np.cos(angle * a) - start * np.cos(angle * (1 - a))) / math.sin(angle)
-    return np.array([value, by_a * slope, by_a * bend - angle**2 * value * slope**2])
+    return np.array([value, by_a * slope, by_a * second_derivative - angle**2 * value * slope**2])
 
 
 def orientation(env: Array, beta: Array) -> Array:

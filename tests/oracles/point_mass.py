@@ -53,8 +53,8 @@ def effective(tau: Vec, epsilon: float) -> Triple:
     mirrored = 1 - last[0], last[1], -last[2]
     before, after = s <= epsilon, s >= 1 - epsilon
     parts = zip(first, middle, mirrored, strict=True)
-    value, slope, bend = (np.where(before, a, np.where(after, c, b)) for a, b, c in parts)
-    return value, slope, bend
+    value, slope, second_derivative = (np.where(before, a, np.where(after, c, b)) for a, b, c in parts)
+    return value, slope, second_derivative
 
 
 def frame(p1: Vec, p2: Vec, p0: Vec, arcs: int, *, normal: Vec = (0.0, 0.0, 1.0)) -> Frame:

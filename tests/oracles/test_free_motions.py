@@ -137,10 +137,10 @@ def test_the_judge_sees_faults(fault):
 
 
 @pytest.mark.parametrize("limit, share", [("tension_max", 0.9999), ("cable_speed_max", 0.9999)])
-def test_the_judge_sees_limits_that_are_touched(limit, share):
+def test_the_judge_sees_limits_that_are_touched(limit, fraction):
     """The fastest motions are on their limits: a smaller one is broken."""
     known = free_motion_times.reference("segment 1")
-    limits = {**known.case.limits, limit: share * known.case.limits[limit]}
+    limits = {**known.case.limits, limit: fraction * known.case.limits[limit]}
     sides = known.time, known.case.start, known.case.end
     faults = motion_judge.judged(known.case.robot, limits, known.motion.state, *sides, samples=1501).faults()
     name = "tension" if limit.startswith("tension") else limit

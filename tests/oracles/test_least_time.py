@@ -38,7 +38,7 @@ def test_rows_are_those_of_motions(kind, cases):
     """The wrench, the cables and the slacks of a motion along a path, from the oracle of any motion."""
     case = cases[kind]
     s, u, x = np.linspace(0.1, 0.9, 5) * case.path.length, 0.7, 1.3
-    place, turned = case.path.at(s), sampled_motion.Motion(case.path.positions, case.path.quaternions).state(s)
+    place, rotated = case.path.at(s), sampled_motion.Motion(case.path.positions, case.path.quaternions).state(s)
     speed = math.sqrt(x)
     state = sampled_motion.State(
         place.position,
@@ -48,9 +48,9 @@ def test_rows_are_those_of_motions(kind, cases):
         place.omega * speed,
         place.omega * u + place.alpha * x,
     )
-    np.testing.assert_allclose(place.rotation, turned.rotation, atol=1e-13)
-    np.testing.assert_allclose(place.omega, turned.omega, atol=1e-13)
-    np.testing.assert_allclose(place.alpha, turned.alpha, atol=1e-12)
+    np.testing.assert_allclose(place.rotation, rotated.rotation, atol=1e-13)
+    np.testing.assert_allclose(place.omega, rotated.omega, atol=1e-13)
+    np.testing.assert_allclose(place.alpha, rotated.alpha, atol=1e-12)
     found, balance = any_motion.cables(case.robot, state), path_rows.balance(case.robot, place)
     matrix, wrench = any_motion.balance(case.robot, state, found)
     size = np.linalg.norm(wrench[:, -1:], axis=1) / np.linalg.norm(
@@ -59,10 +59,10 @@ def test_rows_are_those_of_motions(kind, cases):
     keep = slice(0, 3 if case.robot["pattern"] == "3R3T" else 2)
     np.testing.assert_allclose((balance.a * u + balance.b * x + balance.c)[:, keep], wrench[:, keep], rtol=1e-12)
     np.testing.assert_allclose(size, size[0], rtol=1e-9)
-    length, rate, bend = path_rows.lengths(case.robot, place)
+    length, rate, second_derivative = path_rows.lengths(case.robot, place)
     np.testing.assert_allclose(length, found.lengths, rtol=1e-13)
     np.testing.assert_allclose(rate * speed, found.rates, atol=1e-12)
-    np.testing.assert_allclose(rate * u + bend * x, found.accelerations, atol=1e-11)
+    np.testing.assert_allclose(rate * u + second_derivative * x, found.accelerations, atol=1e-11)
     # The half-planes' margin over |y|_1 has the sign of that by linear programs.
     centring = any_motion.Centring(*path_rows.tension_range(case.robot, case.limits))
     rows = path_rows.tension_rows(case.robot, case.limits, place)
@@ -109,8 +109,8 @@ def test_greedy_solutions_take_little_longer_than_the_optimum(kind, scheme, case
     assert greedy.time < (1.002 if scheme == "interpolation" else 1.02) * time
     assert (x <= greedy.sets[:, 1] * (1.0 + 1e-6) + 1e-6).all()
     u = np.diff(x) / (2.0 * np.diff(problem.nodes))
-    for share, rows in zip(problem.shares, problem.rows, strict=True):
-        slack = path_rows.slack(rows, u, x[:-1] + 2.0 * share * np.diff(problem.nodes) * u)
+    for fraction, rows in zip(problem.shares, problem.rows, strict=True):
+        slack = path_rows.slack(rows, u, x[:-1] + 2.0 * fraction * np.diff(problem.nodes) * u)
         assert (slack > -1e-5 * np.abs(rows.c)).all()
 
 
@@ -177,12 +177,12 @@ def test_level_circle_under_many_spools():
 
 
 @pytest.mark.parametrize("kind, share", [("2T-3", 0.945), ("3T-3", 0.985), ("1R2T-4", 0.965), ("3R3T-7", 0.988)])
-def test_bounds_enclose_the_estimate(kind, share, cases):
+def test_bounds_enclose_the_estimate(kind, fraction, cases):
     case = cases[kind]
     motion, above = least_time_bounds.above(case.robot, case.limits, case.path, 150)
     below = least_time_bounds.below(case.robot, case.limits, case.path, 150)
     time, change = least_time_bounds.estimate(case.robot, case.limits, case.path, 200)
-    assert share * above < below < time + change
+    assert fraction * above < below < time + change
     assert time - change < above < 1.01 * time
     assert change < 2e-3 * time
     slacks = least_time_bounds.slacks(case.robot, case.limits, motion, np.linspace(*motion.times, 400))

@@ -159,7 +159,7 @@ def box_margin(matrix: Array, centre: ArrayLike, half: ArrayLike, low: ArrayLike
     return tension_margin(matrix, corners(centre, half), low, high)
 
 
-def cocircuits(matrix: Array) -> tuple[Array, Array]:
+def facet_normals(matrix: Array) -> tuple[Array, Array]:
     """Normals c (k, d), in the span of W, and y = c W (k, n) of all vectors of minimal support, with both signs.
 
     c is normal to rank - 1 independent columns, for all choices of these; the null vectors come from SVD.  |y| is 1.
@@ -180,7 +180,7 @@ def cocircuits(matrix: Array) -> tuple[Array, Array]:
 def _slacks(matrix: Array, wrenches: Array, shape: Array, low: ArrayLike, high: ArrayLike) -> tuple[Array, Array]:
     # Per cocircuit the distance from its plane times |c|, inf where void, at the worst wrench; and the cocircuits.
     low, high = _bounds(matrix, low, high)
-    c, y = cocircuits(matrix)
+    c, y = facet_normals(matrix)
     with np.errstate(invalid="ignore"):
         reach = np.where(y > 0.0, y * high, y * low).sum(1)
     return reach - (wrenches @ c.T).max(0) - np.linalg.norm(c @ shape, axis=1), np.c_[c, y]
@@ -244,7 +244,7 @@ def is_closed(matrix: Array, tolerance: float = 1e-9) -> bool:
 
 def closed_by_cocircuits(matrix: Array) -> bool:
     """Full rank, and every cocircuit has entries of both signs."""
-    y = cocircuits(matrix)[1]
+    y = facet_normals(matrix)[1]
     return bool(rank_of(matrix) == len(matrix) and np.all((y > 0.0).any(1)))
 
 

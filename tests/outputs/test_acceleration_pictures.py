@@ -50,8 +50,12 @@ def motion(path: Path, robot: dict, poses, rows: dict, ends=(1.0,), **plan) -> P
     known = {"robot": robot["name"], "robot_settings": json.dumps(robot), "plan": json.dumps(keys), "mass": 10.0}
     shapes = {"position": 3, "acceleration": 3, "tension": cables}
     columns = {name: np.zeros((count, width)) for name, width in shapes.items()} | rows
-    stops = np.asarray(ends, float)
-    segments = {"segment": np.arange(1, len(stops) + 1), "segment_start": [0.0, *stops[:-1]], "segment_end": stops}
+    waypoints = np.asarray(ends, float)
+    segments = {
+        "segment": np.arange(1, len(waypoints) + 1),
+        "segment_start": [0.0, *waypoints[:-1]],
+        "segment_end": waypoints,
+    }
     with new_hdf5(path, known | {"z_axis": robot["z_axis"], "base_points": np.array(robot["base_points"])}) as file:
         for table, values in ((TRAJECTORY, columns), (SEGMENTS, segments)):
             for name, data in values.items():

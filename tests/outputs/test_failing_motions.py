@@ -260,8 +260,8 @@ def six_cables(turn, z_axis):
 def test_six_cables_are_drawn_where_they_are_whatever_the_axes_of_the_file(z_axis):
     """Orientations of a motion count from that in which the platform hangs, not from the axes of its file."""
     columns = {"position": np.array([[0.1, 0.2, 1.3]]), "quaternion": np.array([[0.96, 0.0, 0.28, 0.0]])}
-    plain, turned = (resolve_robot(six_cables(turn, z_axis), "", None) for turn in (np.eye(3), TURN))
-    expected, drawn = (moving(columns, robot_file, np.arange(1)) for robot_file in (plain, turned))
+    plain, rotated = (resolve_robot(six_cables(turn, z_axis), "", None) for turn in (np.eye(3), TURN))
+    expected, drawn = (moving(columns, robot_file, np.arange(1)) for robot_file in (plain, rotated))
     np.testing.assert_allclose(drawn.attached, expected.attached, atol=1e-9)
     np.testing.assert_allclose(
         np.unique(drawn.corners[0].round(6), axis=0), np.unique(expected.corners[0].round(6), axis=0)

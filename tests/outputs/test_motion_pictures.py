@@ -52,8 +52,8 @@ def test_the_trajectory_in_space(motions, figures, capsys):
         wanted = [to_rgba(c) for c in colours_of_tension()(result.data["tension"][row] / largest)]
         np.testing.assert_allclose(some.get_colors(), wanted)
     # z points down in the file and upward it is drawn: nothing is mirrored if two axes are turned.
-    turned = [getattr(space, f"get_{axis}lim")()[0] > getattr(space, f"get_{axis}lim")()[1] for axis in "xyz"]
-    assert turned == [False, True, True]
+    rotated = [getattr(space, f"get_{axis}lim")()[0] > getattr(space, f"get_{axis}lim")()[1] for axis in "xyz"]
+    assert rotated == [False, True, True]
     assert [text.get_text() for text in figure.legends[0].get_texts()] == [
         "path",
         "start",

@@ -46,7 +46,7 @@ def asymmetrical(_):
         angles = rng.uniform([-np.pi, 0.2, -0.5], [np.pi, 0.8, 0.5])
         poses.append((position, oracle.pose_quaternion(position, angles)))
     segment, world = made(robot, *poses, Z0, (-3.0, -2.0), arcs), upward("down")
-    points, inertia = world.turned(np.asarray(robot.platform_points)), world.turned_tensor(np.asarray(robot.inertia))
+    points, inertia = world.rotated(np.asarray(robot.platform_points)), world.turned_tensor(np.asarray(robot.inertia))
     body = Suspended(
         *("mine", "down", (), float(robot.mass), inertia, float(robot.gravity)),
         *(world.inward(np.asarray(robot.base_points)), points, np.full(6, np.inf)),
@@ -112,7 +112,7 @@ def test_the_tensions_make_the_motion_in_mujoco(scene):
     for moved in (scene.coarse, scene.fine):
         way = way_of(scene.body, moved, by_segment=False)
         planned = moved.position[ends_of_steps(moved)]
-        errors.append([np.linalg.norm(way.position - planned, axis=1).max(), way.turned.max()])
+        errors.append([np.linalg.norm(way.position - planned, axis=1).max(), way.rotated.max()])
     coarse, fine = np.array(errors)
     assert fine[0] < 5e-9 and fine[1] < 2e-7
     np.testing.assert_allclose(coarse / fine, 16.0, rtol=0.1)

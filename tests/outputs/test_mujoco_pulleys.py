@@ -57,9 +57,9 @@ def scene(pattern: str, name: str, size: float = 0.3):
         inertia=world.turned_tensor(np.asarray(robot.inertia)) if is_body else None,
         gravity=float(robot.gravity),
         spools=world.inward(np.asarray(robot.base_points)),
-        points=world.turned(np.asarray(robot.platform_points)) if is_body else np.zeros((3, 3)),
+        points=world.rotated(np.asarray(robot.platform_points)) if is_body else np.zeros((3, 3)),
         tension_max=np.full(robot.n_cables, np.inf),
-        pulleys=Pulleys(np.asarray(robot.pulleys.radius), world.turned(np.asarray(robot.pulleys.axes))),
+        pulleys=Pulleys(np.asarray(robot.pulleys.radius), world.rotated(np.asarray(robot.pulleys.axes))),
     )
     return body, in_world(columns, np.ones(2 * STEPS + 1, int), "down")
 

@@ -136,8 +136,8 @@ def test_a_platform_s_points_turn_with_it():
     attached = unpacked(found["attached"]).reshape(count, 6, 3)
     own = np.array(robot_file.platform_points)
     for row in range(count):
-        turned = position[row] + Rotation.from_quat(quaternion[row], scalar_first=True).apply(own)
-        np.testing.assert_allclose(attached[row], turned, atol=1e-6)
+        rotated = position[row] + Rotation.from_quat(quaternion[row], scalar_first=True).apply(own)
+        np.testing.assert_allclose(attached[row], rotated, atol=1e-6)
     # The edges join points of the platform, and all of these.
     corners = unpacked(found["corners"]).reshape(count, 2 * found["edges"], 3)
     gaps = np.linalg.norm(corners[:, :, None] - attached[:, None], axis=3)

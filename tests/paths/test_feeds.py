@@ -73,11 +73,11 @@ def test_feeds_are_kept_between_nodes(planned):
 
 def test_feeds_are_named(planned):
     (segment,) = planned.to_dict()["segments"]
-    share = {row.get("feed"): row["share"] for row in segment["binding"]}
+    fraction = {row.get("feed"): row["share"] for row in segment["binding"]}
     rows = planned.rows(rate=5000.0)
     speeds = 6e4 * np.linalg.norm(rows["velocity"], axis=1)
     near = (np.abs(speeds / FEEDS[1] - 1.0) < 1e-2).mean()
-    assert share["F7377"] == pytest.approx(near, abs=0.1) and near > 0.1
+    assert fraction["F7377"] == pytest.approx(near, abs=0.1) and near > 0.1
     assert {row["criterion"] for row in segment["binding"] if "feed" in row} == {"over_feed"}
     assert "feed F7377 (" in path_lines(planned.to_dict()["segments"])[0]
 
@@ -96,9 +96,9 @@ def law() -> Spline:
     """The motion, with its pieces by de Casteljau."""
     rest, pieces = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0]), []
     for k in range(8, 0, -1):
-        share, rows = 1.0 / k, [rest]
+        fraction, rows = 1.0 / k, [rest]
         while len(rows[-1]) > 1:
-            rows.append((1.0 - share) * rows[-1][:-1] + share * rows[-1][1:])
+            rows.append((1.0 - fraction) * rows[-1][:-1] + fraction * rows[-1][1:])
         pieces.append(np.array([row[0] for row in rows]))
         rest = np.array([row[-1] for row in rows])[::-1]
     way = np.array([0.6, 0.0, -0.8])
@@ -110,12 +110,12 @@ def speed_at(t):
 
 
 @pytest.mark.parametrize("share", [1.0 - 1e-6, 1.0 + 1e-6])
-def test_feeds_hold_over_their_pieces_alone(share):
+def test_feeds_hold_over_their_pieces_alone(fraction):
     """Each piece may be just as fast as it is, its neighbours may not."""
     fastest = np.array([speed_at(np.clip(1.0, a, b)) for a, b in itertools.pairwise(KNOTS)])
-    row, proof = feed_proof(law(), share * fastest)
-    assert (proof.low[0] > 0.0) == (share > 1.0) and (proof.high[0] < 0.0) == (share < 1.0)
-    assert row.value(proof.high[0]) == pytest.approx(row.allowed / share, rel=1e-6)
+    row, proof = feed_proof(law(), fraction * fastest)
+    assert (proof.low[0] > 0.0) == (fraction > 1.0) and (proof.high[0] < 0.0) == (fraction < 1.0)
+    assert row.value(proof.high[0]) == pytest.approx(row.allowed / fraction, rel=1e-6)
 
 
 def test_feeds_that_are_exceeded_are_refused():

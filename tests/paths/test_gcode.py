@@ -154,12 +154,12 @@ def test_planes_are_those_of_turned_axes(tmp_path):
     """What G17 does to x, y and z, G18 does to z, x and y, and G19 to y, z and x."""
     text = "{} G0 {}0 {}0 {}10\nG3 {}100 {}20 {}50 {}50 {}10 F600\nG2 {}0 R80"
     plane = ("G17", *"XYZ", *"XYZ", *"IJ", "X")
-    turned = {
+    rotated = {
         "G18": (("G18", *"ZXY", *"ZXY", *"KI", "Z"), [1, 2, 0]),
         "G19": (("G19", *"YZX", *"YZX", *"JK", "Y"), [2, 0, 1]),
     }
     usual = elements_of(moves(tmp_path, text.format(*plane)))
-    for words, order in turned.values():
+    for words, order in rotated.values():
         others = elements_of(moves(tmp_path, text.format(*words)))
         for one, other in zip(usual, others, strict=True):
             middle = 0.5 * one.length

@@ -50,8 +50,8 @@ def test_a_path_of_its_own_is_that_between_poses(kind, corner):
         assert max(passes(walked(x), place) for x in (whole, inner)) < 1e-3 and passes(walked(each), place) < 1e-12
     speeds = np.linalg.norm(each.rows()["velocity"], axis=1)
     at = [int(np.argmin(np.linalg.norm(walked(each) - place, axis=1))) for place in PLACES[1:3]]
-    stops = kind in ("line", "polyline")
-    assert all((speeds[i] < 1e-9) == stops for i in at)
+    waypoints = kind in ("line", "polyline")
+    assert all((speeds[i] < 1e-9) == waypoints for i in at)
     # Velocities are those of the places: the parts of one motion meet.
     times = each.rows()["t"]
     steps = np.diff(walked(each), axis=0) / np.maximum(np.diff(times), 1e-12)[:, None]

@@ -41,14 +41,18 @@ def tensions_for(place: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
 def test_names_of_half_planes():
     robot = cspr_jax.load_robot("prototype")
     limits = Limits(tension_min=LEAST, tension_max=LARGEST, cable_acceleration_max=5.0)
-    place, rate, bend = np.array([0.05, -0.03, 1.0]), np.array([0.6, 0.0, 0.8]), np.array([0.2, 1.0, -0.15])
-    state = State(jnp.asarray(place), jnp.asarray(rate), jnp.asarray(bend))
+    place, rate, second_derivative = (
+        np.array([0.05, -0.03, 1.0]),
+        np.array([0.6, 0.0, 0.8]),
+        np.array([0.2, 1.0, -0.15]),
+    )
+    state = State(jnp.asarray(place), jnp.asarray(rate), jnp.asarray(second_derivative))
     rows = jax.tree.map(np.asarray, path_rows(robot, limits, state, jnp.asarray(jnp.inf)))
     names = row_names(Problem(robot, limits, named("quintic")), state, rows.u, rows.x)
     assert len(names) == len(rows.u) == 12
     for (flag, cable), u, x, most in list(zip(names, rows.u, rows.x, rows.most, strict=True))[:6]:
         speed = 0.7  # squared; any one
-        values = tensions_for(place, rate * (most - x * speed) / u + bend * speed)
+        values = tensions_for(place, rate * (most - x * speed) / u + second_derivative * speed)
         limit = {Verdict.SLACK_CABLE: LEAST, Verdict.OVER_TENSION: LARGEST}[flag]
         assert values[cable] == pytest.approx(limit, abs=1e-9)
     assert sorted(names[:6]) == sorted(

@@ -39,8 +39,8 @@ def distance(before, after, count: int = 400_001) -> float:
     for start in (np.maximum(nearest - 1, 0), np.minimum(nearest, count - 2)):
         a, step = line[start], line[start + 1] - line[start]
         square = np.sum(step**2, axis=2)
-        share = np.clip(np.sum((places - a) * step, axis=2) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
-        apart = np.minimum(apart, np.linalg.norm(a + share[..., None] * step - places, axis=2))
+        fraction = np.clip(np.sum((places - a) * step, axis=2) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
+        apart = np.minimum(apart, np.linalg.norm(a + fraction[..., None] * step - places, axis=2))
     return float(apart.min(1).max())
 
 
@@ -224,7 +224,7 @@ def test_launches_have_their_time():
         pytest.param(7, 0.89, marks=pytest.mark.soak),  # as users run it
     ],
 )
-def test_table_2_1(count, share):
+def test_table_2_1(count, fraction):
     keys = tomllib.loads((ROOT / "sweeps" / "table_2_1.toml").read_text("utf-8")) | {"limits": LIMITS}
     planned = cspr_jax.plan(keys)
     retimed = cspr_jax.retime(planned)
@@ -232,7 +232,7 @@ def test_table_2_1(count, share):
     is_retimed = retimed.answers.is_retimed
     assert is_retimed.sum() >= count
     assert (retimed.answers.duration[is_retimed] < 0.98 * planned.answers.duration[is_retimed]).all()
-    assert retimed.answers.duration.sum() < share * planned.answers.duration.sum()
+    assert retimed.answers.duration.sum() < fraction * planned.answers.duration.sum()
     for before, after, segment in zip(planned.motions, retimed.motions, retimed.to_dict()["segments"], strict=True):
         assert not segment["retimed"] or 0.975 * segment["duration"] <= segment["lower_bound"] <= segment["duration"]
         assert segment["path_deviation"] < 1e-6

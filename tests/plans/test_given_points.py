@@ -41,11 +41,11 @@ def test_poses_of_the_origin_are_those_of_the_mass_centre(z_axis):
     data = {"schema": 1, "family": "spline", "point": "origin", "robot": ROBOT, "pose": poses}
     keys = plan_keys(data, PLAN)
     robot_file = resolve_robot(ROBOT | {"z_axis": z_axis}, PLAN, Path())
-    level, turned, rest = with_mass_centres(robot_file, keys, PLAN).pose
+    level, rotated, rest = with_mass_centres(robot_file, keys, PLAN).pose
     arm = np.array(level.position) - place
     assert np.linalg.norm(arm) == pytest.approx(np.linalg.norm(CENTRE)) and rest.position is None
     expected = Rotation.from_quat(np.roll(QUATERNION, -1)).apply(arm)
-    np.testing.assert_allclose(np.array(turned.position) - place, expected, atol=1e-12)
+    np.testing.assert_allclose(np.array(rotated.position) - place, expected, atol=1e-12)
     for point in ("mass-centre", None):
         same = plan_keys(data | {"point": point}, PLAN)
         assert with_mass_centres(robot_file, same, PLAN).pose == same.pose

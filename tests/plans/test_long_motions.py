@@ -16,8 +16,8 @@ LIMITS = {"cable_speed_max": 0.015}
 def table(tmp_path, monkeypatch):
     """A table of 1,501 rows where 500 are many, and windows have 400."""
     times = np.linspace(0.0, 30.0, 1501)
-    share = np.clip(np.minimum(times, 30.0 - times) / 6.0, 0.0, 1.0)
-    ends = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+    fraction = np.clip(np.minimum(times, 30.0 - times) / 6.0, 0.0, 1.0)
+    ends = fraction**3 * (10.0 - 15.0 * fraction + 6.0 * fraction**2)
     turn = times * (1.0 + times / 60.0)  # the fastest part is not in the first window
     places = np.stack([0.1 * ends * np.cos(turn), 0.1 * ends * np.sin(turn), 1.0 + 0.0 * times], axis=1)
     path = tmp_path / "own.csv"

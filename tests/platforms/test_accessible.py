@@ -174,10 +174,10 @@ def check_volume(count, divisions, places):
         way = pairs[steps.passable(samples, *pairs.T)]
         links = coo_matrix((np.ones(len(way), bool), way.T), shape=(count, count))
         part = connected_components(links, directed=False)[1]
-        share = ((part == part[0]) & steps.regular(samples)).mean()
-        error = math.sqrt(share * (1.0 - share) / count)
+        fraction = ((part == part[0]) & steps.regular(samples)).mean()
+        error = math.sqrt(fraction * (1.0 - fraction) / count)
         volume = accessible(robot, there, "equal-volume", divisions).volume.sum()
-        assert share == pytest.approx(volume, abs=3.0 * error)
+        assert fraction == pytest.approx(volume, abs=3.0 * error)
 
 
 def test_nothing_is_accessible_above_the_spools():
@@ -248,8 +248,8 @@ def test_a_dip_beside_a_singularity():
     there, angles = place(1.5, math.pi / 2.0), np.array([[0.67737013, 0.40312747, -1.6689711]])
     checker = checker_of(kind=FROM_REST)
     found = attainable(checker, there[None], angles, np.array([1.7]), max_arcs=8, values=4)
-    turned = from_tilt_torsion(angles[0] + np.array([math.pi / 2.0, 0.0, 0.0]))
-    way = (np.array([0.0, 0.0, 1.7]), there, 1.7, np.eye(4)[0], turned)
+    rotated = from_tilt_torsion(angles[0] + np.array([math.pi / 2.0, 0.0, 0.0]))
+    way = (np.array([0.0, 0.0, 1.7]), there, 1.7, np.eye(4)[0], rotated)
     segment = oracle.Segment(*way, amplitude=oracle.effective_c3(0.1))
     judged = {p: oracle.check_motion(MSSM, segment, p, tuple(found.beta_hat[0]), 20001) for p in (4, 5)}
     assert judged[4]["mu_hat_min"] < -0.5 and judged[5]["feasible"]
@@ -267,10 +267,10 @@ def test_verdicts_are_the_oracle_s():
         angles = angles[rng.choice(len(angles), 500, replace=False)]
         many, z0 = np.tile(there, (500, 1)), np.full(500, 1.7)
         found = attainable(checker, many, angles, z0, max_arcs=8, values=6)
-        turned = from_tilt_torsion(angles + np.array([azimuth, 0.0, 0.0]))
-        values = end_options(robot, many, turned, z0, 6)[0]
+        rotated = from_tilt_torsion(angles + np.array([azimuth, 0.0, 0.0]))
+        values = end_options(robot, many, rotated, z0, 6)[0]
         for i in range(500):
-            way = (np.array([0.0, 0.0, 1.7]), there, 1.7, np.eye(4)[0], turned[i])
+            way = (np.array([0.0, 0.0, 1.7]), there, 1.7, np.eye(4)[0], rotated[i])
             segment, p = oracle.Segment(*way, amplitude=oracle.effective_c3(0.1)), int(found.arcs[i])
             attained += p > 0
             if p:

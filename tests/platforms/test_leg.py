@@ -184,7 +184,7 @@ def test_what_stays_undecided_is_said(checker, monkeypatch):
     assert more.arcs[0] > p and more.undecided[0] == p
 
 
-def turned(pose, angle):
+def rotated(pose, angle):
     c, s = np.cos(angle), np.sin(angle)
     half = np.array([np.cos(angle / 2), 0.0, 0.0, np.sin(angle / 2)])
     position = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ pose[0]
@@ -204,7 +204,7 @@ def test_symmetries_of_the_mssm():
     regular = plain.slack[:, 1] > 0.0
     assert regular.sum() > 3
     for others in (
-        [(turned(start, third), turned(end, third), beta_hats, p) for start, end, beta_hats, p in cases],
+        [(rotated(start, third), rotated(end, third), beta_hats, p) for start, end, beta_hats, p in cases],
         [(mirrored(start), mirrored(end), beta_hats, p) for start, end, beta_hats, p in cases],
         [(end, start, beta_hats[::-1], p) for start, end, beta_hats, p in cases],
     ):
@@ -227,10 +227,12 @@ def test_limits_of_a_platform():
     cables, arms = oracle.cables(*where), MSSM.platform @ np.swapaxes(motion.rotation, 1, 2)
     omega, omega_dot = motion.omega[:, None], motion.omega_dot[:, None]
     pace = motion.velocity[:, None] + np.cross(omega, arms)
-    bend = motion.acceleration[:, None] + np.cross(omega_dot, arms) + np.cross(omega, np.cross(omega, arms))
+    second_derivative = (
+        motion.acceleration[:, None] + np.cross(omega_dot, arms) + np.cross(omega, np.cross(omega, arms))
+    )
     lengths = np.linalg.norm(cables, axis=-1)
     speeds = (cables * pace).sum(-1) / lengths
-    bends = ((pace * pace + cables * bend).sum(-1) - speeds**2) / lengths
+    bends = ((pace * pace + cables * second_derivative).sum(-1) - speeds**2) / lengths
     values = {
         "tension_min": tensions.min(),
         "tension_max": tensions.max(),

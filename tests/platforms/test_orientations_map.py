@@ -44,8 +44,8 @@ def check_tables(monkeypatch):
     assert len(cells) == 8 * len(chapter_3.PLACES) and {c["variant"]["definition"] for c in cells} == {"grid"}
     by = {(c["row"], c["column"]): c for c in cells}
     for row in NEAR:
-        share = by[row, "attainable"]["computed"] / by[row, "accessible"]["computed"]
-        assert 100.0 * share == pytest.approx(by[row, "proportion"]["computed"])
+        fraction = by[row, "attainable"]["computed"] / by[row, "accessible"]["computed"]
+        assert 100.0 * fraction == pytest.approx(by[row, "proportion"]["computed"])
         assert by[row, "proportion"]["computed"] == pytest.approx(by[row, "proportion"]["published"], abs=4.0)
 
 

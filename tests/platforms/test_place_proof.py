@@ -9,7 +9,7 @@ from oracles import platform as oracle
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 from support.platforms import FROM_REST, MSSM, USUAL, Z0, general, limits_of, stacked
-from support.random_motions import BATCH, ROBOTS, drawn, motions_of, problem_of, turned
+from support.random_motions import BATCH, ROBOTS, drawn, motions_of, problem_of, rotated
 
 from cspr_jax.families.platforms.six_cable_proof import cable_contacts
 from cspr_jax.families.platforms.six_cable_proof.cable_contacts import CablesOfStep
@@ -20,11 +20,11 @@ from cspr_jax.robots.contacts.interference import contacts, platform_hit
 from cspr_jax.robots.contacts.interference_lanes import residual
 
 # Spools far from level: the plane through them rises by 80 degrees.
-STEEP = turned(dataclasses.replace(MSSM, base=MSSM.base @ Rotation.from_euler("x", 80, degrees=True).as_matrix().T))
+STEEP = rotated(dataclasses.replace(MSSM, base=MSSM.base @ Rotation.from_euler("x", 80, degrees=True).as_matrix().T))
 TIGHT = {"floor": 2.0, "cable_length_max": 3.0}
 FINE = 33
 # The oracle knows only flat platforms.
-FLAT = {"mssm": ROBOTS["mssm"], "slanted": turned(dataclasses.replace(general(), platform=MSSM.platform))}
+FLAT = {"mssm": ROBOTS["mssm"], "slanted": rotated(dataclasses.replace(general(), platform=MSSM.platform))}
 
 
 def below_spools(robot, position):
@@ -163,10 +163,10 @@ def test_proofs_agree_with_many_samples(kind, name):
     assert contradicted == 0 and undecided < 5
 
 
-def cables_from(first, last, bent, steps=2):
+def cables_from(first, last, deviation, steps=2):
     """Two cables of one block whose rays go straight from the first ones to the last ones, in equal steps."""
     rays = np.linspace(first, last, steps + 1)[:, None]
-    return CablesOfStep(rays, rays, np.full((1, 2), bent), np.full(1, bent))
+    return CablesOfStep(rays, rays, np.full((1, 2), deviation), np.full(1, deviation))
 
 
 def test_cables_that_meet():
@@ -226,7 +226,7 @@ def test_sectors_are_those_of_the_convex_hull():
     """Along which directions a point of the platform has the platform beside it, by another library's hull."""
     rng, axes = np.random.default_rng(3), Rotation.from_rotvec([0.3, -0.5, 0.2]).as_matrix()
     hull = ConvexHull(FLAT_POINTS).equations
-    robot = problem_of(turned(dataclasses.replace(MSSM, platform=np.c_[FLAT_POINTS, np.zeros(6)] @ axes.T))).robot
+    robot = problem_of(rotated(dataclasses.replace(MSSM, platform=np.c_[FLAT_POINTS, np.zeros(6)] @ axes.T))).robot
     near, points = contacts(robot), np.asarray(robot.platform_points)
     # In the robot's axes, which are others than those of the drawing.
     plane = np.linalg.lstsq(FLAT_POINTS - FLAT_POINTS.mean(0), points - points.mean(0), rcond=None)[0]

@@ -86,12 +86,14 @@ def wrench_of(robot, table, k):
     near, step = slice(k - 2, k + 3), table["t"][1] - table["t"][0]
     turns = np.array([rotation(q) for q in table["quaternion"][near]])
     acceleration = differences(table["position"][near], step)[1]
-    slope, bend = differences(turns, step)
+    slope, second_derivative = differences(turns, step)
     spin = turns[2] @ inertia @ turns[2].T
     # R' R^T is the cross product with omega, and R'' R^T = [omega'] + [omega]^2.
-    whirl = slope @ turns[2].T
-    change = bend @ turns[2].T - whirl @ whirl
-    omega, alpha = (np.array([m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]]) / 2.0 for m in (whirl, change))
+    acceleration_matrix = slope @ turns[2].T
+    change = second_derivative @ turns[2].T - acceleration_matrix @ acceleration_matrix
+    omega, alpha = (
+        np.array([m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]]) / 2.0 for m in (acceleration_matrix, change)
+    )
     moment = spin @ alpha + np.cross(omega, spin @ omega)
     return np.concatenate([mass * (acceleration - FALLING), moment])
 
@@ -176,8 +178,8 @@ def test_limits_that_are_too_tight_refuse_and_infinite_ones_do_not(example):
 
 def test_cables_that_cross_are_refused():
     """A platform that turns by half a turn."""
-    turned = POSE | {"tilt_torsion": [0.0, 0.0, 3.0]}
-    found = cspr_jax.plan(FIXED | {"pose": [{"rest": True}, turned], "tension_max": [np.inf] * 8})
+    rotated = POSE | {"tilt_torsion": [0.0, 0.0, 3.0]}
+    found = cspr_jax.plan(FIXED | {"pose": [{"rest": True}, rotated], "tension_max": [np.inf] * 8})
     assert Verdict(int(found.answers.verdict[0])) & Verdict.CABLE_CABLE
     assert found.to_dict()["segments"][0]["cable_interference"] is True
 

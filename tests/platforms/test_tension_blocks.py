@@ -257,15 +257,18 @@ def test_every_order_of_the_cables_gives_the_same_bounds():
 
 def precise(robot, segment, p, beta, tau):
     """Slacks of taut cables times D, and D, with a mantissa of 64 bits: (n, 6) and (n,)."""
-    (place, _, bend), q, _ = jets(robot, segment, p, beta, tau.astype(np.longdouble))
+    (place, _, second_derivative), q, _ = jets(robot, segment, p, beta, tau.astype(np.longdouble))
     squared = np.longdouble(oracle.plan(robot, segment, p)[2]) ** 2
     omega, spin = (2 * oracle.product(x, oracle.conjugate(q[0]))[:, 1:] for x in q[1:])
     turn = oracle.matrix(q[0])
     rays = place[:, None] + robot.platform @ turn.mT - robot.base
     arms = robot.platform @ turn.mT
     inertia = turn @ robot.inertia @ turn.mT / robot.mass
-    whirl = [(inertia @ x[:, :, None])[:, :, 0] for x in (spin, omega)]
-    force, moment = bend / squared - [0, 0, G], (whirl[0] + np.cross(omega, whirl[1])) / squared
+    acceleration_matrix = [(inertia @ x[:, :, None])[:, :, 0] for x in (spin, omega)]
+    force, moment = (
+        second_derivative / squared - [0, 0, G],
+        (acceleration_matrix[0] + np.cross(omega, acceleration_matrix[1])) / squared,
+    )
     # The tension of cable k pulls along -rho_k.
     columns = np.concatenate([rays, np.cross(arms, rays)], axis=2).mT
     right = -np.concatenate([force, moment], axis=1)
@@ -310,12 +313,12 @@ def rounding_used(count, seed, kind, robot):
     values = np.asarray(_values(problem, items, kind=kind))
     tau, used = blocks.instants(x[:, None]), []
     for i, (segment, p, beta) in enumerate(zip(theirs, arcs, betas, strict=True)):
-        kappa, share = precise(robot, segment, int(p), beta, tau[:, i])
+        kappa, fraction = precise(robot, segment, int(p), beta, tau[:, i])
         allowed = found.rounding[i] / chebyshev.LEBESGUE
         is_taut = (found.nodes[:, 1, i] > 1e-3) & np.isfinite(found.nodes[:, 0, i])
         off = np.abs(values[:, :6, i].min(1) - kappa.min(1))[is_taut]
         used += [*(off / allowed).astype(float)]
-        assert np.allclose(values[:, 6, i], share.astype(float), rtol=1e-8, atol=1e-8)
+        assert np.allclose(values[:, 6, i], fraction.astype(float), rtol=1e-8, atol=1e-8)
     return np.array(used)
 
 

@@ -63,8 +63,8 @@ def check_motion(robot, limits, path, answer, samples):
     step = 1e-6 * answer.time
     inside = times[1:-1:7]
     before, after, state = (answer.motion(inside + k * step) for k in (-1.0, 1.0, 0.0))
-    turned = (after.rotation - before.rotation) @ np.swapaxes(state.rotation, 1, 2) / (2.0 * step)
-    spin = 0.5 * np.stack([turned[:, k, j] - turned[:, j, k] for j, k in ((1, 2), (2, 0), (0, 1))], axis=1)
+    rotated = (after.rotation - before.rotation) @ np.swapaxes(state.rotation, 1, 2) / (2.0 * step)
+    spin = 0.5 * np.stack([rotated[:, k, j] - rotated[:, j, k] for j, k in ((1, 2), (2, 0), (0, 1))], axis=1)
     slope = (after.position - before.position) / (2.0 * step)
     np.testing.assert_allclose(slope, state.velocity, atol=1e-5 * quick)
     np.testing.assert_allclose(spin, state.omega, atol=1e-5 * (np.abs(state.omega).max() + 1.0 / answer.time))

@@ -130,7 +130,7 @@ def ready(path):
     robot_file = resolve_robot(keys.robot, path, path.parent)
     sequence, problem = PlanLegs(robot_file, keys, path), build_problem(robot_file, keys, keys, path, epsilon=0.2)
     if not robot_file.is_platform:
-        return sequence.stops.points(chosen_depth(problem, sequence))
+        return sequence.waypoints.points(chosen_depth(problem, sequence))
     for leg in sequence.legs:
         leg.check(problem)
     try:

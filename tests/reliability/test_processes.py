@@ -78,7 +78,7 @@ def test_kills_all(job, tmp_path):
     kills(job, tmp_path, 200)
 
 
-def stops(job, tmp_path, count):
+def waypoints(job, tmp_path, count):
     """Ctrl-C, SIGTERM, and Ctrl-C twice: the tile in progress is kept, and the code says what happened."""
     sweep, reference = job
     rng = np.random.default_rng(4)
@@ -104,12 +104,12 @@ def stops(job, tmp_path, count):
 
 
 def test_stop_signals(job, tmp_path):
-    stops(job, tmp_path, 3)
+    waypoints(job, tmp_path, 3)
 
 
 @pytest.mark.soak
 def test_stop_signals_all(job, tmp_path):
-    stops(job, tmp_path, 100)
+    waypoints(job, tmp_path, 100)
 
 
 def second_writers(job, tmp_path, count):

@@ -303,9 +303,9 @@ def test_a_room_that_is_turned_and_moved():
         shapes.Box(moved(block.centre), block.half, quarter @ block.rotation),
     )
     w, x, y, z = turns.T
-    turned = np.stack([w - z, x - y, x + y, w + z], 1) / np.sqrt(2.0)
+    rotated = np.stack([w - z, x - y, x + y, w + z], 1) / np.sqrt(2.0)
     after_robot = platform_robot(moved(robot.base_points), robot.platform_points, mass=1.0, inertia=np.eye(3))
-    after = clearance.clearances(scene(after_robot, body, other, diameter=0.02), moved(place), turned)
+    after = clearance.clearances(scene(after_robot, body, other, diameter=0.02), moved(place), rotated)
     np.testing.assert_allclose(after.clearance, before.clearance, rtol=0, atol=1e-10)
     # Spools that move, as pulleys do: here they do not.
     ends = np.broadcast_to(robot.base_points, (300, 6, 3))
@@ -413,10 +413,10 @@ def test_tables_of_obstacles():
     np.testing.assert_allclose(given[3].rotation[:, 1], [0.0, -0.28, 0.96])
     body = file.platform.body([0.0, 0.0, 0.1])
     np.testing.assert_allclose(body.centre, [0.0, 0.0, 0.15])
-    np.testing.assert_allclose(shapes.turned(body, frame).centre, [0.0, 0.0, -0.15])
+    np.testing.assert_allclose(shapes.in_kernel_axes(body, frame).centre, [0.0, 0.0, -0.15])
     corners = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     solid = PlatformShapeKeys(platform_hull=corners).body()
-    upside = shapes.turned(solid, frame)
+    upside = shapes.in_kernel_axes(solid, frame)
     np.testing.assert_allclose(np.einsum("fi,fci->fc", upside.normals, upside.triangles).T, [upside.offsets] * 3)
     assert PlatformShapeKeys().body() is None
 

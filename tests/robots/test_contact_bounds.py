@@ -35,9 +35,11 @@ def float64():
 
 def moving(rng, corners, half: float):
     """Corners on parabolas over a block of a length of 2 `half`: their bounds, and their places at S."""
-    speed, bend = half * rng.normal(size=corners.shape), 0.5 * half**2 * rng.normal(size=corners.shape)
+    speed, second_derivative = half * rng.normal(size=corners.shape), 0.5 * half**2 * rng.normal(size=corners.shape)
     s = S.reshape(-1, *(1,) * corners.ndim)
-    return AffineBounds(corners + 0.5 * bend, speed, 0.5 * np.abs(bend)), corners + s * speed + s**2 * bend
+    return AffineBounds(
+        corners + 0.5 * second_derivative, speed, 0.5 * np.abs(second_derivative)
+    ), corners + s * speed + s**2 * second_derivative
 
 
 def gaps(count: int, half: float, seed: int):
@@ -179,9 +181,9 @@ def still(value) -> AffineBounds:
 def lifted(rate: float, height: float = 0.0) -> StateBounds:
     """A block in which the platform tilts about x, so that two cables pass through each other in its middle."""
     turn = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, -rate], [0.0, rate, 0.0]])
-    bend = AffineBounds(np.eye(3), turn, np.full((3, 3), 0.5 * rate**2 + rate**3))
+    second_derivative = AffineBounds(np.eye(3), turn, np.full((3, 3), 0.5 * rate**2 + rate**3))
     nothing = still(np.zeros(3))
-    return StateBounds(still([0.0, 0.0, height]), nothing, nothing, bend, nothing, nothing)
+    return StateBounds(still([0.0, 0.0, height]), nothing, nothing, second_derivative, nothing, nothing)
 
 
 @pytest.mark.parametrize(("offset", "does"), [(0.0, True), (0.2, False)])

@@ -122,12 +122,17 @@ def test_cable_rates_are_derivatives_of_lengths(states):
     robot = jax.tree.map(lambda leaf: leaf[0], states[0])
     below = robot.base_points.mean(0) + np.array([0.0, 0.0, 1.5])
     rng = np.random.default_rng(12)
-    slope, bend, jerk = rng.normal(size=(3, 3))
+    slope, second_derivative, jerk = rng.normal(size=(3, 3))
 
     def lengths_at(t):
         t = np.asarray(t)[:, None]
-        p = below + slope * t + bend * t**2 / 2 + jerk * t**3 / 6
-        return [np.asarray(v) for v in CABLES_ALONG(robot, p, slope + bend * t + jerk * t**2 / 2, bend + jerk * t)]
+        p = below + slope * t + second_derivative * t**2 / 2 + jerk * t**3 / 6
+        return [
+            np.asarray(v)
+            for v in CABLES_ALONG(
+                robot, p, slope + second_derivative * t + jerk * t**2 / 2, second_derivative + jerk * t
+            )
+        ]
 
     t, step = np.linspace(-0.3, 0.3, 13), 1e-4
     (length, rate, acceleration), after, before = lengths_at(t), lengths_at(t + step), lengths_at(t - step)

@@ -125,7 +125,7 @@ def test_the_launch_robot():
         cspr_jax.parallel_pair_robot(0.35, 0.0, mass=1.0)
 
 
-def bent(cable, by):
+def deviation(cable, by):
     base = LAUNCH_BASE.copy()
     base[cable] += by
     return base, LAUNCH_PLATFORM
@@ -140,7 +140,7 @@ def radial():
 
 
 WRONG = {
-    "bent": (bent(3, [0.0, 0.0, 1e-3]), "cables 3 and 4 are not parallel: base_points[2] - base_points[3] and "),
+    "bent": (deviation(3, [0.0, 0.0, 1e-3]), "cables 3 and 4 are not parallel: base_points[2] - base_points[3] and "),
     "beside": ((LAUNCH_BASE, LAUNCH_PLATFORM + 0.01 * np.eye(3)[0]), "the mass centre lies 0.00866 m beside the"),
     "above": ((LAUNCH_BASE, LAUNCH_PLATFORM + 0.2 * np.eye(3)[2]), "the mass centre lies 0.2 m beside the line of"),
     "line": ((LAUNCH_BASE * [1, 0, 0] + LAUNCH_PLATFORM * [0, 1, 0], LAUNCH_PLATFORM), "points on one line"),
@@ -182,7 +182,7 @@ def inline(base, platform=None, **more) -> str:
 
 def test_the_key_is_checked_when_the_file_is_read(tmp_path):
     """One line says why not; where the key is absent, the family asks."""
-    wrong = inline(*bent(3, [0.0, 1e-3, 0.0]), translation_only=True)
+    wrong = inline(*deviation(3, [0.0, 1e-3, 0.0]), translation_only=True)
     code, _, err = plan(tmp_path, PLAN.format(robot=wrong, family="transition", limits=""))
     assert code == 2 and len(err.splitlines()) == 1
     assert "robot.translation_only = true: must be absent: cables 3 and 4 are not parallel" in err and "0.001 m" in err
@@ -283,8 +283,8 @@ def test_limits_of_six_cables_bound_the_pairs():
     limits = cspr_jax.Limits(tension_min=low, tension_max=high, cable_length_max=long, floor=np.asarray(4.0))
     found = cspr_jax.three_cable_equivalent(made(robot, limits=limits)).limits
     for k, pair in enumerate(pairs.cables):
-        share = pairs.shares[k]
-        assert found.tension_min[k] == max(low[pair] / share) and found.tension_max[k] == min(high[pair] / share)
+        fraction = pairs.shares[k]
+        assert found.tension_min[k] == max(low[pair] / fraction) and found.tension_max[k] == min(high[pair] / fraction)
         assert found.cable_length_max[k] == min(long[pair])
     assert float(found.floor) == 4.0 and found.cable_speed_max is None
     # The same of a file: its own, and over them those of a plan; one number is each cable's.

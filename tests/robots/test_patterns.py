@@ -158,8 +158,8 @@ def test_any_pattern_is_loaded_from_a_file(tmp_path, pattern):
     own, frame = centred(loaded)
     at = state_of(pattern, np.random.default_rng(0))
     signs = np.asarray(frame.signs)
-    turned = signs[:, None] * np.asarray(at.rotation) * signs
-    moved = at._replace(position=jnp.asarray(frame.inward(at.position)), rotation=jnp.asarray(turned))
+    rotated = signs[:, None] * np.asarray(at.rotation) * signs
+    moved = at._replace(position=jnp.asarray(frame.inward(at.position)), rotation=jnp.asarray(rotated))
     with double_precision():
         pair = np.asarray(MATRIX(loaded, at)), np.asarray(MATRIX(own, moved))
     np.testing.assert_allclose(np.abs(pair[0]), np.abs(pair[1]), atol=1e-12)

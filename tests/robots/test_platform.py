@@ -104,8 +104,10 @@ def test_angles_near_zero_and_half_a_turn(start):
         omega_cross = np.einsum("nij,nkj->nik", slope, np.asarray(found.rotation)[1:-1])
         omega = np.stack([omega_cross[:, 2, 1], omega_cross[:, 0, 2], omega_cross[:, 1, 0]], axis=1)
         np.testing.assert_allclose(found.angular_velocity[1:-1], omega, atol=2e-7)
-        bend = (np.asarray(after.angular_velocity) - np.asarray(before.angular_velocity)) / (2.0 * step * time)
-        np.testing.assert_allclose(found.angular_acceleration[1:-1], bend, atol=2e-5)
+        second_derivative = (np.asarray(after.angular_velocity) - np.asarray(before.angular_velocity)) / (
+            2.0 * step * time
+        )
+        np.testing.assert_allclose(found.angular_acceleration[1:-1], second_derivative, atol=2e-5)
         gradient = lowest_and_slopes(_place(Z0, -2.0, -1.0), robot, amplitude, poses, np.asarray(float(p)))
         assert np.isfinite(gradient[0]) and np.isfinite(gradient[1]).all()
 
@@ -140,7 +142,7 @@ def test_wrench_balance(robot):
         cases.append(State(position, velocity, pull, rotation, omega, spin))
     found = cables_at(ours(robot), State(*(np.stack(x) for x in zip(*(case[:6] for case in cases), strict=True))))
     columns = found["tension"], found["determinant"], *found["motion"]
-    for pose, tension, determinant, length, rate, bend in zip(cases, *columns, strict=True):
+    for pose, tension, determinant, length, rate, second_derivative in zip(cases, *columns, strict=True):
         position, velocity, pull, rotation, omega, spin = pose[:6]
         arms = robot.platform @ rotation.T
         cables = position + arms - robot.base
@@ -160,7 +162,7 @@ def test_wrench_balance(robot):
         np.testing.assert_allclose(length, np.linalg.norm(cables, axis=1), rtol=1e-12)
         np.testing.assert_allclose(length * rate, (cables * speed).sum(1), atol=1e-11)
         wanted = (speed**2).sum(1) + (cables * acceleration).sum(1)
-        np.testing.assert_allclose(length * bend + rate**2, wanted, atol=1e-10)
+        np.testing.assert_allclose(length * second_derivative + rate**2, wanted, atol=1e-10)
 
 
 def test_work_of_the_cables_is_the_change_of_energy():
@@ -206,10 +208,10 @@ def test_ends(robot):
             np.testing.assert_allclose([found.lowest, found.highest], [low, high], rtol=1e-8)
         else:
             assert found.lowest > found.highest
-        bend = float(rng.uniform(-4.0, 2.0))
-        segment = made(package, random_pose(rng), (position, quaternion), Z0, (-1.0, bend), 5)
+        second_derivative = float(rng.uniform(-4.0, 2.0))
+        segment = made(package, random_pose(rng), (position, quaternion), Z0, (-1.0, second_derivative), 5)
         at = cables_at(package, states(segment, EFFECTIVE, 5, np.ones(1)))
-        promised = np.asarray(found.offset) + bend * np.asarray(found.slope)
+        promised = np.asarray(found.offset) + second_derivative * np.asarray(found.slope)
         np.testing.assert_allclose(at["per_length"][0], promised, rtol=1e-7, atol=1e-8)
     rest = end_of(package, *random_pose(rng, rest=True), np.asarray(Z0))
     assert float(rest.preferred) == -1.0

@@ -60,8 +60,8 @@ def test_lengths_rates_and_accelerations_are_those_of_a_root_finder(name):
         for cable in range(3):
             far, near, here, after, beyond = (at(k * step, cable) for k in (-2, -1, 0, 1, 2))
             rate = (far - 8.0 * near + 8.0 * after - beyond) / (12.0 * step)
-            bend = (-far + 16.0 * near - 30.0 * here + 16.0 * after - beyond) / (12.0 * step**2)
-            wanted = here, rate, bend
+            second_derivative = (-far + 16.0 * near - 30.0 * here + 16.0 * after - beyond) / (12.0 * step**2)
+            wanted = here, rate, second_derivative
             for value, number, close in zip(found, wanted, (1e-11, 1e-7, 1e-6), strict=True):
                 assert float(value[cable]) == pytest.approx(number, abs=close * max(1.0, abs(number)))
 
@@ -81,9 +81,9 @@ def test_rates_are_the_derivatives_of_lengths():
         values, slopes = jax.jvp(value, (tau,), (1.0,))
         return values, [slope / duration for slope in slopes[:2]]
 
-    (_, rate, bend), (by_length, by_rate) = derivatives(np.linspace(0.01, 0.99, 300))
+    (_, rate, second_derivative), (by_length, by_rate) = derivatives(np.linspace(0.01, 0.99, 300))
     np.testing.assert_allclose(by_length, rate, atol=1e-12)
-    np.testing.assert_allclose(by_rate, bend, atol=1e-10)
+    np.testing.assert_allclose(by_rate, second_derivative, atol=1e-10)
 
 
 def test_pulleys_of_no_size_are_none():

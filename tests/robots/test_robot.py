@@ -36,8 +36,8 @@ BODY = {"mass": 2.0, "inertia": np.diag([0.02, 0.03, 0.04])}
 
 
 def platform(n_cables, **more):
-    turned = 0.3 * RING[:n_cables] @ oracle.matrix(np.array([0.9, 0.1, -0.2, 0.3])).T
-    return platform_robot(2.0 * RING[:n_cables], turned, **BODY, **more)
+    rotated = 0.3 * RING[:n_cables] @ oracle.matrix(np.array([0.9, 0.1, -0.2, 0.3])).T
+    return platform_robot(2.0 * RING[:n_cables], rotated, **BODY, **more)
 
 
 ROBOTS = {
@@ -159,15 +159,15 @@ def test_what_is_singular():
     """One rule: what is beyond a singularity, or no number, is not regular either; the reference pose is."""
     found = wrench_balance.is_regular(np.array([1.0, 2e-6, 1e-7, -1e-7, -1.0, np.nan]))
     assert found.tolist() == [True, True, False, False, False, False]
-    share = jax.jit(wrench_balance.determinant_share)(ROBOTS["six"], np.array([0.0, 0.0, 1.2]), np.eye(3))
-    assert float(share) == pytest.approx(1.0)
+    fraction = jax.jit(wrench_balance.determinant_share)(ROBOTS["six"], np.array([0.0, 0.0, 1.2]), np.eye(3))
+    assert float(fraction) == pytest.approx(1.0)
 
 
 def test_cylindrical_frames_turn_with_their_place():
     """(3.98): a tilt towards the vertical axis is one, wherever the place lies; a turn about it moves both alike."""
     places, angle = np.array([[1.0, 0.2, 1.0], [-0.3, 0.8, 2.0], [-1.0, -1.0, 1.0]]), 0.7
-    turned = places @ rotations.about_vertical(angle).T
-    shift = rotations.cylindrical_frames(turned) - rotations.cylindrical_frames(places)
+    rotated = places @ rotations.about_vertical(angle).T
+    shift = rotations.cylindrical_frames(rotated) - rotations.cylindrical_frames(places)
     np.testing.assert_allclose(np.cos(shift[:, 0] - angle), 1.0, atol=1e-14)
     assert (shift[:, 1:] == 0.0).all()
 
@@ -279,10 +279,10 @@ def test_slacks_of_limits_have_the_sign_of_the_limit(name):
     for row in LIMITS:
         value = np.asarray(getattr(now, row.quantity))
         least = row.sense == "least"
-        for share in (-0.1, 0.1):
-            limit = value - share * np.abs(value) * (1.0 if least else -1.0)
+        for fraction in (-0.1, 0.1):
+            limit = value - fraction * np.abs(value) * (1.0 if least else -1.0)
             found = np.asarray(jax.jit(slack, static_argnums=0)(row, limit, value, scale))
-            assert (np.sign(found) == np.sign(share)).all(), row.name
+            assert (np.sign(found) == np.sign(fraction)).all(), row.name
 
 
 @pytest.mark.thorough

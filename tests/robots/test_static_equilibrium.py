@@ -38,9 +38,9 @@ def test_who_hangs_still_is_who_the_programs_say(pattern, n):
     for _ in range(3):
         drawn = cable_robots.any_robot(rng, pattern, n, suspended=True)
         force = drawn.mass * cable_robots.GRAVITY
-        for share in (0.02, 30.0):
-            low, high = np.full(n, share * force), np.full(n, max(1.5, 1.1 * share) * force)
+        for fraction in (0.02, 30.0):
+            low, high = np.full(n, fraction * force), np.full(n, max(1.5, 1.1 * fraction) * force)
             fault = slack_at_rest(centred(made(drawn))[0], Limits(tension_min=low, tension_max=high))
-            assert (fault is None) == hangs(drawn, low, high), (drawn.name, share, fault)
+            assert (fault is None) == hangs(drawn, low, high), (drawn.name, fraction, fault)
             verdicts.add(fault is None)
     assert False in verdicts

@@ -212,10 +212,10 @@ def test_properties(seed, rule, factor):
     kept = found.tensions[found.is_within]
     assert (kept >= LOW - 1e-7).all() and (kept <= HIGH + 1e-7).all()
     order = np.random.default_rng(seed).permutation(4)
-    turned = distributions(matrices[:, :, order], factor * wrenches, factor * LOW, factor * HIGH, rule=rule)
-    assert np.array_equal(turned.is_within, found.is_within)
+    rotated = distributions(matrices[:, :, order], factor * wrenches, factor * LOW, factor * HIGH, rule=rule)
+    assert np.array_equal(rotated.is_within, found.is_within)
     size = np.abs(found.tensions).max(1, keepdims=True)
-    assert (np.abs(turned.tensions / factor - found.tensions[:, order]) <= 1e-5 * size).all()
+    assert (np.abs(rotated.tensions / factor - found.tensions[:, order]) <= 1e-5 * size).all()
 
 
 @pytest.mark.parametrize(

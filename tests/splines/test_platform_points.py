@@ -76,8 +76,8 @@ def test_what_was_given_comes_back(checked):
         assert (given * turns.inv()).magnitude().max() < 1e-6
         np.testing.assert_allclose(CubicSpline(t, data["position"])(t, 1), data["velocity"], atol=1e-4)
         np.testing.assert_allclose(CubicSpline(t, data["velocity"])(t[5:-5], 1), data["acceleration"][5:-5], atol=1e-3)
-        turned = Rotation.from_quat(np.roll(data["quaternion"], -1, axis=1))
-        centre = data["position"] + turned.apply(robot["centre_of_mass"])
+        rotated = Rotation.from_quat(np.roll(data["quaternion"], -1, axis=1))
+        centre = data["position"] + rotated.apply(robot["centre_of_mass"])
         np.testing.assert_allclose(data["mass_centre"], centre, atol=1e-12)
         np.testing.assert_array_equal(data["mass_centre"], table.data["mass_centre"])
 

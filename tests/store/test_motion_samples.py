@@ -60,13 +60,13 @@ def test_windows_of_this_program(folder):
 def test_axes_and_units_of_a_table(folder):
     """Tables are in the axes of the robot; comments of earlier versions, below the names, say axes and units."""
     head, *rows = (folder / "motion.csv").read_text().splitlines()
-    table, turned = read_motion(folder / "motion.csv"), [1.0, -1.0, -1.0]
+    table, rotated = read_motion(folder / "motion.csv"), [1.0, -1.0, -1.0]
     np.testing.assert_array_equal(table.in_axes("up").positions, table.in_axes("down").positions)
     (folder / "sheet.csv").write_text("\n".join([head, "# z: up,,", "# units: mm rad s,,,", *rows]))
     sheet = read_motion(folder / "sheet.csv")
     assert sheet.z_axis == "up"
     np.testing.assert_allclose(sheet.accelerations, 1e-3 * table.accelerations)
-    np.testing.assert_allclose(sheet.in_axes("down").positions, 1e-3 * table.positions * turned)
+    np.testing.assert_allclose(sheet.in_axes("down").positions, 1e-3 * table.positions * rotated)
 
 
 @pytest.mark.parametrize("name", ["positions", "velocities"])

@@ -28,8 +28,8 @@ def ellipses(rng, spools, gravity, count, *, above=True):
     """Centres, axes (count, 3) and frequencies (count,): of any inclination, parallel to the spools, lines, a point."""
     normal, planar = oracle.normal(spools), oracle.is_planar(spools)
     size = np.ptp(spools, axis=0).max()
-    share = rng.dirichlet(np.ones(len(spools)), count) + rng.normal(scale=0.15, size=(count, len(spools)))
-    centre = (share / share.sum(1, keepdims=True)) @ spools
+    fraction = rng.dirichlet(np.ones(len(spools)), count) + rng.normal(scale=0.15, size=(count, len(spools)))
+    centre = (fraction / fraction.sum(1, keepdims=True)) @ spools
     low = -0.5 if above else 0.3
     centre[:, 2] += size * rng.uniform(low, 3.0, count)
     axes = rng.normal(size=(2, count, 3)) * size * np.exp(rng.uniform(-3.0, 0.7, (count, 1)))

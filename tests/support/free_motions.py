@@ -32,8 +32,8 @@ class Judged:
         position, velocity, acceleration = (curve(times, order) for order in range(3))
         count = len(times)
         turning = np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3)), np.zeros((count, 3))
-        turned = self.frame.turned
-        return State(self.frame.outward(position), turned(velocity), turned(acceleration), *turning)
+        rotated = self.frame.rotated
+        return State(self.frame.outward(position), rotated(velocity), rotated(acceleration), *turning)
 
     def _powers(self):
         # Coefficients of the pieces, highest power first, from those of Bernstein.
@@ -58,7 +58,7 @@ def solve(robot, limits, positions, accelerations=None, settings=QUICK):
     with double_precision():
         problem, frame = problem_of(robot, limits)
         places = np.asarray(frame.inward(np.asarray(positions, float)))
-        free = np.full(places.shape, np.nan) if accelerations is None else frame.turned(np.asarray(accelerations))
+        free = np.full(places.shape, np.nan) if accelerations is None else frame.rotated(np.asarray(accelerations))
         return free_motion(
             problem, None, FreePoses(places, None, np.zeros(places.shape), free, float(places[:, 2].mean())), settings
         ), frame

@@ -19,13 +19,13 @@ QUINTIC = named("quintic")
 BATCH = 64
 
 
-def turned(robot):
+def rotated(robot):
     """An oracle's robot in the axes of its reference orientation."""
     mine = aligned(ours(robot))[0]
     return dataclasses.replace(robot, platform=np.asarray(mine.platform_points), inertia=np.asarray(mine.inertia))
 
 
-ROBOTS = {"mssm": turned(MSSM), "general": turned(general())}
+ROBOTS = {"mssm": rotated(MSSM), "general": rotated(general())}
 
 
 def quintic(tau):

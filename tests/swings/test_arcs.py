@@ -44,10 +44,10 @@ def test_table_of_chapter_2():
     assert found.arcs[:3].tolist() == [5, 2, 5]
     np.testing.assert_allclose(found.duration[:3], [6.54, 2.61, 6.54], atol=0.005)
     np.testing.assert_allclose(found.feasible_at_infinity[:3], [-0.1557, -0.1416, 0.2057], atol=5e-5)
-    hub = np.array([0.0, 0.0, Z0])
+    center = np.array([0.0, 0.0, Z0])
     for i, (start, end) in enumerate(itertools.pairwise(TABLE)):
         assert found.arcs[i] == oracle.smallest_arcs(BASE, start, end, Z0, 9.81, 30)
-        assert found.duration[i] == pytest.approx(oracle.motion(start, end, hub, 9.81, int(found.arcs[i]), 0.0)[0])
+        assert found.duration[i] == pytest.approx(oracle.motion(start, end, center, 9.81, int(found.arcs[i]), 0.0)[0])
         at_infinity = oracle.feasibility_at_infinity(BASE, start, end, Z0)
         assert found.feasible_at_infinity[i] == pytest.approx(at_infinity, abs=1e-12)
     assert (found.verdict == Verdict.FEASIBLE).all()
@@ -98,8 +98,8 @@ def test_without_arcs_the_best_candidate_is_reported():
         assert found.verdict[i] & Verdict.NO_ARCS
         assert found.verdict[i] & (Verdict.SLACK_CABLE | Verdict.ABOVE_SPOOLS)
         assert found.margin_bound[i] <= found.margin[i] < 0
-        hub = np.array([0.0, 0.0, Z0])
-        duration = oracle.motion(starts[i], ends[i], hub, 9.81, int(found.tried_arcs[i]), 0.0)[0]
+        center = np.array([0.0, 0.0, Z0])
+        duration = oracle.motion(starts[i], ends[i], center, 9.81, int(found.tried_arcs[i]), 0.0)[0]
         assert found.duration[i] == pytest.approx(duration)
 
 

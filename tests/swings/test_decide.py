@@ -56,9 +56,9 @@ def problem(rng, kind, n):
     base -= base.mean(0)
     z0, mass, gravity = rng.uniform(1.2, 2.5) * size, rng.uniform(0.1, 20.0), rng.uniform(1.6, 12.0)
     far = np.array([0.6, 0.6, 0.9]) * z0
-    hub = np.array([0.0, 0.0, z0])
-    starts, ends = hub + rng.uniform(-far, far, (2, n, 3))
-    starts[::5] = hub
+    center = np.array([0.0, 0.0, z0])
+    starts, ends = center + rng.uniform(-far, far, (2, n, 3))
+    starts[::5] = center
     mine, theirs = amplitudes(rng, kind)
     cases = [oracle.Case(base, mass, gravity, z0, a, b, theirs, {}) for a, b in zip(starts, ends, strict=True)]
     return mine, cases

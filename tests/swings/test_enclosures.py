@@ -180,11 +180,13 @@ def test_speeds_and_accelerations_of_other_robots_keep_their_limits():
         rays = position[:, None] - spools
         lengths = np.linalg.norm(rays, axis=2)
         rate = np.einsum("nki,ni->nk", rays, velocity) / lengths
-        bend = (np.sum(velocity**2, axis=1)[:, None] + np.einsum("nki,ni->nk", rays, acceleration) - rate**2) / lengths
-        return np.abs(rate).max(), np.abs(bend).max()
+        second_derivative = (
+            np.sum(velocity**2, axis=1)[:, None] + np.einsum("nki,ni->nk", rays, acceleration) - rate**2
+        ) / lengths
+        return np.abs(rate).max(), np.abs(second_derivative).max()
 
-    speed, bend = 1.05 * np.array([fastest(base, i) for i in range(len(LEVELS))]).max(0)
-    limits = limited(uncertain(spool_positions=0.01), cable_speed_max=speed, cable_acceleration_max=bend)
+    speed, second_derivative = 1.05 * np.array([fastest(base, i) for i in range(len(LEVELS))]).max(0)
+    limits = limited(uncertain(spool_positions=0.01), cable_speed_max=speed, cable_acceleration_max=second_derivative)
     problem, segments, answers = point_masses(limits)
     found = tolerated_by_point_masses(problem, segments, answers.arcs)
     assert (found.proved > 0.3).all()
@@ -193,4 +195,4 @@ def test_speeds_and_accelerations_of_other_robots_keep_their_limits():
         for _ in range(30):
             own = fastest(base + on_balls(rng, (3,), proved * 0.01), i)
             assert own[0] <= speed * (1.0 + 1e-5)
-            assert own[1] <= bend * (1.0 + 1e-5)
+            assert own[1] <= second_derivative * (1.0 + 1e-5)

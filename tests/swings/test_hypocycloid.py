@@ -22,7 +22,7 @@ DOWN, OFFSET = np.array([0.0, 0.0, 1.0]), np.array([0.5, -0.7, 0.4])
 
 def one_swing(segment, amplitude, arcs, tau):
     c, d = hypocycloid.swing(segment, derivatives(amplitude, tau, order=2), arcs, tau)
-    return segment.hub + segment.plane @ c, segment.rate * segment.plane @ (d - c)
+    return segment.center + segment.plane @ c, segment.rate * segment.plane @ (d - c)
 
 
 def along(function):
@@ -46,7 +46,7 @@ class Batch:
         shapes = (bases, (3, 3)), (starts, (3,)), (ends, (3,)), (z0, ()), (arcs, ()), (gravity, ())
         whole = [np.broadcast_to(np.asarray(v), (self.n, *shape))[np.arange(N) % self.n] for v, shape in shapes]
         self.bases, self.starts, self.ends, self.z0, self.arcs, self.gravity = whole
-        self.hub = self.bases.mean(1) + self.z0[:, None] * DOWN
+        self.center = self.bases.mean(1) + self.z0[:, None] * DOWN
         robot = point_mass.PointMassRobot(self.bases, np.ones(N), self.gravity.astype(float))
         self.segments = SEGMENTS(robot, self.starts, self.ends, self.z0.astype(float), self.arcs % 2 == 1)
         self.p = self.arcs.astype(float)
@@ -59,7 +59,7 @@ class Batch:
 
     def reference(self, i, tau=TAU, amplitude=oracle.quintic):
         settings = {"z0": self.z0[i], "normal": oracle.plane_normal(self.bases[i])}
-        points = self.starts[i], self.ends[i], self.hub[i]
+        points = self.starts[i], self.ends[i], self.center[i]
         return oracle.motion(*points, self.gravity[i], int(self.arcs[i]), tau, amplitude, **settings)
 
 
@@ -72,8 +72,8 @@ def general():
     bases[::2] = bases[::2, ::-1]
     bases = rng.uniform(0.3, 2.0, (N, 1, 1)) * (bases - bases.mean(1, keepdims=True))
     z0 = rng.uniform(0.8, 4.0, N)
-    hub = bases.mean(1) + z0[:, None] * DOWN
-    starts, ends = hub + rng.normal(size=(N, 3)), hub + rng.normal(size=(N, 3))
+    center = bases.mean(1) + z0[:, None] * DOWN
+    starts, ends = center + rng.normal(size=(N, 3)), center + rng.normal(size=(N, 3))
     return Batch(bases, starts, ends, z0, rng.integers(1, 31, N), rng.uniform(1.6, 12.0, N))
 
 
@@ -84,7 +84,7 @@ def test_boundary_conditions(general):
     np.testing.assert_allclose(position, targets, atol=1e-11)
     np.testing.assert_allclose(velocity, 0.0, atol=1e-10)
     rate = (general.gravity / general.z0)[:, None, None]  # (2.26)
-    np.testing.assert_allclose(acceleration, -rate * (targets - general.hub[:, None]), atol=1e-9)
+    np.testing.assert_allclose(acceleration, -rate * (targets - general.center[:, None]), atol=1e-9)
     rope, gravity = targets - general.bases.mean(1)[:, None], general.gravity[:, None, None] * DOWN
     np.testing.assert_allclose(np.cross(rope, acceleration - gravity), 0.0, atol=1e-8)  # (2.16)
 
@@ -127,23 +127,23 @@ def test_normalised_pseudotensions(general):
     found, eta = KAPPA(general.segments, QUINTIC, general.p, TAU), ETA(general.segments, QUINTIC, general.p, TAU)
     for i in range(N):
         _, position, _, acceleration = general.reference(i)
-        base, hub = general.bases[i], general.hub[i]
-        wanted = oracle.normalised_pseudotensions(base, hub, position, acceleration, general.gravity[i])
+        base, center = general.bases[i], general.center[i]
+        wanted = oracle.normalised_pseudotensions(base, center, position, acceleration, general.gravity[i])
         np.testing.assert_allclose(found[i], wanted, rtol=0, atol=1e-11 * (1.0 + np.abs(wanted).max()))
-        np.testing.assert_allclose(eta[i], oracle.height_ratio(base, position, hub), rtol=0, atol=1e-11)
+        np.testing.assert_allclose(eta[i], oracle.height_ratio(base, position, center), rtol=0, atol=1e-11)
 
 
 @pytest.mark.parametrize("base", [equilateral(0.26), TILTED], ids=["level", "tilted"])
 def test_rest_ends_swing_on_a_straight_line(base):
     """c = r cos(theta tau) with theta = (-1)^(p-1) p pi; an odd number's first swing goes away from the target."""
-    hub, arcs = base.mean(0) + 1.7 * DOWN, np.array([1, 2, 3, 6, 9])
-    rest, away = np.tile(hub, (5, 1)), np.tile(hub + OFFSET, (5, 1))
+    center, arcs = base.mean(0) + 1.7 * DOWN, np.array([1, 2, 3, 6, 9])
+    rest, away = np.tile(center, (5, 1)), np.tile(center + OFFSET, (5, 1))
     radius, shape = np.linalg.norm(OFFSET), oracle.quintic(TAU)[0]
     theta = (-1.0) ** (arcs - 1) * np.pi * arcs
     for starts, ends, r, sign in ((rest, away, radius * shape, (-1.0) ** arcs), (away, rest, radius * (1 - shape), 1)):
         batch = Batch(base, starts, ends, 1.7, arcs)
         line = (sign * np.ones(5))[:, None] * r * np.cos(theta[:, None] * TAU)
-        np.testing.assert_allclose(batch.motion()[0] - hub, line[:, :, None] * OFFSET / radius, atol=1e-12)
+        np.testing.assert_allclose(batch.motion()[0] - center, line[:, :, None] * OFFSET / radius, atol=1e-12)
         np.testing.assert_allclose(batch.duration(), np.pi * arcs * np.sqrt(1.7 / 9.81), rtol=1e-13)
 
 
@@ -168,17 +168,17 @@ STRAIGHT, FREE = slice(0, 4), slice(4, 7)
 def test_points_on_one_line(base):
     """Where the points do not fix the plane: no NaN, targets still met, the plane that was agreed."""
     starts, ends, arcs = (np.array(column) for column in zip(*DEGENERATE, strict=True))
-    hub = base.mean(0) + 1.7 * DOWN
-    batch = Batch(base, hub + starts, hub + ends, 1.7, arcs)
+    center = base.mean(0) + 1.7 * DOWN
+    batch = Batch(base, center + starts, center + ends, 1.7, arcs)
     found, plane = batch.motion(), np.asarray(batch.segments.plane)
     for i in range(len(arcs)):
         for mine, wanted in zip(found, batch.reference(i)[1:], strict=True):
             np.testing.assert_allclose(mine[i], wanted, rtol=0, atol=1e-11, err_msg=str(DEGENERATE[i]))
-    np.testing.assert_allclose(found[0][:, [0, -1]], hub + np.stack([starts, ends], 1), atol=1e-13)
+    np.testing.assert_allclose(found[0][:, [0, -1]], center + np.stack([starts, ends], 1), atol=1e-13)
     np.testing.assert_allclose(np.swapaxes(plane, 1, 2) @ plane, np.tile(np.eye(2), (N, 1, 1)), atol=1e-14)
     np.testing.assert_allclose(plane[FREE, :, 1] @ oracle.plane_normal(base), 0.0, atol=1e-13)  # least inclined
-    np.testing.assert_allclose(np.cross(found[0][STRAIGHT] - hub, OFFSET), 0.0, atol=1e-12)
-    ray = Batch(base, np.tile(hub + OFFSET, (2, 1)), hub + np.array([[1.5], [1.0]]) * OFFSET, 1.7, 1)
+    np.testing.assert_allclose(np.cross(found[0][STRAIGHT] - center, OFFSET), 0.0, atol=1e-12)
+    ray = Batch(base, np.tile(center + OFFSET, (2, 1)), center + np.array([[1.5], [1.0]]) * OFFSET, 1.7, 1)
     np.testing.assert_array_equal(ray.duration(), 0.0)  # one arc on one ray, or none at all: no trajectory
 
 
@@ -190,10 +190,10 @@ def test_nearly_on_one_line(psi):
     batch = Batch(equilateral(0.26), starts, ends, 1.7, np.arange(1, 9))
     position, _, acceleration = batch.motion()
     for i in range(8):
-        duration, wanted, _, bend = batch.reference(i)
+        duration, wanted, _, second_derivative = batch.reference(i)
         assert batch.duration()[i] == pytest.approx(duration, rel=1e-9)
         np.testing.assert_allclose(position[i], wanted, atol=2e-15 / np.sin(psi))
-        np.testing.assert_allclose(acceleration[i], bend, atol=1e-13 / np.sin(psi))
+        np.testing.assert_allclose(acceleration[i], second_derivative, atol=1e-13 / np.sin(psi))
 
 
 def test_feasibility_at_infinity(general):
@@ -208,7 +208,7 @@ def test_feasibility_at_infinity(general):
     np.testing.assert_allclose(printed[:3], [-0.1557, -0.1416, 0.2057], atol=5e-5)
     overshooting = from_polynomial([0, 0, 0, 10 + 40, -15 - 120, 6 + 120, -40])  # quintic + 40 (t - t^2)^3
     far = np.asarray(INFINITY(general.segments, overshooting)) - 1.0
-    radii = [np.linalg.norm(p - general.hub, axis=1) for p in (general.starts, general.ends)]
+    radii = [np.linalg.norm(p - general.center, axis=1) for p in (general.starts, general.ends)]
     shape = np.asarray(derivatives(overshooting, np.linspace(0.0, 1.0, 20_001), order=0)[0])
     worst = np.abs(radii[0] + (radii[1] - radii[0]) * shape[:, None]).max(0)  # the largest radius on the way
     np.testing.assert_allclose(far, (np.asarray(found) - 1.0) * worst / np.maximum(*radii), rtol=1e-7)

@@ -38,12 +38,14 @@ def random_segments(name, seed, n=N):
 
 def reference(base, start, end, arcs, printed):
     """The independent implementation's margin: the smallest of 20,001 samples of each criterion, zoomed in thrice."""
-    hub, normal = base.mean(0) + np.array([0.0, 0.0, Z0]), oracle.plane_normal(base)
+    center, normal = base.mean(0) + np.array([0.0, 0.0, Z0]), oracle.plane_normal(base)
 
     def values(tau):
-        _, position, _, bend = oracle.motion(start, end, hub, 9.81, int(arcs), tau, printed, z0=Z0, normal=normal)
-        kappa = oracle.normalised_pseudotensions(base, hub, position, bend, 9.81)
-        return np.c_[kappa, oracle.height_ratio(base, position, hub)]
+        _, position, _, second_derivative = oracle.motion(
+            start, end, center, 9.81, int(arcs), tau, printed, z0=Z0, normal=normal
+        )
+        kappa = oracle.normalised_pseudotensions(base, center, position, second_derivative, 9.81)
+        return np.c_[kappa, oracle.height_ratio(base, position, center)]
 
     whole = np.linspace(0.0, 1.0, 20_001)
     found, smallest = values(whole), []

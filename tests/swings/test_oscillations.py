@@ -33,11 +33,11 @@ def smallest_pull(base, target, z0, n, samples=20_001):
     omega = 2.0 * np.pi * n
     time = np.sqrt((omega**2 - A1.deriv(2)(1.0)) * z0 / 9.81)
     swing = A1(tau) * np.cos(omega * tau)
-    bend = A1.deriv(2)(tau) * np.cos(omega * tau) - 2.0 * omega * A1.deriv()(tau) * np.sin(omega * tau)
-    bend = (bend - omega**2 * swing) / time**2
-    hub = np.array([0.0, 0.0, z0])
-    u = np.asarray(target) - hub
-    return balance(base, hub + swing[:, None] * u, bend[:, None] * u).min()
+    second_derivative = A1.deriv(2)(tau) * np.cos(omega * tau) - 2.0 * omega * A1.deriv()(tau) * np.sin(omega * tau)
+    second_derivative = (second_derivative - omega**2 * swing) / time**2
+    center = np.array([0.0, 0.0, z0])
+    u = np.asarray(target) - center
+    return balance(base, center + swing[:, None] * u, second_derivative[:, None] * u).min()
 
 
 @pytest.mark.parametrize("robot", [SPATIAL, pytest.param(PLANAR, marks=pytest.mark.thorough)])

@@ -108,9 +108,9 @@ def test_bounds_of_each_cable_hold_and_are_sharp(name, amplitude):
     segments, p, same = segments_of(name, starts, ends, arcs), arcs.astype(float), of_one_shape(amplitude)
     start, stop, tau = random_intervals(rng, amplitude, n)
     values = np.asarray(KAPPA_ETA(None, None, same, segments, p, tau)) - 1.0
-    slope, bend, slope_error, bend_error = differences(values, tau)
+    slope, second_derivative, slope_error, bend_error = differences(values, tau)
     bounds = np.asarray(KAPPA_ETA_BOUNDS(segments, same, p, start, stop))
-    for j, (found, error) in enumerate(((values, 1e-12), (slope, slope_error), (bend, bend_error))):
+    for j, (found, error) in enumerate(((values, 1e-12), (slope, slope_error), (second_derivative, bend_error))):
         bound = bounds[:, j]
         assert (np.abs(found) <= bound[:, None] * (1.0 + 1e-9) + error).all()
         assert ((np.abs(found).max(1) / np.maximum(bound, 0.1)).max(0) > 0.97).all()
@@ -147,10 +147,10 @@ def test_curvature_bounds_of_limits_hold(name):
         bounds = np.asarray(CURVATURES(robot, limits_of(values), same, segments, p, start, stop))
         slacks = np.asarray(SLACKS(robot, limits_of(values, k), same, segments, p, tau))
         below = (slacks[:, :, 1] > 0.01).all(1)  # elsewhere a limit out of reach is not
-        _, bend, _, error = differences(slacks, tau)
-        assert (bend <= bounds[:, None] * (1.0 + 1e-9) + error)[below].all()
+        _, second_derivative, _, error = differences(slacks, tau)
+        assert (second_derivative <= bounds[:, None] * (1.0 + 1e-9) + error)[below].all()
         clear = error[:, 0] < 1e-3 * bounds
-        sharpest = np.maximum(sharpest, np.where(clear, bend.max(1) / bounds, 0.0)[below].max(0))
+        sharpest = np.maximum(sharpest, np.where(clear, second_derivative.max(1) / bounds, 0.0)[below].max(0))
     assert (sharpest > [0.97, 0.97, 0.8, 0.8, 0.97, 0.6, 0.45, 0.45]).all()
 
 
@@ -197,9 +197,9 @@ def dense_margin(name, start, end, arcs, printed):
 
 
 def check_random_segments(count, seed):
-    rng, share = np.random.default_rng(seed), count // 4
+    rng, fraction = np.random.default_rng(seed), count // 4
     for name, amplitude in itertools.product(BASES, PRINTED):
-        starts, ends, arcs = random_points(rng, name, share)
+        starts, ends, arcs = random_points(rng, name, fraction)
         mine, theirs = PRINTED[amplitude]
         proof = prove(Problem(ROBOTS[name], Limits(), mine), segments_of(name, starts, ends, arcs), arcs)
         dense = np.array([dense_margin(name, *segment, theirs) for segment in zip(starts, ends, arcs, strict=True)])
@@ -291,10 +291,10 @@ def extended_kappa_eta(segment, amplitude, arcs, tau):
     span, tau = one["end_radius"] - one["start_radius"], tau.astype(np.longdouble)
     r, ratio = one["start_radius"] + span * curve(tau), one["precession"] / p
     period = (pi * p) ** 2 * (1 - ratio) * (1 + ratio)
-    rho, growth = span * curve.deriv(2)(tau) / period, 2 * one["sense"] * span * curve.deriv(1)(tau) / (pi * p)
+    rho, radial_rate = span * curve.deriv(2)(tau) / period, 2 * one["sense"] * span * curve.deriv(1)(tau) / (pi * p)
     fast, slow = one["sense"] * pi * p * tau, one["sense"] * pi * one["precession"] * tau
     c_r, c_t = r * np.cos(fast), ratio * r * np.sin(fast)
-    d_r, d_t = rho * np.cos(fast) - growth * np.sin(fast), ratio * (rho + 2 * r) * np.sin(fast)
+    d_r, d_t = rho * np.cos(fast) - radial_rate * np.sin(fast), ratio * (rho + 2 * r) * np.sin(fast)
     c, d = (
         (np.cos(slow) * a + np.sin(slow) * b, np.cos(slow) * b - np.sin(slow) * a) for a, b in ((c_r, c_t), (d_r, d_t))
     )
@@ -311,8 +311,12 @@ def test_rounding_stays_below_a_tenth_of_the_tolerance(name):
     starts, ends, _ = random_points(rng, name, n)
     arcs = rng.integers(1, 31, n)
     close = np.array([np.cos(1e-3), np.sin(1e-3), 0.0]) * 0.8  # one arc between neighbours: the largest terms of all
-    hub = BASES[name].mean(0) + np.array([0.0, 0.0, Z0])
-    starts[:50], ends[:50], arcs[:50] = hub + np.array([0.8, 0.0, 0.0]), hub + close * rng.uniform(0.8, 1.2, (50, 1)), 1
+    center = BASES[name].mean(0) + np.array([0.0, 0.0, Z0])
+    starts[:50], ends[:50], arcs[:50] = (
+        center + np.array([0.8, 0.0, 0.0]),
+        center + close * rng.uniform(0.8, 1.2, (50, 1)),
+        1,
+    )
     segments, tau = segments_of(name, starts, ends, arcs), rng.uniform(0.0, 1.0, (n, 60))
     found = np.asarray(KAPPA_ETA(None, None, of_one_shape(QUINTIC), segments, arcs.astype(float), tau))
     error = np.abs(found - extended_kappa_eta(segments, QUINTIC, arcs, tau)).max((1, 2))

@@ -79,7 +79,7 @@ def test_weights_make_the_pseudotensions(tilted, name):
     amplitude, z0, n = FUNCTIONS[name], 1.4, 5.0
     target = np.array([1.1, -0.7, 1.9])
     one = TRANSITION(tilted, amplitude, target, z0)
-    at_rest = PULL(tilted, one.hub, np.zeros(3))
+    at_rest = PULL(tilted, one.center, np.zeros(3))
     end = float(DERIVATIVES(amplitude, jnp.asarray(1.0), order=2)[2])
     for tau in np.linspace(0.0, 1.0, 41):
         position, _, acceleration = MOTION(one, amplitude, 2.0 * n, tau)
@@ -118,16 +118,16 @@ def test_motion_starts_at_rest_and_ends_like_a_pendulum(tilted, name):
         return [np.asarray(x) for x in MOTION(one, amplitude, 2.0 * n, tau)]
 
     start, end = at(0.0), at(1.0)
-    np.testing.assert_allclose(start[0], one.hub, atol=1e-14)
+    np.testing.assert_allclose(start[0], one.center, atol=1e-14)
     np.testing.assert_allclose(start[1:], np.zeros((2, 3)), atol=1e-12)
     np.testing.assert_allclose(end[0], target, atol=1e-14)
     np.testing.assert_allclose(end[1], np.zeros(3), atol=1e-11)
-    pendulum = -float(one.rate) * (np.asarray(target) - np.asarray(one.hub))  # (1.88) along the line
+    pendulum = -float(one.rate) * (np.asarray(target) - np.asarray(one.center))  # (1.88) along the line
     np.testing.assert_allclose(end[2], pendulum, atol=1e-10)
     time, h = float(hypocycloid.duration(one, 2.0 * n)), 1e-5
     for tau in (0.21, 0.5, 0.83):
         swing = float(DERIVATIVES(amplitude, jnp.asarray(tau), order=0)[0]) * math.cos(6.0 * math.pi * tau)
-        np.testing.assert_allclose(at(tau)[0], one.hub + (target - one.hub) * swing, atol=1e-12)  # (1.20)
+        np.testing.assert_allclose(at(tau)[0], one.center + (target - one.center) * swing, atol=1e-12)  # (1.20)
         before, now, after = at(tau - h), at(tau), at(tau + h)
         for k in (0, 1):
             np.testing.assert_allclose((after[k] - before[k]) / (2.0 * h * time), now[k + 1], rtol=2e-6, atol=1e-6)
@@ -194,8 +194,8 @@ def overshooting(rng):
 def densest(coefficients, weights, v, samples=200_001):
     """The largest root of (1.44) over samples, the printed formula in NumPy; infinite where |v A| reaches 1."""
     curve, tau = np.polynomial.Polynomial(coefficients), np.linspace(0.0, 1.0, samples)
-    size, slope, bend, end = curve(tau), curve.deriv()(tau), curve.deriv(2)(tau), curve.deriv(2)(1.0)
-    c, d = bend - size * end, (1.0 - v * size) * (1.0 + v * size)
+    size, slope, second_derivative, end = curve(tau), curve.deriv()(tau), curve.deriv(2)(tau), curve.deriv(2)(1.0)
+    c, d = second_derivative - size * end, (1.0 - v * size) * (1.0 + v * size)
     if (d <= 0.0).any():
         return np.inf
     found = 0.0
@@ -237,11 +237,11 @@ def test_beyond_its_reach_no_number_of_oscillations_will_do():
         )
         loads = rng.normal(size=3)
         loads -= loads.mean()
-        size, slope, bend, end = curve(tau), curve.deriv()(tau), curve.deriv(2)(tau), curve.deriv(2)(1.0)
+        size, slope, second_derivative, end = curve(tau), curve.deriv()(tau), curve.deriv(2)(tau), curve.deriv(2)(1.0)
         for n in (*range(3, 200), 1e3, 1e4, 1e6):
             omega = (2.0 * math.pi * n) ** 2 - end
             if omega > 0.0:
-                c = loads[:, None] * (bend - size * end) / omega - v * size
+                c = loads[:, None] * (second_derivative - size * end) / omega - v * size
                 s = 4.0 * math.pi * n * loads[:, None] * slope / omega
                 assert (c**2 + s**2).max() > 1.0
 

@@ -35,14 +35,14 @@ def text(robot="transition-prototype", amplitude='"A1"', depth=f"z0 = {Z0}", tar
 def forward(name, target, n, tau):
     """Duration, position, velocity, acceleration of (1.20), (1.21), (1.89) with (1.29)."""
     curve = np.polynomial.Polynomial(POLYNOMIALS[name]) if name else np.polynomial.Polynomial([1.0])
-    omega, hub = 2.0 * np.pi * n, np.array([0.0, 0.0, Z0])
+    omega, center = 2.0 * np.pi * n, np.array([0.0, 0.0, Z0])
     time = np.sqrt((omega**2 - curve.deriv(2)(1.0)) * Z0 / G)
     a, a1, a2 = (np.asarray(curve.deriv(k)(tau) if k else curve(tau))[:, None] for k in range(3))
     cosine, sine = np.cos(omega * tau)[:, None], np.sin(omega * tau)[:, None]
-    u = np.asarray(target) - hub
+    u = np.asarray(target) - center
     return (
         time,
-        hub + u * a * cosine,
+        center + u * a * cosine,
         u * (a1 * cosine - omega * a * sine) / time,
         u * (a2 * cosine - 2.0 * omega * a1 * sine - omega**2 * a * cosine) / time**2,
     )

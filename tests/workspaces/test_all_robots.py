@@ -95,7 +95,7 @@ class Uncertain:
             along, about = (np.linalg.norm(part, axis=0) for part in np.split(matrix, [len(matrix) - 3]))
             slacks.append(most - (speed * along + angular_speed * about).max())
         if self.condition == "wrench-closure":
-            slacks.append(oracle.cocircuits(matrix)[1].max(1).min())  # each has entries of both signs
+            slacks.append(oracle.facet_normals(matrix)[1].max(1).min())  # each has entries of both signs
         elif self.condition is not None:
             kept = oracle.rows(drawn.pattern, drawn.platform, self.turn)
             arm = self.turn @ np.asarray(drawn.arm) * (drawn.pattern == "3R") + centre

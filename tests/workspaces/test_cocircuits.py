@@ -49,11 +49,11 @@ def poses_of(drawn, rng, count):
 @pytest.mark.quick("2T-3-0.1", "3T-4-0.1", "3R3T-8-0.1")
 @pytest.mark.parametrize("share", [pytest.param(SHARES[0], marks=pytest.mark.thorough), *SHARES[1:]])
 @pytest.mark.parametrize(("pattern", "n"), [*SIZES, *(pytest.param(*size, marks=pytest.mark.soak) for size in MORE)])
-def test_identities_of_the_margin(pattern, n, share):
+def test_identities_of_the_margin(pattern, n, fraction):
     """Narrower limits shift it, other units scale it, another order of the cables changes nothing."""
-    rng = np.random.default_rng([n, int(100 * share)])
+    rng = np.random.default_rng([n, int(100 * fraction)])
     drawn = limited_robot(rng, pattern, n)
-    radius = share * cable_robots.HALF[0] * rng.uniform(0.5, 1.0, n)
+    radius = fraction * cable_robots.HALF[0] * rng.uniform(0.5, 1.0, n)
     poses, force = poses_of(drawn, rng, 64), drawn.mass * G
     reference = margins(drawn, poses, radius)
     finite = np.isfinite(reference.margin)
@@ -86,10 +86,10 @@ def test_identities_of_the_margin(pattern, n, share):
         *(pytest.param(*size, marks=pytest.mark.soak) for size in MORE),
     ],
 )
-def test_margins_are_those_of_linear_programs(pattern, n, share):
-    rng = np.random.default_rng([n, int(100 * share)])
+def test_margins_are_those_of_linear_programs(pattern, n, fraction):
+    rng = np.random.default_rng([n, int(100 * fraction)])
     drawn = limited_robot(rng, pattern, n)
-    radius, axes = share * cable_robots.HALF[0] * rng.uniform(0.5, 1.0, n), np.tile(UP, (n, 1))
+    radius, axes = fraction * cable_robots.HALF[0] * rng.uniform(0.5, 1.0, n), np.tile(UP, (n, 1))
     places, turns = poses_of(drawn, rng, 40)
     answers = margins(drawn, (places, turns), radius)
     checked = 0

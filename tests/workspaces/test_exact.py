@@ -109,7 +109,7 @@ def test_any_length_may_be_the_unit_of_moments(precision):
         for i in range(8):
             matrix = oracle.wrench_matrix(drawn.base, drawn.platform, places[i], turns[i], "1R2T") / unit[:, None]
             held = oracle.weight(oracle.rows("1R2T", drawn.platform, turns[i]), drawn.mass) / unit
-            normals, rows = oracle.cocircuits(matrix)
+            normals, rows = oracle.facet_normals(matrix)
             reach = np.where(rows > 0.0, rows * drawn.high, rows * drawn.low).sum(1) - normals @ held
             wanted = (reach / np.linalg.norm(normals, axis=1)).min()
             tolerance = (1e-3 if precision == "float32" else 1e-8) * drawn.high.max()

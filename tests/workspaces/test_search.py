@@ -242,11 +242,11 @@ def test_sets_of_wrenches(pattern, n, name):
     dof, load = cable_robots.DEGREES[pattern], 0.05 * drawn.mass * G
     sizes = np.where(np.arange(dof) < {"2R3T": 3}.get(pattern, 6), rng.uniform(0.2, 1.0, dof), 0.0)
     given = {}
-    for key, share in SETS[name].items():
+    for key, fraction in SETS[name].items():
         if key == "acceleration" and pattern != "3R":
-            given[key] = 0.05 * G * share
+            given[key] = 0.05 * G * fraction
         elif key != "acceleration":
-            given[key] = load * share * (rng.normal(size=(2, dof)) * (sizes > 0.0) if key == "wrenches" else sizes)
+            given[key] = load * fraction * (rng.normal(size=(2, dof)) * (sizes > 0.0) if key == "wrenches" else sizes)
     limits = {"tension_min": drawn.low, "tension_max": drawn.high}
     found = asked(drawn, places, turns, "wrench-feasible", **limits, **given)
     capacity = asked(drawn, places, turns, "wrench-feasible", capacity_length=0.7, **limits, **given)
@@ -287,7 +287,7 @@ def distance_to_facets(matrix, points, low, high, shapes):
 
 
 def slacks(matrix, points, low, high, shapes):
-    normals, rows = oracle.cocircuits(matrix)
+    normals, rows = oracle.facet_normals(matrix)
     reach = np.where(rows > 0.0, rows * high, rows * low).sum(1) - (points @ normals.T).max(0)
     return reach - sum(np.linalg.norm(normals @ shape, axis=1) for shape in shapes), (normals, rows)
 
@@ -380,8 +380,8 @@ def test_the_origin_of_the_frame_and_the_axis_do_not_matter():
     second = cspr_jax.workspace(moved, origins, quaternions, **limits)
     np.testing.assert_allclose(second.margin, first.margin, atol=1e-7 * drawn.high.max())
     down = platform_robot(drawn.base * flip, drawn.platform * flip, z_axis="down", **common)
-    turned = quaternions * np.array([1.0, 1.0, -1.0, -1.0])
-    third = cspr_jax.workspace(down, places * flip, turned, **limits)
+    rotated = quaternions * np.array([1.0, 1.0, -1.0, -1.0])
+    third = cspr_jax.workspace(down, places * flip, rotated, **limits)
     np.testing.assert_allclose(third.margin, first.margin, atol=1e-9 * drawn.high.max())
 
 

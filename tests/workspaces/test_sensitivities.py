@@ -122,9 +122,9 @@ def test_the_box_of_the_text():
     np.testing.assert_allclose([found.sigma_p.min(), found.sigma_r.min()], [1.83, 20.8], rtol=1e-2)
     error = cspr_jax.encoder_error(26.75e-3, 2048)
     assert round(1e3 * error, 3) == 0.082
-    far, turned = found.errors(error)
+    far, rotated = found.errors(error)
     np.testing.assert_allclose(far, found.sigma_p * error)
-    np.testing.assert_allclose(turned, found.sigma_r * error)
+    np.testing.assert_allclose(rotated, found.sigma_r * error)
 
 
 def test_mistakes():

@@ -120,9 +120,9 @@ def test_a_planar_square_at_its_middle(crossed):
     square = np.array([[2, 0, 2], [-2, 0, 2], [-2, 0, -2], [2, 0, -2]], float)
     platform = (0.25 * square)[[1, 0, 3, 2] if crossed else [0, 1, 2, 3]]
     matrix = oracle.wrench_matrix(square, platform, np.zeros(3), EYE, "1R2T")
-    share = 1.5 / np.hypot(2.5 if crossed else 1.5, 1.5)
+    fraction = 1.5 / np.hypot(2.5 if crossed else 1.5, 1.5)
     held = [0.0, 3.0 * G, 0.0]
-    assert oracle.tension_margin(matrix, held, 5.0, 105.0) == pytest.approx((100.0 - 3.0 * G / (2.0 * share)) / 2.0)
+    assert oracle.tension_margin(matrix, held, 5.0, 105.0) == pytest.approx((100.0 - 3.0 * G / (2.0 * fraction)) / 2.0)
     assert oracle.rank_of(matrix) == (3 if crossed else 2)
     assert oracle.is_closed(matrix) == crossed
     # Without a rank of 3 any weight is held, and no moment.
@@ -173,8 +173,8 @@ def test_a_wrench_matrix_takes_lengths_off(pulleys):
         twist = rng.normal(size=6)
 
         def lengths(h, robot=robot, position=position, rotation=rotation, twist=twist, radii=radii, axes=axes):
-            turned = Rotation.from_rotvec(h * twist[3:]).as_matrix() @ rotation
-            ends = position + h * twist[:3] + robot.platform @ turned.T
+            rotated = Rotation.from_rotvec(h * twist[3:]).as_matrix() @ rotation
+            ends = position + h * twist[:3] + robot.platform @ rotated.T
             if not pulleys:
                 return np.linalg.norm(ends - robot.base, axis=1)
             return np.array([oracle.tangent_point(*p)[1] for p in zip(robot.base, axes, radii, ends, strict=True)])
@@ -259,7 +259,7 @@ def test_capacity_is_the_ball_of_wrenches_that_fits():
     middle = matrix @ np.full(8, 500.5)
     radius = oracle.capacity_margin(matrix, middle, low, high)
     assert radius > 0.0
-    directions = np.r_[rng.normal(size=(20, 6)), oracle.cocircuits(matrix)[0]]
+    directions = np.r_[rng.normal(size=(20, 6)), oracle.facet_normals(matrix)[0]]
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     margins = [oracle.tension_margin(matrix, middle + radius * e, low, high) for e in directions]
     assert min(margins) == pytest.approx(0.0, abs=1e-8)
@@ -285,7 +285,7 @@ def test_sets_of_wrenches(pattern, n, bounds):
     exact = oracle.ellipsoid_margin(matrix, held, shape, *given)
     assert exact <= oracle.ellipsoid_bound(matrix, held, shape, *given, 5, rng) + 1e-9 * scale
     # The wrench that is worst for the deciding facet gives the exact margin to a linear program.
-    reached = oracle.cocircuits(matrix)[0] @ shape
+    reached = oracle.facet_normals(matrix)[0] @ shape
     worst = held + (reached / np.maximum(np.linalg.norm(reached, axis=1, keepdims=True), 1e-30)) @ shape.T
     assert same(exact, oracle.tension_margin(matrix, worst, *given), scale)
     half = np.r_[0.1 * scale, np.zeros(len(matrix) - 2), 0.05 * scale]

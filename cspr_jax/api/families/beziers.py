@@ -155,7 +155,7 @@ def bezier_durations(
         prepared_robot, frame = prepared(robot)
         first, last = (np.asarray(frame.inward(points[name])) for name in ("starts", "ends"))
         middle = first if control_points is None else np.asarray(frame.inward(points["control_points"]))
-        vectors = np.zeros_like(first) if accelerations is None else np.asarray(frame.turned(points["accelerations"]))
+        vectors = np.zeros_like(first) if accelerations is None else np.asarray(frame.rotated(points["accelerations"]))
         depth = depths_of(prepared_robot, first)
         intervals = feasible_durations(prepared_robot, Ends(first, last, middle, vectors), depth)
         return [durations for durations in intervals if durations is not None]

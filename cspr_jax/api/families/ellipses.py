@@ -59,9 +59,9 @@ def ellipse(
     if isinstance(frequency, str):
         with double_precision():
             problem = Problem(prepared_robot, limits_over(robot, limits, families=("ellipse",)), named("quintic"))
-            place = Ellipse(frame.inward(centre), frame.turned(a), frame.turned(b))
+            place = Ellipse(frame.inward(centre), frame.rotated(a), frame.rotated(b))
             frequency = chosen_frequency(problem, place, frequency)
-    place = Ellipse(*(jnp.asarray(x, float) for x in (frame.inward(centre), frame.turned(a), frame.turned(b))))
+    place = Ellipse(*(jnp.asarray(x, float) for x in (frame.inward(centre), frame.rotated(a), frame.rotated(b))))
     return Placed(turning(place, jnp.asarray(frequency, float), jnp.asarray(phase, float), turns), frame)
 
 
@@ -140,4 +140,4 @@ def _many(robot: PointMassRobot, centres, a, b) -> tuple[SpoolHull, Ellipse]:
 def _axes(key: str, axes, count: int, frame: Frame) -> np.ndarray:
     if np.shape(axes) not in ((3,), (count, 3)):
         raise InputError(key, f"shape {np.shape(axes)}", f"(3,) or ({count}, 3) m")
-    return np.broadcast_to(frame.turned(axes), (count, 3))
+    return np.broadcast_to(frame.rotated(axes), (count, 3))

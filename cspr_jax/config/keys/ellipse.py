@@ -143,13 +143,13 @@ def cell_axes(
     tilt, azimuth = (np.asarray(place.get(name, 0.0), float)[..., None] for name in ("tilt", "tilt_azimuth"))
     level = np.concatenate([np.cos(azimuth), np.sin(azimuth), np.zeros_like(azimuth)], axis=-1)
 
-    def turned(axis: np.ndarray) -> np.ndarray:
+    def rotated(axis: np.ndarray) -> np.ndarray:
         # About the level direction.
         along = level * (level @ axis)[..., None]
         return size * (along + np.cos(tilt) * (axis - along) + np.sin(tilt) * np.cross(level, axis))
 
     a, b = table.axes(is_planar=is_planar)
-    return turned(a), turned(b)
+    return rotated(a), rotated(b)
 
 
 # Keys of a plan that is one ellipse.

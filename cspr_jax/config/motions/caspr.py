@@ -188,9 +188,9 @@ def _blends(
             raise ConfigError(
                 path, f"{place}, point {k + 2}.{key} = {blend:g}: must be greater than 0, and less than {width / 2:g}"
             )
-        share = blend / (2.0 * (width - blend))
+        fraction = blend / (2.0 * (width - blend))
         knots += [times[k] + blend, times[k + 1] - blend, times[k + 1]]
-        law += [[0.0, 0.0, share], [share, 0.5, 1.0 - share], [1.0 - share, 1.0, 1.0]]
+        law += [[0.0, 0.0, fraction], [fraction, 0.5, 1.0 - fraction], [1.0 - fraction, 1.0, 1.0]]
     laws, starts = np.array(law), np.repeat(values[0][:-1], 3, axis=0)
     steps = np.repeat(np.diff(values[0], axis=0), 3, axis=0)
     return np.array(knots), starts[:, None] + laws[:, :, None] * steps[:, None], laws
@@ -250,8 +250,8 @@ def _pieces(half: np.ndarray, axis: np.ndarray, width: np.ndarray) -> tuple[np.n
         second = degree * (degree - 1) * (c[:, min(2, degree)] - 2.0 * c[:, 1] + c[:, 0])
         value, across = unit(c[:, 0]), unit(c[:, 0] + math.pi / 2.0)
         slope = first[:, None] * across
-        bend = second[:, None] * across - (first**2)[:, None] * value
-        ends.append([value, value + slope / 5.0, value + 2.0 * slope / 5.0 + bend / 20.0])
+        second_derivative = second[:, None] * across - (first**2)[:, None] * value
+        ends.append([value, value + slope / 5.0, value + 2.0 * slope / 5.0 + second_derivative / 20.0])
     pieces = np.stack([*ends[0], *reversed(ends[1])], axis=1)
     binomials = np.array([1.0, 5.0, 10.0, 10.0, 5.0, 1.0]) / 32.0
     middle = np.array([math.comb(degree, k) for k in range(degree + 1)]) / 2.0**degree
@@ -263,10 +263,10 @@ def _split(coefficients: np.ndarray, parts: int) -> np.ndarray:
     degree = coefficients.shape[1] - 1
     nodes = np.arange(degree + 1) / degree
 
-    def basis(share: np.ndarray) -> np.ndarray:
+    def basis(fraction: np.ndarray) -> np.ndarray:
         k = np.arange(degree + 1)
         binomials = np.array([math.comb(degree, j) for j in k])
-        return binomials * share[..., None] ** k * (1.0 - share[..., None]) ** (degree - k)
+        return binomials * fraction[..., None] ** k * (1.0 - fraction[..., None]) ** (degree - k)
 
     matrices = np.linalg.solve(basis(nodes), basis((np.arange(parts)[:, None] + nodes) / parts))
     return np.einsum("jab,mbn->mjan", matrices, coefficients).reshape(-1, degree + 1, coefficients.shape[2])

@@ -42,19 +42,19 @@ class _Chosen(NamedTuple):
 class Beziers(Leg):
     """Any places, joined by Bezier segments; see `Leg`."""
 
-    def __init__(self, stops: Waypoints) -> None:
+    def __init__(self, waypoints: Waypoints) -> None:
         """Refuse numbers of arcs, of which a segment has none."""
-        super().__init__(stops)
+        super().__init__(waypoints)
         self._refuse("arcs")
-        if stops.keys.least == "total" and None not in self._durations:
-            raise ConfigError(stops.path, 'least = "total": must be absent where every duration is given')
-        launch = stops.keys.launch
+        if waypoints.keys.least == "total" and None not in self._durations:
+            raise ConfigError(waypoints.path, 'least = "total": must be absent where every duration is given')
+        launch = waypoints.keys.launch
         # Number of the segment of the launch, if it is one of these.
-        self._at = None if launch is None or not 0 <= launch.segment - stops.first < len(self) else launch.segment
+        self._at = None if launch is None or not 0 <= launch.segment - waypoints.first < len(self) else launch.segment
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the places; see `Leg.join`."""
-        points, frame = self._points(problem, z0), self.stops.frame
+        points, frame = self._points(problem, z0), self.waypoints.frame
         # The depth is that of P0, else that of the first pose.
         depth = z0 if np.isfinite(z0) else float(depths_of(problem.robot, points[:1])[0])
         chosen = self._chosen(problem, points, depth)
@@ -63,8 +63,8 @@ class Beziers(Leg):
         answers, motions = answers_of(problem, segments), segments.motions
         self._check_rests(problem, motions, chosen.first - points[0])
         if self._at is not None:
-            answers.release[self._at - self.stops.first] = chosen.release
-            answers.flight_time[self._at - self.stops.first] = chosen.flight_time
+            answers.release[self._at - self.waypoints.first] = chosen.release
+            answers.flight_time[self._at - self.waypoints.first] = chosen.flight_time
         shown_points = np.asarray(frame.outward(answers.control_points))
         return dataclasses.replace(answers, control_points=shown_points), each(motions, len(self))
 
@@ -72,10 +72,10 @@ class Beziers(Leg):
         self, problem: Problem, joined: JoinedLeg, tension_min: np.ndarray, start: float
     ) -> LaunchOutcome | None:
         """Release and flight of the object that the leg launches; see `Leg.outcome`."""
-        table, frame, answers = self.stops.keys.launch, self.stops.frame, cast(BezierAnswers, joined.answers)
+        table, frame, answers = self.waypoints.keys.launch, self.waypoints.frame, cast(BezierAnswers, joined.answers)
         if table is None or self._at is None:
             return None
-        at = self._at - self.stops.first
+        at = self._at - self.waypoints.first
         motion, release = cast(Bezier, joined.motions[at]), float(answers.release[at])
         return launch_outcome(
             table,
@@ -89,36 +89,37 @@ class Beziers(Leg):
         )
 
     def _chosen(self, problem: Problem, points: np.ndarray, depth: float) -> _Chosen:
-        stops, durations, launch = self.stops, self._durations, self.stops.keys.launch
+        waypoints, durations, launch = self.waypoints, self._durations, self.waypoints.keys.launch
         if launch is not None and self._at is not None:
-            question = _question(stops, launch, points, depth, float(problem.robot.gravity))
+            question = _question(waypoints, launch, points, depth, float(problem.robot.gravity))
             best = launched(problem, question, durations, launch.choose)
             first = segments_of(best.sequence, jnp.asarray(best.durations)).middle[0]
             places, times, first = jax.tree.map(np.asarray, (best.sequence.points, best.durations, first))
             return _Chosen(places, times.tolist(), first, float(best.release), float(best.time))
-        control_point = stops.keys.first_control_point if stops.first == 0 else None
-        first = points[0] if control_point is None else np.asarray(stops.frame.inward(control_point))
-        if stops.keys.least == "total":
+        control_point = waypoints.keys.first_control_point if waypoints.first == 0 else None
+        first = points[0] if control_point is None else np.asarray(waypoints.frame.inward(control_point))
+        if waypoints.keys.least == "total":
             sequence = Anchored(points, np.asarray(0), first, np.asarray(depth))
             durations = least_total(problem, sequence, durations).tolist()
         return _Chosen(points, durations, first)
 
     @property
     def _durations(self) -> list[float | None]:
-        durations = (pose.duration for pose in self.stops.poses[1:])
+        durations = (pose.duration for pose in self.waypoints.poses[1:])
         return [time if isinstance(time, float) else None for time in durations]
 
     def _points(self, problem: Problem, z0: float) -> np.ndarray:
-        points, stops = self.stops.points(z0), self.stops
+        points, waypoints = self.waypoints.points(z0), self.waypoints
         if self._at is not None:  # where it follows from the launch
-            points[self._at - stops.first + 1] = np.nan
+            points[self._at - waypoints.first + 1] = np.nan
         near = np.linalg.norm(np.diff(points, axis=0), axis=1) <= AT_P0 * float(spool_radius(problem.robot))
         for i in (np.flatnonzero(near) + 1).tolist():
-            control_point = stops.keys.first_control_point if stops.first == 0 else None
-            if control_point is None or control_point == stops.poses[0].position:
+            control_point = waypoints.keys.first_control_point if waypoints.first == 0 else None
+            if control_point is None or control_point == waypoints.poses[0].position:
                 raise ConfigError(
-                    stops.path,
-                    f"{stops.name(i)}.position: must be another than that of {stops.name(i - 1)}, for a segment that "
+                    waypoints.path,
+                    f"{waypoints.name(i)}.position: must be another than that of {waypoints.name(i - 1)}, for "
+                    "a segment that "
                     "starts without acceleration",
                 )
         return points
@@ -127,13 +128,14 @@ class Beziers(Leg):
         # Redundant cables without largest tensions may give any acceleration, so that no duration is the least.
         if problem.robot.n_cables == problem.robot.dof:
             return
-        is_searched = self.stops.keys.least == "total" or self._at is not None
+        is_searched = self.waypoints.keys.least == "total" or self._at is not None
         shortest = np.exp(duration_bounds(problem, points)[0]) if is_searched else 0.0
         is_free = np.array([time is None for time in self._durations])[: len(times)]
         for i in np.flatnonzero(is_free & ~(times > shortest * ABOVE_SHORTEST)).tolist():
             raise ConfigError(
-                self.stops.path,
-                f"{self.stops.name(i + 1)}.duration: must be a number without tension_max and limits of speeds, since "
+                self.waypoints.path,
+                f"{self.waypoints.name(i + 1)}.duration: must be a number without tension_max and limits "
+                "of speeds, since "
                 "nothing bounds the acceleration of the segment",
             )
 
@@ -144,22 +146,23 @@ class Beziers(Leg):
         starts = (np.pi / times[:1]) ** 2 * first[None]
         sizes = np.linalg.norm(np.concatenate([starts, ends]), axis=1)
         for i in np.flatnonzero(sizes > AT_REST * float(problem.robot.gravity)).tolist():
-            if self.stops.poses[i].rest:
+            if self.waypoints.poses[i].rest:
                 raise ConfigError(
-                    self.stops.path,
-                    f"{self.stops.name(i)}.rest = {shown(True)}: must be absent where the acceleration is not zero: "
+                    self.waypoints.path,
+                    f"{self.waypoints.name(i)}.rest = {shown(True)}: must be absent where the acceleration is "
+                    "not zero: "
                     f"it is {sizes[i]:.3g} m/s^2",
                 )
 
 
-def _question(stops: Waypoints, table: LaunchTable, points: np.ndarray, depth: float, gravity: float) -> Launch:
+def _question(waypoints: Waypoints, table: LaunchTable, points: np.ndarray, depth: float, gravity: float) -> Launch:
     # Ask what the [launch] table asks; depth is that at which slacks are normalised.
-    parabola = parabola_of(table, stops.frame, gravity, stops.path)
-    duration = stops.poses[table.segment - stops.first + 1].duration
+    parabola = parabola_of(table, waypoints.frame, gravity, waypoints.path)
+    duration = waypoints.poses[table.segment - waypoints.first + 1].duration
     if table.release is not None and isinstance(duration, float) and not table.release < duration:
         raise ConfigError(
-            stops.path,
+            waypoints.path,
             f"launch.release = {shown(table.release)}: must be below the duration of the segment, {shown(duration)} s",
         )
-    at = np.asarray(table.segment - stops.first)
+    at = np.asarray(table.segment - waypoints.first)
     return Launch(points, at, *parabola, table.release, np.asarray(depth))

@@ -69,12 +69,12 @@ def _tables(problem: Problem, motions: Bezier, kappa: np.ndarray, is_below: np.n
     square, slope, rest = powers(motions.start, motions.middle, motions.end)
     u = ((np.pi / motions.time) ** 2)[:, None, None]
     place = np.stack([rest, slope, square], axis=-1)
-    bend = u * np.stack([2.0 * square, -slope, -4.0 * square], axis=-1)
+    second_derivative = u * np.stack([2.0 * square, -slope, -4.0 * square], axis=-1)
     rays = np.repeat(-place[:, None], len(a), axis=1)
     rays[..., 0] += a
-    growth = np.stack([slope, 2.0 * square], axis=-1)[:, None]
+    radial_rate = np.stack([slope, 2.0 * square], axis=-1)[:, None]
     per_time = product(u, np.array([1.0, 0.0, -1.0]))
-    along = _dot(rays, growth)
+    along = _dot(rays, radial_rate)
     rows, arms = (np.asarray(x)[0] for x in jax.jit(adjugate)(problem.robot))
     level = np.einsum("i,nij->nj", np.cross(arms, a[0]) - rows, place)
     level[:, 0] += rows @ a[0]
@@ -84,9 +84,11 @@ def _tables(problem: Problem, motions: Bezier, kappa: np.ndarray, is_below: np.n
         "determinant": np.where(is_below[:, None], level, [1.0, 0.0, 0.0])[:, None],
         "depth": place[:, 2:],
         "rate": product(per_time, product(along, along)),
-        "speed": product(per_time, _dot(growth, growth)),
-        "acceleration": _dot(bend[:, None], bend[:, None]),
-        "bend": total(product(per_time, _dot(growth, growth)), -_dot(rays, bend[:, None])),
+        "speed": product(per_time, _dot(radial_rate, radial_rate)),
+        "acceleration": _dot(second_derivative[:, None], second_derivative[:, None]),
+        "second_derivative": total(
+            product(per_time, _dot(radial_rate, radial_rate)), -_dot(rays, second_derivative[:, None])
+        ),
         "z0": np.broadcast_to(motions.z0[:, None, None], (len(u), 1, 1)),
     }
 
@@ -121,10 +123,14 @@ def _speed(problem: Problem, limit) -> Callable[[Items], Any]:
 
 def _acceleration(problem: Problem, limit) -> Callable[[Items], Any]:
     def slack(at: Items) -> Any:
-        share = (at["bend"] - at["rate"] * at["square"] ** -1.0) * at["square"] ** -0.5 * (1.0 / np.asarray(limit))
-        if isinstance(share, Jet):
-            return (share * -1.0 + 1.0).joined(share + 1.0)
-        return np.concatenate([1.0 - share, 1.0 + share], axis=-1)
+        fraction = (
+            (at["second_derivative"] - at["rate"] * at["square"] ** -1.0)
+            * at["square"] ** -0.5
+            * (1.0 / np.asarray(limit))
+        )
+        if isinstance(fraction, Jet):
+            return (fraction * -1.0 + 1.0).joined(fraction + 1.0)
+        return np.concatenate([1.0 - fraction, 1.0 + fraction], axis=-1)
 
     return slack
 

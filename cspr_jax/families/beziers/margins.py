@@ -120,5 +120,5 @@ def _inside(c: Array) -> Array:
 
 
 def _at_rest(robot: PointMassRobot, z0: Array) -> Array:
-    hub = rest_point(z0)
-    return pseudotensions(robot, hub, jnp.zeros_like(hub))
+    center = rest_point(z0)
+    return pseudotensions(robot, center, jnp.zeros_like(center))

@@ -69,5 +69,5 @@ def instant_slacks(problem: Problem, motion: Bezier, tau: Float[Array, ""]) -> F
     robot, state = problem.robot, motion.state(tau)
     matrix, wrench = robot.wrench_matrix(state), robot.inertial_wrench(state)
     margin = centred(matrix, wrench, *tension_range(robot, problem.limits))[1]
-    share = jnp.minimum(margin * robot.n_cables / (robot.mass * robot.gravity), LARGEST)
-    return jnp.stack([share, *other_slacks(robot, problem.limits, state, motion.z0)])
+    fraction = jnp.minimum(margin * robot.n_cables / (robot.mass * robot.gravity), LARGEST)
+    return jnp.stack([fraction, *other_slacks(robot, problem.limits, state, motion.z0)])

@@ -82,8 +82,8 @@ def _terms(hull: SpoolHull, ellipse: Ellipse) -> _Terms:
             return gradient[0] * vector[0] + gradient[1] * vector[1]
 
         constant = 1.0 + flat(ellipse.centre)
-        share = constant / depth
-        tilting = (share * swing[0], share * swing[1])
+        fraction = constant / depth
+        tilting = (fraction * swing[0], fraction * swing[1])
         return _Edge(constant, tilting, (flat(ellipse.cosine) - tilting[0], flat(ellipse.sine) - tilting[1]))
 
     return _Terms([of_edge(gradient) for gradient in hull.edges], depth, _size(swing))

@@ -65,22 +65,29 @@ class Ellipses(Leg):
 
     step = 1
 
-    def __init__(self, stops: Waypoints) -> None:
+    def __init__(self, waypoints: Waypoints) -> None:
         """Refuse poses that are neither on an ellipse nor at rest."""
-        super().__init__(stops)
-        for i, pose in enumerate(stops.poses):
+        super().__init__(waypoints)
+        for i, pose in enumerate(waypoints.poses):
             self._check_pose(i, pose)
-        launch, count = stops.keys.launch, len(stops)
+        launch, count = waypoints.keys.launch, len(waypoints)
         # Number of the pose of the release, if it is one of these.
-        of_launch = 0 if launch is None else launch.segment - stops.first + 1
+        of_launch = 0 if launch is None else launch.segment - waypoints.first + 1
         self._of_launch = of_launch if 0 < of_launch <= count else None
-        if self._of_launch and stops.robot_file.is_platform:
-            raise ConfigError(stops.path, f"launch: must be absent for {stops.robot_file.kind}")
+        if self._of_launch and waypoints.robot_file.is_platform:
+            raise ConfigError(waypoints.path, f"launch: must be absent for {waypoints.robot_file.kind}")
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the poses; see `Leg.join`."""
-        stops = self.stops
-        scene = scene_of(problem.robot, stops.robot_file, stops.frame, stops.keys, stops.path, trajectory=stops.keys)
+        waypoints = self.waypoints
+        scene = scene_of(
+            problem.robot,
+            waypoints.robot_file,
+            waypoints.frame,
+            waypoints.keys,
+            waypoints.path,
+            trajectory=waypoints.keys,
+        )
         turnings = self._turnings(problem, z0, scene)
         ways: list[Way] = []
         place = turnings[0]
@@ -94,7 +101,7 @@ class Ellipses(Leg):
         self, problem: Problem, joined: JoinedLeg, tension_min: np.ndarray, start: float
     ) -> LaunchOutcome | None:
         """Release at the end of a segment, and flight of the object; see `Leg.outcome`."""
-        table, frame = self.stops.keys.launch, self.stops.frame
+        table, frame = self.waypoints.keys.launch, self.waypoints.frame
         if table is None or self._of_launch is None:
             return None
         at, answers = self._of_launch - 1, cast(EllipseAnswers, joined.answers)
@@ -109,74 +116,82 @@ class Ellipses(Leg):
             time=start + float(answers.duration[: at + 1].sum()),
             flight_time=float(answers.flight_time[at]),
             tension_min=float(tension_min[at]),
-            half_axes=frame.turned(np.stack([way.last.cosine, way.last.sine])),
+            half_axes=frame.rotated(np.stack([way.last.cosine, way.last.sine])),
         )
 
     def _release(self, problem: Problem, before: Turning, scene: Scene) -> Release:
-        stops, table, i = self.stops, self.stops.keys.launch, self._of_launch or 0
-        ellipse = stops.poses[i].ellipse
+        waypoints, table, i = self.waypoints, self.waypoints.keys.launch, self._of_launch or 0
+        ellipse = waypoints.poses[i].ellipse
         if table is None or ellipse is None:
             raise ValueError("no launch")
-        gravity, centre = float(problem.robot.gravity), np.asarray(stops.frame.inward(ellipse.centre))
-        parabola = parabola_of(table, stops.frame, gravity, stops.path)
-        requirement = ReleaseRequirement(problem, scene, parabola, centre, stops.poses[i].turns or 0.0)
-        fixed, step = int(stops.arcs[i - 1]), 1 if before.rests else 2
-        arcs = range(fixed, fixed + 1) if fixed else range(step, stops.max_arcs + 1, step)
+        gravity, centre = float(problem.robot.gravity), np.asarray(waypoints.frame.inward(ellipse.centre))
+        parabola = parabola_of(table, waypoints.frame, gravity, waypoints.path)
+        requirement = ReleaseRequirement(problem, scene, parabola, centre, waypoints.poses[i].turns or 0.0)
+        fixed, step = int(waypoints.arcs[i - 1]), 1 if before.rests else 2
+        arcs = range(fixed, fixed + 1) if fixed else range(step, waypoints.max_arcs + 1, step)
         rule = ellipse.frequency
         rule = 2.0 * math.pi * rule.hertz if isinstance(rule, Hertz) else rule
         try:
             return chosen_release(requirement, before, rule, table.choose, arcs)
         except InputError as error:
-            raise ConfigError(stops.path, f"{stops.name(i)}.ellipse.{error}") from error
+            raise ConfigError(waypoints.path, f"{waypoints.name(i)}.ellipse.{error}") from error
 
     def _check_pose(self, i: int, pose: Pose) -> None:
-        stops, name = self.stops, self.stops.name(i)
+        waypoints, name = self.waypoints, self.waypoints.name(i)
         if pose.beta_hat is not None and i:
-            raise ConfigError(stops.path, f'{name}.beta_hat: must be absent with family = "ellipse"')
+            raise ConfigError(waypoints.path, f'{name}.beta_hat: must be absent with family = "ellipse"')
         has_oscillation = pose.ellipse is not None and pose.ellipse.oscillation is not None
-        if has_oscillation and not stops.robot_file.is_platform:
+        if has_oscillation and not waypoints.robot_file.is_platform:
             key = self._key(i, "oscillation")
-            raise ConfigError(stops.path, f"{key}: must be absent for {stops.robot_file.kind}")
-        if pose.ellipse is not None and stops.robot_file.is_planar:
+            raise ConfigError(waypoints.path, f"{key}: must be absent for {waypoints.robot_file.kind}")
+        if pose.ellipse is not None and waypoints.robot_file.is_planar:
             self._check_plane(i, pose.ellipse)
         if pose.rest and pose.ellipse is not None:
-            raise ConfigError(stops.path, f"{name}.ellipse: must be absent at rest")
+            raise ConfigError(waypoints.path, f"{name}.ellipse: must be absent at rest")
         if pose.rest and pose.turns is not None and i:
-            raise ConfigError(stops.path, f"{name}.turns = {pose.turns:g}: must be absent at rest")
+            raise ConfigError(waypoints.path, f"{name}.turns = {pose.turns:g}: must be absent at rest")
         # Families before and behind need the place of the pose that they share.
-        is_shared = (i == 0 and stops.first > 0) or (i == len(stops) and stops.last < len(stops.keys.pose) - 1)
+        is_shared = (i == 0 and waypoints.first > 0) or (
+            i == len(waypoints) and waypoints.last < len(waypoints.keys.pose) - 1
+        )
         if pose.position is not None and not pose.rest and not is_shared:
-            raise ConfigError(stops.path, f"{name}.position = {shown(pose.position)}: must be absent on an ellipse")
-        before = stops.poses[i - 1] if i else None
+            raise ConfigError(waypoints.path, f"{name}.position = {shown(pose.position)}: must be absent on an ellipse")
+        before = waypoints.poses[i - 1] if i else None
         if not pose.rest and pose.ellipse is None and (before is None or before.rest):
-            raise ConfigError(stops.path, f"{name}.ellipse is missing: the ellipse, or rest = true")
+            raise ConfigError(waypoints.path, f"{name}.ellipse is missing: the ellipse, or rest = true")
         if pose.rest and before is not None and before.rest:
-            raise ConfigError(stops.path, f"{name}.rest = true: must follow an ellipse, not another rest")
+            raise ConfigError(waypoints.path, f"{name}.rest = true: must follow an ellipse, not another rest")
 
     def _key(self, i: int, name: str) -> str:
         # Name of a key of an ellipse in messages.
-        return f"ellipse.{name}" if self.stops.keys.ellipse is not None else f"{self.stops.name(i)}.ellipse.{name}"
+        return (
+            f"ellipse.{name}" if self.waypoints.keys.ellipse is not None else f"{self.waypoints.name(i)}.ellipse.{name}"
+        )
 
     def _check_plane(self, i: int, table: EllipseTable) -> None:
         axes = table.half_axes or []
         for key, vectors in (("centre", [table.centre]), ("half_axes", axes)):
             if any(vector[1] != 0.0 for vector in vectors):
                 value = shown(getattr(table, key))
-                raise ConfigError(self.stops.path, f"{self._key(i, key)} = {value}: must have y = 0: a planar robot")
+                raise ConfigError(
+                    self.waypoints.path, f"{self._key(i, key)} = {value}: must have y = 0: a planar robot"
+                )
         if table.normal is not None and (table.normal[0] != 0.0 or table.normal[2] != 0.0):
             value = shown(table.normal)
-            raise ConfigError(self.stops.path, f"{self._key(i, 'normal')} = {value}: must be along y: a planar robot")
+            raise ConfigError(
+                self.waypoints.path, f"{self._key(i, 'normal')} = {value}: must be along y: a planar robot"
+            )
 
     def _turnings(self, problem: Problem, z0: float, scene: Scene) -> list[Turning]:
         # Return the ellipse of each pose, at the angle at which it is reached.
-        stops, turnings = self.stops, list[Turning]()
-        centres = stops.points(z0)
-        for i, pose in enumerate(stops.poses):
+        waypoints, turnings = self.waypoints, list[Turning]()
+        centres = waypoints.points(z0)
+        for i, pose in enumerate(waypoints.poses):
             if pose.ellipse is not None:
-                centres[i] = stops.frame.inward(pose.ellipse.centre)
+                centres[i] = waypoints.frame.inward(pose.ellipse.centre)
         is_platform = isinstance(problem.robot, PlatformRobot)
-        quaternions = pose_quaternions(stops, centres) if is_platform else [None] * len(centres)
-        for i, (pose, quaternion) in enumerate(zip(stops.poses, quaternions, strict=True)):
+        quaternions = pose_quaternions(waypoints, centres) if is_platform else [None] * len(centres)
+        for i, (pose, quaternion) in enumerate(zip(waypoints.poses, quaternions, strict=True)):
             if pose.rest:
                 nothing = np.zeros(3)
                 turnings.append(Turning(Ellipse(centres[i], nothing, nothing), quaternion=quaternion))
@@ -194,7 +209,7 @@ class Ellipses(Leg):
     def _oscillation(self, table: EllipseTable) -> dict[str, np.ndarray]:
         if table.oscillation is None:
             return {}
-        axis, phase = self.stops.frame.turned(table.oscillation.axis), table.oscillation.phase
+        axis, phase = self.waypoints.frame.rotated(table.oscillation.axis), table.oscillation.phase
         parts = table.oscillation.angle * np.array([math.cos(phase), math.sin(phase)])
         return {"axis": axis / np.linalg.norm(axis), "oscillation": parts}
 
@@ -203,19 +218,21 @@ class Ellipses(Leg):
         before, after = turnings[max(i - 1, 0)], turnings[i]
         if before.oscillation.any() and after.oscillation.any() and not np.allclose(before.axis, after.axis):
             key = self._key(i, "oscillation.axis")
-            raise ConfigError(self.stops.path, f"{key}: must be that of {self.stops.name(i - 1)}, or rest between")
+            raise ConfigError(
+                self.waypoints.path, f"{key}: must be that of {self.waypoints.name(i - 1)}, or rest between"
+            )
 
     def _continued(self, before: Turning, i: int) -> Turning:
-        turns = self.stops.poses[i - 1].turns if i > 1 else None
+        turns = self.waypoints.poses[i - 1].turns if i > 1 else None
         return dataclasses.replace(before, phase=before.phase + 2.0 * math.pi * (turns or 0.0))
 
     def _ellipse(self, table: EllipseTable) -> Ellipse:
-        frame = self.stops.frame
-        a, b = table.axes(is_planar=self.stops.robot_file.is_planar)
-        return Ellipse(frame.inward(table.centre), frame.turned(a), frame.turned(b))
+        frame = self.waypoints.frame
+        a, b = table.axes(is_planar=self.waypoints.robot_file.is_planar)
+        return Ellipse(frame.inward(table.centre), frame.rotated(a), frame.rotated(b))
 
     def _frequency(self, problem: Problem, turning: Turning, i: int, scene: Scene) -> float:
-        table = self.stops.poses[i].ellipse
+        table = self.waypoints.poses[i].ellipse
         rule = "natural" if table is None else table.frequency
         if isinstance(rule, Hertz):
             return 2.0 * math.pi * rule.hertz
@@ -224,26 +241,28 @@ class Ellipses(Leg):
         try:
             return chosen_frequency(problem, turning.ellipse, rule, scene, rotation_between(turning, turning))
         except InputError as error:
-            raise ConfigError(self.stops.path, f"{self._key(i, '')}{error}") from error
+            raise ConfigError(self.waypoints.path, f"{self._key(i, '')}{error}") from error
 
     def _turns(self, i: int, first: Turning, last: Turning) -> float:
-        pose = self.stops.poses[i]
+        pose = self.waypoints.poses[i]
         if pose.turns is not None:
             return pose.turns
         return 0.0 if last.rests or step_of(first, last) else 1.0
 
     def _way(self, problem: Problem, i: int, first: Turning, last: Turning, scene: Scene) -> Way:
-        stops, turns, step = self.stops, self._turns(i, first, last), step_of(first, last)
-        arcs = int(stops.arcs[i - 1])
+        waypoints, turns, step = self.waypoints, self._turns(i, first, last), step_of(first, last)
+        arcs = int(waypoints.arcs[i - 1])
         if arcs % max(step, 1) or (arcs and not step):
             allowed = "absent on one and the same ellipse" if not step else "even between two ellipses"
-            raise ConfigError(stops.path, f"{stops.name(i)}.arcs = {arcs}: must be {allowed}")
-        if not arcs and step > stops.max_arcs:
-            raise ConfigError(stops.path, f"max_arcs = {stops.max_arcs}: must be at least {step} between two ellipses")
+            raise ConfigError(waypoints.path, f"{waypoints.name(i)}.arcs = {arcs}: must be {allowed}")
+        if not arcs and step > waypoints.max_arcs:
+            raise ConfigError(
+                waypoints.path, f"max_arcs = {waypoints.max_arcs}: must be at least {step} between two ellipses"
+            )
         if not step and not turns and not between(first, last):
-            key = "turns" if stops.keys.ellipse is not None else f"{stops.name(i)}.turns"
-            raise ConfigError(stops.path, f"{key} = 0: must be above 0 on one and the same ellipse")
-        return least_way(problem, first, last, turns, scene, arcs=arcs, max_arcs=stops.max_arcs)
+            key = "turns" if waypoints.keys.ellipse is not None else f"{waypoints.name(i)}.turns"
+            raise ConfigError(waypoints.path, f"{key} = 0: must be above 0 on one and the same ellipse")
+        return least_way(problem, first, last, turns, scene, arcs=arcs, max_arcs=waypoints.max_arcs)
 
     def _answers(self, problem: Problem, turnings: list[Turning], ways: list[Way], scene: Scene) -> EllipseAnswers:
         hull = formula_hull(problem.robot)
@@ -251,7 +270,7 @@ class Ellipses(Leg):
         plain = answers_of([way.proof for way in ways], np.array([float(motion.duration()) for motion in motions]))
         judge_all_robots(problem, plain, motions, scene)
         arcs, verdict = np.array([way.arcs for way in ways]), np.array(plain.verdict, FLAGS)
-        free = (self.stops.arcs == 0) & (arcs > 0)
+        free = (self.waypoints.arcs == 0) & (arcs > 0)
         broken = (verdict != 0) & (verdict != Verdict.UNDECIDED.value)
         verdict[free & broken] |= Verdict.NO_ARCS.value
         doubtful = np.array([way.fewer_undecided for way in ways]) & (verdict == 0)
@@ -259,7 +278,7 @@ class Ellipses(Leg):
         verdict[doubtful] |= Verdict.FEWER_ARCS_UNDECIDED.value
         details = np.empty(len(ways), object)
         details[:] = [
-            _details(problem, hull, first if last.rests else last, self.stops.frame)
+            _details(problem, hull, first if last.rests else last, self.waypoints.frame)
             for first, last in itertools.pairwise(turnings)
         ]
         changed = {"arcs": np.where(is_feasible, arcs, 0), "tried_arcs": arcs, "verdict": verdict}
@@ -273,7 +292,7 @@ def _details(problem: Problem, hull: SpoolHull | None, turning: Turning, frame: 
     if turning.quaternion is not None:
         rotation = np.asarray(rotations.matrix(jnp.asarray(turning.quaternion)))
         natural = rotation_frequencies(problem, np.asarray(turning.ellipse.centre), rotation)
-        modes = frame.turned(natural.modes.reshape(3, 2, 3)).reshape(3, 6).tolist()
+        modes = frame.rotated(natural.modes.reshape(3, 2, 3)).reshape(3, 6).tolist()
         details |= {"rotation_frequencies": natural.frequencies.tolist(), "rotation_modes": modes}
     if hull is None:
         return details

@@ -56,8 +56,8 @@ class EllipseMap(PointMassMap):
         if isinstance(rule, Hertz):
             rule = 2.0 * math.pi * rule.hertz
         frequency = np.full(len(centres), rule) if isinstance(rule, float) else rule
-        turned = (np.broadcast_to(self._frame.turned(axis), centres.shape) for axis in (a, b))
-        return ellipse_cells(self._problem, Ellipse(centres, *turned), cells.get("frequency", frequency)).arrays()
+        rotated = (np.broadcast_to(self._frame.rotated(axis), centres.shape) for axis in (a, b))
+        return ellipse_cells(self._problem, Ellipse(centres, *rotated), cells.get("frequency", frequency)).arrays()
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse centres that are all out of reach; see `GridMap.refuse_hopeless`."""

@@ -113,8 +113,8 @@ def _kinematics(first: Ellipse, last: Ellipse, s: tuple, turns: tuple, rates: tu
     place = s[0] * spans[0] + first.centre + outward
     pace = growing[0] + growing[1] * cosine + growing[2] * sine + forward * rates[0]
     swept = growing[2] * cosine - growing[1] * sine
-    bend = bending[0] + bending[1] * cosine + bending[2] * sine
-    pull = bend + swept * (rates[0] * 2.0) + forward * rates[1] - outward * (rates[0] * rates[0])
+    second_derivative = bending[0] + bending[1] * cosine + bending[2] * sine
+    pull = second_derivative + swept * (rates[0] * 2.0) + forward * rates[1] - outward * (rates[0] * rates[0])
     return place, pace, pull
 
 
@@ -152,16 +152,16 @@ def turning(ellipse: Ellipse, frequency: Float[Array, ""], phase: Float[Array, "
     return EllipseMotion(ellipse, ellipse, jnp.stack([frequency, frequency]), phase, law, integral(law), time)
 
 
-def with_turns(amplitude: Amplitude, share: float) -> Amplitude:
+def with_turns(amplitude: Amplitude, fraction: float) -> Amplitude:
     """Law of a way that takes a share of the time, and of turns for the rest."""
-    if share == 0.0:
+    if fraction == 0.0:
         return from_pieces("1", (), (0.0,), ((1.0,),))
-    powers = share ** -np.arange(amplitude.coefficients.shape[1])
+    powers = fraction ** -np.arange(amplitude.coefficients.shape[1])
     pieces = (np.asarray(amplitude.coefficients) * powers).tolist()
-    knots, origins = (np.asarray(x) * share for x in (amplitude.knots, amplitude.origins))
-    if share == 1.0:
+    knots, origins = (np.asarray(x) * fraction for x in (amplitude.knots, amplitude.origins))
+    if fraction == 1.0:
         return amplitude
-    return from_pieces(amplitude.name, [*knots, share], [*origins, 1.0], [*pieces, (1.0,)])
+    return from_pieces(amplitude.name, [*knots, fraction], [*origins, 1.0], [*pieces, (1.0,)])
 
 
 def integral(law: Amplitude) -> Amplitude:

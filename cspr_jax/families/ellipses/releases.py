@@ -194,8 +194,8 @@ class _Times:
         if first:
             end = _narrowed(slack, end, float(looks[first - 1]))
         inside = float(looks[min(first + 1, len(looks) - 1)])
-        for share in INSIDE:
-            time = end + share * (inside - end)
+        for fraction in INSIDE:
+            time = end + fraction * (inside - end)
             if not proof_of(
                 self._requirement.problem, self._way(before, time, number), self._requirement.scene
             ).verdict:

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, cross, dot, turned
+from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, cross, dot, rotated
 from cspr_jax.numerics.bounds.function_bounds import sincospi
 from cspr_jax.numerics.bounds.rotation_bounds import RotationBounds
 from cspr_jax.numerics.elementary import leaf, length
@@ -70,9 +70,9 @@ def rotation_state(
     swing = _quaternion(rotation.axis, psi[0])
     quaternion = rotations.product(swing, rotations.product(_quaternion(way, s[0] * angle), rotation.start))
     outer = rotations.matrix(swing)
-    spin, bend = outer @ (s[1] * rotation.turn), outer @ (s[2] * rotation.turn)
+    spin, second_derivative = outer @ (s[1] * rotation.turn), outer @ (s[2] * rotation.turn)
     beat = psi[1] * rotation.axis
-    rate = psi[2] * rotation.axis + bend + jnp.cross(beat, spin)
+    rate = psi[2] * rotation.axis + second_derivative + jnp.cross(beat, spin)
     return rotations.matrix(quaternion), beat + spin, rate, quaternion
 
 
@@ -82,9 +82,9 @@ def rotation_bounds(rotation: Rotation, s: tuple, psi: tuple) -> RotationBounds:
     outer = _about(rotation.axis, psi[0])
     inner = dot(_rows(_about(way, s[0] * angle)), rotations.matrix(rotation.start).T[None])
     whole = dot(_rows(outer), inner.each(lambda x: x.T[None]))
-    spin, bend = turned(outer, s[1] * rotation.turn), turned(outer, s[2] * rotation.turn)
+    spin, second_derivative = rotated(outer, s[1] * rotation.turn), rotated(outer, s[2] * rotation.turn)
     beat = psi[1] * rotation.axis
-    return RotationBounds(whole, beat + spin, psi[2] * rotation.axis + bend + cross(beat, spin))
+    return RotationBounds(whole, beat + spin, psi[2] * rotation.axis + second_derivative + cross(beat, spin))
 
 
 def _rows(matrix: AffineBounds) -> AffineBounds:

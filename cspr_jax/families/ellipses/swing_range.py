@@ -142,11 +142,13 @@ def _above(space: _Space, cells: _Cells, times: np.ndarray) -> np.ndarray:
 
 def _looks(space: _Space, cells: _Cells, times: np.ndarray) -> _Looks:
     normal, (low, high) = space.normal, space.box
-    fallen, share = _above(space, cells, times), 1.0 / (cells.frequency * times) ** 2
+    fallen, fraction = _above(space, cells, times), 1.0 / (cells.frequency * times) ** 2
     # Depths that the box has, and those that ellipses leave.
     corners = np.sort(np.stack([low * normal, high * normal]), axis=0).sum(1)
-    depths = _interval(cells.depth, _depth(fallen, normal), share, cells.depth, corners)
-    heights = _interval(cells.centre[:, 2], fallen[..., 2], share, space.floor - cells.centre[:, 2], (low[2], high[2]))
+    depths = _interval(cells.depth, _depth(fallen, normal), fraction, cells.depth, corners)
+    heights = _interval(
+        cells.centre[:, 2], fallen[..., 2], fraction, space.floor - cells.centre[:, 2], (low[2], high[2])
+    )
     first, last = (np.broadcast_to(side, fallen.shape).copy() for side in (low, high))
     first[..., 2], last[..., 2] = np.maximum(low[2], heights.low), np.minimum(high[2], heights.high)
     place = _nearest(fallen, first, last, normal, depths)
@@ -165,14 +167,14 @@ class _Interval(NamedTuple):
     room: np.ndarray
 
 
-def _interval(centre: np.ndarray, fallen: np.ndarray, share: np.ndarray, reach: np.ndarray, box) -> _Interval:
+def _interval(centre: np.ndarray, fallen: np.ndarray, fraction: np.ndarray, reach: np.ndarray, box) -> _Interval:
     # The p for which (p - centre)^2 + share (fallen - p)^2 stays below the square of the reach.
-    middle = (centre[:, None] + share * fallen) / (1.0 + share)
+    middle = (centre[:, None] + fraction * fallen) / (1.0 + fraction)
     away, inner = fallen - centre[:, None], reach[:, None] * (1.0 - KEPT)
-    square = inner**2 / (1.0 + share) - share * away**2 / (1.0 + share) ** 2
+    square = inner**2 / (1.0 + fraction) - fraction * away**2 / (1.0 + fraction) ** 2
     half = np.where(inner > 0.0, np.sqrt(np.where(square >= 0.0, square, np.nan)), np.nan)
     best = np.clip(middle, *box)
-    swing = np.sqrt((best - centre[:, None]) ** 2 + share * (fallen - best) ** 2)
+    swing = np.sqrt((best - centre[:, None]) ** 2 + fraction * (fallen - best) ** 2)
     return _Interval(middle - half, middle + half, reach[:, None] - swing)
 
 

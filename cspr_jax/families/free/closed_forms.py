@@ -57,7 +57,7 @@ def closed_forms(legs: Sequence[Leg], problem: Problem, poses: FreePoses) -> lis
         except (ConfigError, InputError):
             continue  # the family joins other poses
         proved = answers if isinstance(answers, ProvedAnswers) else None
-        form = ClosedForm(leg.stops.family, motions, answers.feasible, np.asarray(answers.duration), proved)
+        form = ClosedForm(leg.waypoints.family, motions, answers.feasible, np.asarray(answers.duration), proved)
         if answers.feasible.any() and _passes(form, problem, poses):
             forms.append(form)
     return forms
@@ -72,10 +72,10 @@ def _passes(form: ClosedForm, problem: Problem, poses: FreePoses) -> bool:
         ends = slice(i, i + 2)
         far = np.abs(state.position - poses.positions[ends]).max() > NEAR * size
         fast = np.abs(state.velocity - poses.velocities[ends]).max() > NEAR * speed
-        turned = poses.quaternions is not None and (
+        rotated = poses.quaternions is not None and (
             np.abs(np.sum(state.quaternion * poses.quaternions[ends], axis=1)).min() < 1.0 - NEAR
         )
-        if far or fast or turned:
+        if far or fast or rotated:
             return False
     return True
 

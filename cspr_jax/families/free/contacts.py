@@ -67,16 +67,16 @@ def around(
         return None
     segments = np.any(is_met.reshape(len(tasks.places[0]), -1), axis=1)
     least = dict.fromkeys(np.flatnonzero(is_met.any(axis=0)).tolist(), APART * size)
-    bent = Unknowns(*map(np.concatenate, zip(*_bent(tasks, unknowns, segments), strict=True)))
-    return _clear(question, tasks.taken(np.zeros(len(bent.duration), int)), bent, least)
+    deviation = Unknowns(*map(np.concatenate, zip(*_bent(tasks, unknowns, segments), strict=True)))
+    return _clear(question, tasks.taken(np.zeros(len(deviation.duration), int)), deviation, least)
 
 
 def _clear(
-    question: FreeQuestion, tasks: Tasks, bent: Unknowns, least: dict[int, float]
+    question: FreeQuestion, tasks: Tasks, deviation: Unknowns, least: dict[int, float]
 ) -> tuple[Tasks, Unknowns] | None:
     # The best of the motions on the sides of bent ones, if one is clear at all instants: planes about one after the
     # other.
-    within, begun = _parted(question, tasks, bent, least, np.inf)
+    within, begun = _parted(question, tasks, deviation, least, np.inf)
     begun = started(within, within.controls(begun), begun.duration)
     level, until = (BARRIERS[0], SOFTNESS), question.settings.until
     best, cost = None, np.inf
@@ -123,10 +123,12 @@ def _bent(tasks: Tasks, unknowns: Unknowns, segments: np.ndarray) -> Iterator[Un
     # Motions that are bent along some of their segments (s,).
     (along, about), chords = coordinates(tasks.robot.pattern), tasks.places[0, :, 1] - tasks.places[0, :, 0]
     lengths = np.maximum(np.linalg.norm(chords[:, : len(along)], axis=1), NEAR * float(spool_radius(tasks.robot)))
-    bend = BENT * (tasks.basis.fit @ bulge(tasks.basis.averages))[:, None] * (lengths * segments)[:, None, None]
+    second_derivative = (
+        BENT * (tasks.basis.fit @ bulge(tasks.basis.averages))[:, None] * (lengths * segments)[:, None, None]
+    )
     for wider in WIDER[:1] if len(about) else WIDER:
         for directions in list(zip(*(ways(chord, along) for chord in chords), strict=True))[1:]:
-            inner = unknowns.inner + wider * (bend * np.array(directions)[:, None])[None, :, OUTER:-OUTER]
+            inner = unknowns.inner + wider * (second_derivative * np.array(directions)[:, None])[None, :, OUTER:-OUTER]
             yield unknowns._replace(inner=inner, duration=SLOWER * unknowns.duration)
 
 
@@ -153,8 +155,8 @@ def _linear(tasks: Tasks, places: np.ndarray, gap: _Gap) -> tuple[np.ndarray, np
         positions = np.zeros((len(flat), 3))
         along = np.array(PATTERNS[tasks.robot.pattern].forces, int)
         positions[:, along] = flat[:, : len(along)]
-        turned = None if quaternions is None else quaternions.reshape(-1, 4)
-        value, is_near = gap.of_poses(positions, turned)
+        rotated = None if quaternions is None else quaternions.reshape(-1, 4)
+        value, is_near = gap.of_poses(positions, rotated)
         return value.reshape(where.shape[:-1]), is_near.reshape(where.shape[:-1])
 
     (middle, is_near), steps = values(places), STEP * np.eye(places.shape[-1])
@@ -211,7 +213,7 @@ def _between_lines(scene: Scene, k: int, other: int) -> Callable:
         normal = np.cross(u, v)
         square = np.sum(normal**2, axis=1)
         shares = [np.sum(np.cross(start, ray) * normal, axis=1) for ray in (v, u)]
-        is_inside = (square > 0.0) & np.all([(share > 0.0) & (share < square) for share in shares], axis=0)
+        is_inside = (square > 0.0) & np.all([(fraction > 0.0) & (fraction < square) for fraction in shares], axis=0)
         with np.errstate(invalid="ignore", divide="ignore"):
             return normal @ start / np.sqrt(square), is_inside
 

@@ -61,8 +61,10 @@ def _turning(tasks: Tasks, segment: int, motion: Motion, duration: float) -> np.
         if not tasks.is_free[0, place]:
             spin[1 + about] = tasks.accelerations[0, place, len(along) :]
         # A quaternion at rest has the second derivative of half its product with the angular acceleration.
-        bend = 0.5 * products(spin[None], quaternions[side][None])[0]
-        outer = [quaternions[side]] * (OUTER - 1) + [quaternions[side] + basis.end_bend * duration**2 * bend]
+        second_derivative = 0.5 * products(spin[None], quaternions[side][None])[0]
+        outer = [quaternions[side]] * (OUTER - 1) + [
+            quaternions[side] + basis.end_bend * duration**2 * second_derivative
+        ]
         controls[np.arange(OUTER) if side == 0 else -1 - np.arange(OUTER)] = outer
     return np.einsum("mbk,mkd->mbd", basis.pieces, basis.in_intervals(controls))
 

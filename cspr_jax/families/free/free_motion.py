@@ -112,8 +112,8 @@ def free_motion(
     else:
         best, is_stopped = _searched(question, () if before is None else before.parts, forms, lines)
     tasks, optimum = question.tasks(settings.intervals, question.instants), None
-    for share, way in TOGETHER if all(one.is_optimal for one in best) else ():
-        tasks = question.tasks(2 * round(0.5 * settings.intervals / share), question.instants)
+    for fraction, way in TOGETHER if all(one.is_optimal for one in best) else ():
+        tasks = question.tasks(2 * round(0.5 * settings.intervals / fraction), question.instants)
         try:
             optimum = first_optimum(tasks, [(_together(tasks, best, FINE[way][0]), *FINE[way])], settings.until)
         except OutOfTime:
@@ -152,7 +152,7 @@ def _searched(
     count, best = len(poses.positions) - 1, {k: part._replace(start=-1) for k, part in enumerate(before)}
     until, begin = settings.until, time.monotonic()
     enough = begin + ENOUGH * (until - begin)
-    for number, (share, softness) in enumerate(SEARCHES, 1):
+    for number, (fraction, softness) in enumerate(SEARCHES, 1):
         is_last = number == len(SEARCHES)
         is_left = [
             k not in best or not (best[k].is_optimal if is_last else best[k].is_shared) or (number == 1 and bool(forms))
@@ -162,7 +162,7 @@ def _searched(
         if not len(rows) or (best and time.monotonic() > (enough if _all_optimal(best) else until)):
             return list(best.values()), bool(len(rows))
         stage(f"free motion: search {number}{_said(best, settings.objective)}")
-        single = segments_of(question.tasks(settings.intervals // share, FEWEST))
+        single = segments_of(question.tasks(settings.intervals // fraction, FEWEST))
         begun = form_starts(single, rows, forms) if forms else _starts(question, single, rows, lines)
         if not len(begun.task):
             break

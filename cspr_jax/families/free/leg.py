@@ -75,45 +75,55 @@ class FreeAnswers(ProvedAnswers):
 class FreeMotions(Leg):
     """Poses joined by the fastest motions that are found between them; see `Leg`."""
 
-    def __init__(self, stops: Waypoints) -> None:
+    def __init__(self, waypoints: Waypoints) -> None:
         """Refuse keys of other families, and accelerations that do not fit the poses."""
-        super().__init__(stops)
+        super().__init__(waypoints)
         self._notes: list[str] = []
         self._others: Sequence[Leg] = ()
         self._lines: Sequence[Leg] = ()
         self._refuse("arcs", "beta_hat")
-        accelerations = stops.keys.end_accelerations
-        if isinstance(accelerations, list) and len(accelerations) != len(stops.keys.pose):
+        accelerations = waypoints.keys.end_accelerations
+        if isinstance(accelerations, list) and len(accelerations) != len(waypoints.keys.pose):
             raise ConfigError(
-                stops.path,
+                waypoints.path,
                 f"end_accelerations = {shown(accelerations)}: must be one [x, y, z] for each of the "
-                f"{len(stops.keys.pose)} poses",
+                f"{len(waypoints.keys.pose)} poses",
             )
-        if accelerations == "swing" and stops.keys.z0 is None:
-            raise ConfigError(stops.path, 'z0 is missing: depth of P0, m, about which end_accelerations = "swing" are')
-        if stops.keys.objective in LEVELS and stops.keys.duration_max is None:
-            why = f'which objective = "{stops.keys.objective}" needs: the slower a motion, the better it is'
-            raise ConfigError(stops.path, f"duration_max is missing: longest duration of a segment, s, {why}")
+        if accelerations == "swing" and waypoints.keys.z0 is None:
+            raise ConfigError(
+                waypoints.path, 'z0 is missing: depth of P0, m, about which end_accelerations = "swing" are'
+            )
+        if waypoints.keys.objective in LEVELS and waypoints.keys.duration_max is None:
+            why = f'which objective = "{waypoints.keys.objective}" needs: the slower a motion, the better it is'
+            raise ConfigError(waypoints.path, f"duration_max is missing: longest duration of a segment, s, {why}")
 
     def begin_with(self, others: Sequence[Leg]) -> None:
         """Begin searches from motions of other families, too; see `Leg.begin_with`."""
         self._others, self._lines = (
-            [leg for leg in others if FAMILIES[leg.stops.family].precedes_searches is first] for first in (False, True)
+            [leg for leg in others if FAMILIES[leg.waypoints.family].precedes_searches is first]
+            for first in (False, True)
         )
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the poses; see `Leg.join`."""
-        stops = self.stops
-        scene = scene_of(problem.robot, stops.robot_file, stops.frame, stops.keys, stops.path, trajectory=stops.keys)
+        waypoints = self.waypoints
+        scene = scene_of(
+            problem.robot,
+            waypoints.robot_file,
+            waypoints.frame,
+            waypoints.keys,
+            waypoints.path,
+            trajectory=waypoints.keys,
+        )
         poses = self._poses(problem, z0)
         if not len(divided(problem, poses)):
             self._refuse_poses(problem, scene, poses)
         # Segments have nothing in common if all accelerations are known.
-        is_separate = stops.keys.together is False or not np.isnan(poses.accelerations[1:-1]).any()
+        is_separate = waypoints.keys.together is False or not np.isnan(poses.accelerations[1:-1]).any()
         try:
             parts = (self._separate if is_separate else self._together)(problem, scene, poses)
         except InputError as error:
-            raise ConfigError(stops.path, str(error)) from error
+            raise ConfigError(waypoints.path, str(error)) from error
         if any(part.is_stopped for part in parts):
             self._notes.append(f'family = "free": {STOPPED}')
         sources = [family for part in parts for family in part.families or [None] * len(part.motions)]
@@ -121,7 +131,9 @@ class FreeMotions(Leg):
         self._notes += [f'family = "free": {line}' for line in self._said(sources, motions)]
         sides = divided(problem, poses)
         for i, *ends in sides.tolist():
-            self._notes.append(f'family = "free": {DIVIDED.format(stops.name(int(i)), stops.name(int(i) + 1), *ends)}')
+            self._notes.append(
+                f'family = "free": {DIVIDED.format(waypoints.name(int(i)), waypoints.name(int(i) + 1), *ends)}'
+            )
         if not len(sides) and not all(part.is_optimal or part.answers.feasible.all() for part in parts):
             self._notes.append(f'family = "free": {MISSED}')
         answers = joined([part.answers for part in parts])
@@ -129,29 +141,32 @@ class FreeMotions(Leg):
         is_still = np.array([not (poses.velocities[i : i + 2]).any() for i in range(len(self))])
         bounds = np.where(is_still, time_bounds(problem, motions), np.nan)
         energy = np.concatenate([part.energy for part in parts])
-        source = np.array([family or stops.family for family in sources])
+        source = np.array([family or waypoints.family for family in sources])
         columns |= {"objective": self._settings.objective, "energy": energy, "lower_bound": bounds, "source": source}
         return FreeAnswers(**columns), list(motions)
 
     def _refuse_poses(self, problem: Problem, scene: Scene, poses: FreePoses) -> None:
         # Poses that no motion can have.
-        refused = first_refused(problem, scene, poses, self.stops.frame)
+        refused = first_refused(problem, scene, poses, self.waypoints.frame)
         if refused is None:
             return
         i, cause = refused
-        position, is_place = self.stops.poses[i].position, bool(Verdict[cause.criterion.upper()] & OF_PLACES)
-        key = f"{self.stops.name(i)}.position = {shown(position)}"
-        if position is None or (self.stops.poses[i].rest and not is_place):
-            key = f"{self.stops.name(i)}.rest = true"
+        position, is_place = self.waypoints.poses[i].position, bool(Verdict[cause.criterion.upper()] & OF_PLACES)
+        key = f"{self.waypoints.name(i)}.position = {shown(position)}"
+        if position is None or (self.waypoints.poses[i].rest and not is_place):
+            key = f"{self.waypoints.name(i)}.rest = true"
         allowed = "must be one that a motion can have" if is_place else "must be where the robot can stand still"
-        raise ConfigError(self.stops.path, f"{key}: {allowed}: {cause.text}")
+        raise ConfigError(self.waypoints.path, f"{key}: {allowed}: {cause.text}")
 
     def _said(self, sources: list[str | None], motions: list[Spline]) -> list[str]:
         # Which motions are those of other families; lines take the place of single segments.
         lines = []
         for family in dict.fromkeys(source for source in sources if source):
             indices = [i for i, source in enumerate(sources) if source == family]
-            names, jumps = ", ".join(self.stops.name(i + 1) for i in indices), [motions[i].jumps(JUMP) for i in indices]
+            names, jumps = (
+                ", ".join(self.waypoints.name(i + 1) for i in indices),
+                [motions[i].jumps(JUMP) for i in indices],
+            )
             is_line = FAMILIES[family].precedes_searches
             why = JUMPING if any(map(len, jumps)) else ""
             lines.append(LINES.format(family, names, why) if is_line else FOLLOWED.format(family))
@@ -160,7 +175,7 @@ class FreeMotions(Leg):
     @property
     def _settings(self) -> FreeSettings:
         # With the end of a search that begins now.
-        keys = self.stops.keys
+        keys = self.waypoints.keys
         until = np.inf if keys.search_time is None else time.monotonic() + keys.search_time
         return FreeSettings(keys.objective or "time", keys.duration_max, keys.starts, until)
 
@@ -241,22 +256,22 @@ class FreeMotions(Leg):
 
     def _poses(self, problem: Problem, z0: float) -> FreePoses:
         # The poses in the axes of the kernels.
-        stops = self.stops
-        positions, quaternions = np.asarray(stops.points(z0)), None
+        waypoints = self.waypoints
+        positions, quaternions = np.asarray(waypoints.points(z0)), None
         if isinstance(problem.robot, PlatformRobot):
-            quaternions = pose_quaternions(stops, positions)
+            quaternions = pose_quaternions(waypoints, positions)
         accelerations = np.full((len(positions), 3 if quaternions is None else 6), np.nan)
-        known = stops.keys.end_accelerations
+        known = waypoints.keys.end_accelerations
         if known == "swing":
             accelerations[:] = 0.0
             accelerations[:, :3] = -float(problem.robot.gravity) / z0 * (positions - rest_point(z0))
         elif isinstance(known, list):
             accelerations[:] = 0.0
-            accelerations[:, :3] = stops.frame.turned(np.array(known[stops.first : stops.last + 1], float))
-        accelerations[[pose.rest for pose in stops.poses]] = 0.0
-        rates = np.array([pose.velocity or (0.0, 0.0, 0.0) for pose in stops.poses])
+            accelerations[:, :3] = waypoints.frame.rotated(np.array(known[waypoints.first : waypoints.last + 1], float))
+        accelerations[[pose.rest for pose in waypoints.poses]] = 0.0
+        rates = np.array([pose.velocity or (0.0, 0.0, 0.0) for pose in waypoints.poses])
         middle = z0 if np.isfinite(z0) else float(positions[:, 2].mean())
-        return FreePoses(positions, quaternions, stops.frame.turned(rates), accelerations, middle)
+        return FreePoses(positions, quaternions, waypoints.frame.rotated(rates), accelerations, middle)
 
 
 def _of_segment(forms: Callable[[], list[ClosedForm]], i: int) -> list[ClosedForm]:

@@ -76,11 +76,11 @@ class Neighbours:
         rows, others = self._rows, self._others
         longest = np.maximum(np.maximum(self._way[rows], self._way[others]), 1e-9)
         ratio = np.clip(self._way[rows] / np.maximum(self._way[others], 1e-9), 1.0 / RATIO, RATIO)
-        share = 1.0 + FASTER + self._distance / longest
+        fraction = 1.0 + FASTER + self._distance / longest
         for _ in range(VISITS):
             # A motion is tried once.
             expected = self.duration[others] * np.sqrt(ratio)
-            helps = (expected * share < self.duration[rows]) & (self.duration[others] < self._tried)
+            helps = (expected * fraction < self.duration[rows]) & (self.duration[others] < self._tried)
             best = np.full(len(self.duration), np.inf)
             np.minimum.at(best, rows[helps], expected[helps])
             chosen = np.flatnonzero(helps & (expected == best[rows]))
@@ -93,6 +93,6 @@ class Neighbours:
     def _moved(self, source: np.ndarray, to: np.ndarray) -> np.ndarray:
         # Motions of some pairs, moved to the poses of others.
         tau = self._tasks.basis.averages[:, None]
-        share = 3.0 * tau**2 - 2.0 * tau**3
+        fraction = 3.0 * tau**2 - 2.0 * tau**3
         shift = self._tasks.places[to, 0] - self._tasks.places[source, 0]
-        return self.controls[source] + shift[:, :1] * (1.0 - share) + shift[:, 1:] * share
+        return self.controls[source] + shift[:, :1] * (1.0 - fraction) + shift[:, 1:] * fraction

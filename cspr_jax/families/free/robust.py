@@ -33,8 +33,12 @@ DEPENDING = Verdict.SLACK_CABLE, Verdict.ABOVE_SPOOLS
 
 def for_all_robots(question: FreeQuestion, uncertainty: Uncertainty, multiple: float) -> FreeQuestion:
     """A question about all robots within a multiple of an uncertainty."""
-    share = MULTIPLE * multiple
-    sizes = share * uncertainty.spool_positions, share * uncertainty.mass_centre, uncertainty.mass_factor**share
+    fraction = MULTIPLE * multiple
+    sizes = (
+        fraction * uncertainty.spool_positions,
+        fraction * uncertainty.mass_centre,
+        uncertainty.mass_factor**fraction,
+    )
     limits = dataclasses.replace(question.problem.limits, uncertainty=Uncertainty(*sizes))
     return dataclasses.replace(question, problem=question.problem._replace(limits=limits))
 

@@ -61,12 +61,12 @@ def gain(
     largest: Float[Array, ""],
 ) -> Gain:
     """Feasible q of one law."""
-    share = jnp.linspace(0.0, 1.0, SAMPLES if edges.shape[0] > 2 else 2 * HALF)
-    tau = edges[:-1, None] + jnp.diff(edges)[:, None] * share[None]
-    s, speed, bend = (x[..., None] for x in derivatives(law, tau, order=2))
+    fraction = jnp.linspace(0.0, 1.0, SAMPLES if edges.shape[0] > 2 else 2 * HALF)
+    tau = edges[:-1, None] + jnp.diff(edges)[:, None] * fraction[None]
+    s, speed, second_derivative = (x[..., None] for x in derivatives(law, tau, order=2))
     # At rest, and at q = 1: (2, n_pieces, n_samples, 1).
     both = jnp.asarray([0.0, 1.0])[:, None, None, None]
-    instants = Instants(s[None], both * speed[None] ** 2, both * bend[None])
+    instants = Instants(s[None], both * speed[None] ** 2, both * second_derivative[None])
     line = jax.tree.map(lambda x: x[None, None, None], line)
     tensions = tensions_at(line, line.tightest, s[None])
     rows = [slacks(line, line.tightest, instants, tensions)]
@@ -75,9 +75,9 @@ def gain(
     is_finite = jnp.isfinite(still)
     most = jnp.where(is_finite, still, 1.0)
     needed = jnp.where(is_finite, still - moving, 0.0)
-    most = jnp.concatenate([most, jnp.broadcast_to(largest[None, None, None], bend.shape)], axis=-1)
-    needed = jnp.concatenate([needed, jnp.abs(bend)], axis=-1)
-    is_known = jnp.concatenate([is_finite, jnp.ones_like(bend, bool)], axis=-1)
+    most = jnp.concatenate([most, jnp.broadcast_to(largest[None, None, None], second_derivative.shape)], axis=-1)
+    needed = jnp.concatenate([needed, jnp.abs(second_derivative)], axis=-1)
+    is_known = jnp.concatenate([is_finite, jnp.ones_like(second_derivative, bool)], axis=-1)
     above = _above(most, needed, is_known)
     below = jnp.where((most < 0.0) & (needed < 0.0), most / jnp.where(needed < 0.0, needed, 1.0), 0.0)
     first, numbers = (tau <= middle)[..., None], _numbers(line, tensions, above.shape)
@@ -95,8 +95,8 @@ def gain(
 def _above(most: Array, needed: Array, is_known: Array) -> Array:
     # Largest q of samples (n_pieces, n_samples, n_rows) whose slack is most - q needed.
     is_known &= most > 0.0
-    share = _between(jnp.where(most > 0.0, needed / jnp.where(most > 0.0, most, 1.0), 0.0), is_known)
-    above = jnp.where(share > 0.0, 1.0 / jnp.where(share > 0.0, share, 1.0), jnp.inf)
+    fraction = _between(jnp.where(most > 0.0, needed / jnp.where(most > 0.0, most, 1.0), 0.0), is_known)
+    above = jnp.where(fraction > 0.0, 1.0 / jnp.where(fraction > 0.0, fraction, 1.0), jnp.inf)
     return jnp.where((most <= 0.0) & (needed >= 0.0), -1.0, above)
 
 
@@ -114,8 +114,8 @@ def _near_spools(
         return jnp.where(is_before, middle, low), jnp.where(is_before, high, middle)
 
     tau, _ = lax.fori_loop(0, HALVINGS, halved, (jnp.zeros_like(s), jnp.ones_like(s)))
-    way, speed, bend = (x[..., None] for x in derivatives(law, tau, order=2))
-    at = Instants(way, speed**2, bend)
+    way, speed, second_derivative = (x[..., None] for x in derivatives(law, tau, order=2))
+    at = Instants(way, speed**2, second_derivative)
     line = jax.tree.map(lambda x: x[None, None], line)
     rows = jnp.concatenate([slacks(line, name, at) for name in line.names if name in line.largest], axis=-1)
     # Parabolas are not laid here, since knots of the law lie between these samples.

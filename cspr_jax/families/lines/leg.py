@@ -16,22 +16,22 @@ from cspr_jax.schema.verdicts import Verdict
 class TimedLines(Leg):
     """Any places, joined by straight lines in the least time of their law; see `Leg`."""
 
-    def __init__(self, stops: Waypoints) -> None:
+    def __init__(self, waypoints: Waypoints) -> None:
         """Refuse numbers of arcs, which a line does not have."""
-        super().__init__(stops)
+        super().__init__(waypoints)
         self._refuse("arcs")
 
     def check(self, problem: Problem) -> None:
         """Refuse the rule of the text where spools are not in one plane; see `Leg.check`."""
-        if self.stops.keys.rule == "thesis" and not in_one_plane(problem.robot):
-            place, key = self.stops.robot_file.placed("base_points", self.stops.path)
+        if self.waypoints.keys.rule == "thesis" and not in_one_plane(problem.robot):
+            place, key = self.waypoints.robot_file.placed("base_points", self.waypoints.path)
             raise ConfigError(place, f'{key}: must lie in one plane with rule = "thesis"')
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the places; see `Leg.join`."""
         starts, ends = self._ends(problem, np.array([z0]))
         answers = self._solved(problem, starts, ends)
-        return answers, list(motions_of(answers, starts, ends, law=self.stops.family))
+        return answers, list(motions_of(answers, starts, ends, law=self.waypoints.family))
 
     def answers(self, problem: Problem, depths: np.ndarray) -> Answers:
         """Answers for several depths, on which they depend only by rests in P0; see `Leg.answers`."""
@@ -39,26 +39,27 @@ class TimedLines(Leg):
 
     def _ends(self, problem: Problem, depths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         # Return the starts and the ends of all lines, (n_depths * n_lines, 3) each.
-        points = np.stack([self.stops.points(float(z0)) for z0 in depths])
+        points = np.stack([self.waypoints.points(float(z0)) for z0 in depths])
         size = float(spool_radius(problem.robot))
         apart = np.linalg.norm(np.diff(points, axis=1), axis=2)
         for i in (np.flatnonzero((apart <= AT_P0 * size).any(0)) + 1).tolist():
             raise ConfigError(
-                self.stops.path,
-                f"{self.stops.name(i)}.position: must be another than that of {self.stops.name(i - 1)}, for a line "
+                self.waypoints.path,
+                f"{self.waypoints.name(i)}.position: must be another than that of "
+                f"{self.waypoints.name(i - 1)}, for a line "
                 "between them",
             )
         return points[:, :-1].reshape(-1, 3), points[:, 1:].reshape(-1, 3)
 
     def _solved(self, problem: Problem, starts: np.ndarray, ends: np.ndarray) -> LineAnswers:
-        keys, law = self.stops.keys, self.stops.family
+        keys, law = self.waypoints.keys, self.waypoints.family
         largest = np.inf if keys.max_acceleration is None else keys.max_acceleration
         rule = keys.rule or "optimum"
         answers = timed_lines(problem, starts, ends, law=law, rule=rule, max_acceleration=largest)
         unbounded = np.flatnonzero(answers.verdict == Verdict.NOT_FINITE.value)
-        for i in (unbounded % len(self.stops) + 1).tolist():
+        for i in (unbounded % len(self.waypoints) + 1).tolist():
             raise ConfigError(
-                self.stops.path,
-                f"max_acceleration is missing: nothing else bounds the acceleration up to {self.stops.name(i)}",
+                self.waypoints.path,
+                f"max_acceleration is missing: nothing else bounds the acceleration up to {self.waypoints.name(i)}",
             )
         return answers

@@ -98,8 +98,8 @@ def least_of_law(law: Amplitude, sides: Sides) -> Least:
 
     def smallest(start, slope):
         def gain(tau):
-            s, _, bend = derivatives(law, tau, order=2)
-            return jnp.where(jnp.isfinite(start), start + slope * s, jnp.inf) / bend
+            s, _, second_derivative = derivatives(law, tau, order=2)
+            return jnp.where(jnp.isfinite(start), start + slope * s, jnp.inf) / second_derivative
 
         values = jax.vmap(gain)(tau)  # (n_samples, n_bounds)
         width = tau[1] - tau[0]
@@ -179,10 +179,10 @@ def _lowest(start: Array, slope: Array, places: Array, holds: Array | None) -> t
     return jnp.where(jnp.isfinite(values.min(1)), start[index], jnp.inf), slope[index]
 
 
-def _time(stops: Array, nodes: Array, energy: Array, start: Array, slope: Array) -> Array:
+def _time(ends: Array, nodes: Array, energy: Array, start: Array, slope: Array) -> Array:
     # Sum of the times from node to node, up to the stops, of s'' = start + slope * s with s'^2 / 2 = energy at the
     # first node of each interval.
-    low, high = stops[:-1], stops[1:]
+    low, high = ends[:-1], ends[1:]
 
     def speed(s):
         gone = s - nodes[:-1]

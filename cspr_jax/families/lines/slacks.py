@@ -136,12 +136,12 @@ class Instants(NamedTuple):
     Fields:
         s: path coordinate.
         speed: s'^2, 1/s^2.
-        bend: s'', 1/s^2.
+        second_derivative: s'', 1/s^2.
     """
 
     s: Any
     speed: Any
-    bend: Any
+    second_derivative: Any
 
 
 def slacks(line: LineSlacks, name: str, at: Instants, tensions: Any = None) -> Any:
@@ -149,17 +149,17 @@ def slacks(line: LineSlacks, name: str, at: Instants, tensions: Any = None) -> A
     if name == "speed_max":
         return 1.0 - at.speed * (line.square[..., None] / line.largest[name] ** 2)
     if name == "acceleration_max":
-        share = at.bend * (line.square[..., None] ** 0.5 / line.largest[name])
-        return joined(1.0 - share, 1.0 + share)
+        fraction = at.second_derivative * (line.square[..., None] ** 0.5 / line.largest[name])
+        return joined(1.0 - fraction, 1.0 + fraction)
     away = at.s - line.nearest
     square = line.square[..., None]
     length2 = away**2 * square + line.apart
     if name == "cable_speed_max":
         return 1.0 - away**2 * length2**-1.0 * at.speed * (square / line.largest[name]) ** 2
     if name == "cable_acceleration_max":
-        second = length2**-1.5 * at.speed * (square * line.apart) + away * length2**-0.5 * at.bend * square
+        second = length2**-1.5 * at.speed * (square * line.apart) + away * length2**-0.5 * at.second_derivative * square
         return joined(1.0 - second / line.largest[name], 1.0 + second / line.largest[name])
-    slack = at.bend * line.steepness - at.s * line.slope - line.offset
+    slack = at.second_derivative * line.steepness - at.s * line.slope - line.offset
     if tensions is not None:
         slack = slack - _pulled(line, at.s, length2**-0.5, tensions)
     size2 = (at.s - line.narrowest) ** 2 * line.normal_change_square + line.least_size

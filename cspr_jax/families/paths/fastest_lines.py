@@ -33,15 +33,15 @@ class FastestLines(Leg):
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the poses; see `Leg.join`."""
-        frame, keys = self.stops.frame, self.stops.keys
-        scene = scene_of(problem.robot, self.stops.robot_file, frame, keys, self.stops.path, trajectory=keys)
-        positions, units = np.array(frame.outward(self.stops.points(z0))), None
+        frame, keys = self.waypoints.frame, self.waypoints.keys
+        scene = scene_of(problem.robot, self.waypoints.robot_file, frame, keys, self.waypoints.path, trajectory=keys)
+        positions, units = np.array(frame.outward(self.waypoints.points(z0))), None
         if isinstance(problem.robot, PlatformRobot):
-            units = continuous(frame.turned_quaternions(pose_quaternions(self.stops, self.stops.points(z0))))
+            units = continuous(frame.turned_quaternions(pose_quaternions(self.waypoints, self.waypoints.points(z0))))
         lines = [
             self._lines(positions[i : i + 2], None if units is None else units[i : i + 2]) for i in range(len(self))
         ]
-        asks = keys.end_accelerations not in (None, "free") or any(pose.rest for pose in self.stops.poses)
+        asks = keys.end_accelerations not in (None, "free") or any(pose.rest for pose in self.waypoints.poses)
         ramp_time = RAMP_TIME if asks else 0.0
         left = [_in_order(problem, candidates) for candidates in lines]
         first = [candidates[0].curve for candidates in lines]
@@ -62,13 +62,13 @@ class FastestLines(Leg):
             turning = np.stack([units[0], units.sum(0) / np.linalg.norm(units.sum(0)), units[1]])
         curves = [
             course_through(PathTable(kind="quintic"), np.stack([ends[0], point, ends[1]]), turning).sections()
-            for point in _beside(ends, len(PATTERNS[self.stops.robot_file.own_pattern].forces))
+            for point in _beside(ends, len(PATTERNS[self.waypoints.robot_file.own_pattern].forces))
         ]
         return [self._placed(section) for section in (*straight, *(section for one in curves for section in one))]
 
     def _placed(self, section: Section) -> Section:
-        curve = kept_to(self.stops.robot_file.own_pattern, section.curve, is_planar=False)
-        return section._replace(curve=placed_inward(curve, self.stops.frame, np.array(IDENTITY)))
+        curve = kept_to(self.waypoints.robot_file.own_pattern, section.curve, is_planar=False)
+        return section._replace(curve=placed_inward(curve, self.waypoints.frame, np.array(IDENTITY)))
 
 
 def _in_order(problem: Problem, lines: list[Section]) -> list[Section]:

@@ -69,24 +69,31 @@ class Ride(NamedTuple):
 class Paths(Leg):
     """Poses joined along paths in the least time; see `Leg`."""
 
-    def __init__(self, stops: Waypoints) -> None:
+    def __init__(self, waypoints: Waypoints) -> None:
         """Refuse keys of other families, and what a path and its poses say twice."""
-        super().__init__(stops)
+        super().__init__(waypoints)
         self._notes: list[str] = []
         self._refuse("arcs", "beta_hat")
-        for i, pose in enumerate(stops.poses):
-            if i and pose.path is not None and not stops.keys.is_one_path:
+        for i, pose in enumerate(waypoints.poses):
+            if i and pose.path is not None and not waypoints.keys.is_one_path:
                 self._check_path(i, pose.path)
 
     @classmethod
-    def for_searches(cls, stops: Waypoints) -> Leg:
+    def for_searches(cls, waypoints: Waypoints) -> Leg:
         """Lines between the poses, whatever the plan says of paths; see `Leg.for_searches`."""
-        return FastestLines(stops)
+        return FastestLines(waypoints)
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the poses; see `Leg.join`."""
-        stops = self.stops
-        scene = scene_of(problem.robot, stops.robot_file, stops.frame, stops.keys, stops.path, trajectory=stops.keys)
+        waypoints = self.waypoints
+        scene = scene_of(
+            problem.robot,
+            waypoints.robot_file,
+            waypoints.frame,
+            waypoints.keys,
+            waypoints.path,
+            trajectory=waypoints.keys,
+        )
         parts: list[list[Spline]] = [[] for _ in range(len(self))]
         through = np.empty(len(self), object)
         through[:] = [[] for _ in range(len(self))]
@@ -96,7 +103,7 @@ class Paths(Leg):
         for ride, fastest in zip(rides, along, strict=True):
             for segment, motion in cut(fastest, ride):
                 parts[segment].append(motion)
-            section = section_answer(fastest, ride, stops.first)
+            section = section_answer(fastest, ride, waypoints.first)
             for segment in range(section.ends[0], section.ends[1] + 1):
                 through[segment].append(section)
         motions = [chained(splines) for splines in parts]
@@ -114,19 +121,19 @@ class Paths(Leg):
 
     def _rides(self, problem: Problem, z0: float) -> list[Ride]:
         # Sections of all runs, in the axes of the kernels; notes of their files.
-        stops, rides = self.stops, list[Ride]()
+        waypoints, rides = self.waypoints, list[Ride]()
         self._notes, cells = [], 0
-        places = np.array(stops.frame.outward(stops.points(z0)))
+        places = np.array(waypoints.frame.outward(waypoints.points(z0)))
         units = None
         if isinstance(problem.robot, PlatformRobot):
-            units = stops.frame.turned_quaternions(pose_quaternions(stops, stops.points(z0)))
+            units = waypoints.frame.turned_quaternions(pose_quaternions(waypoints, waypoints.points(z0)))
         for run in self._runs:
             try:
                 course = self._course(run, places, units)
                 cells += _cells(course, GRID if run.table.grid is None else run.table.grid)
                 sections = [self._placed(section, course) for section in course.sections()]
             except InputError as error:
-                raise ConfigError(stops.path, f"{self._key(run)}.{error}") from error
+                raise ConfigError(waypoints.path, f"{self._key(run)}.{error}") from error
             self._notes += course.notes
             places[run.last] = course.tracks[-1].place[-1]
             if units is not None:
@@ -142,7 +149,7 @@ class Paths(Leg):
     @property
     def _runs(self) -> list[CourseRun]:
         # A course ends where a pose has a path of its own, before one, and at rest.
-        poses, keys, first, runs = self.stops.poses, self.stops.keys, 0, list[CourseRun]()
+        poses, keys, first, runs = self.waypoints.poses, self.waypoints.keys, 0, list[CourseRun]()
         usual = PathTable() if keys.path is None or keys.is_one_path else keys.path
         for i, pose in enumerate(poses[1:], start=1):
             following = poses[i + 1] if i < len(self) else None
@@ -160,65 +167,66 @@ class Paths(Leg):
     def _key(self, run: CourseRun) -> str:
         return (
             "path"
-            if self.stops.poses[run.last].path is None or self.stops.keys.is_one_path
-            else (f"{self.stops.name(run.last)}.path")
+            if self.waypoints.poses[run.last].path is None or self.waypoints.keys.is_one_path
+            else (f"{self.waypoints.name(run.last)}.path")
         )
 
     def _course(self, run: CourseRun, places: np.ndarray, units: np.ndarray | None) -> Course:
         # Course of a run, in the axes of the robot file.
-        stops, table = self.stops, run.table
+        waypoints, table = self.waypoints, run.table
         if not table.is_whole:
             chosen = slice(run.first, run.last + 1)
             return course_through(table, places[chosen], None if units is None else units[chosen])
-        robot_file = stops.robot_file
+        robot_file = waypoints.robot_file
         if table.orientations is not None and units is None:
             raise InputError("orientations", None, "must be absent for a point mass", fault="given")
-        has_start = not stops.keys.is_one_path and not (
-            run.first == 0 and table.has_start and stops.poses[0].position is None and not stops.poses[0].rest
+        has_start = not waypoints.keys.is_one_path and not (
+            run.first == 0 and table.has_start and waypoints.poses[0].position is None and not waypoints.poses[0].rest
         )
         ends = CourseEnds(
             places[run.first] if has_start else None,
-            None if stops.keys.is_one_path or table.has_end else places[run.last],
+            None if waypoints.keys.is_one_path or table.has_end else places[run.last],
             *(() if units is None else (units[run.first], units[run.last])),
         )
         if has_start and table.start is not None:
-            raise InputError("start", table.start, f"absent: the path begins at {stops.name(run.first)}")
+            raise InputError("start", table.start, f"absent: the path begins at {waypoints.name(run.first)}")
         turning = np.array(IDENTITY)
         if table.kind == "csv" and units is not None:
-            reference = reference_of(build_robot(robot_file, stops.keys, stops.path))
-            turning = stops.frame.turned_quaternions(reference * BACK)
+            reference = reference_of(build_robot(robot_file, waypoints.keys, waypoints.path))
+            turning = waypoints.frame.turned_quaternions(reference * BACK)
         axes = FileAxes(robot_file.z_axis, np.eye(3)[1 if robot_file.is_planar else 2], turning)
-        return course_of(table, ends, stops.path.parent, axes)
+        return course_of(table, ends, waypoints.path.parent, axes)
 
     def _placed(self, section: Section, course: Course) -> Section:
         # The section in the axes of the kernels, on the plane or the guide of the robot.
-        curve = kept_to(self.stops.robot_file.own_pattern, section.curve, is_planar=course.is_planar)
-        return section._replace(curve=placed_inward(curve, self.stops.frame, np.array(IDENTITY)))
+        curve = kept_to(self.waypoints.robot_file.own_pattern, section.curve, is_planar=course.is_planar)
+        return section._replace(curve=placed_inward(curve, self.waypoints.frame, np.array(IDENTITY)))
 
     def _check_path(self, i: int, table: PathTable) -> None:
-        stops, pose, name = self.stops, self.stops.poses[i], self.stops.name(i)
+        waypoints, pose, name = self.waypoints, self.waypoints.poses[i], self.waypoints.name(i)
         has_orientation = pose.quaternion is not None or pose.tilt_torsion is not None
         if table.has_end and (pose.position is not None or pose.rest):
             key = "rest" if pose.position is None else "position"
-            raise ConfigError(stops.path, f"{name}.{key}: must be absent: {name}.path decides where it ends")
+            raise ConfigError(waypoints.path, f"{name}.{key}: must be absent: {name}.path decides where it ends")
         if table.kind == "gcode" and has_orientation:
-            raise ConfigError(stops.path, f"{name}: must have no orientation: that of the pose before stays")
+            raise ConfigError(waypoints.path, f"{name}: must have no orientation: that of the pose before stays")
         if table.orientations is not None and table.points is None:
-            raise ConfigError(stops.path, f"{name}.path.orientations: must be absent: the poses have them")
+            raise ConfigError(waypoints.path, f"{name}.path.orientations: must be absent: the poses have them")
 
     def _check_going_on(self, rides: list[Ride]) -> None:
         # A motion that does not stop goes on at its speed and in its direction.
         for before, after in itertools.pairwise(rides):
             one, other = before.settings.end_speed, after.settings.start_speed
-            name = f"{self.stops.name(int(after.segments[0]))}"
+            name = f"{self.waypoints.name(int(after.segments[0]))}"
             if one != other:
                 raise ConfigError(
-                    self.stops.path, f"path.start_speed = {other:g} at {name}: must be {one:g}, the end_speed before it"
+                    self.waypoints.path,
+                    f"path.start_speed = {other:g} at {name}: must be {one:g}, the end_speed before it",
                 )
             directions = [_direction(before.section.curve, -1), _direction(after.section.curve, 0)]
             if one and np.abs(directions[1] - directions[0]).max() > SAME_DIRECTION:
                 raise ConfigError(
-                    self.stops.path, f"path.end_speed = {one:g} at {name}: must be 0: the direction changes there"
+                    self.waypoints.path, f"path.end_speed = {one:g} at {name}: must be 0: the direction changes there"
                 )
 
 

@@ -102,7 +102,7 @@ def retraced(
     paths: list[Retraced] = []
     run: list[SmoothPart] = []
     for part in sequence.parts():
-        if run and (run[-1].stops[1] or part.stops[0]):
+        if run and (run[-1].at_rest[1] or part.at_rest[0]):
             paths.append(_path(sequence, run, cells, feeds))
             run = []
         run.append(part)
@@ -139,9 +139,9 @@ def _path(motions: MotionSequence, parts: list[SmoothPart], cells: int, feeds: S
     is_mark[1:] |= narrow[1:] & narrow[:-1]
     marks = np.asarray(curve.knots)[[*np.flatnonzero(is_mark).tolist(), -1]]
     ends = motions.inside(parts, pieces.number[[0, -1]], np.array([0.0, 1.0]))
-    stops = np.array([parts[0].stops[0], parts[-1].stops[1]])
-    start, end = np.where(stops, 0.0, np.linalg.norm(ends.velocity[:, :AXES], axis=1)).tolist()
-    if ((np.array([start, end]) <= TURNS * ends.speed) & ~stops).any():
+    at_rest = np.array([parts[0].at_rest[0], parts[-1].at_rest[1]])
+    start, end = np.where(at_rest, 0.0, np.linalg.norm(ends.velocity[:, :AXES], axis=1)).tolist()
+    if ((np.array([start, end]) <= TURNS * ends.speed) & ~at_rest).any():
         name = f"segment {numbers[0] + 1}"
         raise InputError(name, None, "must move its mass centre where it begins and ends", fault="it turns in place")
     return Retraced(
@@ -155,33 +155,33 @@ def _path(motions: MotionSequence, parts: list[SmoothPart], cells: int, feeds: S
 
 def _changes(motions: MotionSequence, parts: list[SmoothPart], pieces: _Pieces) -> np.ndarray:
     # Tell for each piece whether direction or speed change much along it; from a stop on they always do.
-    start, end = (motions.inside(parts, pieces.number, share) for share in (pieces.start, pieces.end))
+    start, end = (motions.inside(parts, pieces.number, fraction) for fraction in (pieces.start, pieces.end))
     speeds = np.stack([start.speed, end.speed])
     ratio = speeds.max(0) > RATIO * speeds.min(0)
     cosine = np.sum(start.velocity * end.velocity, axis=1) / np.maximum(speeds.prod(0), np.finfo(float).tiny)
     changes = ratio | (cosine < np.cos(TURN))
-    for piece, stops in ((0, parts[0].stops[0]), (-1, parts[-1].stops[1])):
-        changes[piece] &= not stops
+    for piece, at_rest in ((0, parts[0].at_rest[0]), (-1, parts[-1].at_rest[1])):
+        changes[piece] &= not at_rest
     return changes
 
 
 def _pace(motions: MotionSequence, parts: list[SmoothPart], pieces: _Pieces, curve: Spline) -> PathPace:
     # Speeds change at both ends of the pieces as they do on their own side.
-    start, end = (motions.inside(parts, pieces.number, share) for share in (pieces.start, pieces.end))
+    start, end = (motions.inside(parts, pieces.number, fraction) for fraction in (pieces.start, pieces.end))
     slopes = []
     for rates in (start, end):
         speed = np.maximum(rates.speed, np.finfo(float).tiny)
         slopes.append(np.sum(rates.velocity * rates.acceleration, axis=1) / speed)
     both = np.stack(slopes, axis=1).ravel()
-    for edge, near, stops in ((0, 1, parts[0].stops[0]), (-1, -2, parts[-1].stops[1])):
-        both[edge] = both[near] if stops else both[edge]
+    for edge, near, at_rest in ((0, 1, parts[0].at_rest[0]), (-1, -2, parts[-1].at_rest[1])):
+        both[edge] = both[near] if at_rest else both[edge]
     return PathPace(np.repeat(curve.knots, 2)[1:-1], both)
 
 
 def _signs(motions: MotionSequence, parts: list[SmoothPart]) -> np.ndarray:
     # Signs (m,) with which quaternions are continuous from part to part.
     count = np.arange(len(parts))
-    first, last = (motions.inside(parts, count, np.full(len(parts), share)).place for share in (0.0, 1.0))
+    first, last = (motions.inside(parts, count, np.full(len(parts), fraction)).place for fraction in (0.0, 1.0))
     products = np.sum(first[1:, AXES:] * last[:-1, AXES:], axis=1)
     return np.cumprod(np.append(1.0, np.where(products < 0.0, -1.0, 1.0)))
 
@@ -204,8 +204,8 @@ def _curve(
 
     start = _derivatives(signed(motions.inside(parts, pieces.number, pieces.start), pieces.number))
     end = _derivatives(signed(motions.inside(parts, pieces.number, pieces.end), pieces.number))
-    for side, piece, stops in ((start, 0, parts[0].stops[0]), (end, -1, parts[-1].stops[1])):
-        if stops:
+    for side, piece, at_rest in ((start, 0, parts[0].at_rest[0]), (end, -1, parts[-1].at_rest[1])):
+        if at_rest:
             number = np.full(len(BESIDE), pieces.number[piece])
             sign = -1.0 if piece else 1.0
             beside = signed(motions.inside(parts, number, BESIDE if piece == 0 else 1.0 - BESIDE), number)

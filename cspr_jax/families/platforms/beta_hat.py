@@ -54,8 +54,8 @@ def _ends(robot: PlatformRobot, poses) -> tuple[jax.Array, ...]:
     # and the depth.
     def one(position, quaternion, z0):
         end, depth = endpoint(robot, position, quaternion, z0), plane_normal(robot) @ position
-        share = determinant_share(robot, position, rotations.matrix(quaternion))
-        return end.preferred, end.lowest, end.highest, share, depth
+        fraction = determinant_share(robot, position, rotations.matrix(quaternion))
+        return end.preferred, end.lowest, end.highest, fraction, depth
 
     return jax.vmap(one)(*poses)
 
@@ -68,10 +68,10 @@ def end_options(
     count: int,
 ) -> tuple[Float[np.ndarray, "n count"], Bool[np.ndarray, "n"]]:
     """Values of beta-hat to try at poses."""
-    preferred, lowest, highest, share, depth = in_batches(
+    preferred, lowest, highest, fraction, depth = in_batches(
         partial(_ends, robot), (positions, quaternions, z0), size=BATCH
     )
-    return options(preferred, lowest, highest, count), (depth > 0.0) & is_regular(share)
+    return options(preferred, lowest, highest, count), (depth > 0.0) & is_regular(fraction)
 
 
 def cheapest_path(costs: list[np.ndarray]) -> list[int]:

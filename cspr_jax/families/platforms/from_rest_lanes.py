@@ -28,7 +28,7 @@ class Swings(NamedTuple):
     """Segments from rest.
 
     Fields:
-        hub: the point p0, m.
+        center: the point p0, m.
         reach: vector from p0 to the end, along the first arc; m.
         axis: unit vector of the rotation.
         angle: whole angle of the envelope, in half turns; (n,).
@@ -37,7 +37,7 @@ class Swings(NamedTuple):
         rate: lambda of (3.50), 1/s^2; (n,).
     """
 
-    hub: Vector
+    center: Vector
     reach: Vector
     axis: Vector
     angle: Array
@@ -68,7 +68,7 @@ def swings(segments: PlatformSegment) -> Swings:
     """Swings of segments from rest."""
     slerp = segments.slerp
     return Swings(
-        tuple(segments.hub[:, i] for i in range(3)),
+        tuple(segments.center[:, i] for i in range(3)),
         tuple(segments.plane[:, i, 0] * segments.end_radius for i in range(3)),
         tuple(slerp.across[:, i] for i in range(1, 4)),
         slerp.angle * (2.0 / math.pi),
@@ -87,15 +87,15 @@ def rest_table(
     sine, cosine = sincospi(arcs * tau)
     if kind.variable:  # (3.44)
         place = a * cosine - a1 * sine
-        bend = -((a + a2) * cosine + (a1 + a3) * sine)
+        second_derivative = -((a + a2) * cosine + (a1 + a3) * sine)
     else:
         place = a * cosine
-        bend = (a2 - a) * cosine - 2.0 * a1 * sine
+        second_derivative = (a2 - a) * cosine - 2.0 * a1 * sine
     beat = _plain(sine, cosine) if kind.plain else _with_beta_hats(sine, cosine, tau, theta)
     angles = []
     for b, b1, b2 in beat:
         angles.append((a * b, math.pi * (a1 * b + a * b1), math.pi * (a2 * b + 2.0 * a1 * b1 + a * b2)))
-    return jnp.stack([place, bend, *(angle[k] for k in range(3) for angle in angles)], axis=1)
+    return jnp.stack([place, second_derivative, *(angle[k] for k in range(3) for angle in angles)], axis=1)
 
 
 def _plain(sine: Array, cosine: Array) -> list[tuple[Array, ...]]:
@@ -126,7 +126,7 @@ def swing(motions: Swings, row: Float[Array, "11"]) -> Swing:
     sine, cosine = sincospi(motions.angle * blended(2))
     pull = motions.rate * row[1]
     return Swing(
-        tuple(h + row[0] * r for h, r in zip(motions.hub, motions.reach, strict=True)),
+        tuple(h + row[0] * r for h, r in zip(motions.center, motions.reach, strict=True)),
         tuple(pull * r for r in motions.reach),
         about_axis(motions.axis, sine, cosine),
         motions.rate * speed * speed,

@@ -53,36 +53,36 @@ class _Poses(Leg):
     step = 1
     variable: ClassVar[bool]
 
-    def __init__(self, stops: Waypoints) -> None:
+    def __init__(self, waypoints: Waypoints) -> None:
         """Refuse keys of other families and quaternions that are no orientations."""
-        keys, path = stops.keys, stops.path
+        keys, path = waypoints.keys, waypoints.path
         if keys.inclination is not None:
             raise ConfigError(path, 'inclination: must be absent unless family = "transition"')
         if keys.beat in WITHOUT_BETA_HAT:
-            for i, pose in enumerate(stops.poses):
+            for i, pose in enumerate(waypoints.poses):
                 if pose.beta_hat is not None:
-                    raise ConfigError(path, f'{stops.name(i)}.beta_hat: must be absent with beat = "{keys.beat}"')
-        super().__init__(stops)
+                    raise ConfigError(path, f'{waypoints.name(i)}.beta_hat: must be absent with beat = "{keys.beat}"')
+        super().__init__(waypoints)
         self._kind = PlatformMotionKind(variable=self.variable, plain=keys.beat == "beta_1")
-        self._given = np.array([_orientation(stops.name(i), pose, path) for i, pose in enumerate(stops.poses)])
+        self._given = np.array([_orientation(waypoints.name(i), pose, path) for i, pose in enumerate(waypoints.poses)])
 
     def _quaternions(self, points: np.ndarray) -> np.ndarray:
         # Return orientations (n_poses, 4) in the kernels' axes; azimuths of tilts are relative to the vertical plane
         # through the centroid and the point.
-        poses, frame = self.stops.poses, self.stops.frame
+        poses, frame = self.waypoints.poses, self.waypoints.frame
         angles = np.array([[0.0] * 3 if p.rest else p.tilt_torsion or [0.0] * 3 for p in poses])
         is_given = np.array([pose.rest or pose.tilt_torsion is None for pose in poses])
         return np.where(is_given[:, None], frame.turned_quaternions(self._given), orientations(frame, points, angles))
 
     def check(self, problem: Problem) -> None:
         """Refuse poses at which no motion can begin or end; see `Leg.check`."""
-        stops = self.stops
-        points = stops.points(1.0)
-        hint = "".join(f" ({line})" for line in plan_hints(stops.keys, stops.robot_file))
+        waypoints = self.waypoints
+        points = waypoints.points(1.0)
+        hint = "".join(f" ({line})" for line in plan_hints(waypoints.keys, waypoints.robot_file))
         for i, (position, quaternion) in enumerate(zip(points, self._quaternions(points), strict=True)):
             # On more than six cables poses are judged by the margin of their tensions alone.
-            if not stops.poses[i].rest and _is_determined(problem):
-                _check_pose(problem.robot, stops.name(i), position, quaternion, stops.path, hint)
+            if not waypoints.poses[i].rest and _is_determined(problem):
+                _check_pose(problem.robot, waypoints.name(i), position, quaternion, waypoints.path, hint)
 
     def join(self, problem: Problem, z0: float) -> tuple[PlatformMotionAnswers, list[Motion]]:
         """Join the poses; see `Leg.join`."""
@@ -90,7 +90,7 @@ class _Poses(Leg):
             if _is_determined(problem):
                 reference_pose(problem.robot, z0)
         except InputError as error:
-            raise ConfigError(self.stops.path, self.stops.robot_file.typed(error)) from error
+            raise ConfigError(self.waypoints.path, self.waypoints.robot_file.typed(error)) from error
         answers, segments = self._search(problem, np.array([z0]), is_final=True)
         pairs = zip(each(segments, len(self)), answers.tried_arcs, strict=True)
         return answers, [PlatformMotion(segment, problem.amplitude, leaf(arcs), self._kind) for segment, arcs in pairs]
@@ -108,7 +108,7 @@ class _Poses(Leg):
     ) -> tuple[PlatformMotionAnswers, PlatformSegment]:
         # Choose the values of beta-hat that give the fewest arcs in sum.
         count, z0 = len(self), np.repeat(depths, len(self))
-        points = self.stops.points(depths)
+        points = self.waypoints.points(depths)
         quaternions = self._quaternions(points[0])
         checker = pose_checker(problem, self._kind, batch=FEW if len(z0) <= FEW_SEGMENTS else MANY)
         beta_hats = [
@@ -122,7 +122,7 @@ class _Poses(Leg):
         motion = np.repeat(np.arange(len(z0)), [pair[0].size for of_depth in pairs for pair in of_depth])
         first, last = (np.concatenate([pair[k].ravel() for of_depth in pairs for pair in of_depth]) for k in (0, 1))
         trial = self._candidates(points, quaternions, z0, motion, (first, last))
-        fixed, largest = np.tile(self.stops.arcs, len(depths)), self.stops.max_arcs
+        fixed, largest = np.tile(self.waypoints.arcs, len(depths)), self.waypoints.max_arcs
         of_trials = smallest_arcs(checker, trial, max_arcs=largest, fixed=fixed, beyond=BEYOND)
         refused = self._refused(checker, trial, of_trials, fixed)
         path = _best_paths(of_trials.arcs, refused.arcs, pairs)
@@ -136,7 +136,7 @@ class _Poses(Leg):
         is_open = np.ones(len(trial.z0), bool)
         is_open[trial.motion[(of_trials.arcs > 0) | (of_trials.undecided > 0)]] = False
         rows, count = np.flatnonzero(is_open[trial.motion]), len(trial.motion)
-        part = refused_by_limits(checker, trial.rows(rows), max_arcs=self.stops.max_arcs, fixed=fixed)
+        part = refused_by_limits(checker, trial.rows(rows), max_arcs=self.waypoints.max_arcs, fixed=fixed)
         refused = Refused(np.zeros(count, int), np.zeros((count, len(checker.flags)), bool))
         refused.arcs[rows], refused.broken[rows] = part.arcs, part.broken
         return refused
@@ -144,8 +144,8 @@ class _Poses(Leg):
     def _pairs(self, i: int, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         # Return the values at both ends of segment i, (n_first, n_last) each.
         starts, ends = np.meshgrid(first, last, indexing="ij")
-        if self.stops.keys.beat == "beta_f":
-            return (starts, starts) if self.stops.poses[i + 1].rest else (ends, ends)
+        if self.waypoints.keys.beat == "beta_f":
+            return (starts, starts) if self.waypoints.poses[i + 1].rest else (ends, ends)
         return starts, ends
 
     def _candidates(
@@ -161,9 +161,9 @@ class _Poses(Leg):
     ) -> list[np.ndarray]:
         # Return the values of beta-hat to try at each pose; NaN where none keeps every cable taut.
         tries: list[np.ndarray] = []
-        stops, changes = self.stops, self._changes()
-        for i, (pose, position, quaternion) in enumerate(zip(stops.poses, points, quaternions, strict=True)):
-            if stops.keys.beat in WITHOUT_BETA_HAT:
+        waypoints, changes = self.waypoints, self._changes()
+        for i, (pose, position, quaternion) in enumerate(zip(waypoints.poses, points, quaternions, strict=True)):
+            if waypoints.keys.beat in WITHOUT_BETA_HAT:
                 tries.append(np.zeros(1))
                 continue
             if pose.beta_hat is not None or pose.rest:
@@ -181,15 +181,16 @@ class _Poses(Leg):
     def _changes(self) -> set[int]:
         # Return the poses where the family changes: both families take the value that is tried first there, so that
         # accelerations are continuous.
-        ends = {0: self.stops.first > 0, len(self): self.stops.last < len(self.stops.keys.pose) - 1}
+        ends = {0: self.waypoints.first > 0, len(self): self.waypoints.last < len(self.waypoints.keys.pose) - 1}
         return {i for i, changes in ends.items() if changes}
 
     def _refuse_slack(self, beta_hats: list[np.ndarray]) -> None:
         for i, values in enumerate(beta_hats):
             if np.isnan(values).any():
-                name = self.stops.name(i)
+                name = self.waypoints.name(i)
                 raise ConfigError(
-                    self.stops.path, f"{name}: must be another pose, or z0: no beta_hat keeps every cable taut there"
+                    self.waypoints.path,
+                    f"{name}: must be another pose, or z0: no beta_hat keeps every cable taut there",
                 )
 
 
@@ -229,8 +230,8 @@ def _orientation(name: str, pose: Pose, path: Path) -> np.ndarray:
     if pose.tilt_torsion is not None and pose.quaternion is not None:
         raise ConfigError(path, f"{name}.quaternion: cannot be combined with tilt_torsion")
     if pose.rest:
-        turned = pose.quaternion is not None and np.abs(np.asarray(pose.quaternion) - reference).max() > 1e-9
-        if turned or (pose.tilt_torsion is not None and (pose.tilt_torsion[1] != 0.0 or pose.tilt_torsion[2] != 0.0)):
+        rotated = pose.quaternion is not None and np.abs(np.asarray(pose.quaternion) - reference).max() > 1e-9
+        if rotated or (pose.tilt_torsion is not None and (pose.tilt_torsion[1] != 0.0 or pose.tilt_torsion[2] != 0.0)):
             raise ConfigError(path, f"{name}: must have the reference orientation at rest")
         return reference
     return given_quaternion(pose.quaternion, f"{name}.quaternion", path)
@@ -254,12 +255,12 @@ def _standing(robot: PlatformRobot, position: Array, quaternion: Array, pairs: A
 def _check_pose(
     robot: PlatformRobot, name: str, position: np.ndarray, quaternion: np.ndarray, path: Path, hint: str
 ) -> None:
-    depth, share, apart = map(np.asarray, _standing(robot, position, quaternion, contacts(robot).pairs))
+    depth, fraction, apart = map(np.asarray, _standing(robot, position, quaternion, contacts(robot).pairs))
     if not depth > 0.0:
         raise ConfigError(path, f"{name}.position: must be below the spool plane{hint}")
-    if not is_regular(abs(share)):
+    if not is_regular(abs(fraction)):
         raise ConfigError(
-            path, f"{name}: must be another orientation: singular there (relative determinant {share:.1g})"
+            path, f"{name}: must be another orientation: singular there (relative determinant {fraction:.1g})"
         )
     if apart.min(initial=np.inf) < TOUCH * float(np.linalg.norm(np.asarray(robot.platform_points), axis=1).max()):
         raise ConfigError(path, f"{name}: must be another orientation: two cables touch there")

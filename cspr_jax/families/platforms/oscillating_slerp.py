@@ -78,7 +78,7 @@ def slerp_between(
 def beat(
     start_beta_hat: Float[Array, ""],
     end_beta_hat: Float[Array, ""],
-    share: Float[Array, ""],
+    fraction: Float[Array, ""],
     arcs: Num[Array, ""],
     tau: Float[Array, ""],
 ) -> tuple[Float[Array, ""], Float[Array, ""], Float[Array, ""]]:
@@ -88,16 +88,16 @@ def beat(
     beta-hat of -1 / share it is beta_1 of (3.66), with 0 beta_0 of (3.67).
     """
     omega = math.pi * arcs
-    slope = (end_beta_hat - start_beta_hat) * share
-    h = start_beta_hat * share + slope * tau  # beta'' over (pi p)^2
+    slope = (end_beta_hat - start_beta_hat) * fraction
+    h = start_beta_hat * fraction + slope * tau  # beta'' over (pi p)^2
     sine, cosine = sincospi(arcs * tau)
     sine3, cosine3 = sine * (3.0 - 4.0 * sine**2), cosine * (4.0 * cosine**2 - 3.0)
     value = ((9.0 + h) * cosine - (1.0 + h) * cosine3) / 8.0  # (3.68)
     rate = (slope * (cosine - cosine3) + omega * (3.0 * (1.0 + h) * sine3 - (9.0 + h) * sine)) / 8.0
-    bend = (
+    second_derivative = (
         2.0 * slope * omega * (3.0 * sine3 - sine) + omega**2 * (9.0 * (1.0 + h) * cosine3 - (9.0 + h) * cosine)
     ) / 8.0
-    return value, rate, bend
+    return value, rate, second_derivative
 
 
 @jax.jit
@@ -119,10 +119,10 @@ def _half_vector(slerp: Slerp, amplitude_values: tuple[Array, ...]) -> tuple[Arr
     # plane.
     a, a1, a2 = amplitude_values[:3]
     sine, cosine = sincospi(slerp.angle * a / math.pi)
-    rate, bend = slerp.angle * a1, slerp.angle * a2
+    rate, second_derivative = slerp.angle * a1, slerp.angle * a2
     q = slerp.start * cosine + slerp.across * sine
     along = slerp.across * cosine - slerp.start * sine
-    q1, q2 = along * rate, along * bend - q * rate**2
+    q1, q2 = along * rate, along * second_derivative - q * rate**2
     s, s1, s2, v, v1, v2 = q[0], q1[0], q2[0], q[1:], q1[1:], q2[1:]
     w, w1, w2 = angle_ratio(s, jnp.dot(v, v), orders=3)
     return v * w, v1 * w + v * w1 * s1, v2 * w + 2.0 * v1 * w1 * s1 + v * (w2 * s1**2 + w1 * s2)

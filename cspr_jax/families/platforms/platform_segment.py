@@ -55,7 +55,7 @@ class PlatformSegment:
 
     Fields:
         plane: (3, 2) q_h1 and q_h2 of (3.42), as columns.
-        hub: (3,) the point p0, m.
+        center: (3,) the point p0, m.
         start_radius: () r1 of (3.46), m.
         end_radius: () r2, m.
         precession: () of the ellipse, in half turns, in [0, 1].
@@ -67,7 +67,7 @@ class PlatformSegment:
     """
 
     plane: Array
-    hub: Array
+    center: Array
     start_radius: Array
     end_radius: Array
     precession: Array
@@ -87,15 +87,15 @@ def pose_segment(
     odd: Bool[Array, ""],
 ) -> PlatformSegment:
     """The segment from one pose to another."""
-    hub = rest_point(z0)
-    upright = jnp.zeros_like(hub).at[2].set(1.0)
-    plane, r1, r2, precession = swing_plane(start[0] - hub, end[0] - hub, spool_radius(robot), upright, odd)
+    center = rest_point(z0)
+    upright = jnp.zeros_like(center).at[2].set(1.0)
+    plane, r1, r2, precession = swing_plane(start[0] - center, end[0] - center, spool_radius(robot), upright, odd)
     sense = jnp.where(odd, 1.0, -1.0).astype(r1.dtype)
     slerp = slerp_between(start[1], end[1], *beta_hats, odd=odd)
     is_determined = robot.n_cables == robot.dof
-    one = jnp.eye(3, dtype=hub.dtype)
-    regular = normalised_determinant(robot, hub, one) if is_determined else one[0, 0]
-    return PlatformSegment(plane, hub, r1, r2, precession, sense, robot.gravity / z0, slerp, regular)
+    one = jnp.eye(3, dtype=center.dtype)
+    regular = normalised_determinant(robot, center, one) if is_determined else one[0, 0]
+    return PlatformSegment(plane, center, r1, r2, precession, sense, robot.gravity / z0, slerp, regular)
 
 
 def duration(segment: PlatformSegment, arcs: Num[Array, ""]) -> Float[Array, ""]:
@@ -125,7 +125,7 @@ def motion(
     quaternions = _quaternions(segment, values, arcs, tau, kind)
     omega, omega1 = rates(quaternions)
     return State(
-        segment.hub + segment.plane @ c,  # (3.43)
+        segment.center + segment.plane @ c,  # (3.43)
         segment.plane @ c1 / time,
         segment.plane @ c2 / time**2,
         rotations.matrix(quaternions[0]),
@@ -149,13 +149,13 @@ def quaternion_at(
 def _quaternions(
     segment: PlatformSegment, values: tuple[Array, ...], arcs: Array, tau: Array, kind: PlatformMotionKind
 ) -> tuple[Array, Array, Array]:
-    share = _share(segment, arcs)
-    return orientation(segment.slerp, values, beat(*_beta_hats(segment, share, kind), share, arcs, tau))
+    fraction = _share(segment, arcs)
+    return orientation(segment.slerp, values, beat(*_beta_hats(segment, fraction, kind), fraction, arcs, tau))
 
 
-def _beta_hats(segment: PlatformSegment, share: Array, kind: PlatformMotionKind) -> tuple[Array, Array]:
+def _beta_hats(segment: PlatformSegment, fraction: Array, kind: PlatformMotionKind) -> tuple[Array, Array]:
     slerp = segment.slerp
-    return (-1.0 / share, -1.0 / share) if kind.plain else (slerp.start_beta_hat, slerp.end_beta_hat)
+    return (-1.0 / fraction, -1.0 / fraction) if kind.plain else (slerp.start_beta_hat, slerp.end_beta_hat)
 
 
 def _swing(
@@ -173,19 +173,19 @@ def _swing(
         w = (-(r * steady + r2) / omega, 2.0 * nu * r1)
         w1 = (2.0 * nu**2 * r1 * omega - (r1 * steady + r3) / omega, nu * (r * steady + 3.0 * r2))
         pace = (sine * w[0], sine * w[1])
-        bend = (omega * cosine * w[0] + sine * w1[0], omega * cosine * w[1] + sine * w1[1])
+        second_derivative = (omega * cosine * w[0] + sine * w1[0], omega * cosine * w[1] + sine * w1[1])
     else:
         place = (r * cosine, nu * r * sine)
         pace = (r1 * cosine - r * steady / omega * sine, nu * r1 * sine)
-        bend = (
+        second_derivative = (
             (r2 - r * steady) * cosine - 2.0 * r1 * steady / omega * sine,
             nu * (r2 + r * steady) * sine,
         )
 
-    def turned(vector):
+    def rotated(vector):
         return jnp.stack([axial * vector[0] + lateral * vector[1], axial * vector[1] - lateral * vector[0]])
 
-    return turned(place), turned(pace), turned(bend)
+    return rotated(place), rotated(pace), rotated(second_derivative)
 
 
 @jax.tree_util.register_dataclass
@@ -208,7 +208,7 @@ class PlatformMotion:
     @property
     def z0(self) -> Array:
         """Depth of P0 below the centroid of the spools, () m."""
-        return self.segment.hub[..., 2]
+        return self.segment.center[..., 2]
 
     def duration(self) -> Array:
         """Duration; see `Motion.duration`."""
@@ -243,8 +243,8 @@ def several_bounds(cases: tuple[PlatformSegment, Array, TimeBounds], *, kind: Pl
 
 
 def _block_bounds(kind: PlatformMotionKind, segment: PlatformSegment, arcs: Array, block: TimeBounds) -> StateBounds:
-    time, share = duration(segment, arcs), _share(segment, arcs)
+    time, fraction = duration(segment, arcs), _share(segment, arcs)
     translation = swing_bounds(segment, arcs, time, block, variable=kind.variable)
-    beats = beat_bounds(*_beta_hats(segment, share, kind), share, arcs, block.tau)
+    beats = beat_bounds(*_beta_hats(segment, fraction, kind), fraction, arcs, block.tau)
     q, q1, q2 = orientation_bounds(segment.slerp, block.values, beats)
     return StateBounds(*translation, *unit_rotation_bounds(q, q1 * (1.0 / time), q2 * (1.0 / time**2)))

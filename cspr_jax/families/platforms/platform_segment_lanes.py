@@ -101,8 +101,8 @@ def state(
     else:
         place = _ellipse(segment, arcs, instant, variable=kind.variable)
         rotation = _exponential(*_half_vector(segment, instant, _beat(segment, arcs, instant, kind)))
-    hub = tuple(segment.hub[:, i] for i in range(3))
-    position = tuple(h + c for h, c in zip(hub, place[0], strict=True))
+    center = tuple(segment.center[:, i] for i in range(3))
+    position = tuple(h + c for h, c in zip(center, place[0], strict=True))
     return StateLanes(position, place[1], place[2], *rotation)
 
 
@@ -112,12 +112,14 @@ def _straight(segment: PlatformSegment, arcs: Array, instant: InstantLanes, *, v
         inner = instant.a * omega * omega + instant.a2
         place = instant.a * instant.cosine - instant.a1 * instant.sine / omega
         pace = -inner * instant.sine / omega
-        bend = -(inner * instant.cosine + (instant.a1 * omega + instant.a3 / omega) * instant.sine)
+        second_derivative = -(inner * instant.cosine + (instant.a1 * omega + instant.a3 / omega) * instant.sine)
     else:
         place = instant.a * instant.cosine
         pace = instant.a1 * instant.cosine - instant.a * omega * instant.sine
-        bend = (instant.a2 - instant.a * omega * omega) * instant.cosine - 2.0 * instant.a1 * omega * instant.sine
-    return tuple(tuple(segment.plane[:, i, 0] * (size * x) for i in range(3)) for x in (place, pace, bend))
+        second_derivative = (
+            instant.a2 - instant.a * omega * omega
+        ) * instant.cosine - 2.0 * instant.a1 * omega * instant.sine
+    return tuple(tuple(segment.plane[:, i, 0] * (size * x) for i in range(3)) for x in (place, pace, second_derivative))
 
 
 def _ellipse(segment: PlatformSegment, arcs: Array, instant: InstantLanes, *, variable: bool) -> tuple[Vector, ...]:
@@ -133,13 +135,16 @@ def _ellipse(segment: PlatformSegment, arcs: Array, instant: InstantLanes, *, va
         w1 = (2.0 * nu * nu * r1 * omega - (r1 * steady + r3) / omega, nu * (r * steady + 3.0 * r2))
         place = (r * cosine - r1 * sine / omega, nu * r * sine)
         pace = (sine * w[0], sine * w[1])
-        bend = (omega * cosine * w[0] + sine * w1[0], omega * cosine * w[1] + sine * w1[1])
+        second_derivative = (omega * cosine * w[0] + sine * w1[0], omega * cosine * w[1] + sine * w1[1])
     else:
         place = (r * cosine, nu * r * sine)
         pace = (r1 * cosine - r * steady / omega * sine, nu * r1 * sine)
-        bend = ((r2 - r * steady) * cosine - 2.0 * r1 * steady / omega * sine, nu * (r2 + r * steady) * sine)
+        second_derivative = (
+            (r2 - r * steady) * cosine - 2.0 * r1 * steady / omega * sine,
+            nu * (r2 + r * steady) * sine,
+        )
     vectors = []
-    for x, y in (place, pace, bend):
+    for x, y in (place, pace, second_derivative):
         along, across = axial * x + lateral * y, axial * y - lateral * x
         vectors.append(tuple(segment.plane[:, i, 0] * along + segment.plane[:, i, 1] * across for i in range(3)))
     return tuple(vectors)
@@ -150,17 +155,19 @@ def _beat(
 ) -> tuple[Array, Array, Array]:
     # Compute the same as `oscillating_slerp.beat`, at the phase that the instant knows.
     slerp, omega, nu = segment.slerp, math.pi * arcs, segment.precession / arcs
-    share = (1.0 - nu) * (1.0 + nu)
+    fraction = (1.0 - nu) * (1.0 + nu)
     sine, cosine = segment.sense * instant.sine, instant.cosine
     if kind.plain:  # beta_1
         return cosine, -omega * sine, -omega * omega * cosine
     sine3, cosine3 = sine * (3.0 - 4.0 * sine * sine), cosine * (4.0 * cosine * cosine - 3.0)
-    slope = (slerp.end_beta_hat - slerp.start_beta_hat) * share
-    h = slerp.start_beta_hat * share + slope * instant.tau
+    slope = (slerp.end_beta_hat - slerp.start_beta_hat) * fraction
+    h = slerp.start_beta_hat * fraction + slope * instant.tau
     value = ((9.0 + h) * cosine - (1.0 + h) * cosine3) * 0.125
     rate = (slope * (cosine - cosine3) + omega * (3.0 * (1.0 + h) * sine3 - (9.0 + h) * sine)) * 0.125
-    bend = 2.0 * slope * omega * (3.0 * sine3 - sine) + omega * omega * (9.0 * (1.0 + h) * cosine3 - (9.0 + h) * cosine)
-    return value, rate, bend * 0.125
+    second_derivative = 2.0 * slope * omega * (3.0 * sine3 - sine) + omega * omega * (
+        9.0 * (1.0 + h) * cosine3 - (9.0 + h) * cosine
+    )
+    return value, rate, second_derivative * 0.125
 
 
 def _about_one_axis(
@@ -172,8 +179,8 @@ def _about_one_axis(
     whole = 2.0 * segment.slerp.angle
     sine, cosine = stored(sincospi(whole * beta * instant.a / math.pi), one)
     rate = whole * (beta1 * instant.a + beta * instant.a1)
-    bend = whole * (beta2 * instant.a + 2.0 * beta1 * instant.a1 + beta * instant.a2)
-    return about_axis(axis, sine, cosine), tuple(rate * e for e in axis), tuple(bend * e for e in axis)
+    second_derivative = whole * (beta2 * instant.a + 2.0 * beta1 * instant.a1 + beta * instant.a2)
+    return about_axis(axis, sine, cosine), tuple(rate * e for e in axis), tuple(second_derivative * e for e in axis)
 
 
 def _angle_ratio_coefficients() -> list[list[float]]:
@@ -197,11 +204,11 @@ def _half_vector(
     # Return half of the rotation vector and its derivatives, as in `oscillating_slerp`.
     slerp, (beta, beta1, beta2) = segment.slerp, beats
     sine, cosine = sincospi(slerp.angle * instant.a / math.pi)
-    rate, bend = slerp.angle * instant.a1, slerp.angle * instant.a2
+    rate, second_derivative = slerp.angle * instant.a1, slerp.angle * instant.a2
     q = [slerp.start[:, i] * cosine + slerp.across[:, i] * sine for i in range(4)]
     along = [slerp.across[:, i] * cosine - slerp.start[:, i] * sine for i in range(4)]
     q1 = [x * rate for x in along]
-    q2 = [x * bend - y * rate * rate for x, y in zip(along, q, strict=True)]
+    q2 = [x * second_derivative - y * rate * rate for x, y in zip(along, q, strict=True)]
     x = 1.0 - q[0]
     w, w1, w2 = (polynomial(each, x) for each in _RATIO)
     w1 = -w1

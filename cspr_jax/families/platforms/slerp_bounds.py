@@ -10,7 +10,7 @@ from jax import Array
 
 from cspr_jax.families.platforms.oscillating_slerp import Slerp, angle_ratio, sinc
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, dot, joined, norm_squared, squared
-from cspr_jax.numerics.bounds.function_bounds import bent, sincospi
+from cspr_jax.numerics.bounds.function_bounds import deviation, sincospi
 
 if TYPE_CHECKING:
     from jaxtyping import Float, Num
@@ -27,18 +27,18 @@ Bounds3 = tuple[AffineBounds, AffineBounds, AffineBounds]
 def beat_bounds(
     start_beta_hat: Float[Array, ""],
     end_beta_hat: Float[Array, ""],
-    share: Float[Array, ""],
+    fraction: Float[Array, ""],
     arcs: Num[Array, ""],
     tau: AffineBounds,
 ) -> Bounds3:
     """Bounds of the time function of the rotation and its first two derivatives in tau."""
-    omega, slope = math.pi * arcs, (end_beta_hat - start_beta_hat) * share
-    more = tau * slope + (1.0 + start_beta_hat * share)  # 1 + h
+    omega, slope = math.pi * arcs, (end_beta_hat - start_beta_hat) * fraction
+    more = tau * slope + (1.0 + start_beta_hat * fraction)  # 1 + h
     (sine, cosine), (sine3, cosine3) = sincospi(tau * arcs), sincospi(tau * (3.0 * arcs))
     value = cosine + more * (cosine - cosine3) * 0.125
     rate = (cosine - cosine3) * (0.125 * slope) + (more * (3.0 * sine3 - sine) * 0.125 - sine) * omega
-    bend = (3.0 * sine3 - sine) * (0.25 * slope * omega)
-    return value, rate, bend + (more * (9.0 * cosine3 - cosine) * 0.125 - cosine) * omega**2
+    second_derivative = (3.0 * sine3 - sine) * (0.25 * slope * omega)
+    return value, rate, second_derivative + (more * (9.0 * cosine3 - cosine) * 0.125 - cosine) * omega**2
 
 
 def orientation_bounds(slerp: Slerp, values: tuple[AffineBounds, ...], beats: Bounds3) -> Bounds3:
@@ -51,10 +51,10 @@ def orientation_bounds(slerp: Slerp, values: tuple[AffineBounds, ...], beats: Bo
 def _half_vector(slerp: Slerp, values: tuple[AffineBounds, ...]) -> Bounds3:
     a, a1, a2 = values[:3]
     sine, cosine = (f.each(lambda x: x[None]) for f in sincospi(a * (slerp.angle / math.pi)))
-    rate, bend = a1 * slerp.angle, a2 * slerp.angle
+    rate, second_derivative = a1 * slerp.angle, a2 * slerp.angle
     q = cosine * slerp.start + sine * slerp.across
     along = cosine * slerp.across - sine * slerp.start
-    q1, q2 = along * rate, along * bend - q * squared(rate)
+    q1, q2 = along * rate, along * second_derivative - q * squared(rate)
     (s, v), (s1, v1), (s2, v2) = ((f.each(lambda x: x[0]), f.each(lambda x: x[1:])) for f in (q, q1, q2))
     w, w1, w2 = _angle_ratio(s)
     second = w2 * squared(s1) + w1 * s2
@@ -67,7 +67,7 @@ def _angle_ratio(s: AffineBounds) -> Bounds3:
     middle = angle_ratio(s.middle, 1.0 - s.middle**2, orders=4)
     steepest = angle_ratio(low, 1.0 - low**2, orders=5)
     w, w1, w2 = (
-        _widened(bent(s, middle[j], middle[j + 1], (1.0 + DERIVATIVE_ERROR) * steepest[j + 2]), middle[j])
+        _widened(deviation(s, middle[j], middle[j + 1], (1.0 + DERIVATIVE_ERROR) * steepest[j + 2]), middle[j])
         for j in range(3)
     )
     return w, w1, w2
@@ -90,8 +90,10 @@ def _sinc(y: AffineBounds) -> tuple[AffineBounds, ...]:
     slopes = (-0.5 * derivatives[0], *derivatives[1:])
     half = 0.5 * y.reach() ** 2
     return tuple(
-        _widened(AffineBounds(value, slope * y.slope, jnp.abs(slope) * y.radius + bend * half), 1.0 + y.reach())
-        for value, slope, bend in zip((cosine, *derivatives[:3]), slopes, _BENDS, strict=True)
+        _widened(
+            AffineBounds(value, slope * y.slope, jnp.abs(slope) * y.radius + second_derivative * half), 1.0 + y.reach()
+        )
+        for value, slope, second_derivative in zip((cosine, *derivatives[:3]), slopes, _BENDS, strict=True)
     )
 
 

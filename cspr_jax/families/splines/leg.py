@@ -30,16 +30,16 @@ from cspr_jax.verification.proved_answers import proved_answers
 class Splines(Leg):
     """Poses at their times, and files of samples, joined by piecewise polynomials; see `Leg`."""
 
-    def __init__(self, stops: Waypoints) -> None:
+    def __init__(self, waypoints: Waypoints) -> None:
         """Refuse poses without times, and keys of other families."""
-        super().__init__(stops)
+        super().__init__(waypoints)
         self._notes: list[str] = []
         self._points: set[str] = set()
         self._refuse("arcs", "beta_hat")
-        for i, pose in enumerate(stops.poses):
+        for i, pose in enumerate(waypoints.poses):
             if pose.trajectory is not None and pose.motion is None:
-                name = f"{stops.name(i)}.trajectory = {shown(pose.trajectory)}"
-                raise ConfigError(stops.path, f"{name}: must be beside motion, the file that holds it")
+                name = f"{waypoints.name(i)}.trajectory = {shown(pose.trajectory)}"
+                raise ConfigError(waypoints.path, f"{name}: must be beside motion, the file that holds it")
             if pose.motion is not None and i:
                 self._check_file(i)
         for first, last in self._runs:
@@ -56,10 +56,17 @@ class Splines(Leg):
             else:
                 curve = self._curve(problem, z0, first, last)
                 motions += [part(curve, i, i + 1) for i in range(last - first)]
-        if self.stops.keys.stretch is not None:
-            motions = [motion.stretched(self.stops.keys.stretch) for motion in motions]
-        stops = self.stops
-        scene = scene_of(problem.robot, stops.robot_file, stops.frame, stops.keys, stops.path, trajectory=stops.keys)
+        if self.waypoints.keys.stretch is not None:
+            motions = [motion.stretched(self.waypoints.keys.stretch) for motion in motions]
+        waypoints = self.waypoints
+        scene = scene_of(
+            problem.robot,
+            waypoints.robot_file,
+            waypoints.frame,
+            waypoints.keys,
+            waypoints.path,
+            trajectory=waypoints.keys,
+        )
         return proved_answers(problem, motions, scene), list(motions)
 
     def warnings(self, problem: Problem) -> list[str]:
@@ -69,7 +76,7 @@ class Splines(Leg):
     @property
     def _runs(self) -> list[tuple[int, int]]:
         # Numbers of the first and the last pose of each curve: a file, or poses up to one whose velocity is known.
-        poses, ends = self.stops.poses, []
+        poses, ends = self.waypoints.poses, []
         for i in range(1, len(self) + 1):
             stops_here = poses[i].rest or (poses[i].velocity is not None and not self._is_hermite)
             if stops_here or i == len(self) or self._is_file(i - 1) or self._is_file(i):
@@ -78,17 +85,17 @@ class Splines(Leg):
 
     @property
     def _is_hermite(self) -> bool:
-        return self.stops.keys.interpolation == "hermite"
+        return self.waypoints.keys.interpolation == "hermite"
 
     def _is_file(self, segment: int) -> bool:
-        return self.stops.poses[segment + 1].motion is not None
+        return self.waypoints.poses[segment + 1].motion is not None
 
     def _of_file(self, i: int) -> Any:
-        stops = self.stops
-        name = stops.poses[i].motion or ""
-        source = stops.keys.source(name)
+        waypoints = self.waypoints
+        name = waypoints.poses[i].motion or ""
+        source = waypoints.keys.source(name)
         if source is None:
-            source = read_motion(stops.path.parent / name, stops.poses[i].trajectory)
+            source = read_motion(waypoints.path.parent / name, waypoints.poses[i].trajectory)
         try:
             self._refuse_keys_of_samples(source)
             if isinstance(source, Placed):
@@ -98,24 +105,26 @@ class Splines(Leg):
             source = self._cleaned(name, source)
             curve = source_spline(
                 source,
-                z_axis=stops.robot_file.z_axis,
-                is_platform=stops.robot_file.is_platform,
-                interpolation=stops.keys.interpolation,
-                ends=stops.keys.ends,
+                z_axis=waypoints.robot_file.z_axis,
+                is_platform=waypoints.robot_file.is_platform,
+                interpolation=waypoints.keys.interpolation,
+                ends=waypoints.keys.ends,
             )
             is_planar = getattr(source, "is_planar", False)
-            curve = kept_to(stops.robot_file.own_pattern, curve, is_planar=is_planar)
+            curve = kept_to(waypoints.robot_file.own_pattern, curve, is_planar=is_planar)
         except InputError as error:
             raise ConfigError(name, str(error)) from error
         reference = np.array(IDENTITY)
         if not getattr(source, "from_reference", False):
-            reference = reference_of(build_robot(stops.robot_file, stops.keys, stops.path))
-        return placed_inward(curve, stops.frame, reference, centre_from(stops.robot_file, self._point(name, source)))
+            reference = reference_of(build_robot(waypoints.robot_file, waypoints.keys, waypoints.path))
+        return placed_inward(
+            curve, waypoints.frame, reference, centre_from(waypoints.robot_file, self._point(name, source))
+        )
 
     def _point(self, name: str, source: Any) -> str:
-        point, centre = self.stops.keys.point or getattr(source, "point", None), None
+        point, centre = self.waypoints.keys.point or getattr(source, "point", None), None
         if point is None:
-            centre = centre_from(self.stops.robot_file, "origin")
+            centre = centre_from(self.waypoints.robot_file, "origin")
         if centre is not None and centre.any():
             self._notes.append(
                 f"{name}: hint: positions are taken as those of the mass centre, {centre.tolist()} m from the origin "
@@ -127,17 +136,17 @@ class Splines(Leg):
 
     def _refuse_keys_of_samples(self, source: Any) -> None:
         for key in ("interpolation", "ends", "smooth") if not isinstance(source, MotionTable) else ():
-            if getattr(self.stops.keys, key) is not None:
-                raise InputError(key, getattr(self.stops.keys, key), "absent for a motion without samples")
-        if isinstance(source, Placed) and self.stops.keys.point == "origin":
+            if getattr(self.waypoints.keys, key) is not None:
+                raise InputError(key, getattr(self.waypoints.keys, key), "absent for a motion without samples")
+        if isinstance(source, Placed) and self.waypoints.keys.point == "origin":
             raise InputError("point", "origin", '"mass-centre", whose positions functions and motions give')
 
     def _cleaned(self, name: str, source: Any) -> Any:
         # Take the noise off that the plan names, else tell it.
         lines: list[str] = []
         if isinstance(source, MotionTable):
-            lines += [f"hint: {line}" for line in unit_hints(source, np.asarray(self.stops.robot_file.base_points))]
-            noise, settings = list[str](), self.stops.keys
+            lines += [f"hint: {line}" for line in unit_hints(source, np.asarray(self.waypoints.robot_file.base_points))]
+            noise, settings = list[str](), self.waypoints.keys
             if settings.smooth is not None:
                 from cspr_jax.curves.smoothing import smoothed  # takes time, and few records are noisy
 
@@ -150,45 +159,46 @@ class Splines(Leg):
         return source
 
     def _check_file(self, i: int) -> None:
-        pose = self.stops.poses[i]
+        pose = self.waypoints.poses[i]
         for key in ("position", "quaternion", "tilt_torsion", "time"):
             if getattr(pose, key) is not None:
-                name = f"{self.stops.name(i)}.{key}"
-                raise ConfigError(self.stops.path, f"{name}: must be absent where a file leads to the pose")
+                name = f"{self.waypoints.name(i)}.{key}"
+                raise ConfigError(self.waypoints.path, f"{name}: must be absent where a file leads to the pose")
 
     def _check_times(self, first: int, last: int) -> None:
-        stops, previous = self.stops, None
+        waypoints, previous = self.waypoints, None
         for i in range(first, last + 1):
-            time = stops.poses[i].time
+            time = waypoints.poses[i].time
             if time is None and (i > first or first > 0):
-                raise ConfigError(stops.path, f"{stops.name(i)}.time is missing: instant of the pose, s")
+                raise ConfigError(waypoints.path, f"{waypoints.name(i)}.time is missing: instant of the pose, s")
             time = 0.0 if time is None else time
             if previous is not None and not time > previous:
                 raise ConfigError(
-                    stops.path,
-                    f"{stops.name(i)}.time = {time:g}: must be above that of {stops.name(i - 1)}, {previous:g}",
+                    waypoints.path,
+                    f"{waypoints.name(i)}.time = {time:g}: must be above that of {waypoints.name(i - 1)}, {previous:g}",
                 )
             previous = time
 
     def _check_rates(self, first: int, last: int) -> None:
-        poses = self.stops.poses[first : last + 1]
+        poses = self.waypoints.poses[first : last + 1]
         needed = ["velocity"] + ["acceleration"] * any(pose.acceleration is not None for pose in poses)
         for key in needed if self._is_hermite else ():
             for i, pose in enumerate(poses, start=first):
                 if getattr(pose, key) is None and not pose.rest:
                     unit = "m/s" if key == "velocity" else "m/s^2"
                     raise ConfigError(
-                        self.stops.path,
-                        f'{self.stops.name(i)}.{key} is missing: [x, y, z] in {unit}, for interpolation = "hermite"',
+                        self.waypoints.path,
+                        f"{self.waypoints.name(i)}.{key} is missing: [x, y, z] in {unit}, for interpolation = "
+                        '"hermite"',
                     )
 
     def _curve(self, problem: Problem, z0: float, first: int, last: int) -> Spline:
-        stops, keys = self.stops, self.stops.keys
-        chosen, frame = slice(first, last + 1), stops.frame
-        poses, points = stops.poses[chosen], stops.points(z0)
+        waypoints, keys = self.waypoints, self.waypoints.keys
+        chosen, frame = slice(first, last + 1), waypoints.frame
+        poses, points = waypoints.poses[chosen], waypoints.points(z0)
         interpolation = keys.interpolation or "cubic"
         rates = {name: np.array([self._rate(pose, name) for pose in poses]) for name in ("velocity", "acceleration")}
-        velocities, accelerations = (frame.turned(values) for values in rates.values())
+        velocities, accelerations = (frame.rotated(values) for values in rates.values())
         if self._is_hermite:
             derivatives = {"velocities": velocities}
             derivatives |= {} if np.isnan(accelerations).all() else {"accelerations": accelerations}
@@ -198,15 +208,15 @@ class Splines(Leg):
             curve = interpolated(
                 np.array([pose.time or 0.0 for pose in poses]),
                 points[chosen],
-                pose_quaternions(stops, points)[chosen] if isinstance(problem.robot, PlatformRobot) else None,
+                pose_quaternions(waypoints, points)[chosen] if isinstance(problem.robot, PlatformRobot) else None,
                 interpolation=interpolation,
                 ends=keys.ends or "rest",
                 **derivatives,
             )
-            pattern = stops.robot_file.own_pattern
+            pattern = waypoints.robot_file.own_pattern
             return kept_to(pattern, curve, is_planar=False) if PATTERNS[pattern].is_jointed else curve
         except InputError as error:
-            raise ConfigError(stops.path, f"{stops.name(first)} to {stops.name(last)}: {error}") from error
+            raise ConfigError(waypoints.path, f"{waypoints.name(first)} to {waypoints.name(last)}: {error}") from error
 
     def _rate(self, pose, name: str) -> list[float]:
         # A pose at rest has neither velocity nor acceleration.

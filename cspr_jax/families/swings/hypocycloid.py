@@ -57,7 +57,7 @@ class Segment:
 
     Fields:
         plane: (3, 2) unit vectors q_h1 and q_h2 of (2.30), as columns.
-        hub: (3,) the point p0, m.
+        center: (3,) the point p0, m.
         start_radius: () r1 of (2.39), m.
         end_radius: () r2, m.
         precession: () delta, in half turns, in [0, 1].
@@ -70,7 +70,7 @@ class Segment:
     """
 
     plane: Array
-    hub: Array
+    center: Array
     start_radius: Array
     end_radius: Array
     precession: Array
@@ -83,7 +83,7 @@ class Segment:
 
 
 def couplings(
-    robot: PointMassRobot, hub: Float[Array, "3"], axes: Float[Array, "3 n"]
+    robot: PointMassRobot, center: Float[Array, "3"], axes: Float[Array, "3 n"]
 ) -> tuple[Float[Array, "n"], Float[Array, "n_cables n"], Float[Array, "n_cables"]]:
     """Coefficients that couple a motion p = p0 + axes c, in a plane or on a line through p0, to the pseudotensions.
 
@@ -92,17 +92,17 @@ def couplings(
     """
     if robot.n_cables > robot.dof:
         nothing = jnp.full((robot.n_cables, axes.shape[1]), jnp.nan)
-        return point_mass.plane_normal(robot) @ axes / hub[2], nothing, nothing[:, 0]
+        return point_mass.plane_normal(robot) @ axes / center[2], nothing, nothing[:, 0]
     if point_mass.is_planar(robot):
         half = robot.base_points[:, 0]
-        tilt = axes[2] / hub[2]
+        tilt = axes[2] / center[2]
         return tilt, axes[:1] / half[:, None] - tilt[None], jnp.zeros_like(half)  # (1.15), (1.16)
     a = robot.base_points
     area = jnp.cross(a[0], a[1]) + jnp.cross(a[1], a[2]) + jnp.cross(a[2], a[0])
-    scale = 3.0 / (area[2] * hub[2])
+    scale = 3.0 / (area[2] * center[2])
     opposite = jnp.roll(a, -1, axis=0) - jnp.roll(a, -2, axis=0)  # a2 - a3, a3 - a1, a1 - a2
-    tilt = point_mass.plane_normal(robot) @ axes / hub[2]
-    pull = -scale * (jnp.cross(hub, opposite) + area[None] / 3.0) @ axes
+    tilt = point_mass.plane_normal(robot) @ axes / center[2]
+    pull = -scale * (jnp.cross(center, opposite) + area[None] / 3.0) @ axes
     twist = scale * (opposite @ jnp.cross(axes[:, 0], axes[:, -1]))
     return tilt, pull, twist
 
@@ -117,11 +117,11 @@ def segment(
     odd: Bool[Array, ""],
 ) -> Segment:
     """The segment from one point to another."""
-    hub, size = point_mass.rest_point(z0), point_mass.spool_radius(robot)
-    plane, r1, r2, precession = swing_plane(start - hub, end - hub, size, point_mass.plane_normal(robot), odd)
-    tilt, pull, twist = couplings(robot, hub, plane)
+    center, size = point_mass.rest_point(z0), point_mass.spool_radius(robot)
+    plane, r1, r2, precession = swing_plane(start - center, end - center, size, point_mass.plane_normal(robot), odd)
+    tilt, pull, twist = couplings(robot, center, plane)
     sense = jnp.where(odd, 1.0, -1.0).astype(r1.dtype)
-    return Segment(plane, hub, r1, r2, precession, sense, robot.gravity / z0, jnp.zeros_like(r1), tilt, pull, twist)
+    return Segment(plane, center, r1, r2, precession, sense, robot.gravity / z0, jnp.zeros_like(r1), tilt, pull, twist)
 
 
 class Oscillation(NamedTuple):
@@ -201,7 +201,7 @@ def motion(
     a0, a1, a2 = derivatives(amplitude, tau, order=2)
     r, r1, r2 = segment.start_radius + span * a0, span * a1, span * a2  # (2.48)
     time = duration(segment, arcs)
-    position = segment.hub + segment.plane @ (r * u)  # (2.31), (2.38)
+    position = segment.center + segment.plane @ (r * u)  # (2.31), (2.38)
     velocity = segment.plane @ (r1 * u + r * u1) / time  # (2.42)
     acceleration = segment.plane @ (r2 * u + 2.0 * r1 * u1 + r * u2) / time**2  # (2.43)
     return position, velocity, acceleration
@@ -225,7 +225,7 @@ class Hypocycloid:
     @property
     def z0(self) -> Array:
         """Depth of P0 below the centroid of the spools, () m."""
-        return self.segment.hub[..., 2]
+        return self.segment.center[..., 2]
 
     def duration(self) -> Array:
         """Duration; see `Motion.duration`."""

@@ -18,11 +18,11 @@ class Hypocycloids(Leg):
 
     step = 1
 
-    def __init__(self, stops: Waypoints) -> None:
+    def __init__(self, waypoints: Waypoints) -> None:
         """Refuse a key that belongs to transitions."""
-        if stops.keys.inclination is not None:
-            raise ConfigError(stops.path, 'inclination: must be absent unless family = "transition"')
-        super().__init__(stops)
+        if waypoints.keys.inclination is not None:
+            raise ConfigError(waypoints.path, 'inclination: must be absent unless family = "transition"')
+        super().__init__(waypoints)
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the points; see `Leg.join`."""
@@ -35,13 +35,13 @@ class Hypocycloids(Leg):
         return self._answers_and_segments(problem, depths)[0]
 
     def _answers_and_segments(self, problem: Problem, depths: np.ndarray) -> tuple[Answers, Segment]:
-        points = self.stops.points(depths)
+        points = self.waypoints.points(depths)
         starts, ends = points[:, :-1].reshape(-1, 3), points[:, 1:].reshape(-1, 3)
         return arcs_and_segments(
             problem,
             starts,
             ends,
             np.repeat(depths, len(self)),
-            max_arcs=self.stops.max_arcs,
-            arcs=np.tile(self.stops.arcs, len(depths)),
+            max_arcs=self.waypoints.max_arcs,
+            arcs=np.tile(self.waypoints.arcs, len(depths)),
         )

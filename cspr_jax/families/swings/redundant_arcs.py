@@ -61,8 +61,8 @@ def _instants(problem: Problem, items) -> jax.Array:
         state = motion.state(tau)
         margin = centred(robot.wrench_matrix(state), robot.inertial_wrench(state), low, high)[1]
         depth = plane_normal(robot) @ state.position / motion.z0
-        share = margin * robot.n_cables / (robot.mass * robot.gravity)
-        slacks = jnp.stack([share, depth, *other_slacks(robot, limits, state, motion.z0)])
+        fraction = margin * robot.n_cables / (robot.mass * robot.gravity)
+        slacks = jnp.stack([fraction, depth, *other_slacks(robot, limits, state, motion.z0)])
         return jnp.where(jnp.isnan(slacks), -jnp.inf, slacks)
 
     return jax.vmap(one)(*items)

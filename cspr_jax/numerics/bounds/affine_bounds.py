@@ -234,7 +234,7 @@ def cross(f: AffineBounds, g: AffineBounds) -> AffineBounds:
 
 
 @jax.jit
-def turned(matrix: AffineBounds | Float[Array, "... m n"], f: AffineBounds | Float[Array, "... n"]) -> AffineBounds:
+def rotated(matrix: AffineBounds | Float[Array, "... m n"], f: AffineBounds | Float[Array, "... n"]) -> AffineBounds:
     """Bounds of matrices times vectors; one of both may be constant."""
     across: Any = f.each(lambda x: x[..., None, :]) if isinstance(f, AffineBounds) else f[..., None, :]
     # Constants go to the right.

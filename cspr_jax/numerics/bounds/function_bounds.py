@@ -24,7 +24,7 @@ def reciprocal(f: AffineBounds) -> AffineBounds:
     value = 1.0 / f.middle
     if f.square is not None:
         return _bent_parabola(f, (value, -(value**2), 2.0 * value**3), 6.0 / _positive(f) ** 4)
-    return bent(f, value, -(value**2), 2.0 / _positive(f) ** 3)
+    return deviation(f, value, -(value**2), 2.0 / _positive(f) ** 3)
 
 
 @jax.jit
@@ -32,7 +32,7 @@ def root(f: AffineBounds) -> AffineBounds:
     """Bounds of the square root of a positive function."""
     f = flat(f)
     value = jnp.sqrt(f.middle)
-    return bent(f, value, 0.5 / value, -0.25 * _positive(f) ** -1.5)
+    return deviation(f, value, 0.5 / value, -0.25 * _positive(f) ** -1.5)
 
 
 @jax.jit
@@ -41,7 +41,7 @@ def reciprocal_root(f: AffineBounds) -> AffineBounds:
     value = 1.0 / jnp.sqrt(f.middle)
     if f.square is not None:
         return _bent_parabola(f, (value, -0.5 * value**3, 0.75 * value**5), 1.875 * _positive(f) ** -3.5)
-    return bent(f, value, -0.5 * value**3, 0.75 * _positive(f) ** -2.5)
+    return deviation(f, value, -0.5 * value**3, 0.75 * _positive(f) ** -2.5)
 
 
 @jax.jit
@@ -50,9 +50,9 @@ def arc_sine(f: AffineBounds) -> AffineBounds:
     f = flat(f)
     size = jnp.where(f.size() < LARGEST_SINE, f.size(), jnp.nan)
     # The second derivative, x (1 - x^2)^-1.5, changes its sign with x, and is largest where |x| is.
-    bend = 0.5 * size * f.reach() ** 2 * (1.0 - size**2) ** -1.5
+    second_derivative = 0.5 * size * f.reach() ** 2 * (1.0 - size**2) ** -1.5
     value, slope = jnp.arcsin(f.middle), (1.0 - f.middle**2) ** -0.5
-    return rounded(AffineBounds(value, slope * f.slope, slope * f.radius + bend))
+    return rounded(AffineBounds(value, slope * f.slope, slope * f.radius + second_derivative))
 
 
 def _positive(f: AffineBounds) -> Array:
@@ -60,20 +60,20 @@ def _positive(f: AffineBounds) -> Array:
     return jnp.where(low > 0.0, low, jnp.nan)
 
 
-def bent(
-    f: AffineBounds, value: Float[Array, "..."], slope: Float[Array, "..."], bend: Float[Array, "..."]
+def deviation(
+    f: AffineBounds, value: Float[Array, "..."], slope: Float[Array, "..."], second_derivative: Float[Array, "..."]
 ) -> AffineBounds:
     """Bounds of F(f) for a function F whose second derivative keeps its sign."""
     # By Taylor about the middle, the remainder is between 0 and bend reach^2 / 2.
-    half = 0.25 * bend * f.reach() ** 2
+    half = 0.25 * second_derivative * f.reach() ** 2
     return rounded(AffineBounds(value + half, slope * f.slope, jnp.abs(slope) * f.radius + jnp.abs(half)), value)
 
 
 def _bent_parabola(f: AffineBounds, values: tuple[Array, Array, Array], third: Array) -> AffineBounds:
     # F(f) from F and its first two derivatives in the middle, and the size of the third one within the band.
-    value, slope, bend = values
-    off, squared = jnp.abs(f.square) + f.radius, 0.5 * bend * f.slope**2
-    radius = jnp.abs(slope) * f.radius + 0.5 * jnp.abs(bend) * (2.0 * jnp.abs(f.slope) + off) * off
+    value, slope, second_derivative = values
+    off, squared = jnp.abs(f.square) + f.radius, 0.5 * second_derivative * f.slope**2
+    radius = jnp.abs(slope) * f.radius + 0.5 * jnp.abs(second_derivative) * (2.0 * jnp.abs(f.slope) + off) * off
     parabola = AffineBounds(value, slope * f.slope, radius + third / 6.0 * f.reach() ** 3, slope * f.square + squared)
     return rounded(parabola, jnp.abs(value) + jnp.abs(slope * f.square) + jnp.abs(squared))
 

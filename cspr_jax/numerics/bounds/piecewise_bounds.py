@@ -92,16 +92,16 @@ def _between(coefficients: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.
         return coefficients
     after = _split(coefficients, high[:, None, None])
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.where(high > 0.0, low / high, 0.0)[:, None, None]
+        fraction = np.where(high > 0.0, low / high, 0.0)[:, None, None]
     # Reversed, the part up to an instant is the part from there on.
-    return _split(after[:, ::-1], 1.0 - share)[:, ::-1]
+    return _split(after[:, ::-1], 1.0 - fraction)[:, ::-1]
 
 
-def _split(coefficients: np.ndarray, share: np.ndarray) -> np.ndarray:
+def _split(coefficients: np.ndarray, fraction: np.ndarray) -> np.ndarray:
     # Bernstein coefficients over [0, share].
     rows, ends = coefficients, [coefficients[:, :1]]
     while rows.shape[1] > 1:
-        rows = rows[:, :-1] + share * np.diff(rows, axis=1)
+        rows = rows[:, :-1] + fraction * np.diff(rows, axis=1)
         ends.append(rows[:, :1])
     return np.concatenate(ends, axis=1)
 

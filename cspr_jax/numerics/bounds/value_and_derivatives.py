@@ -58,7 +58,7 @@ class Bounds(NamedTuple):
             hypotenuse(self.curvature, other.curvature),
         )
 
-    def turned(self, rate: Array) -> "Bounds":
+    def rotated(self, rate: Array) -> "Bounds":
         """Bounds of the length of a vector and its derivatives, seen from axes it turns against at a constant rate."""
         return Bounds(
             self.value,

@@ -65,7 +65,7 @@ class Frame:
         """Height in the file of a depth below the centroid of the spools."""
         return self.origin[2] + (_numbers(depth) * self.signs[2] + self.rest[2])
 
-    def turned(self, vectors) -> Float[np.ndarray, "... 3"]:
+    def rotated(self, vectors) -> Float[np.ndarray, "... 3"]:
         """Vectors in the other axes, either way."""
         array = _numbers(vectors)
         return array * _beside(self.signs, array)

@@ -31,7 +31,7 @@ def combined(terms: Sequence[tuple[Array, Vector]]) -> Vector:
     return tuple(sum((w * v[i] for w, v in terms[1:]), terms[0][0] * terms[0][1][i]) for i in range(3))
 
 
-def turned(matrix: Matrix, vector: Vector) -> Vector:
+def rotated(matrix: Matrix, vector: Vector) -> Vector:
     """Matrix times vector."""
     return tuple(dot(row, vector) for row in matrix)
 

@@ -65,8 +65,8 @@ def least(
     """Unknowns with the least objective among feasible ones: a local minimum, or the best of several."""
     from scipy.stats import qmc  # it takes a second to import
 
-    share = qmc.Halton(len(low), seed=0).random(LOOKED_AT)
-    places = low + (high - low) * share
+    fraction = qmc.Halton(len(low), seed=0).random(LOOKED_AT)
+    places = low + (high - low) * fraction
     value, margin = in_batches(partial(_screened, parts, arguments), places, size=BATCH)
     usable = np.isfinite(value) & np.isfinite(margin)
     margin = np.where(usable, margin, -np.inf)

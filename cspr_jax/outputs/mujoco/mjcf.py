@@ -44,8 +44,8 @@ BROWN, GLASS, HULL = (0.36, 0.24, 0.18, 0.6), (0.85, 0.45, 0.1, 0.35), "platform
 def model_xml(body: Suspended, moved: Played, step: float = STEP, control_file: str = "", note: str = "") -> str:
     """A model of a robot for MuJoCo."""
     root = ElementTree.Element("mujoco", model=printable(body.name))
-    turned = "" if body.z_axis == "up" else ", turned by half a turn about x: (x, -y, -z) of the robot file"
-    words = f"World axes are those of the robot file{turned}; z is up. A control is the tension of a cable, N."
+    rotated = "" if body.z_axis == "up" else ", turned by half a turn about x: (x, -y, -z) of the robot file"
+    words = f"World axes are those of the robot file{rotated}; z is up. A control is the tension of a cable, N."
     root.append(ElementTree.Comment(f" Written by cspr_jax {__version__}. SI units. {words}{note} "))
     _add(root, "compiler", angle="radian", inertiafromgeom="false")
     # A dense Jacobian of the tendons has one row a cable. Pulleys follow their cables by constraints.

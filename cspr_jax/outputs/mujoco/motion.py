@@ -127,14 +127,14 @@ def suspended(plan: PlannedMotions) -> Suspended:
     row, inertia = PATTERNS[robot.pattern], None
     points = np.zeros((len(written.base_points), 3))
     if plan.robot_file.pairs is not None:
-        points = world.turned(np.asarray(written.platform_points) - np.asarray(written.centre_of_mass or [0.0] * 3))
+        points = world.rotated(np.asarray(written.platform_points) - np.asarray(written.centre_of_mass or [0.0] * 3))
         inertia = world.turned_tensor(np.asarray(written.inertia))
     elif row.is_body:
-        points = world.turned(plan.frame.turned(np.asarray(robot.platform_points)))
+        points = world.rotated(plan.frame.rotated(np.asarray(robot.platform_points)))
         inertia = world.turned_tensor(plan.frame.turned_tensor(np.asarray(robot.inertia)))
     pulleys = robot.pulleys
     if pulleys is not None:
-        pulleys = Pulleys(pulleys.radius, leaf(world.turned(plan.frame.turned(np.asarray(pulleys.axes)))))
+        pulleys = Pulleys(pulleys.radius, leaf(world.rotated(plan.frame.rotated(np.asarray(pulleys.axes)))))
     limits = [getattr(keys, "tension_max", None) for keys in (plan.keys, written)]
     limit = next((value for value in limits if value is not None), np.inf)
     return Suspended(
@@ -214,7 +214,7 @@ def played(plan: PlannedMotions, step: float = STEP) -> Played:
 def in_world(columns: Mapping[str, np.ndarray], segment: Int[np.ndarray, "n"], z_axis: str) -> Played:
     """A motion in MuJoCo's axes."""
     world = upward(z_axis)
-    moved: dict[str, Any] = {name: world.turned(columns[name]) for name in ("position", "velocity", "acceleration")}
+    moved: dict[str, Any] = {name: world.rotated(columns[name]) for name in ("position", "velocity", "acceleration")}
     if "quaternion" in columns:
         from scipy.spatial.transform import Rotation  # takes time, likewise
 
@@ -222,7 +222,7 @@ def in_world(columns: Mapping[str, np.ndarray], segment: Int[np.ndarray, "n"], z
         rotation = Rotation.from_quat(np.roll(world.turned_quaternions(columns["quaternion"]), -1, axis=1))
         back = rotation.inv()
         # Nothing is added to the derivative in axes that turn: omega x omega is nil.
-        moved |= {name: back.apply(world.turned(columns[name])) for name in ("omega", "omega_dot")}
+        moved |= {name: back.apply(world.rotated(columns[name])) for name in ("omega", "omega_dot")}
         moved["rotation"] = rotation
     return Played(time=columns["t"], segment=segment, tension=columns["tension"], **moved)
 

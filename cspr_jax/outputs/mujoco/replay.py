@@ -28,11 +28,11 @@ class PlayedPath(NamedTuple):
 
     Fields:
         position: (n, 3) of the mass centre, m.
-        turned: (n,) angle from the planned orientation, rad; 0 of what does not turn.
+        rotated: (n,) angle from the planned orientation, rad; 0 of what does not turn.
     """
 
     position: np.ndarray
-    turned: np.ndarray
+    rotated: np.ndarray
 
 
 @dataclasses.dataclass(frozen=True)
@@ -84,8 +84,8 @@ class PlayedPlan:
         deviations = {
             "path": self._largest(self.path_deviation, "m"),
             "path_in_one_go": self._largest(self.through_deviation, "m"),
-            "turn": self._largest(self.played.turned, "rad"),
-            "turn_in_one_go": self._largest(self.through.turned, "rad"),
+            "turn": self._largest(self.played.rotated, "rad"),
+            "turn_in_one_go": self._largest(self.through.rotated, "rad"),
             "tension": self._largest(of_cables, "N") | {"cable": int(cable[of_cables.argmax()]) + 1},
         }
         whole = {"robot": self.robot, "mujoco": self.mujoco, "duration": float(self.time[-1]), "steps": self.steps}
@@ -102,7 +102,7 @@ class PlayedPlan:
         text = [f"{self.robot}: {self.time[-1]:.2f} s in {self.steps} steps of MuJoCo {self.mujoco}"]
         for name, how in (("", "each segment from its start"), ("_in_one_go", "all in one go")):
             far, turn = deviations[f"path{name}"], deviations[f"turn{name}"]
-            angle = f" and {two_digits(turn['value'])} rad" if self.played.turned.any() else ""
+            angle = f" and {two_digits(turn['value'])} rad" if self.played.rotated.any() else ""
             text.append(f"path, {how}: at most {two_digits(far['value'])} m{angle} off the plan, {_place(far)}")
         most = deviations["tension"]
         text.append(f"tensions: at most {two_digits(most['value'])} N off, cable {most['cable']}, {_place(most)}")
@@ -119,7 +119,7 @@ def replay(plan: PlannedMotions, step: float = STEP) -> PlayedPlan:
     body, moved = suspended(plan), played(plan, step)
     rows, world = ends_of_steps(moved), upward(plan.robot_file.z_axis)
     ways = [way_of(body, moved, step, by_segment=by_segment) for by_segment in (True, False)]
-    by_segment_path, through = (way._replace(position=world.turned(way.position)) for way in ways)
+    by_segment_path, through = (way._replace(position=world.rotated(way.position)) for way in ways)
     return PlayedPlan(
         robot=plan.robot_file.name,
         z_axis=plan.robot_file.z_axis,
@@ -127,7 +127,7 @@ def replay(plan: PlannedMotions, step: float = STEP) -> PlayedPlan:
         steps=len(rows) - len(moved.runs()),
         time=moved.time[rows],
         segment=moved.segment[rows],
-        position=world.turned(moved.position[rows]),
+        position=world.rotated(moved.position[rows]),
         played=by_segment_path,
         through=through,
         tension=moved.tension[rows],
@@ -180,13 +180,13 @@ def _callback_lent(mujoco: Any) -> Iterator[None]:
 
 def _way(moved: Played, reached: np.ndarray, axes: Sequence[int]) -> PlayedPath:
     rows = ends_of_steps(moved)
-    position, turned = moved.position[rows], np.zeros(len(rows))
+    position, rotated = moved.position[rows], np.zeros(len(rows))
     if moved.rotation is None:
         position[:, list(axes)] = reached[:, : len(axes)]
     else:
         position[:], quaternions = reached[:, :3], np.roll(reached[:, 3:7], -1, axis=1)
-        turned = (moved.rotation[rows].inv() * Rotation.from_quat(quaternions)).magnitude()
-    return PlayedPath(position, turned)
+        rotated = (moved.rotation[rows].inv() * Rotation.from_quat(quaternions)).magnitude()
+    return PlayedPath(position, rotated)
 
 
 def tension_deviation(body: Suspended, moved: Played) -> Float[np.ndarray, "n n_cables"]:

@@ -21,7 +21,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, constant, cross, dot, norm_squared, stacked, turned
+from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, constant, cross, dot, norm_squared, rotated, stacked
 from cspr_jax.numerics.bounds.determinant_bounds import changes_sign
 from cspr_jax.robots.bounds.state_bounds import CableBounds, StateBounds
 from cspr_jax.robots.cables import AnyRobot
@@ -99,7 +99,7 @@ def _ends(state: StateBounds, cables: CableBounds) -> AffineBounds:
 def _seen(state: StateBounds, ends: AffineBounds) -> AffineBounds:
     # Cables from the platform to the spools in platform axes, (n_cables, 3).
     away = ends.each(lambda x: x[:, 0]) - ends.each(lambda x: x[:, 1])
-    return turned(state.rotation.each(lambda x: x.T[None]), away)
+    return rotated(state.rotation.each(lambda x: x.T[None]), away)
 
 
 def _of_pairs(robot: AnyRobot, bodies: Bodies, ends: AffineBounds) -> Range:
@@ -148,7 +148,7 @@ def _signed(bodies: Bodies, first: Solid, second: Solid, depth: Array) -> Range:
 
 def _of_platform(bodies: Bodies, body: Shape, state: StateBounds, cables: CableBounds, ends: AffineBounds) -> Range:
     # In the axes of the platform its shape and the attachment points do not move.
-    away = turned(state.rotation.each(lambda x: x.T[None]), cables.direction)
+    away = rotated(state.rotation.each(lambda x: x.T[None]), cables.direction)
     spools = _inward(state, ends.each(lambda x: x[:, 0]))
     starts = away * bodies.leave + bodies.points
     shape = Solid(constant(body.corners), body.edges, body.faces)
@@ -165,12 +165,12 @@ def _of_platform(bodies: Bodies, body: Shape, state: StateBounds, cables: CableB
 
 def _inward(state: StateBounds, points: AffineBounds) -> AffineBounds:
     # Points (n, 3) in the axes of the platform, from the mass centre.
-    return turned(state.rotation.each(lambda x: x.T[None]), points - state.position.each(lambda x: x[None]))
+    return rotated(state.rotation.each(lambda x: x.T[None]), points - state.position.each(lambda x: x[None]))
 
 
 def _platform_from_obstacles(bodies: Bodies, body: Shape, state: StateBounds) -> Range:
     shape, parts = Solid(constant(body.corners), body.edges, body.faces), []
-    place = turned(state.rotation.each(lambda x: x[None]), body.corners) + state.position.each(lambda x: x[None])
+    place = rotated(state.rotation.each(lambda x: x[None]), body.corners) + state.position.each(lambda x: x[None])
 
     def from_rod(rod: Array) -> Range:
         axis = Solid(_inward(state, constant(rod)), *SEGMENT)
@@ -220,8 +220,8 @@ def _pass(first: AffineBounds, second: AffineBounds) -> Array:
     is_inside = square.low() > 0.0
     for ray in (v, u):
         # Share of a cable at which the lines are nearest, times the square of the normal.
-        share = dot(cross(between, ray), normal)
-        is_inside &= (share.low() > 0.0) & ((square - share).low() > 0.0)
+        fraction = dot(cross(between, ray), normal)
+        is_inside &= (fraction.low() > 0.0) & ((square - fraction).low() > 0.0)
     return is_inside & changes_sign(dot(between, normal))
 
 

@@ -16,9 +16,9 @@ from cspr_jax.numerics.bounds.affine_bounds import (
     dot,
     joined,
     norm_squared,
+    rotated,
     selected,
     squared,
-    turned,
 )
 from cspr_jax.numerics.bounds.function_bounds import reciprocal_root
 from cspr_jax.robots.bounds.pulley_bounds import pulley_bounds
@@ -82,7 +82,7 @@ def attachments(
     target, velocity, pull = (_rows(bounds) for bounds in state[:3])
     if not isinstance(robot, PlatformRobot):
         return None, target, velocity, pull
-    arm = turned(state.rotation.each(lambda x: x[None]), robot.platform_points)
+    arm = rotated(state.rotation.each(lambda x: x[None]), robot.platform_points)
     swing = cross(_rows(state.angular_velocity), arm)
     pull = pull + cross(_rows(state.angular_acceleration), arm) + cross(_rows(state.angular_velocity), swing)
     return arm, target + arm, velocity + swing, pull
@@ -123,7 +123,7 @@ def balance_bounds(robot: AnyRobot, state: StateBounds, cables: CableBounds) -> 
     moments = cross(cables.arm, cables.direction).each(jnp.transpose)
     moment = _spin_moment(robot, state)
     if row.is_jointed and robot.centre_of_mass is not None:
-        moment = moment + cross(turned(state.rotation, robot.centre_of_mass), force)
+        moment = moment + cross(rotated(state.rotation, robot.centre_of_mass), force)
     matrix = balanced_part(robot, state.rotation, forces, moments)
     wrench = balanced_part(robot, state.rotation, *(bounds.each(lambda x: x[:, None]) for bounds in (force, moment)))
     return matrix, wrench.each(lambda x: x[:, 0])
@@ -140,8 +140,8 @@ def _spin_moment(robot: PlatformRobot, state: StateBounds) -> AffineBounds:
         arm = jnp.asarray(robot.centre_of_mass)
         inertia = inertia + robot.mass * (jnp.dot(arm, arm) * jnp.eye(3) - jnp.outer(arm, arm))
     back = state.rotation.each(jnp.transpose)
-    velocity, acceleration = turned(back, state.angular_velocity), turned(back, state.angular_acceleration)
-    return turned(state.rotation, turned(inertia, acceleration) + cross(velocity, turned(inertia, velocity)))
+    velocity, acceleration = rotated(back, state.angular_velocity), rotated(back, state.angular_acceleration)
+    return rotated(state.rotation, rotated(inertia, acceleration) + cross(velocity, rotated(inertia, velocity)))
 
 
 def balanced_part(
@@ -150,7 +150,7 @@ def balanced_part(
     """Bounds of the components of wrenches that the cables balance."""
     row = PATTERNS[robot.pattern]
     if row.along_line:
-        across = turned(rotation.each(lambda x: x[None]), across_line(robot).T)
+        across = rotated(rotation.each(lambda x: x[None]), across_line(robot).T)
         turning = _products(across, moment)
     else:
         turning = moment.each(lambda x: x[np.array(row.moments)])

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import jax.numpy as jnp
 from jax import Array, lax
 
-from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, constant, cross, dot, norm, turned
+from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, constant, cross, dot, norm, rotated
 from cspr_jax.numerics.elementary import solved
 from cspr_jax.robots.bounds.state_bounds import CableBounds, StateBounds, balance_bounds, balanced_part
 from cspr_jax.robots.bounds.witness_tensions import witness_tensions
@@ -106,7 +106,7 @@ class _UnitBlock(NamedTuple):
         rounding = jnp.where(jnp.sum(left, axis=1).max() < 0.5 * SURPLUS, SURPLUS, jnp.nan)
         radius = self.matrix.radius + rounding * jnp.sum(jnp.abs(self.matrix.middle), axis=0, keepdims=True)
         within = jnp.abs(rows @ self.matrix.slope) + jnp.abs(rows) @ radius
-        ways = turned(self.across.each(lambda x: x.reshape(dof, -1).T[None]), rows)
+        ways = rotated(self.across.each(lambda x: x.reshape(dof, -1).T[None]), rows)
         return within, norm(ways.each(lambda x: x.reshape(len(rows), count, 3))).high() * self.tilt[None]
 
 
@@ -137,8 +137,8 @@ def centre_wrench(robot: AnyRobot, state: StateBounds, centre: Float[Array, "3"]
     """Bounds of what a displaced mass centre adds to the wrench that cables must supply."""
     if not isinstance(robot, PlatformRobot):
         return constant(jnp.zeros(robot.dof))
-    linear = turned(_centre_influence(robot, state), centre)
-    force = turned(_whirl(state), centre) * robot.mass
+    linear = rotated(_centre_influence(robot, state), centre)
+    force = rotated(_whirl(state), centre) * robot.mass
     return linear + _wrench_of(robot, state, None, cross(constant(centre), force))
 
 
@@ -177,16 +177,16 @@ def _whirl(state: StateBounds) -> AffineBounds:
 
 def _centre_influence(robot: PlatformRobot, state: StateBounds) -> AffineBounds:
     # Share of a displaced mass centre in the wrench, to first order, (dof, 3) per length.
-    whirl, axes = _whirl(state) * robot.mass, constant(jnp.eye(3))
+    acceleration_matrix, axes = _whirl(state) * robot.mass, constant(jnp.eye(3))
     force = (state.acceleration + jnp.asarray([0.0, 0.0, -1.0]) * robot.gravity) * robot.mass
     moment: AffineBounds | None = None
     if PATTERNS[robot.pattern].is_jointed and robot.centre_of_mass is not None:
-        arm = turned(state.rotation, robot.centre_of_mass)
-        force = force + turned(whirl, arm)
-        moment = cross(arm.each(lambda x: x[None]), whirl.each(jnp.transpose))
+        arm = rotated(state.rotation, robot.centre_of_mass)
+        force = force + rotated(acceleration_matrix, arm)
+        moment = cross(arm.each(lambda x: x[None]), acceleration_matrix.each(jnp.transpose))
     turning = cross(axes, force.each(lambda x: x[None]))
     moment = turning if moment is None else turning + moment
-    return balanced_part(robot, state.rotation, whirl, moment.each(jnp.transpose))
+    return balanced_part(robot, state.rotation, acceleration_matrix, moment.each(jnp.transpose))
 
 
 def _centre_change(robot: AnyRobot, state: StateBounds, inverse: Array, size: Array) -> Array:
@@ -195,9 +195,9 @@ def _centre_change(robot: AnyRobot, state: StateBounds, inverse: Array, size: Ar
         return jnp.zeros(robot.n_cables)
     influence = _centre_influence(robot, state).each(lambda x: x.T[None])
     moments = balanced_part(robot, state.rotation, constant(jnp.zeros((3, 3))), constant(jnp.eye(3)))
-    turning = turned(moments.each(lambda x: x.T[None]), inverse)
-    whirl = jnp.linalg.norm(_whirl(state).size()) * robot.mass
-    return size * (norm(turned(influence, inverse)).high() + size * whirl * norm(turning).high())
+    turning = rotated(moments.each(lambda x: x.T[None]), inverse)
+    acceleration_matrix = jnp.linalg.norm(_whirl(state).size()) * robot.mass
+    return size * (norm(rotated(influence, inverse)).high() + size * acceleration_matrix * norm(turning).high())
 
 
 def _solution(matrix: Array, right: Array) -> Array:

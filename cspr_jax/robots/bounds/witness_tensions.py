@@ -21,7 +21,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, constant, dot, squares, turned
+from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, constant, dot, rotated, squares
 from cspr_jax.numerics.elementary import solved
 from cspr_jax.robots.statics.wrench_sets import FLAT
 from cspr_jax.robots.tensions.nearest_face import NearestFace, nearest_face
@@ -124,11 +124,11 @@ def _solution(
     if matrix.square is not None:
         line = line._replace(square=inverse @ (squares(right) - matrix.square @ middle - matrix.slope @ slope))
         rows += jnp.abs(matrix.square @ inverse)
-    residual = (right - turned(matrix, line)).size()
+    residual = (right - rotated(matrix, line)).size()
     rows = jnp.sum(rows + matrix.radius @ jnp.abs(inverse), axis=1)
-    share = jnp.max(rows, initial=0.0)
-    radius = jnp.abs(inverse) @ (residual + rows * jnp.max(residual, initial=0.0) / (1.0 - share))
-    is_known = (share < 1.0) & jnp.isfinite(middle).all() & jnp.isfinite(slope).all() & jnp.isfinite(radius).all()
+    fraction = jnp.max(rows, initial=0.0)
+    radius = jnp.abs(inverse) @ (residual + rows * jnp.max(residual, initial=0.0) / (1.0 - fraction))
+    is_known = (fraction < 1.0) & jnp.isfinite(middle).all() & jnp.isfinite(slope).all() & jnp.isfinite(radius).all()
     return line._replace(radius=jnp.where(is_known, radius, jnp.nan)), is_known
 
 
@@ -142,7 +142,7 @@ def _face_margin(
     across, nothing = matrix.each(lambda x: x[:, columns].T), constant(jnp.zeros(dof - 1))
     normal, is_normal = _solution(across, right_inverse(across.middle), nothing, face.along @ inverse, jnp.zeros(dof))
     is_spanning = (jnp.arange(count)[:, None] == columns[None]).any(1)
-    along = turned(matrix.each(jnp.transpose), normal).each(lambda x: jnp.where(is_spanning, 0.0, x))
+    along = rotated(matrix.each(jnp.transpose), normal).each(lambda x: jnp.where(is_spanning, 0.0, x))
     # Each cable at the limit that gives the least; the other one counts as far as its product may change sign.
     is_inward = along.middle > 0.0
     limit = jnp.where(is_spanning, 0.0, jnp.where(is_inward, low, high))

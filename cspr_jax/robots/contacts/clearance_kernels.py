@@ -133,7 +133,7 @@ def _cables(points: Points, poses: PoseLanes) -> tuple[Sequence[Vector], Sequenc
     rotation, count = _rotation(poses), points.base.shape[0]
     arms = [_three(points.platform[k]) for k in range(count)]
     if rotation is not None:
-        arms = [lanes.turned(rotation, arm) for arm in arms]
+        arms = [lanes.rotated(rotation, arm) for arm in arms]
     ends = [_three(points.base[k]) for k in range(count)] if poses.ends is None else list(poses.ends)
     return ends, [tuple(poses.position[i] + arms[k][i] - ends[k][i] for i in range(3)) for k in range(count)]
 
@@ -156,7 +156,7 @@ def _lines(points: Points, poses: PoseLanes) -> tuple[list[Array] | None, list[A
     arms = [jnp.broadcast_to(points.platform[:, i, None], shape) for i in range(3)]
     rotation = _rotation(poses)
     if rotation is not None:
-        arms = list(lanes.turned([[jnp.broadcast_to(x[None], shape) for x in row] for row in rotation], arms))
+        arms = list(lanes.rotated([[jnp.broadcast_to(x[None], shape) for x in row] for row in rotation], arms))
     return None, [poses.position[i][None] + arms[i] - points.base[:, i, None] for i in range(3)]
 
 

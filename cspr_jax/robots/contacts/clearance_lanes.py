@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
-from cspr_jax.numerics.elementary import lesser
+from cspr_jax.numerics.elementary import nan_ignoring_min
 from cspr_jax.numerics.linear.lanes import Vector, cross, dot
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def _greater(a: Array, b: Array) -> Array:
 
 def _fraction(x: Array) -> Array:
     # Clip to [0, 1] by one instruction each; `jnp.clip` would take care of NaN, which shows in the distance anyway.
-    return lesser(_greater(x, jnp.zeros_like(x)), jnp.ones_like(x))
+    return nan_ignoring_min(_greater(x, jnp.zeros_like(x)), jnp.ones_like(x))
 
 
 def _less(a: Vector, b: Vector) -> Vector:
@@ -104,13 +104,13 @@ def _outside_box(a: Vector, u: Vector, half: Numbers) -> Array:
     first, *others = (_beyond(_along(a, u, place), half) for place in (part, start, stop))
     least = dot(first, first)
     for beyond in others:
-        least = lesser(dot(beyond, beyond), least)
+        least = nan_ignoring_min(dot(beyond, beyond), least)
     return jnp.sqrt(least)
 
 
 def _beyond(point: Vector, half: Numbers) -> Vector:
     # Return the vector to a point from the nearest point of the box.
-    return tuple(x - _greater(lesser(x, h), -h) for x, h in zip(point, half, strict=True))
+    return tuple(x - _greater(nan_ignoring_min(x, h), -h) for x, h in zip(point, half, strict=True))
 
 
 def _parting(a: Vector, u: Vector, half: Numbers) -> Array:
@@ -171,7 +171,7 @@ def segment_hull(a: Vector, u: Vector, hull: Polyhedron) -> Float[Array, "..."]:
         meet = -high / jnp.where(rate == 0.0, jnp.ones_like(rate), rate)
         # A segment parallel to a face lies outside of its plane, or inside, as a whole.
         first = jnp.where(rate < 0.0, _greater(meet, ends[0]), ends[0])
-        last = jnp.where(rate > 0.0, lesser(meet, ends[1]), ends[1])
+        last = jnp.where(rate > 0.0, nan_ignoring_min(meet, ends[1]), ends[1])
         return first, jnp.where((rate == 0.0) & (high > 0.0), -jnp.ones_like(last), last)
 
     first, last = lax.fori_loop(0, count, clip, (zero, jnp.ones_like(zero)))
@@ -197,7 +197,9 @@ def _outside_hull(a: Vector, u: Vector, hull: Polyhedron) -> Array:
 
     def to_edge(edge, least):
         start, end = hull.edges[edge, 0], hull.edges[edge, 1]
-        return lesser(segments(a, u, [start[k] for k in range(3)], [end[k] - start[k] for k in range(3)]), least)
+        return nan_ignoring_min(
+            segments(a, u, [start[k] for k in range(3)], [end[k] - start[k] for k in range(3)]), least
+        )
 
     def to_face(face, least):
         normal, triangle = hull.normals[face], hull.triangles[face]
@@ -260,7 +262,7 @@ def hull_box(hull: Polyhedron, centre: Vector, axes: Sequence[Vector], half: Num
 
         def of_corner(corner, ends, axis=axis):
             height = dot([corners[corner, k] for k in range(3)], axis)
-            return lesser(height, ends[0]), _greater(height, ends[1])
+            return nan_ignoring_min(height, ends[0]), _greater(height, ends[1])
 
         far = jnp.full_like(largest, jnp.inf)
         low, high = lax.fori_loop(0, len(corners), of_corner, (far, -far))

@@ -225,7 +225,7 @@ def nearest_weights(
     (first, second), (edges, s, t) = features.bodies, features.nearest_on_edges(p, q)
 
     def spread(count: int, corners: Array, shares: list[Array]) -> Array:
-        return sum(jnp.where(jnp.arange(count) == corners[k], share, 0.0) for k, share in enumerate(shares))  # type: ignore[return-value]
+        return sum(jnp.where(jnp.arange(count) == corners[k], fraction, 0.0) for k, fraction in enumerate(shares))  # type: ignore[return-value]
 
     def on_edge(count: int, edge: Array, part: Array) -> Array:
         return spread(count, edge, [1.0 - part, part])

@@ -54,8 +54,8 @@ def residual(sides: tuple[Vector, Vector], normal: Vector, seen: Vector) -> Vect
     left = []
     for side in sides:
         # The sector of a point inside the platform has no sides.
-        share = jnp.maximum(dot(seen, side) / jnp.maximum(dot(side, side), TINY), 0.0)
-        left.append(tuple(v - share * w for v, w in zip(seen, side, strict=True)))
+        fraction = jnp.maximum(dot(seen, side) / jnp.maximum(dot(side, side), TINY), 0.0)
+        left.append(tuple(v - fraction * w for v, w in zip(seen, side, strict=True)))
     is_first = dot(left[0], left[0]) <= dot(left[1], left[1])
     return tuple(jnp.where(inside, w, jnp.where(is_first, a, b)) for w, a, b in zip(up, *left, strict=True))
 

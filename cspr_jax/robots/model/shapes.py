@@ -171,12 +171,12 @@ def inward(shape: Obstacle, frame: Frame) -> Obstacle:
         return dataclasses.replace(shape, start=frame.inward(shape.start), end=frame.inward(shape.end))
     if isinstance(shape, Sphere):
         return dataclasses.replace(shape, centre=frame.inward(shape.centre))
-    return dataclasses.replace(shape, centre=frame.inward(shape.centre), rotation=frame.turned(shape.rotation.T).T)
+    return dataclasses.replace(shape, centre=frame.inward(shape.centre), rotation=frame.rotated(shape.rotation.T).T)
 
 
-def turned(shape: Body, frame: Frame) -> Body:
+def in_kernel_axes(shape: Body, frame: Frame) -> Body:
     """The shape of a platform in the platform axes of the kernels."""
-    return _changed(shape, frame.turned)
+    return _changed(shape, frame.rotated)
 
 
 def rotated(shape: Body, rotation: Float[np.ndarray, "3 3"]) -> Body:

@@ -64,5 +64,5 @@ def cable_motion(
 
 def _planar_adjugate(rays: Array) -> Array:
     # Return rows whose products with p'' - g are the numerators of both unknowns by Cramer's rule, in the plane y = 0.
-    turned = jnp.stack([rays[:, 2], jnp.zeros_like(rays[:, 0]), -rays[:, 0]], axis=1)
-    return jnp.stack([turned[1], -turned[0]])
+    rotated = jnp.stack([rays[:, 2], jnp.zeros_like(rays[:, 0]), -rays[:, 0]], axis=1)
+    return jnp.stack([rotated[1], -rotated[0]])

@@ -20,12 +20,12 @@ def centred(robot: RobotKind) -> tuple[RobotKind, Frame]:
     frame = frame_of(robot.base_points, robot.z_axis)
     changes: dict[str, Any] = {"base_points": leaf(frame.inward(robot.base_points)), "z_axis": "down"}
     if isinstance(robot, PlatformRobot):
-        changes["platform_points"] = leaf(frame.turned(robot.platform_points))
+        changes["platform_points"] = leaf(frame.rotated(robot.platform_points))
         changes["inertia"] = frame.turned_tensor(leaf(robot.inertia))
         if robot.centre_of_mass is not None:
-            changes["centre_of_mass"] = leaf(frame.turned(robot.centre_of_mass))
+            changes["centre_of_mass"] = leaf(frame.rotated(robot.centre_of_mass))
     if robot.pulleys is not None:
-        changes["pulleys"] = Pulleys(robot.pulleys.radius, leaf(frame.turned(robot.pulleys.axes)))
+        changes["pulleys"] = Pulleys(robot.pulleys.radius, leaf(frame.rotated(robot.pulleys.axes)))
     return dataclasses.replace(robot, limits=NO_LIMITS, **changes), frame
 
 

@@ -77,33 +77,33 @@ def aligned(robot: PlatformRobot) -> tuple[PlatformRobot, Float[np.ndarray, "3 3
             rotation = np.eye(3)
     points, inertia = leaf(robot.platform_points) @ rotation.T, rotation @ leaf(robot.inertia) @ rotation.T
     centre = None if robot.centre_of_mass is None else leaf(leaf(robot.centre_of_mass) @ rotation.T)
-    turned = dataclasses.replace(robot, platform_points=leaf(points), inertia=leaf(inertia), centre_of_mass=centre)
-    return turned, rotation
+    rotated = dataclasses.replace(robot, platform_points=leaf(points), inertia=leaf(inertia), centre_of_mass=centre)
+    return rotated, rotation
 
 
 def reference_pose(robot: PlatformRobot, z0: float) -> Reference:
     """The reference orientation of a robot, checked."""
-    turned, rotation = aligned(robot)
-    hub = rest_point(np.asarray(z0, float))
+    rotated, rotation = aligned(robot)
+    center = rest_point(np.asarray(z0, float))
     with double_precision():
-        size, still = (np.asarray(x) for x in _standing(turned, hub))
+        size, still = (np.asarray(x) for x in _standing(rotated, center))
     place = f"the reference pose (platform level and at rest, z0 = {z0:g} m)"
     if not wrench_balance.is_regular(abs(size)):
         fault = f"{place} is singular (determinant {size:.1g}, at least {wrench_balance.SINGULAR:g} counts): "
-        raise InputError("platform_points", None, _CHANGE_LINES, fault=fault + _free(turned, hub))
+        raise InputError("platform_points", None, _CHANGE_LINES, fault=fault + _free(rotated, center))
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):  # all tensions may be zero, or not finite
-        share = still / np.abs(still).mean()
-    if not (np.isfinite(share) & (share > SMALLEST_TENSION)).all():
-        slack = int(np.argmin(np.where(np.isfinite(share), share, -np.inf)))
-        fault = f"in {place} cable {slack + 1} is slack: it would need {share[slack]:.3g} of the mean tension"
+        fraction = still / np.abs(still).mean()
+    if not (np.isfinite(fraction) & (fraction > SMALLEST_TENSION)).all():
+        slack = int(np.argmin(np.where(np.isfinite(fraction), fraction, -np.inf)))
+        fault = f"in {place} cable {slack + 1} is slack: it would need {fraction[slack]:.3g} of the mean tension"
         raise InputError("platform_points", None, _CHANGE_LOAD, fault=fault)
-    return Reference(turned, rotation, float(size), share)
+    return Reference(rotated, rotation, float(size), fraction)
 
 
-def _free(robot: PlatformRobot, hub: np.ndarray) -> str:
+def _free(robot: PlatformRobot, center: np.ndarray) -> str:
     # Find the small motion that changes no cable length, a shift and a rotation, and name its largest part.
     points = np.asarray(robot.platform_points)
-    cables = np.asarray(robot.base_points) - hub - points
+    cables = np.asarray(robot.base_points) - center - points
     along = cables / np.linalg.norm(cables, axis=1, keepdims=True)
     size = np.linalg.norm(points, axis=1).max()
     still = np.linalg.svd(np.hstack([along, np.cross(points, along) / size]))[2][-1]
@@ -117,9 +117,9 @@ def _free(robot: PlatformRobot, hub: np.ndarray) -> str:
 
 
 @jax.jit
-def _standing(robot: PlatformRobot, hub: Array) -> tuple[Array, Array]:
-    return wrench_balance.normalised_determinant(robot, hub, jnp.eye(3)), wrench_balance.tensions(
-        robot, wrench_balance.at_rest(hub, jnp.eye(3))
+def _standing(robot: PlatformRobot, center: Array) -> tuple[Array, Array]:
+    return wrench_balance.normalised_determinant(robot, center, jnp.eye(3)), wrench_balance.tensions(
+        robot, wrench_balance.at_rest(center, jnp.eye(3))
     )
 
 

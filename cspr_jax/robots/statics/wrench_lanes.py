@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.numerics.linear.lanes import Matrix, Vector, combined, cross, dot, turned, turned_back
+from cspr_jax.numerics.linear.lanes import Matrix, Vector, combined, cross, dot, rotated, turned_back
 from cspr_jax.robots.model.platform import PlatformRobot
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ class Balance(NamedTuple):
 
 def cable_lanes(robot: PlatformRobot, position: Vector, rotation: Matrix) -> CableLanes:
     """Arms and rays of the cables, (3.1)."""
-    each = {k: turned(rotation, [robot.platform_points[k, j] for j in range(3)]) for k in set(robot.joints)}
+    each = {k: rotated(rotation, [robot.platform_points[k, j] for j in range(3)]) for k in set(robot.joints)}
     arms = [each[k] for k in robot.joints]
     rays = [tuple(position[i] + arm[i] - robot.base_points[k, i] for i in range(3)) for k, arm in enumerate(arms)]
     return CableLanes(arms, rays)
@@ -66,7 +66,7 @@ def inertial_wrench(
 
     def weighted(vector):
         own_axes = turned_back(rotation, vector)
-        return turned(rotation, [dot([inertia[i, j] for j in range(3)], own_axes) for i in range(3)])
+        return rotated(rotation, [dot([inertia[i, j] for j in range(3)], own_axes) for i in range(3)])
 
     x, y = weighted(angular_acceleration), cross(omega, weighted(omega))
     force = (acceleration[0], acceleration[1], acceleration[2] - robot.gravity)

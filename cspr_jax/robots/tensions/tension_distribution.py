@@ -194,10 +194,10 @@ def _candidates(solutions: AllTensions, low: Array, high: Array) -> tuple[Array,
     if freedom == 1:
         return points, is_point
     one, other = _pairs(count)
-    turned = jnp.stack([rows[:, 1], -rows[:, 0]], axis=1)
-    product = jnp.sum(rows[one] * turned[other], axis=1)
+    rotated = jnp.stack([rows[:, 1], -rows[:, 0]], axis=1)
+    product = jnp.sum(rows[one] * rotated[other], axis=1)
     meet = is_line[one] & is_line[other] & (jnp.abs(product) > FLAT)
-    crossings = offsets[one][:, None] * turned[other] - offsets[other][:, None] * turned[one]
+    crossings = offsets[one][:, None] * rotated[other] - offsets[other][:, None] * rotated[one]
     crossings = crossings / jnp.where(meet, product, 1.0)[:, None]
     return jnp.concatenate([points, crossings]), jnp.concatenate([is_point, meet])
 

@@ -16,7 +16,7 @@ import numpy as np
 from jax import Array, lax
 
 from cspr_jax.numerics.batches import in_batches, in_parts, room
-from cspr_jax.numerics.elementary import lesser
+from cspr_jax.numerics.elementary import nan_ignoring_min
 from cspr_jax.numerics.linear.lanes import stored
 from cspr_jax.robots.statics.wrench_sets import FLAT
 from cspr_jax.robots.tensions.tension_distribution import TENSION_ERROR, WITHIN, Distribution
@@ -83,7 +83,7 @@ def _all_tensions(matrix: Array, wrench: Array, one: Array) -> tuple[list[Array]
         units.append(kernel[-1])
     shortest, longest = lengths[0], lengths[0]
     for length in lengths[1:]:
-        shortest, longest = lesser(length, shortest), jnp.where(length > longest, length, longest)
+        shortest, longest = nan_ignoring_min(length, shortest), jnp.where(length > longest, length, longest)
     return least, kernel, shortest / longest
 
 
@@ -94,12 +94,12 @@ def _interval(values: Lanes, rates: Lanes, low: Lanes, high: Lanes, rounding: Ar
         moves = jnp.abs(rate) > FLAT
         inverse = 1.0 / jnp.where(moves, rate, 1.0)
         to_least, to_most = (least - rounding - value) * inverse, (most + rounding - value) * inverse
-        near, far = lesser(to_least, to_most), jnp.where(to_least > to_most, to_least, to_most)
+        near, far = nan_ignoring_min(to_least, to_most), jnp.where(to_least > to_most, to_least, to_most)
         # A tension with rate zero keeps its limits everywhere or nowhere.
         is_kept = (value >= least - rounding) & (value <= most + rounding)
         near, far = jnp.where(moves, near, -jnp.inf), jnp.where(moves | is_kept, far, -jnp.inf)
         far = jnp.where(moves | ~is_kept, far, jnp.inf)
-        first, last = jnp.where(near > first, near, first), lesser(far, last)
+        first, last = jnp.where(near > first, near, first), nan_ignoring_min(far, last)
     return first, last
 
 
@@ -153,7 +153,7 @@ def _shortest(least: Lanes, low: Lanes, high: Lanes, size: Array, points: Sequen
     shortest = best.real * best.real + best.imag * best.imag
     for point in points[1:]:
         square = point.real * point.real + point.imag * point.imag
-        best, shortest = jnp.where(square < shortest, point, best), lesser(square, shortest)
+        best, shortest = jnp.where(square < shortest, point, best), nan_ignoring_min(square, shortest)
     # The result is not finite where no point is within limits.
     return jnp.where(within, jnp.zeros_like(best), best)
 
@@ -189,7 +189,7 @@ def _residual(matrix: Array, wrench: Array, tensions: Lanes) -> Array:
 def _of_batch(batch: tuple[np.ndarray, ...]) -> tuple[tuple[Array, ...], Array, Array, Array]:
     matrix, wrench, low, high = (np.ascontiguousarray(np.moveaxis(x, 0, -1)) for x in batch)
     lows, highs = list(low), list(high)
-    least, kernel, share = _all_tensions(matrix, wrench, np.ones(()))
+    least, kernel, fraction = _all_tensions(matrix, wrench, np.ones(()))
     size = _size(least, lows)
     if len(kernel) == 1:
         points = [_in_interval(least, kernel, lows, highs, size)]
@@ -201,7 +201,7 @@ def _of_batch(batch: tuple[np.ndarray, ...]) -> tuple[tuple[Array, ...], Array, 
             points.append(_on_line(rolled[0], rolled[1:3], *rolled[3:], size))
     point = _shortest(least, lows, highs, size, points)
     tensions = _tensions(least, kernel, point)
-    return tuple(tensions), _residual(matrix, wrench, tensions), _verdict(tensions, lows, highs, point), share
+    return tuple(tensions), _residual(matrix, wrench, tensions), _verdict(tensions, lows, highs, point), fraction
 
 
 def least_norms(
@@ -218,5 +218,5 @@ def least_norms(
         return np.stack(tensions, 1), *others
 
     parts = in_parts(one, len(matrices), 4 * room(BATCH))
-    tensions, residual, is_within, share = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return Distribution(*(cast(Array, x) for x in (tensions, residual, is_within))), ~(share > UNCERTAIN)
+    tensions, residual, is_within, fraction = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return Distribution(*(cast(Array, x) for x in (tensions, residual, is_within))), ~(fraction > UNCERTAIN)

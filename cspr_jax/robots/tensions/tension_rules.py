@@ -161,10 +161,10 @@ def _along_barriers(solutions: AllTensions, start: Array, low: Array, high: Arra
         weight = FIRST_WEIGHT * jnp.exp(part * np.log(LAST_WEIGHT / FIRST_WEIGHT))
         away = (tensions - reference) / scale
         distance = jnp.maximum(jnp.abs(away), NEAR)
-        bend = jnp.exp((p - 2.0) * jnp.log(distance))
+        second_derivative = jnp.exp((p - 2.0) * jnp.log(distance))
         above, below = rooms(tensions)
-        slope = bend * away + weight * (jnp.where(has_largest, 1.0 / below, 0.0) - 1.0 / above)
-        bends = (p - 1.0) * bend + weight * (jnp.where(has_largest, 1.0 / below**2, 0.0) + 1.0 / above**2)
+        slope = second_derivative * away + weight * (jnp.where(has_largest, 1.0 / below, 0.0) - 1.0 / above)
+        bends = (p - 1.0) * second_derivative + weight * (jnp.where(has_largest, 1.0 / below**2, 0.0) + 1.0 / above**2)
         hessian = (solutions.kernel * bends[None]) @ solutions.kernel.T
         hessian = hessian + jnp.eye(freedom) * (1e-15 * jnp.trace(hessian) + 1e-300)
         way = -solved(hessian, (solutions.kernel @ slope)[:, None])[0][:, 0] @ solutions.kernel

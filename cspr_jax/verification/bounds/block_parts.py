@@ -79,9 +79,9 @@ class TimeBlocks(NamedTuple):
     def _part(self, chosen, first, last, **edges) -> "TimeBlocks":
         # Bounds by the lines between two shares of the block, beyond the edges by more than these are rounded.
         low, high, low_rise, high_rise = self.slacks
-        ends = [np.broadcast_to(share, len(low))[:, None] for share in (first, last)]
-        fall = np.minimum(*(low_rise * share for share in ends)) + np.maximum(-low_rise, 0.0)
-        rise = np.maximum(*(high_rise * share for share in ends)) - np.maximum(high_rise, 0.0)
+        ends = [np.broadcast_to(fraction, len(low))[:, None] for fraction in (first, last)]
+        fall = np.minimum(*(low_rise * fraction for fraction in ends)) + np.maximum(-low_rise, 0.0)
+        rise = np.maximum(*(high_rise * fraction for fraction in ends)) - np.maximum(high_rise, 0.0)
         low = low + fall - ROUNDING * (np.abs(low) + np.abs(low_rise))
         high = high + rise + ROUNDING * (np.abs(high) + np.abs(high_rise))
         level = np.zeros_like(low)

@@ -63,8 +63,8 @@ class Parts(NamedTuple):
 
     def of(self, arcs: int) -> Float[np.ndarray, "m"]:
         """Number of parts of an arc, along a motion of so many arcs."""
-        share = np.sin(math.pi * arcs * np.linspace(0.0, 1.0, len(self.at_cusps))) ** 2
-        return self.at_cusps + (self.at_middles - self.at_cusps) * share
+        fraction = np.sin(math.pi * arcs * np.linspace(0.0, 1.0, len(self.at_cusps))) ** 2
+        return self.at_cusps + (self.at_middles - self.at_cusps) * fraction
 
 
 def growing(amplitude: Amplitude, at_cusps: tuple[float, float], at_middles: tuple[float, float]) -> Parts:

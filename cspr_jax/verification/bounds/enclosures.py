@@ -69,30 +69,27 @@ class Enclosure(NamedTuple):
     """Middle states and bounds of k blocks of motions; "in the middle" means at the middle instant.
 
     Fields:
-        rays: (k, n_cables, 3) from spool to attachment point in the middle, m.
-        arms: (n_cables, 3) attachment points from the mass centre, m; zero of a point mass.
-        force: (k, 3) force that the cables supply, per mass, in the middle, m/s^2.
-        moment: (k, 3) moment of the cables about the mass centre, per mass, in the middle, m^2/s^2.
-        whirl: (k, 3, 3) maps a point of the platform, from the mass centre, to its relative acceleration, 1/s^2.
-        way: (k, n_cables, 3) how far the tangents of the rays lead from the middle to the stop, m.
-        bent: (k, n_cables) largest distance of the rays from their tangents within the block, m.
-        force_change: (k,) largest change of the force from the middle, within the block, m/s^2.
-        whirl_change: (k,) largest such change of `whirl`, 1/s^2.
-        low: (k, n_cables) lower bounds of the tensions per mass and length within the block, 1/s^2.
-        high: (k, n_cables) upper bounds of the tensions per mass and length, 1/s^2.
-        distances: distances that shrink as spools move.
-        rates: motion of the attachment points.
+        rays: (k, n_cables, 3) from spool to attachment point in the middle, m. arms: (n_cables, 3) attachment points
+        from the mass centre, m; zero of a point mass. force: (k, 3) force that the cables supply, per mass, in the
+        middle, m/s^2. moment: (k, 3) moment of the cables about the mass centre, per mass, in the middle, m^2/s^2.
+        acceleration_matrix: (k, 3, 3) maps a point of the platform, from the mass centre, to its relative acceleration,
+        1/s^2. way: (k, n_cables, 3) how far the tangents of the rays lead from the middle to the stop, m. deviation:
+        (k, n_cables) largest distance of the rays from their tangents within the block, m. force_change: (k,) largest
+        change of the force from the middle, within the block, m/s^2. acceleration_matrix_change: (k,) largest such
+        change of `acceleration_matrix`, 1/s^2. low: (k, n_cables) lower bounds of the tensions per mass and length
+        within the block, 1/s^2. high: (k, n_cables) upper bounds of the tensions per mass and length, 1/s^2. distances:
+        distances that shrink as spools move. rates: motion of the attachment points.
     """
 
     rays: np.ndarray
     arms: np.ndarray
     force: np.ndarray
     moment: np.ndarray
-    whirl: np.ndarray
+    acceleration_matrix: np.ndarray
     way: np.ndarray
-    bent: np.ndarray
+    deviation: np.ndarray
     force_change: np.ndarray
-    whirl_change: np.ndarray
+    acceleration_matrix_change: np.ndarray
     low: np.ndarray
     high: np.ndarray
     distances: Distances
@@ -101,7 +98,7 @@ class Enclosure(NamedTuple):
     @property
     def moved(self) -> np.ndarray:
         """Largest change of the rays from the middle, within the block, (k, n_cables) m."""
-        return largest_moves(self.way, self.bent)
+        return largest_moves(self.way, self.deviation)
 
     def part(self, rows: np.ndarray) -> "Enclosure":
         """Blocks chosen by indices, or by a mask (k,)."""
@@ -116,7 +113,7 @@ class Enclosure(NamedTuple):
 
     def middle(self, mu: Float[np.ndarray, "k n_cables"]) -> "Enclosure":
         """Enclosure of the middle instants alone, as if blocks had no length."""
-        names = "way", "bent", "force_change", "whirl_change"
+        names = "way", "deviation", "force_change", "acceleration_matrix_change"
         changes = {name: np.zeros_like(getattr(self, name)) for name in names}
         still = {name: np.zeros_like(getattr(self.rates, name)) for name in ("velocity_change", "acceleration_change")}
         nothing = np.zeros_like(self.distances.change)
@@ -124,9 +121,9 @@ class Enclosure(NamedTuple):
         return self._replace(**changes, low=mu, high=mu, distances=distances, rates=self.rates._replace(**still))
 
 
-def largest_moves(way: Float[np.ndarray, "... 3"], bent: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
+def largest_moves(way: Float[np.ndarray, "... 3"], deviation: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
     """Largest changes of rays from the middles of blocks."""
-    return np.linalg.norm(way, axis=-1) + bent
+    return np.linalg.norm(way, axis=-1) + deviation
 
 
 def structure(
@@ -178,7 +175,7 @@ def influence(known: Enclosure) -> Influence:
     lengths = np.linalg.norm(known.rays, axis=2)
     units = known.rays / lengths[..., None]
     across = spools - np.sum(spools * units[:, None], axis=3, keepdims=True) * units[:, None]
-    centre = forces @ known.whirl + np.cross(known.force[:, None], moments)
+    centre = forces @ known.acceleration_matrix + np.cross(known.force[:, None], moments)
     wrench = np.concatenate([known.force, known.moment], axis=1)[..., None] if is_platform else known.force[..., None]
     return Influence(spools, across, centre, forces, moments, lengths, (inverse @ wrench)[..., 0])
 

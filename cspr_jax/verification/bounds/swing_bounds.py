@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from jax import Array
 
-from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, stacked, turned
+from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, rotated, stacked
 from cspr_jax.numerics.bounds.function_bounds import sincospi
 from cspr_jax.verification.bounds.amplitude_bounds import TimeBounds
 
@@ -36,14 +36,17 @@ def swing_bounds(
         w = ((r * steady + r2) * (-1.0 / omega), r1 * (2.0 * nu))
         w1 = (r1 * (2.0 * nu**2 * omega - steady / omega) - r3 * (1.0 / omega), (r * steady + r2 * 3.0) * nu)
         pace = (sine * w[0], sine * w[1])
-        bend = tuple(cosine * rate * omega + sine * slope for rate, slope in zip(w, w1, strict=True))
+        second_derivative = tuple(cosine * rate * omega + sine * slope for rate, slope in zip(w, w1, strict=True))
     else:
         place = (r * cosine, r * sine * nu)
         pace = (r1 * cosine - r * sine * (steady / omega), r1 * sine * nu)
-        bend = ((r2 - r * steady) * cosine - r1 * sine * (2.0 * steady / omega), (r2 + r * steady) * sine * nu)
+        second_derivative = (
+            (r2 - r * steady) * cosine - r1 * sine * (2.0 * steady / omega),
+            (r2 + r * steady) * sine * nu,
+        )
     # Into the axes of the robot.
     here, velocity, acceleration = (
-        turned(segment.plane, stacked([axial * x + lateral * y, axial * y - lateral * x]))
-        for x, y in (place, pace, bend)
+        rotated(segment.plane, stacked([axial * x + lateral * y, axial * y - lateral * x]))
+        for x, y in (place, pace, second_derivative)
     )
-    return here + segment.hub, velocity * (1.0 / duration), acceleration * (1.0 / duration**2)
+    return here + segment.center, velocity * (1.0 / duration), acceleration * (1.0 / duration**2)

@@ -35,8 +35,8 @@ def rates_hold(
     with np.errstate(divide="ignore", invalid="ignore"):
         up = across / short + most + rates.acceleration_change
         down = inward / long + least - rates.acceleration_change
-    bend = np.where(short > 0.0, np.maximum(np.abs(up), np.abs(down)), np.inf)
-    return ((speed <= largest[0]) & (bend <= largest[1])).all(1)
+    second_derivative = np.where(short > 0.0, np.maximum(np.abs(up), np.abs(down)), np.inf)
+    return ((speed <= largest[0]) & (second_derivative <= largest[1])).all(1)
 
 
 def _limits_of_rates(limits: Limits) -> tuple[np.ndarray, np.ndarray] | None:
@@ -74,6 +74,6 @@ def rates_fail(
             rays = known.rays - sign * spools[:, None, None] * way
             lengths = np.linalg.norm(rays, axis=2)
             rate = np.sum(rays * velocity, axis=2) / lengths
-            bend = (np.sum(velocity**2 + rays * acceleration, axis=2) - rate**2) / lengths
-            broken |= ((np.abs(rate) > largest[0]) | (np.abs(bend) > largest[1])).any(1)
+            second_derivative = (np.sum(velocity**2 + rays * acceleration, axis=2) - rate**2) / lengths
+            broken |= ((np.abs(rate) > largest[0]) | (np.abs(second_derivative) > largest[1])).any(1)
     return broken

@@ -69,8 +69,8 @@ class _StatePool:
         if not len(self.blocks.row):
             return np.zeros(0, bool)
         of_robot = self.problem.robot, self.problem.limits, self.bodies
-        share = share_of(self.problem.limits, multiple)
-        return instants_fail(*of_robot, self.instants, share, self.ways, contacts_alone=self.contacts_alone)
+        fraction = share_of(self.problem.limits, multiple)
+        return instants_fail(*of_robot, self.instants, fraction, self.ways, contacts_alone=self.contacts_alone)
 
 
 def _pool(
@@ -79,8 +79,8 @@ def _pool(
     middle = 0.5 * (blocks.start + blocks.stop)
     each = motion.bounds(blocks.start, blocks.stop), instant_states(motion, middle / float(motion.duration()))
     states, instants = (jax.tree.map(np.asarray, bounds) for bounds in each)
-    share, of_robot = share_of(problem.limits, np.ones(len(middle))), (problem.robot, problem.limits, bodies)
-    ways = worst_ways(*of_robot, instants, share, contacts_alone=contacts_alone)
+    fraction, of_robot = share_of(problem.limits, np.ones(len(middle))), (problem.robot, problem.limits, bodies)
+    ways = worst_ways(*of_robot, instants, fraction, contacts_alone=contacts_alone)
     return _StatePool(problem, bodies, motion, contacts_alone, blocks, states, instants, ways)
 
 

@@ -71,18 +71,18 @@ def blocks_hold(
 ) -> Float[Array, "k"]:
     """Prove that all robots keep taut cables, limits and distances throughout blocks."""
 
-    def one(state: StateBounds, share: Share) -> Array:
+    def one(state: StateBounds, fraction: Share) -> Array:
         cables = cable_bounds(robot, state)
-        parts = [] if contacts_alone else _cable_slacks(robot, limits, state, cables, share)
-        turn = jnp.arcsin(share.spools / cables.length.low())
+        parts = [] if contacts_alone else _cable_slacks(robot, limits, state, cables, fraction)
+        turn = jnp.arcsin(fraction.spools / cables.length.low())
         wide = cables._replace(
-            exit=_wider(cables.exit, share.spools),
+            exit=_wider(cables.exit, fraction.spools),
             direction=_wider(cables.direction, turn[:, None]),
-            length=_wider(cables.length, share.spools),
+            length=_wider(cables.length, fraction.spools),
         )
         apart = contact_bounds(robot, bodies, state, wide)[0]
         is_met = (jnp.concatenate(parts) > 0.0).all() if parts else jnp.ones((), bool)
-        return is_met & ((apart > 0.0).all() | (share.spools == 0.0))
+        return is_met & ((apart > 0.0).all() | (fraction.spools == 0.0))
 
     return jax.vmap(one)(*cases)
 
@@ -91,8 +91,8 @@ def blocks_hold(
 def lower_slacks(robot: AnyRobot, limits: Limits, cases: tuple[StateBounds, Share]) -> Float[Array, "k n_slacks"]:
     """Lower bounds of the slacks of tensions and limits of all robots over blocks."""
 
-    def one(state: StateBounds, share: Share) -> Array:
-        slacks = jnp.concatenate(_cable_slacks(robot, limits, state, cable_bounds(robot, state), share))
+    def one(state: StateBounds, fraction: Share) -> Array:
+        slacks = jnp.concatenate(_cable_slacks(robot, limits, state, cable_bounds(robot, state), fraction))
         return jnp.where(jnp.isnan(slacks), -jnp.inf, slacks)
 
     return jax.vmap(one)(*cases)
@@ -103,7 +103,7 @@ def _wider(bounds: AffineBounds, radius: Array) -> AffineBounds:
 
 
 def _cable_slacks(
-    robot: AnyRobot, limits: Limits, state: StateBounds, cables: CableBounds, share: Share
+    robot: AnyRobot, limits: Limits, state: StateBounds, cables: CableBounds, fraction: Share
 ) -> list[Array]:
     # Bound the slacks of tensions, and of the limits of lengths, speeds and accelerations, from below, with the unit
     # vectors u' of cables at most `turn` from u.
@@ -111,13 +111,13 @@ def _cable_slacks(
 
     def at_mass(ratio: Array) -> UncertainTensions:
         other = with_mass(robot, ratio)
-        return uncertain_tensions(other, state, cables, (low, high), (share.spools, share.centre))
+        return uncertain_tensions(other, state, cables, (low, high), (fraction.spools, fraction.centre))
 
-    tensions = jax.vmap(at_mass)(jnp.stack([1.0 / share.factor, share.factor]))
+    tensions = jax.vmap(at_mass)(jnp.stack([1.0 / fraction.factor, fraction.factor]))
     parts = [jnp.min(tensions.low - low[None], axis=0)]
     parts += [] if limits.tension_max is None else [jnp.min(high[None] - tensions.high, axis=0)]
     parts = [jnp.min(jnp.concatenate(parts), keepdims=True)] if robot.n_cables > robot.dof else parts
-    most = _largest(robot, limits, state, cables, share.spools)
+    most = _largest(robot, limits, state, cables, fraction.spools)
     for row in limits_set(limits):
         if row.quantity != "tension":
             limit = jnp.broadcast_to(getattr(limits, row.name), robot.n_cables if row.per_cable else 1)
@@ -194,7 +194,7 @@ def worst_ways(
     limits: Limits,
     bodies: Bodies,
     states: StateBounds,
-    share: Share,
+    fraction: Share,
     *,
     contacts_alone: bool = False,
 ) -> Float[np.ndarray, "k 2 n_cables+1 3"]:
@@ -210,7 +210,9 @@ def worst_ways(
         slopes = np.swapaxes(high[:, 1:] - high[:, :1], 1, 2).reshape(len(step), -1, count, 3) / step
         slopes = np.where(np.isfinite(slopes), slopes, 0.0)
         sizes = np.linalg.norm(slopes, axis=3)
-        room = high[:, 0] / (sizes[..., :-1].sum(2) * share.spools[:, None] + sizes[..., -1] * share.centre[:, None])
+        room = high[:, 0] / (
+            sizes[..., :-1].sum(2) * fraction.spools[:, None] + sizes[..., -1] * fraction.centre[:, None]
+        )
         first = np.argsort(np.where(np.isfinite(room), room, np.inf), axis=1)[
             :, np.minimum(np.arange(NEAREST), room.shape[1] - 1)
         ]
@@ -223,13 +225,13 @@ def instants_fail(
     limits: Limits,
     bodies: Bodies,
     states: StateBounds,
-    share: Share,
+    fraction: Share,
     ways: np.ndarray,
     *,
     contacts_alone: bool = False,
 ) -> Float[np.ndarray, "k"]:
     """Tell at which instants a robot that is displaced, light or heavy, breaks a criterion."""
-    radii = np.repeat(np.stack([share.spools, share.centre], axis=1), [robot.n_cables, 1], axis=1)
+    radii = np.repeat(np.stack([fraction.spools, fraction.centre], axis=1), [robot.n_cables, 1], axis=1)
     moved = np.repeat(radii[:, None, :, None] * ways, 2, axis=1)
-    ratio = np.tile(np.stack([1.0 / share.factor, share.factor], axis=1), (1, ways.shape[1]))
+    ratio = np.tile(np.stack([1.0 / fraction.factor, fraction.factor], axis=1), (1, ways.shape[1]))
     return _of_robots(robot, limits, bodies, states, moved, ratio, contacts_alone=contacts_alone).min((1, 2)) < 0.0

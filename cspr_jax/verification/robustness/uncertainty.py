@@ -88,14 +88,21 @@ class _Reaches(NamedTuple):
 
 def _reaches(known: Enclosure, influence: Influence, spools: np.ndarray, centre: np.ndarray) -> _Reaches:
     near = influence.lengths - known.moved
-    share = spools[:, None] / np.where(near > 0.0, near, np.nan)
+    fraction = spools[:, None] / np.where(near > 0.0, near, np.nan)
     # A displaced spool counts as one that is displaced across its ray alone, at the planned length.
-    off = np.where(share < 1.0, spools[:, None] / np.sqrt(1.0 - share**2), np.nan)
+    off = np.where(fraction < 1.0, spools[:, None] / np.sqrt(1.0 - fraction**2), np.nan)
     direct_effect, moment, force = (
         np.linalg.norm(x, axis=2) for x in (influence.centre, influence.moments, influence.forces)
     )
-    whirl, radius = np.linalg.norm(known.whirl, axis=(1, 2)) + known.whirl_change, centre[:, None]
-    rest = direct_effect + force * known.whirl_change[:, None] + moment * (known.force_change + centre * whirl)[:, None]
+    acceleration_matrix, radius = (
+        np.linalg.norm(known.acceleration_matrix, axis=(1, 2)) + known.acceleration_matrix_change,
+        centre[:, None],
+    )
+    rest = (
+        direct_effect
+        + force * known.acceleration_matrix_change[:, None]
+        + moment * (known.force_change + centre * acceleration_matrix)[:, None]
+    )
     return _Reaches(off, np.minimum(known.moved / influence.lengths, 1.0), radius * rest)
 
 
@@ -103,16 +110,16 @@ def _changes(
     known: Enclosure, influence: Influence, vectors: np.ndarray, far: _Reaches
 ) -> tuple[np.ndarray, np.ndarray]:
     # Bound the changes of rays within blocks, and by displaced spools, along vectors (k, ..., n_cables, 3).
-    shape = (len(vectors), *(1,) * (vectors.ndim - 3), *known.bent.shape[1:])
+    shape = (len(vectors), *(1,) * (vectors.ndim - 3), *known.deviation.shape[1:])
     whole = np.linalg.norm(vectors, axis=-1)
     units = (known.rays / influence.lengths[..., None]).reshape(*shape, 3)
-    way, bent, off, tilt = (
+    way, deviation, off, tilt = (
         known.way.reshape(*shape, 3),
-        *(x.reshape(shape) for x in (known.bent, far.off, far.tilt)),
+        *(x.reshape(shape) for x in (known.deviation, far.off, far.tilt)),
     )
     along = np.sum(vectors * units, axis=-1)
     across = np.sqrt(np.maximum(whole**2 - along**2, 0.0))
-    return np.abs(np.sum(vectors * way, axis=-1)) + whole * bent, off * np.minimum(whole, across + whole * tilt)
+    return np.abs(np.sum(vectors * way, axis=-1)) + whole * deviation, off * np.minimum(whole, across + whole * tilt)
 
 
 @UNKNOWN
@@ -198,17 +205,17 @@ def holds(
     known: Enclosure, influence: Influence, requirements: Requirements, multiple: Float[np.ndarray, "k"]
 ) -> Float[np.ndarray, "k"]:
     """Prove that every robot within a multiple of the uncertainty meets all criteria within blocks."""
-    share = _share(requirements, multiple)
+    fraction = _share(requirements, multiple)
     is_met = np.ones(len(multiple), bool)
     if float(requirements.uncertainty.spool_positions) > 0.0:
-        is_met &= known.distances.hold(share.spools)
-        is_met &= rates_hold(known, influence, requirements.limits, share.spools)
-    off = deviations(known, influence, share.spools, share.centre)
-    is_taut = _tensions_hold(known, influence, requirements, share, Changes(off, off))
+        is_met &= known.distances.hold(fraction.spools)
+        is_met &= rates_hold(known, influence, requirements.limits, fraction.spools)
+    off = deviations(known, influence, fraction.spools, fraction.centre)
+    is_taut = _tensions_hold(known, influence, requirements, fraction, Changes(off, off))
     again = np.flatnonzero(is_met & ~is_taut & np.isfinite(off).all(1))
     if len(again):
         part = known.part(again), influence.part(again)
-        part_share = _Share(*(x[again] for x in share))
+        part_share = _Share(*(x[again] for x in fraction))
         less = dataclasses.replace(requirements, slack=requirements.slack[again])
         upwards = requirements.limits.tension_max is not None
         closer = closer_changes(
@@ -218,26 +225,26 @@ def holds(
     return is_met & is_taut
 
 
-def _least(known: Enclosure, influence: Influence, requirements: Requirements, share: _Share) -> np.ndarray:
+def _least(known: Enclosure, influence: Influence, requirements: Requirements, fraction: _Share) -> np.ndarray:
     # Return the smallest tensions per mass and length that are allowed within blocks.
     least = np.repeat(SIX_CABLES_UNDECIDED * requirements.slack[:, None], influence.lengths.shape[1], axis=1)
     limit = requirements.limits.tension_min
     if limit is None:
         return least
     near = influence.lengths - known.moved
-    return np.maximum(least, limit / (near * (requirements.mass / share.factor)[:, None]))
+    return np.maximum(least, limit / (near * (requirements.mass / fraction.factor)[:, None]))
 
 
 def _tensions_hold(
-    known: Enclosure, influence: Influence, requirements: Requirements, share: _Share, changes: Changes
+    known: Enclosure, influence: Influence, requirements: Requirements, fraction: _Share, changes: Changes
 ) -> np.ndarray:
-    is_met = (known.low - changes.down > _least(known, influence, requirements, share)).all(1)
+    is_met = (known.low - changes.down > _least(known, influence, requirements, fraction)).all(1)
     limit = requirements.limits.tension_max
     if limit is None:
         return is_met
     near, far = influence.lengths - known.moved, influence.lengths + known.moved
-    longest = far / np.sqrt(1.0 - np.minimum(share.spools[:, None] / near, 1.0) ** 2)
-    most = (known.high + changes.up) * longest * (requirements.mass * share.factor)[:, None]
+    longest = far / np.sqrt(1.0 - np.minimum(fraction.spools[:, None] / near, 1.0) ** 2)
+    most = (known.high + changes.up) * longest * (requirements.mass * fraction.factor)[:, None]
     return is_met & (most <= limit).all(1)
 
 
@@ -283,19 +290,19 @@ def fails(
     multiple: Float[np.ndarray, "k"],
 ) -> Float[np.ndarray, "k"]:
     """Tell where a worst robot within a multiple of the uncertainty breaks a criterion in the middle of a block."""
-    share, limits = _share(requirements, multiple), requirements.limits
+    fraction, limits = _share(requirements, multiple), requirements.limits
     broken = np.zeros(len(multiple), bool)
     for spools, centre in zip(*worst, strict=True):
-        mu, lengths = tensions(known, share.spools[:, None, None] * spools, share.centre[:, None] * centre)
+        mu, lengths = tensions(known, fraction.spools[:, None, None] * spools, fraction.centre[:, None] * centre)
         broken |= (mu < -SIX_CABLES_UNDECIDED * requirements.slack[:, None]).any(1)
         pull = requirements.mass * mu * lengths
         if limits.tension_min is not None:
-            broken |= (pull / share.factor[:, None] < limits.tension_min).any(1)
+            broken |= (pull / fraction.factor[:, None] < limits.tension_min).any(1)
         if limits.tension_max is not None:
-            broken |= (pull * share.factor[:, None] > limits.tension_max).any(1)
+            broken |= (pull * fraction.factor[:, None] > limits.tension_max).any(1)
     if float(requirements.uncertainty.spool_positions) > 0.0:
-        broken |= known.distances.fail(share.spools)
-        broken |= rates_fail(known, influence, limits, share.spools)
+        broken |= known.distances.fail(fraction.spools)
+        broken |= rates_fail(known, influence, limits, fraction.spools)
     return broken
 
 
@@ -304,7 +311,7 @@ def tensions(
 ) -> tuple[Float[np.ndarray, "k n_cables"], Float[np.ndarray, "k n_cables"]]:
     """Tensions of other robots in the middles of blocks."""
     rays, is_platform = known.rays - spools, bool(known.arms.any())
-    extra = np.einsum("kij,kj->ki", known.whirl, centre)
+    extra = np.einsum("kij,kj->ki", known.acceleration_matrix, centre)
     force = known.force + extra
     wrench = np.concatenate([force, known.moment + np.cross(centre, force)], axis=1) if is_platform else force
     inverse = inverted(structure(rays, known.arms, is_platform=is_platform))

@@ -164,12 +164,12 @@ def least_slacks(cells: Cells, products: Products, limits: Float[np.ndarray, "n 
     second = -np.minimum(least_quadratic(quadratic), least_quadratic(-quadratic))
     middle = products.value[:, -1] - (limits * value).sum(1)
     along = products.linear[:, -1] - (limits[..., None] * (linear + value[..., None] * steps)).sum(1)
-    bent = quadratic + linear[..., :, None] * steps[..., None, :]
-    bends = products.quadratic[:, -1] - (limits[..., None, None] * bent).sum(1)
+    deviation = quadratic + linear[..., :, None] * steps[..., None, :]
+    bends = products.quadratic[:, -1] - (limits[..., None, None] * deviation).sum(1)
     shift, radius = reach(steps), cells.radius[:, None]
-    curved = radius**2 * cells.lengths / cells.shortest**3 + cells.moves * cells.lengths / cells.shortest**2
+    regularization = radius**2 * cells.lengths / cells.shortest**3 + cells.moves * cells.lengths / cells.shortest**2
     cable_rests = products.rest[:, :-1]
     most = np.abs(value) + reach(linear) + second + cable_rests
-    rest = cable_rests * (1.0 + shift) + second * shift + most * curved
+    rest = cable_rests * (1.0 + shift) + second * shift + most * regularization
     rest = products.rest[:, -1] + (np.abs(limits) * rest).sum(1)
     return middle - reach(along) + least_quadratic(bends) - rest

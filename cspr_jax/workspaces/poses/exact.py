@@ -22,7 +22,7 @@ ZERO = 1e-10
 OUTSIDE = 1e-9
 
 
-def cocircuits(
+def facet_normals(
     matrix: Float[np.ndarray, "dof n_cables"],
 ) -> tuple[Float[np.ndarray, "k n_cables"], Float[np.ndarray, "k dof"], Float[np.ndarray, "dof rank"]]:
     """Cocircuits of a wrench matrix, and a basis of its span."""
@@ -62,7 +62,7 @@ def margin_planes(
     matrix: Float[np.ndarray, "dof n_cables"], low: Float[np.ndarray, "n_cables"], high: Float[np.ndarray, "n_cables"]
 ) -> Planes:
     """Planes that bound the margin by their distances, in newtons of tension: one a cocircuit and sign."""
-    components, normals, basis = cocircuits(matrix)
+    components, normals, basis = facet_normals(matrix)
     rows, normals = np.concatenate([components, -components]), np.concatenate([normals, -normals])
     finite = np.where(np.isfinite(high), high, 0.0)
     bounds = ~((rows > 0.0) & np.isinf(high)).any(1)
@@ -97,7 +97,7 @@ def is_outside(wrenches: Float[np.ndarray, "n dof"], basis: Float[np.ndarray, "d
 
 def closure_margin(matrix: Float[np.ndarray, "dof n_cables"], choices: CableSubsets) -> float:
     """Margin of wrench closure; see `workspaces.poses.margins.closure_margin`."""
-    components, _, basis = cocircuits(matrix)
+    components, _, basis = facet_normals(matrix)
     if basis.shape[1] < len(matrix):
         return -1.0
     other = components != 0.0

@@ -46,7 +46,7 @@ def turned_arms(robot: AnyRobot, quaternion: Vector) -> Vector | None:
         return None
     shape = robot.n_cables, len(quaternion[0])
     rotation = [[_along(x, shape) for x in row] for row in lanes.rotation_matrix(quaternion)]
-    return lanes.turned(rotation, _down(robot.platform_points, shape))
+    return lanes.rotated(rotation, _down(robot.platform_points, shape))
 
 
 def _along(lane: Array, shape: tuple[int, int]) -> Array:
@@ -102,7 +102,7 @@ def _columns(
         axes = [_down(jnp.broadcast_to(axis, (shape[0], 3)), shape) for axis in across_line(robot).T]
         if quaternion is not None:
             rotation = [[_along(x, shape) for x in line] for line in lanes.rotation_matrix(quaternion)]
-            axes = [lanes.turned(rotation, axis) for axis in axes]
+            axes = [lanes.rotated(rotation, axis) for axis in axes]
         about: Sequence[Array] = [lanes.dot(axis, moment) for axis in axes]
     else:
         about = [moment[i] for i in row.moments]

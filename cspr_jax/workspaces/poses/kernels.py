@@ -112,11 +112,11 @@ def _least(
     judged = margins.bounded_margin if is_bounded else margins.free_margin
 
     def step(bounds, each):
-        cocircuit, asking = pull(*each)
+        facet_normal, asking = pull(*each)
         if measure == "closure":
-            lower, upper = margins.closure_margin(cocircuit)
+            lower, upper = margins.closure_margin(facet_normal)
         else:
-            lower, upper = judged(cocircuit, *asking)
+            lower, upper = judged(facet_normal, *asking)
         least = jnp.minimum(jnp.real(bounds), lower), jnp.minimum(jnp.imag(bounds), upper)
         return lax.complex(*least), None
 

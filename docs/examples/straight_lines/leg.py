@@ -14,6 +14,6 @@ class Lines(Leg):
 
     def join(self, problem, z0):
         """Return answers and motions; samples refute, and prove nothing."""
-        points = self.stops.points(z0)
+        points = self.waypoints.points(z0)
         motions = [Line(start, end, np.asarray(z0)) for start, end in itertools.pairwise(points)]
         return sampled_answers(problem, motions), motions

@@ -28,8 +28,8 @@ class Line:
         way, time = self.end - self.start, self.duration()
         size = tau**3 * (10.0 + tau * (-15.0 + 6.0 * tau))
         slope = tau**2 * (30.0 + tau * (-60.0 + 30.0 * tau))
-        bend = tau * (60.0 + tau * (-180.0 + 120.0 * tau))
-        return State(self.start + way * size, way * slope / time, way * bend / time**2)
+        second_derivative = tau * (60.0 + tau * (-180.0 + 120.0 * tau))
+        return State(self.start + way * size, way * slope / time, way * second_derivative / time**2)
 
     def breaks(self):
         """Normalised times at which the motion is less smooth: none."""

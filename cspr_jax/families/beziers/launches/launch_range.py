@@ -61,14 +61,14 @@ class Shot(NamedTuple):
         position: (3,) of the release, m.
         velocity: (3,) there, m/s.
         flight_time: () s.
-        share: () time of the release over the duration of the segment.
+        fraction: () time of the release over the duration of the segment.
         motion: the segment.
     """
 
     position: Any
     velocity: Any
     flight_time: Any
-    share: Any
+    fraction: Any
     motion: Bezier
 
 
@@ -91,10 +91,10 @@ class LaunchRange(Releases):
 def _shot(known: tuple[Problem, ReleaseBounds], question: LaunchRequirement, x: Array) -> Shot:
     problem, bounds = known
     unknowns = bounds.low + (bounds.high - bounds.low) * x
-    position, (flight, duration), share = unknowns[:3], jnp.exp(unknowns[3:5]), unknowns[5]
+    position, (flight, duration), fraction = unknowns[:3], jnp.exp(unknowns[3:5]), unknowns[5]
     velocity = aimed(position, question.target, problem.robot.gravity, flight)
-    middle, end = through(question.start, position, velocity, share, duration)
-    return Shot(position, velocity, flight, share, Bezier(question.start, middle, end, duration, question.z0))
+    middle, end = through(question.start, position, velocity, fraction, duration)
+    return Shot(position, velocity, flight, fraction, Bezier(question.start, middle, end, duration, question.z0))
 
 
 def _energy(known: tuple[Problem, ReleaseBounds], question: LaunchRequirement, x: Array) -> tuple[Array, Array]:
@@ -150,7 +150,7 @@ def _answers(known: tuple[Problem, ReleaseBounds], cases: tuple[LaunchRequiremen
         release_y=y,
         release_z=z,
         duration=shown(shots.motion.time),
-        release_time=shown(shots.share * shots.motion.time),
+        release_time=shown(shots.fraction * shots.motion.time),
     )
 
 

@@ -71,22 +71,22 @@ def _sequence_of(arguments: Any, x: Array) -> LaunchSequence:
     problem, launch, durations, free = arguments
     times = durations.at[free].set(jnp.exp(x[: len(free)])) if len(free) else durations
     rest, at = x[len(free) :], launch.segment
-    share = rest[0] if launch.release is None else launch.release / times[at]
+    fraction = rest[0] if launch.release is None else launch.release / times[at]
     time = jnp.exp(rest[-1]) if launch.time is None else launch.time
     gravity = problem.robot.gravity
     if launch.point is None:
         position, velocity = flown(launch.target, launch.velocity, gravity, -time)
     else:
         position, velocity = launch.point, aimed(launch.point, launch.target, gravity, time)
-    middle, end = through(launch.points[at], position, velocity, share, times[at])
+    middle, end = through(launch.points[at], position, velocity, fraction, times[at])
     sequence = Anchored(launch.points.at[at + 1].set(end), at, middle, launch.z0)
-    return LaunchSequence(sequence, times, share * times[at], time, position, velocity)
+    return LaunchSequence(sequence, times, fraction * times[at], time, position, velocity)
 
 
 def _margins(problem: Problem, launch: LaunchSequence) -> Array:
-    share = launch.release / launch.durations[launch.sequence.segment]
+    fraction = launch.release / launch.durations[launch.sequence.segment]
     margins = margins_of(problem, segments_of(launch.sequence, launch.durations))
-    return jnp.append(margins, jnp.minimum(share, 1.0 - share))
+    return jnp.append(margins, jnp.minimum(fraction, 1.0 - fraction))
 
 
 def _total(arguments, x: Array) -> tuple[Array, Array]:

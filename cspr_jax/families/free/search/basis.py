@@ -81,10 +81,10 @@ def basis(intervals: int, instants: int) -> Basis:
     rows = [[table[m, :, m : m + LOCAL] for table in derivatives] for m in range(intervals)]
     averages = np.array([knots[k + 1 : k + 1 + DEGREE].mean() for k in range(count)])
     # Bernstein coefficients from values at six places of each interval.
-    share = np.linspace(0.0, 1.0, LOCAL)[:, None]
+    fraction = np.linspace(0.0, 1.0, LOCAL)[:, None]
     power = np.arange(LOCAL)
-    bernstein = np.array([comb(DEGREE, k) for k in power]) * share**power * (1.0 - share) ** power[::-1]
-    values = functions(borders[:-1, None] + share.T / intervals)
+    bernstein = np.array([comb(DEGREE, k) for k in power]) * fraction**power * (1.0 - fraction) ** power[::-1]
+    values = functions(borders[:-1, None] + fraction.T / intervals)
     pieces = [np.linalg.solve(bernstein, values[m, :, m : m + LOCAL]) for m in range(intervals)]
     return Basis(
         knots, tau, np.swapaxes(np.array(rows), 1, 2), averages, np.linalg.inv(functions(averages)), np.array(pieces)

@@ -62,14 +62,14 @@ class Eliminated(NamedTuple):
     """Newton's equations in the state alone, bend dx + slope = 0, and what follows from dx.
 
     Fields:
-        bend: (..., n_x, n_x).
+        second_derivative: (..., n_x, n_x).
         slope: (..., n_x).
         start: (..., n_values + n_equations) changes of the values and new multipliers where the state stays.
         fall: (..., n_values + n_equations, n_x) by how much they fall with the state; tensions, then multipliers of
             their equations, then other values, then theirs.
     """
 
-    bend: np.ndarray
+    second_derivative: np.ndarray
     slope: np.ndarray
     start: np.ndarray
     fall: np.ndarray
@@ -103,17 +103,17 @@ def eliminated(
     right = np.concatenate([push[..., :cables], aim[..., :dof]], axis=-1)
     solved = np.linalg.solve(system, np.concatenate([left, right[..., None]], axis=-1))
     fall, start = solved[..., :-1], solved[..., -1]
-    bend = equations.bend - transposed(left) @ fall
+    second_derivative = equations.second_derivative - transposed(left) @ fall
     slope = times(transposed(left), start)
     # Other values: W dv + y = push, dv + J dx - S y = aim.
     jacobian, weight = equations.slope[..., dof:, :], weights[..., cables:]
-    share = weight / (1.0 + size * weight)
+    fraction = weight / (1.0 + size * weight)
     multiplier = (push[..., cables:] - weight * aim[..., dof:]) / (1.0 + size * weight)
-    bend = bend + transposed(jacobian) @ (share[..., None] * jacobian)
+    second_derivative = second_derivative + transposed(jacobian) @ (fraction[..., None] * jacobian)
     slope = slope + times(transposed(jacobian), multiplier)
     starts = start, aim[..., dof:] + size * multiplier, multiplier
-    falls = fall, (1.0 - size * share)[..., None] * jacobian, -share[..., None] * jacobian
-    return Eliminated(bend, slope, np.concatenate(starts, axis=-1), np.concatenate(falls, axis=-2))
+    falls = fall, (1.0 - size * fraction)[..., None] * jacobian, -fraction[..., None] * jacobian
+    return Eliminated(second_derivative, slope, np.concatenate(starts, axis=-1), np.concatenate(falls, axis=-2))
 
 
 def less_missed(

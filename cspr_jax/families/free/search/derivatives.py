@@ -44,14 +44,14 @@ class InstantValues(NamedTuple):
             less the other values of the state.
         slope: (..., n_equations, n_x).
         matrix: (..., dof, n_cables) wrenches of unit tensions.
-        bend: (..., n_x, n_x) second derivatives of the residuals times multipliers.
+        second_derivative: (..., n_x, n_x) second derivatives of the residuals times multipliers.
         mixed: (..., n_cables, n_x) of the same, by a tension and x.
     """
 
     residual: Any
     slope: Any
     matrix: Any
-    bend: Any
+    second_derivative: Any
     mixed: Any
 
 
@@ -95,18 +95,20 @@ def _kernel(robot: AnyRobot, limits: Limits, longest: Array | None, instants: tu
         def pushed(*motion: Array) -> Array:
             return jnp.dot(missed(*motion), pushes) + jnp.sum(by_matrix * matrix(motion[0]))
 
-        bend = _bend(pushed, motion)
+        second_derivative = _bend(pushed, motion)
         mixed = jax.jacfwd(lambda place: multipliers[: robot.dof] @ matrix(place))(motion[0])
         if longest is not None:
             residual, slope = jnp.append(residual, -duration / longest), jnp.pad(slope, [(0, 1), (0, 0)])
         if regular is not None:
             residual = jnp.append(residual, -regular.value)
             slope = jnp.concatenate([slope, jnp.pad(-regular.slope, (0, 2 * d))[None]])
-            bend = bend.at[:d, :d].add(-multipliers[-1] * regular.bend)
-        slope, bend = _chained(motion, duration, slope, bend, multipliers)
+            second_derivative = second_derivative.at[:d, :d].add(-multipliers[-1] * regular.second_derivative)
+        slope, second_derivative = _chained(motion, duration, slope, second_derivative, multipliers)
         if longest is not None:
             slope = slope.at[len(pushes), -SCALARS].set(-1.0 / longest)
-        return InstantValues(residual, slope, matrix(motion[0]), bend, jnp.pad(mixed, [(0, 0), (0, 2 * d + SCALARS)]))
+        return InstantValues(
+            residual, slope, matrix(motion[0]), second_derivative, jnp.pad(mixed, [(0, 0), (0, 2 * d + SCALARS)])
+        )
 
     return jax.vmap(one)(*instants)
 
@@ -118,16 +120,19 @@ def _bend(function: Callable[..., Array], motion: Sequence[Array]) -> Array:
 
 
 def _chained(
-    motion: Sequence[Array], duration: Array, slope: Array, bend: Array, multipliers: Array
+    motion: Sequence[Array], duration: Array, slope: Array, second_derivative: Array, multipliers: Array
 ) -> tuple[Array, Array]:
     # Derivatives by coordinates in normalised time, by the duration and by the level, from those by the motion in time.
     d, flat = len(motion[0]), jnp.concatenate(motion)
     power = np.repeat(POWERS, d)
     scale, along = duration**-power, -power * flat / duration
     push = multipliers @ slope
-    side = scale * (bend @ along - power * push / duration)
-    corner = along @ bend @ along + jnp.dot(push, power * (power + 1.0) * flat) / duration**2
-    whole: list[list[Any]] = [[bend * jnp.outer(scale, scale), side[:, None]], [side[None], corner[None, None]]]
+    side = scale * (second_derivative @ along - power * push / duration)
+    corner = along @ second_derivative @ along + jnp.dot(push, power * (power + 1.0) * flat) / duration**2
+    whole: list[list[Any]] = [
+        [second_derivative * jnp.outer(scale, scale), side[:, None]],
+        [side[None], corner[None, None]],
+    ]
     slopes = jnp.concatenate([slope * scale[None], (slope @ along)[:, None]], axis=1)
     return jnp.pad(slopes, [(0, 0), (0, 1)]), jnp.pad(jnp.block(whole), (0, 1))
 

@@ -34,13 +34,13 @@ class Determinant(NamedTuple):
     Fields:
         value: ().
         slope: (d,).
-        bend: (d, d) without second derivatives of the matrix.
+        second_derivative: (d, d) without second derivatives of the matrix.
         cofactors: (n, n) by which second derivatives of the matrix count in those of the determinant.
     """
 
     value: Array
     slope: Array
-    bend: Array
+    second_derivative: Array
     cofactors: Array
 
 
@@ -62,7 +62,7 @@ def with_derivatives(matrix: Callable[[Array], Array], place: Float[Array, "d"])
     """Determinant of a matrix, with derivatives."""
     rows, slopes = matrix(place), jax.jacfwd(matrix)(place)
     if len(rows) == ROWS:
-        value, (cofactors, bend) = _minors(rows)[0], _weighted(jnp.ones(1), rows, slopes)
+        value, (cofactors, second_derivative) = _minors(rows)[0], _weighted(jnp.ones(1), rows, slopes)
     else:
         # Laplace's expansion, with minors of the moments as constant weights of those of the forces, and the reverse.
         (forces, by_forces), (moments, by_moments) = (
@@ -71,15 +71,15 @@ def with_derivatives(matrix: Callable[[Array], Array], place: Float[Array, "d"])
         )
         signs, others = _laplace(len(rows))
         of_forces, of_moments = signs * moments[others], (signs * forces)[others]
-        upper, bend = _weighted(of_forces, rows[FORCES], slopes[FORCES])
+        upper, second_derivative = _weighted(of_forces, rows[FORCES], slopes[FORCES])
         lower, further = _weighted(of_moments, rows[MOMENTS], slopes[MOMENTS])
         both = by_forces.T @ (signs[:, None] * by_moments[others])
-        value, cofactors, bend = (
+        value, cofactors, second_derivative = (
             jnp.dot(forces, of_forces),
             jnp.concatenate([upper, lower]),
-            bend + further + both + both.T,
+            second_derivative + further + both + both.T,
         )
-    return Determinant(value, jnp.einsum("ak,akd->d", cofactors, slopes), bend, cofactors)
+    return Determinant(value, jnp.einsum("ak,akd->d", cofactors, slopes), second_derivative, cofactors)
 
 
 def _minors(rows: Array) -> Array:

@@ -71,13 +71,13 @@ def other_rows(limits: Limits) -> list[Limit]:
 def _other_values(robot: AnyRobot, limits: Limits, state: State) -> Array:
     # Values beside tensions, duration and determinant: over limits, of the mass centre squared; depths over the
     # robot's size.
-    length, rate, bend = cable_motion(robot, state)
+    length, rate, second_derivative = cable_motion(robot, state)
     size = spool_radius(robot)
     values = {
         "depth": state.position[2:],
         "length": length,
         "speed": rate,
-        "acceleration": bend,
+        "acceleration": second_derivative,
         "mass_centre_speed": jnp.sum(state.velocity**2, keepdims=True),
         "mass_centre_acceleration": jnp.sum(state.acceleration**2, keepdims=True),
     }

@@ -128,7 +128,7 @@ def optima(
 def _sought(points: SearchPoints, levels: Levels, result: Optima, ending: Ending) -> bool:
     # Puts motions into the result as their searches end; whether all have ended in time.
     rows = np.arange(len(result.steps))
-    curved, waited = np.zeros(len(rows)), np.zeros(len(rows))
+    regularization, waited = np.zeros(len(rows)), np.zeros(len(rows))
     for number in range(STEPS + 1):
         before = levels.barrier
         levels, errors = _sharpened(points, levels)
@@ -142,12 +142,18 @@ def _sought(points: SearchPoints, levels: Levels, result: Optima, ending: Ending
         if is_over.all():
             return not is_late
         if is_over.any():
-            rows, curved, waited = rows[~is_over], curved[~is_over], waited[~is_over]
+            rows, regularization, waited = rows[~is_over], regularization[~is_over], waited[~is_over]
             points, levels = points.taken(~is_over), levels.taken(~is_over)
         step = newton_step(
-            points.tasks, points.unknowns, points.equations, points.residual, levels.barrier, levels.soft, curved
+            points.tasks,
+            points.unknowns,
+            points.equations,
+            points.residual,
+            levels.barrier,
+            levels.soft,
+            regularization,
         )
-        curved = np.where(step.curved > 0.0, step.curved, curved)
+        regularization = np.where(step.regularization > 0.0, step.regularization, regularization)
         points = _safeguarded(descended(points, step, levels), levels.barrier)
     return True
 

@@ -25,14 +25,14 @@ class Step(NamedTuple):
     Fields:
         change: of the unknowns.
         fall: (l,) slope of the merit along it.
-        curved: (l,) what was added to the diagonal.
+        regularization: (l,) what was added to the diagonal.
         missed: (l, s, m, n, n_equations) change of what equations miss, to first order.
         weights: (l, s, m, n, n_values) of the bounds of the values.
     """
 
     change: Unknowns
     fall: np.ndarray
-    curved: np.ndarray
+    regularization: np.ndarray
     missed: np.ndarray
     weights: np.ndarray
 
@@ -61,17 +61,17 @@ def gathered(basis: Basis, push: np.ndarray) -> np.ndarray:
     return np.concatenate([whole.reshape(*push.shape[:2], -1), push[..., -SCALARS:].sum((2, 3))], axis=-1)
 
 
-def _assembled(basis: Basis, bend: np.ndarray) -> np.ndarray:
+def _assembled(basis: Basis, second_derivative: np.ndarray) -> np.ndarray:
     # The Hessian of a sum over instants, (l, s, K d + 2, K d + 2), as `gathered`.
-    d = (bend.shape[-1] - SCALARS) // 3
+    d = (second_derivative.shape[-1] - SCALARS) // 3
     m, n = basis.tau.shape
     weights = np.zeros((m, n, 3 * d + SCALARS, LOCAL * d + SCALARS))
     for i in range(d):
         weights[:, :, i : 3 * d : d, i : LOCAL * d : d] = basis.rows
     weights[:, :, -SCALARS:, -SCALARS:] = np.eye(SCALARS)
-    local = np.einsum("mnya,lsmnyb->lsmab", weights, bend @ weights, optimize=True)
+    local = np.einsum("mnya,lsmnyb->lsmab", weights, second_derivative @ weights, optimize=True)
     size, last = LOCAL * d, basis.controls * d
-    whole = np.zeros((*bend.shape[:2], last + SCALARS, last + SCALARS))
+    whole = np.zeros((*second_derivative.shape[:2], last + SCALARS, last + SCALARS))
     for k in range(m):
         part = slice(k * d, k * d + size)
         whole[:, :, part, part] += local[:, :, k, :size, :size]
@@ -81,7 +81,9 @@ def _assembled(basis: Basis, bend: np.ndarray) -> np.ndarray:
     return whole
 
 
-def _segments(tasks: Tasks, unknowns: Unknowns, bend: np.ndarray, slope: np.ndarray, push: np.ndarray) -> _Bordered:
+def _segments(
+    tasks: Tasks, unknowns: Unknowns, second_derivative: np.ndarray, slope: np.ndarray, push: np.ndarray
+) -> _Bordered:
     # Newton's equations bend z + slope = 0 in inner coordinates, and in durations, accelerations and the level; push
     # is the gradient of the Lagrangian.
     d, border = tasks.places.shape[-1], tasks.border
@@ -93,21 +95,23 @@ def _segments(tasks: Tasks, unknowns: Unknowns, bend: np.ndarray, slope: np.ndar
     width = LOCAL * d
     below = np.minimum(np.arange(width)[:, None] + np.arange(len(inner)), len(inner) - 1)
     is_inside = np.arange(width)[:, None] + np.arange(len(inner)) < len(inner)
-    band = np.where(is_inside, bend[:, :, inner[below], inner[None]], 0.0)
-    beside = bend[:, :, inner[:, None], columns] @ moves
-    corner = transposed(moves) @ bend[:, :, columns[:, None], columns] @ moves
+    band = np.where(is_inside, second_derivative[:, :, inner[below], inner[None]], 0.0)
+    beside = second_derivative[:, :, inner[:, None], columns] @ moves
+    corner = transposed(moves) @ second_derivative[:, :, columns[:, None], columns] @ moves
     corner[:, :, :-1, :-1] += tasks.border_bends(unknowns, push[:, :, border])
     return _Bordered(band, beside, corner, -slope[:, :, inner], -times(transposed(moves), slope[:, :, columns]))
 
 
-def _solved(segments: _Bordered, k: int, is_moving: np.ndarray, curved: float) -> tuple[np.ndarray, np.ndarray] | None:
+def _solved(
+    segments: _Bordered, k: int, is_moving: np.ndarray, regularization: float
+) -> tuple[np.ndarray, np.ndarray] | None:
     # Changes of inner coordinates, (s, n), and of durations, accelerations and the level; None where the matrix is not
     # positive.
     count, d, size = len(segments.band[k]), (segments.border.shape[-1] - SCALARS) // 2, len(is_moving)
-    matrix, right, parts = curved * np.eye(size), np.zeros(size), []
+    matrix, right, parts = regularization * np.eye(size), np.zeros(size), []
     for s in range(count):
         band = segments.band[k, s].copy()
-        band[0] += curved
+        band[0] += regularization
         factor, failed = dpbtrf(band, lower=1)
         if failed:
             return None
@@ -129,17 +133,19 @@ def _solved(segments: _Bordered, k: int, is_moving: np.ndarray, curved: float) -
     return (inner, change) if np.isfinite(inner).all() and np.isfinite(change).all() else None
 
 
-def _changes(tasks: Tasks, unknowns: Unknowns, segments: _Bordered, curved: np.ndarray) -> tuple[Unknowns, np.ndarray]:
+def _changes(
+    tasks: Tasks, unknowns: Unknowns, segments: _Bordered, regularization: np.ndarray
+) -> tuple[Unknowns, np.ndarray]:
     # Changes of control points, durations, accelerations and levels, with what had to be added to the diagonal.
     count, d = len(unknowns.duration[0]), tasks.places.shape[-1]
     changes = [np.zeros_like(part) for part in unknowns[:4]]
-    used = np.zeros(len(curved))
-    for k in range(len(curved)):
+    used = np.zeros(len(regularization))
+    for k in range(len(regularization)):
         is_moving = np.concatenate(
             [np.ones(count, bool), np.repeat(tasks.is_free[k], d), np.repeat(tasks.objective.level > 0.0, count)]
         )
         solution = _solved(segments, k, is_moving, 0.0)
-        tries = min(max(CURVED, curved[k] / SHRINKING), MOST_CURVED) * GROWING ** np.arange(TRIES)
+        tries = min(max(CURVED, regularization[k] / SHRINKING), MOST_CURVED) * GROWING ** np.arange(TRIES)
         for more in tries if solution is None else ():
             solution, used[k] = _solved(segments, k, is_moving, more), more
             if solution is not None:
@@ -161,7 +167,7 @@ def newton_step(
     residual: Float[np.ndarray, "l s m n n_equations"],
     barrier: Float[np.ndarray, "l"],
     soft: Softness,
-    curved: Float[np.ndarray, "l"],
+    regularization: Float[np.ndarray, "l"],
 ) -> Step:
     """Step towards the optimum with a barrier before the bounds."""
     cables, gaps = tasks.robot.n_cables, tasks.gaps(unknowns)
@@ -170,8 +176,8 @@ def newton_step(
     slope = gathered(tasks.basis, local.slope)
     slope[..., -SCALARS:] += by_scalars
     lagrangian = gathered(tasks.basis, times(transposed(equations.slope), unknowns.multipliers))
-    segments = _segments(tasks, unknowns, _assembled(tasks.basis, local.bend), slope, lagrangian)
-    change, used = _changes(tasks, unknowns, segments, curved)
+    segments = _segments(tasks, unknowns, _assembled(tasks.basis, local.second_derivative), slope, lagrangian)
+    change, used = _changes(tasks, unknowns, segments, regularization)
     state = _at_instants(tasks, unknowns, change)
     values, multipliers = local.changes(state, cables, tasks.robot.dof)
     change = change._replace(values=values, multipliers=multipliers - unknowns.multipliers)
@@ -202,14 +208,14 @@ def _with_objective(
     tensions, duration = unknowns.values[..., :cables], wide(unknowns.duration)
     weight[..., :cables] += 2.0 * shares * duration
     push[..., :cables] -= 2.0 * shares * duration * tensions
-    mixed, bend = equations.mixed.copy(), equations.bend.copy()
+    mixed, second_derivative = equations.mixed.copy(), equations.second_derivative.copy()
     mixed[..., -2] += 2.0 * shares * tensions
     mixed[..., -1] -= sum(part * lift for part, lift in zip(weights, lifts, strict=True))[..., :cables]
-    bend[..., -1, -1] += sum((part * lift**2).sum(-1) for part, lift in zip(weights, lifts, strict=True))
+    second_derivative[..., -1, -1] += sum((part * lift**2).sum(-1) for part, lift in zip(weights, lifts, strict=True))
     by_level = objective.level + sum((part * lift).sum((2, 3, 4)) for part, lift in zip(pushes, lifts, strict=True))
     by_duration = objective.time / tasks.scale[:, None] + np.sum(shares * tensions**2, axis=(2, 3, 4))
     slope = np.stack([by_duration, by_level], axis=-1)
-    return equations._replace(mixed=mixed, bend=bend), weight, push, slope
+    return equations._replace(mixed=mixed, second_derivative=second_derivative), weight, push, slope
 
 
 def _at_instants(tasks: Tasks, unknowns: Unknowns, change: Unknowns) -> np.ndarray:

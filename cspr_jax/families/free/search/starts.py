@@ -79,12 +79,12 @@ def _lines(tasks: Tasks, start: np.ndarray, end: np.ndarray) -> list[_Start]:
 def _swings(tasks: Tasks, start: np.ndarray, end: np.ndarray, z0: float, most: int) -> list[_Start]:
     # Swings about P0 of one arc, two arcs, ...
     tau, along = tasks.basis.averages[:, None], coordinates(tasks.robot.pattern)[0]
-    line, grown, hub = _line(tasks, start, end), tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2), start.copy()
-    hub[: len(along)] = rest_point(z0)[along]
+    line, grown, center = _line(tasks, start, end), tau**3 * (10.0 - 15.0 * tau + 6.0 * tau**2), start.copy()
+    center[: len(along)] = rest_point(z0)[along]
     half, swings = np.pi * np.sqrt(z0 / float(tasks.robot.gravity)), list[_Start]()
     for arcs in range(1, most + 1):
         first, last = np.cos(arcs * np.pi * tau), np.cos(arcs * np.pi * (1.0 - tau))
-        swing = hub + (start - hub) * (1.0 - grown) * first + (end - hub) * grown * last
+        swing = center + (start - center) * (1.0 - grown) * first + (end - center) * grown * last
         places = np.concatenate([swing[:, : len(along)], line[:, len(along) :]], axis=1)
         swings.append(_Start(places, arcs * half))
     return swings

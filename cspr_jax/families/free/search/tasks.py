@@ -205,8 +205,8 @@ class Tasks:
         controls[:, :, OUTER:-OUTER] = unknowns.inner
         for side, sign in ((0, 1.0), (1, -1.0)):
             place, step = self.places[:, :, side], sign * self.basis.end_slope * time * self.velocities[:, :, side]
-            bend = self.basis.end_bend * time**2 * self._second(unknowns, side)
-            steps = (place, place + step, place + 3.0 * step + bend)
+            second_derivative = self.basis.end_bend * time**2 * self._second(unknowns, side)
+            steps = (place, place + step, place + 3.0 * step + second_derivative)
             for k, value in enumerate(steps):
                 controls[:, :, k if side == 0 else -1 - k] = value
         return controls

@@ -85,8 +85,8 @@ def _of_mass_centre(problem: Problem, way: np.ndarray) -> float:
     pulls_up = is_point and is_level and judged_poses(robot)[1]
 
     def largest(down: np.ndarray) -> np.ndarray:
-        share = np.sqrt(np.clip(1.0 - np.maximum(down, 0.0) ** 2, 0.0, 1.0)) if pulls_up else np.ones_like(down)
-        return np.clip(np.minimum(share + SLANTED, 1.0) * pull + float(robot.gravity) * down, 0.0, most)
+        fraction = np.sqrt(np.clip(1.0 - np.maximum(down, 0.0) ** 2, 0.0, 1.0)) if pulls_up else np.ones_like(down)
+        return np.clip(np.minimum(fraction + SLANTED, 1.0) * pull + float(robot.gravity) * down, 0.0, most)
 
     speed = np.inf if limits.speed_max is None else float(limits.speed_max)
     with np.errstate(divide="ignore"):  # where nothing moves

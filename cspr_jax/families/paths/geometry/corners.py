@@ -29,10 +29,10 @@ Corners = Literal["every", "stop", "blend"]
 def tracks_of(elements: Sequence[Element], corners: Corners = "stop", tolerance: float = 0.0) -> list[Track]:
     """Tracks from stop to stop; the points of each are the ends of its elements."""
     lengths = _blend_lengths(elements, corners, tolerance)
-    stops = [0, *(np.flatnonzero(np.isnan(lengths)) + 1).tolist(), len(elements)]
+    splits = [0, *(np.flatnonzero(np.isnan(lengths)) + 1).tolist(), len(elements)]
     return [
         _track(elements[first:end], np.array([0.0, *lengths[first : end - 1], 0.0]))
-        for first, end in itertools.pairwise(stops)
+        for first, end in itertools.pairwise(splits)
     ]
 
 

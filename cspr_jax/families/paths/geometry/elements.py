@@ -67,9 +67,9 @@ class Straight:
 
     def at(self, s: Float[np.ndarray, "n"]) -> Nodes:
         """States at lengths."""
-        share, step = (s / self.length)[:, None], (self.end - self.start) / self.length
+        fraction, step = (s / self.length)[:, None], (self.end - self.start) / self.length
         # Whole lines meet their ends without rounding.
-        place = self.start * (1.0 - share) + self.end * share
+        place = self.start * (1.0 - fraction) + self.end * fraction
         return Nodes(s, place, np.array([step] * len(s)), np.zeros((len(s), 3)))
 
 

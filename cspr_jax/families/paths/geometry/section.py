@@ -129,12 +129,12 @@ def half_angles(units: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n-1"]:
     return 2.0 * np.arctan2(apart, together)
 
 
-def turn(units: Float[np.ndarray, "2 4"], share: Float[np.ndarray, "n"], length: float = 1.0) -> list[np.ndarray]:
+def turn(units: Float[np.ndarray, "2 4"], fraction: Float[np.ndarray, "n"], length: float = 1.0) -> list[np.ndarray]:
     """Orientations at a constant rate from one to another, and their derivatives."""
     half = float(half_angles(units)[0])
     across = units[1] - (units[1] @ units[0]) * units[0]
     across /= np.linalg.norm(across) or 1.0
     rate = half / length
-    cosine, sine = np.cos(half * share)[:, None], np.sin(half * share)[:, None]
+    cosine, sine = np.cos(half * fraction)[:, None], np.sin(half * fraction)[:, None]
     value = cosine * units[0] + sine * across
     return [value, rate * (cosine * across - sine * units[0]), -(rate**2) * value]

@@ -34,13 +34,13 @@ class SmoothPart(NamedTuple):
         motion: number of the motion.
         start: tau.
         end: tau.
-        stops: whether the motion is at rest at the start, and at the end.
+        at_rest: whether the motion is at rest at the start, and at the end.
     """
 
     motion: int
     start: float
     end: float
-    stops: tuple[bool, bool] = (False, False)
+    at_rest: tuple[bool, bool] = (False, False)
 
 
 class MovingPlaces(NamedTuple):
@@ -94,11 +94,11 @@ class MotionSequence:
         return MovingPlaces(*columns)
 
     def inside(
-        self, parts: Sequence[SmoothPart], number: Float[np.ndarray, "k"], share: Float[np.ndarray, "k"]
+        self, parts: Sequence[SmoothPart], number: Float[np.ndarray, "k"], fraction: Float[np.ndarray, "k"]
     ) -> MovingPlaces:
         """Places and their derivatives within smooth parts."""
         motion, start, end = (np.array([part[i] for part in parts])[number] for i in range(3))
-        return self.rates(motion.astype(int), start + (end - start) * np.clip(share, INSIDE, 1.0 - INSIDE))
+        return self.rates(motion.astype(int), start + (end - start) * np.clip(fraction, INSIDE, 1.0 - INSIDE))
 
     def ends(self, motion: int) -> Float[np.ndarray, "pieces+1"]:
         """Starts and ends of the pieces of a motion."""
@@ -115,8 +115,8 @@ class MotionSequence:
             return MovingPlaces(p, v, a, v, a)
         q, w, b = state.quaternion, state.angular_velocity, state.angular_acceleration
         turn = 0.5 * _product(w, q)
-        bend = 0.5 * (_product(b, q) + _product(w, turn))
-        places = [np.concatenate(pair, axis=1) for pair in ((p, q), (v, turn), (a, bend))]
+        second_derivative = 0.5 * (_product(b, q) + _product(w, turn))
+        places = [np.concatenate(pair, axis=1) for pair in ((p, q), (v, turn), (a, second_derivative))]
         return MovingPlaces(*places, *[np.concatenate([x, self.size * y], axis=1) for x, y in ((v, w), (a, b))])
 
     def parts(self) -> list[SmoothPart]:
@@ -126,15 +126,15 @@ class MotionSequence:
         lengths = np.array([part.end - part.start for part in smooth])
         counts = np.maximum(FEWEST, np.ceil(SAMPLES * lengths)).astype(int)
         number = np.repeat(np.arange(len(smooth)), counts + 1)
-        share = np.concatenate([np.linspace(0.0, 1.0, count + 1) for count in counts])
-        speed = self.inside(smooth, number, share).speed
+        fraction = np.concatenate([np.linspace(0.0, 1.0, count + 1) for count in counts])
+        speed = self.inside(smooth, number, fraction).speed
         still = STILL * speed.max()
         if len(smooth) > 1:
             self._check_meeting(smooth, still)
         # Least speeds among the samples of one part lie near stops.
         is_least = (speed[1:-1] <= speed[:-2]) & (speed[1:-1] < speed[2:]) & (number[2:] == number[:-2])
         row = np.flatnonzero(is_least) + 1
-        instants, is_stop = self._stops(smooth, number[row], share[row], 1.0 / counts[number[row]], still)
+        instants, is_stop = self._stops(smooth, number[row], fraction[row], 1.0 / counts[number[row]], still)
         ends = self.inside(smooth, np.repeat(np.arange(len(smooth)), 2), np.tile([0.0, 1.0], len(smooth)))
         # A stop at an end is met to INSIDE of the part.
         reach = np.linalg.norm(ends.acceleration, axis=1) * np.repeat(self.times(smooth), 2) * INSIDE
@@ -144,9 +144,9 @@ class MotionSequence:
             inner = np.sort(instants[is_stop & (number[row] == k)])
             inner = inner[(inner > 10.0 * INSIDE) & (inner < 1.0 - 10.0 * INSIDE)]
             cuts = [part.start, *(part.start + (part.end - part.start) * inner).tolist(), part.end]
-            stops = [bool(is_end[k, 0]), *[True] * len(inner), bool(is_end[k, 1])]
+            at_rest = [bool(is_end[k, 0]), *[True] * len(inner), bool(is_end[k, 1])]
             for i in range(len(cuts) - 1):
-                rows.append(SmoothPart(part.motion, cuts[i], cuts[i + 1], (stops[i], stops[i + 1])))
+                rows.append(SmoothPart(part.motion, cuts[i], cuts[i + 1], (at_rest[i], at_rest[i + 1])))
         middles = self.inside(rows, np.repeat(np.arange(len(rows)), 3), np.tile([0.25, 0.5, 0.75], len(rows)))
         moves = (middles.speed.reshape(-1, 3) > still).any(1)
         return [part for part, is_moving in zip(rows, moves, strict=True) if is_moving]
@@ -161,22 +161,22 @@ class MotionSequence:
             raise InputError(name, None, "must go on at the same velocity", fault=f"it jumps by {jump[bad[0]]:.3g} m/s")
 
     def _stops(
-        self, smooth: list[SmoothPart], number: np.ndarray, share: np.ndarray, width: np.ndarray, still: float
+        self, smooth: list[SmoothPart], number: np.ndarray, fraction: np.ndarray, width: np.ndarray, still: float
     ) -> tuple[np.ndarray, np.ndarray]:
         # Shares of parts at which the speed is least, by steps of Gauss and Newton, and whether it is a stop.
         if not len(number):
-            return share, np.zeros(0, bool)
-        times, low, high = self.times(smooth)[number], share - width, share + width
-        best, speed, radius = share.copy(), np.full(len(number), np.inf), np.full(len(number), np.inf)
+            return fraction, np.zeros(0, bool)
+        times, low, high = self.times(smooth)[number], fraction - width, fraction + width
+        best, speed, radius = fraction.copy(), np.full(len(number), np.inf), np.full(len(number), np.inf)
         for _ in range(STEPS):
-            rates = self.inside(smooth, number, share)
+            rates = self.inside(smooth, number, fraction)
             better = rates.speed < speed
-            best, speed = np.where(better, share, best), np.where(better, rates.speed, speed)
+            best, speed = np.where(better, fraction, best), np.where(better, rates.speed, speed)
             square = np.sum(rates.acceleration**2, axis=1)
             turn = rates.speed**2 / np.sqrt(np.where(square > 0.0, square, np.inf))
             radius = np.where(better, turn, radius)
             step = np.sum(rates.velocity * rates.acceleration, axis=1) / np.where(square > 0.0, square, np.inf)
-            share = np.clip(share - step / times, low, high)
+            fraction = np.clip(fraction - step / times, low, high)
             if not better.any():
                 break
         return best, (speed <= still) | (radius <= CUSP)

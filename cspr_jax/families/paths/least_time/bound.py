@@ -45,18 +45,18 @@ def path_bound(problem: Problem, path: Discrete, x: Float[np.ndarray, "n_nodes"]
 @persistent_jit(compiler_options=compile_options.least())
 def _of_nodes(robot: AnyRobot, limits: Limits, nodes: tuple[Places, Array]) -> tuple[Array, Array, Array]:
     # Multipliers of what the half-planes are made of, from those of the half-planes.
-    def one(place: Places, pressures: Array) -> tuple[Array, Array, Array]:
+    def one(place: Places, multipliers: Array) -> tuple[Array, Array, Array]:
         state = state_at(place)
         matrix = unit_wrenches(robot, state).matrix
         along = tension_faces(robot, limits, matrix).along
         count, n_cables = along.shape
-        wrench = -(pressures[:count] @ along @ right_inverse(matrix)) / (robot.mass * robot.gravity)
-        bend, turn, rest = jnp.zeros(n_cables), jnp.zeros(3), pressures[count:]
+        wrench = -(multipliers[:count] @ along @ right_inverse(matrix)) / (robot.mass * robot.gravity)
+        second_derivative, turn, rest = jnp.zeros(n_cables), jnp.zeros(3), multipliers[count:]
         if limits.cable_acceleration_max is not None:
-            bend, rest = rest[:n_cables] - rest[n_cables : 2 * n_cables], rest[2 * n_cables :]
+            second_derivative, rest = rest[:n_cables] - rest[n_cables : 2 * n_cables], rest[2 * n_cables :]
         if limits.acceleration_max is not None:
             turn = rest @ tangent_directions(state.velocity, state.acceleration)
-        return wrench, bend, turn
+        return wrench, second_derivative, turn
 
     return jax.vmap(one)(*nodes)
 

@@ -42,10 +42,10 @@ def _of_faces(problem: Problem, state: State, shares: np.ndarray) -> list[RowNam
     if robot.n_cables > robot.dof:
         return [(Verdict.WRENCH_INFEASIBLE, None)] * count
     parts = unit_wrenches(robot, state)
-    tensions = np.linalg.solve(parts.matrix, np.stack([parts.momentum, parts.bend], axis=1))
+    tensions = np.linalg.solve(parts.matrix, np.stack([parts.momentum, parts.second_derivative], axis=1))
     beside = [set(range(robot.n_cables)) - set(chosen) for chosen in spanning(robot.n_cables, robot.dof).tolist()]
     cables = [cable for others in beside for cable in others] * 2
-    is_least = [tensions[cable] @ share < 0.0 for cable, share in zip(cables, shares, strict=False)]
+    is_least = [tensions[cable] @ fraction < 0.0 for cable, fraction in zip(cables, shares, strict=False)]
     return [
         (Verdict.SLACK_CABLE if least else Verdict.OVER_TENSION, cable)
         for least, cable in zip(is_least, cables, strict=True)

@@ -62,13 +62,13 @@ class UnitWrenches(NamedTuple):
     Fields:
         matrix: (dof, n_cables) wrenches of unit tensions.
         momentum: of a unit path speed.
-        bend: its derivative along the path.
+        second_derivative: its derivative along the path.
         rest: what holds the weight.
     """
 
     matrix: Array
     momentum: Array
-    bend: Array
+    second_derivative: Array
     rest: Array
 
 
@@ -86,18 +86,18 @@ def unit_wrenches(robot: AnyRobot, state: State) -> UnitWrenches:
     unit = wrench_units(robot)
     rest = robot.inertial_wrench(still(state, pushed=False)) / unit
     momentum = robot.inertial_wrench(still(state, pushed=True)) / unit - rest
-    bend = robot.inertial_wrench(state) / unit - rest
-    return UnitWrenches(robot.wrench_matrix(state) / unit[:, None], momentum, bend, rest)
+    second_derivative = robot.inertial_wrench(state) / unit - rest
+    return UnitWrenches(robot.wrench_matrix(state) / unit[:, None], momentum, second_derivative, rest)
 
 
 def path_rows(robot: AnyRobot, limits: Limits, state: State, speed: Float[Array, ""]) -> Rows:
     """Half-planes of one place."""
     parts = [_of_tensions(robot, limits, unit_wrenches(robot, state))]
     cap = jnp.square(speed) / jnp.maximum(jnp.sum(state.velocity**2), TINY)
-    _, rate, bend = cable_motion(robot, state)
+    _, rate, second_derivative = cable_motion(robot, state)
     if limits.cable_acceleration_max is not None:
         most = jnp.broadcast_to(jnp.asarray(limits.cable_acceleration_max), rate.shape)
-        both = (jnp.concatenate([side, -side]) for side in (rate, bend))
+        both = (jnp.concatenate([side, -side]) for side in (rate, second_derivative))
         parts.append((*both, *[jnp.concatenate([most, most])] * 2))
     if limits.cable_speed_max is not None:
         cap = jnp.minimum(cap, jnp.min(jnp.square(limits.cable_speed_max) / jnp.maximum(rate**2, TINY)))
@@ -135,19 +135,21 @@ def _of_tensions(robot: AnyRobot, limits: Limits, wrenches: UnitWrenches) -> tup
     # One half-plane a face, over the weight.
     faces, weight = tension_faces(robot, limits, wrenches.matrix), robot.mass * robot.gravity
     inverse, bounds = right_inverse(wrenches.matrix), jnp.isfinite(faces.least)
-    momentum, bend, rest = (jnp.sum(faces.along * (inverse @ x)[None], axis=1) / weight for x in wrenches[1:])
+    momentum, second_derivative, rest = (
+        jnp.sum(faces.along * (inverse @ x)[None], axis=1) / weight for x in wrenches[1:]
+    )
     most = rest - jnp.where(bounds, faces.least, 0.0) / weight
     size = jnp.sum(jnp.abs(faces.along), axis=1) / weight
     # A face without a bound is 0 <= 1.
-    momentum, bend, size = (jnp.where(bounds, x, 0.0) for x in (-momentum, -bend, size))
-    return momentum, bend, jnp.where(bounds, most, 1.0), size
+    momentum, second_derivative, size = (jnp.where(bounds, x, 0.0) for x in (-momentum, -second_derivative, size))
+    return momentum, second_derivative, jnp.where(bounds, most, 1.0), size
 
 
 def tangent_directions(velocity: Float[Array, "3"], acceleration: Float[Array, "3"]) -> Float[Array, "n_tangents 3"]:
     """Directions in which the Cartesian acceleration is bounded, in the plane of p' and p''."""
     along = velocity / jnp.sqrt(jnp.maximum(jnp.sum(velocity**2), TINY))
-    bend = acceleration - jnp.dot(acceleration, along) * along
-    across = bend / jnp.sqrt(jnp.maximum(jnp.sum(bend**2), TINY))
+    second_derivative = acceleration - jnp.dot(acceleration, along) * along
+    across = second_derivative / jnp.sqrt(jnp.maximum(jnp.sum(second_derivative**2), TINY))
     angles = np.linspace(0.0, np.pi, TANGENTS + 1)
     return np.cos(angles)[:, None] * along[None] + np.sin(angles)[:, None] * across[None]
 

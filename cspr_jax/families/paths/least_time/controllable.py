@@ -48,10 +48,10 @@ class GridCells(NamedTuple):
     cap: Array
 
 
-def _cells_of(sides: tuple[Rows, Rows], width: Array, bend: Array, cap: Array) -> GridCells:
+def _cells_of(sides: tuple[Rows, Rows], width: Array, second_derivative: Array, cap: Array) -> GridCells:
     # At the end of a cell x is that at its start and what u in the middle adds.
     start, end = sides
-    half = (0.5 * bend * width)[:, None]
+    half = (0.5 * second_derivative * width)[:, None]
     return GridCells(
         u=jnp.concatenate([start.u, end.u + 2.0 * width[:, None] * end.x], axis=1),
         x=jnp.concatenate([start.x, end.x], axis=1),
@@ -142,12 +142,12 @@ def _flat_range(u: Array, x_share: Array, most: Array, cap: Array) -> tuple[Arra
 def fastest(
     sides: tuple[Rows, Rows],
     width: Float[Array, "n_cells n_paths"],
-    bend: Float[Array, "n_cells n_paths"],
+    second_derivative: Float[Array, "n_cells n_paths"],
     cap: Float[Array, "n_cells+1 n_paths"],
     ends: tuple[Float[Array, "n_paths"], Float[Array, "n_paths"]],
 ) -> GridSolution:
     """Fastest motions along paths."""
-    cells = _cells_of(sides, width, bend, cap)
+    cells = _cells_of(sides, width, second_derivative, cap)
     start, end = ends
 
     def rows_of(cell: GridCells, low: Array, high: Array) -> tuple[Array, Array, Array]:

@@ -29,7 +29,7 @@ from cspr_jax.families.paths.least_time.constraints import still, unit_wrenches
 from cspr_jax.families.paths.least_time.discrete import Discrete
 from cspr_jax.families.paths.least_time.nodes import Places, places_on, state_at
 from cspr_jax.numerics.batches import in_batches
-from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, cross, dot, norm_squared, squared, turned
+from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, cross, dot, norm_squared, rotated, squared
 from cspr_jax.numerics.tolerances import ROUNDING
 from cspr_jax.robots.bounds.state_bounds import CableBounds, StateBounds, balance_bounds, balanced_part, cable_bounds
 from cspr_jax.robots.cables import AnyRobot, cable_motion, wrench_units
@@ -54,12 +54,12 @@ class Multipliers(NamedTuple):
 
     Fields:
         wrench: (n_nodes, dof) of the wrench balance, over the units of wrenches, s / N.
-        bend: (n_nodes, n_cables) of the cables' accelerations, s^3 / m; zeros without a limit.
+        second_derivative: (n_nodes, n_cables) of the cables' accelerations, s^3 / m; zeros without a limit.
         turn: (n_nodes, 3) of the Cartesian acceleration, likewise.
     """
 
     wrench: Any
-    bend: Any
+    second_derivative: Any
     turn: Any
 
 
@@ -124,7 +124,10 @@ def _boundary(robot: AnyRobot, path: Discrete, multipliers: Multipliers) -> floa
             node = places_on(path.section.curve, path.grid.nodes[[place]], ahead=place == 0)
             state = state_at(jax.tree.map(lambda leaf: leaf[0], node))
             along = multipliers.wrench[place] @ unit_wrenches(robot, state).momentum
-            along += multipliers.bend[place] @ cable_motion(robot, state)[1] + multipliers.turn[place] @ state.velocity
+            along += (
+                multipliers.second_derivative[place] @ cable_motion(robot, state)[1]
+                + multipliers.turn[place] @ state.velocity
+            )
             total += 0.5 * sign * x * float(along)
     return total
 
@@ -132,16 +135,16 @@ def _boundary(robot: AnyRobot, path: Discrete, multipliers: Multipliers) -> floa
 def _evened(robot: AnyRobot, path: Discrete, multipliers: Multipliers, short: np.ndarray) -> Multipliers:
     # Let y fall more along a where it changes so fast that y . a' - y' . a is negative, and less in cells beside.
     nodes = np.arange(len(short) + 1)
-    share = np.zeros(len(nodes))
+    fraction = np.zeros(len(nodes))
     for cell in np.flatnonzero(short > 0.0):
         rise = np.clip(1.0 - (cell - nodes) / REACH, 0.0, 1.0) * (nodes <= cell)
         fall = np.clip(1.0 - (nodes - cell - 1) / REACH, 0.0, 1.0) * (nodes > cell)
-        share += 0.5 * SPARE * short[cell] * (rise - fall)
+        fraction += 0.5 * SPARE * short[cell] * (rise - fall)
     momentum = in_batches(
         partial(_momentum, robot), (places_on(path.section.curve, path.grid.nodes, ahead=True),), size=BATCH
     )
     square = np.sum(momentum**2, axis=1)
-    change = np.where(square > 0.0, share / np.where(square > 0.0, square, 1.0), 0.0)[:, None] * momentum
+    change = np.where(square > 0.0, fraction / np.where(square > 0.0, square, 1.0), 0.0)[:, None] * momentum
     return multipliers._replace(wrench=multipliers.wrench + change)
 
 
@@ -166,9 +169,11 @@ def _ends(bounds: AffineBounds, sign: float) -> tuple[Array, Array]:
     return side - bounds.slope, side + bounds.slope
 
 
-def _along(start: Array, end: Array, width: Array, momentum: AffineBounds, bend: AffineBounds) -> AffineBounds:
+def _along(
+    start: Array, end: Array, width: Array, momentum: AffineBounds, second_derivative: AffineBounds
+) -> AffineBounds:
     # y . a' - y' . a.
-    return dot(_line(start, end), bend) - dot(_steep(start, end, width), momentum)
+    return dot(_line(start, end), second_derivative) - dot(_steep(start, end, width), momentum)
 
 
 @persistent_jit(compiler_options=compile_options.least())
@@ -179,7 +184,7 @@ def _kernel(robot: AnyRobot, limits: Limits, blocks: tuple[StateBounds, _Cell]) 
         twice, lost, lack = _of_wrenches(robot, limits, state, cell)
         cables = cable_bounds(robot, state)
         if limits.cable_acceleration_max is not None:
-            ends = cell.start.bend, cell.end.bend
+            ends = cell.start.second_derivative, cell.end.second_derivative
             twice = twice + _along(*ends, cell.width, cables.rate, cables.acceleration)
             lost += jnp.sum(limits.cable_acceleration_max * 0.5 * (jnp.abs(ends[0]) + jnp.abs(ends[1])))
         if limits.acceleration_max is not None:
@@ -208,11 +213,16 @@ def _of_wrenches(robot: AnyRobot, limits: Limits, state: StateBounds, cell: _Cel
     cables = cable_bounds(robot, rest)
     matrix, weight = balance_bounds(robot, rest, cables)
     momentum = balance_bounds(robot, pushed, cables)[1] - weight
-    bend = balance_bounds(robot, state, cables)[1] - weight
-    matrix, weight, momentum, bend = matrix * unit[:, None], weight * unit, momentum * unit, bend * unit
+    second_derivative = balance_bounds(robot, state, cables)[1] - weight
+    matrix, weight, momentum, second_derivative = (
+        matrix * unit[:, None],
+        weight * unit,
+        momentum * unit,
+        second_derivative * unit,
+    )
     ends = cell.start.wrench, cell.end.wrench
     line = _line(*ends)
-    pulls = turned(matrix.each(jnp.transpose), line)
+    pulls = rotated(matrix.each(jnp.transpose), line)
     low, high = tension_range(robot, limits)
     is_bounded = jnp.isfinite(high)
 
@@ -229,8 +239,8 @@ def _of_wrenches(robot: AnyRobot, limits: Limits, state: StateBounds, cell: _Cel
         gains = jnp.where(is_bounded, 0.0, pulls.high())
         lack = jnp.max(jnp.where(gains > 0.0, gains / jnp.maximum(upward, 0.0), 0.0))
     if PATTERNS[robot.pattern].along_line:
-        bend = bend - _turning_axes(robot, pushed, cables) * unit
-    return _along(*ends, cell.width, momentum, bend), support - (held.middle - held.radius), lack
+        second_derivative = second_derivative - _turning_axes(robot, pushed, cables) * unit
+    return _along(*ends, cell.width, momentum, second_derivative), support - (held.middle - held.radius), lack
 
 
 def _turning_axes(robot: Any, pushed: StateBounds, cables: CableBounds) -> AffineBounds:

@@ -32,20 +32,20 @@ class Constrained(Protocol):
             z: unknowns.
         """
 
-    def residual(self, z: np.ndarray, pressures: np.ndarray) -> np.ndarray:
+    def residual(self, z: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
         """Gradient of the Lagrangian, and the residuals of equations, as `z`.
 
         Args:
             z: unknowns.
-            pressures: (m,).
+            multipliers: (m,).
         """
 
-    def pushed(self, z: np.ndarray, pressures: np.ndarray) -> np.ndarray:
+    def pushed(self, z: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
         """Gradient of minus the slacks times pressures, as `z`.
 
         Args:
             z: unknowns.
-            pressures: (m,).
+            multipliers: (m,).
         """
 
     def change(self, z: np.ndarray, step: np.ndarray) -> np.ndarray:
@@ -78,12 +78,12 @@ class Optimum(NamedTuple):
 
     Fields:
         z: unknowns.
-        pressures: (m,) multipliers of the constraints.
+        multipliers: (m,) multipliers of the constraints.
         is_optimal: whether the method converged.
     """
 
     z: np.ndarray
-    pressures: np.ndarray
+    multipliers: np.ndarray
     is_optimal: bool
 
 
@@ -100,26 +100,26 @@ def interior_point(problem: Constrained, z: np.ndarray) -> Optimum:
     """Minimise."""
     slacks = problem.slacks(z)
     slacks = np.maximum(slacks, 0.05)
-    pressures = 0.1 * problem.value(z) / len(slacks) / slacks
+    multipliers = 0.1 * problem.value(z) / len(slacks) / slacks
     for _ in range(STEPS):
         missed = slacks - problem.slacks(z)
-        residual = problem.residual(z, pressures)
-        complement = float(slacks @ pressures)
+        residual = problem.residual(z, multipliers)
+        complement = float(slacks @ multipliers)
         is_met = np.abs(missed).max() < MISSED and np.abs(residual).max() < LEVEL
         if is_met and complement < GAP * problem.value(z):
-            return Optimum(z, pressures, True)
-        target, weights = AIM * complement / len(slacks), pressures / slacks
-        push = target / slacks - pressures + weights * missed
+            return Optimum(z, multipliers, True)
+        target, weights = AIM * complement / len(slacks), multipliers / slacks
+        push = target / slacks - multipliers + weights * missed
         try:
             step = problem.solved(z, weights, -residual - problem.pushed(z, push))
         except np.linalg.LinAlgError:  # of cells whose widths differ beyond all digits
             break
         slack_step = problem.change(z, step) - missed
-        pressure_step = target / slacks - pressures - weights * slack_step
+        pressure_step = target / slacks - multipliers - weights * slack_step
         primal = _length([(slacks, slack_step), (problem.positive(z), problem.positive(step))])
-        dual = _length([(pressures, pressure_step)])
+        dual = _length([(multipliers, pressure_step)])
         if not np.isfinite(primal * dual) or not np.isfinite(step).all():
             break
         z = z + primal * step
-        slacks, pressures = slacks + primal * slack_step, pressures + dual * pressure_step
-    return Optimum(z, pressures, False)
+        slacks, multipliers = slacks + primal * slack_step, multipliers + dual * pressure_step
+    return Optimum(z, multipliers, False)

@@ -34,7 +34,7 @@ class PathPace(NamedTuple):
     coordinate: np.ndarray
     acceleration: np.ndarray
 
-    def bend(self, nodes: Float[np.ndarray, "n_cells+1"]) -> Float[np.ndarray, "n_cells"]:
+    def second_derivative(self, nodes: Float[np.ndarray, "n_cells+1"]) -> Float[np.ndarray, "n_cells"]:
         """Changes of the path acceleration within cells, over their widths."""
         return np.diff(np.interp(nodes, *self)) / np.diff(nodes)
 
@@ -44,12 +44,12 @@ class Jumping(NamedTuple):
 
     Fields:
         run: path speeds and accelerations; None if there is no motion.
-        bend: (n_cells,) change of u along each cell, over its width.
+        second_derivative: (n_cells,) change of u along each cell, over its width.
         first: solution with u constant in each cell.
     """
 
     run: PathSpeeds | None
-    bend: np.ndarray
+    second_derivative: np.ndarray
     first: GridSolution
 
 
@@ -76,11 +76,13 @@ def solved_together(paths: Sequence[Discrete], bends: Sequence[np.ndarray]) -> l
     return [solutions[k] for k in range(len(paths))]
 
 
-def run_of(solution: GridSolution, path: Discrete, bend: Float[np.ndarray, "n_cells"]) -> PathSpeeds | None:
+def run_of(
+    solution: GridSolution, path: Discrete, second_derivative: Float[np.ndarray, "n_cells"]
+) -> PathSpeeds | None:
     """Path speeds and accelerations of a solution."""
     if not _is_passable(solution):
         return None
-    half = 0.5 * bend * path.grid.width
+    half = 0.5 * second_derivative * path.grid.width
     u = np.asarray(solution.u)
     return moving(PathSpeeds(np.asarray(solution.x), u - half, u + half), path.grid.width)
 
@@ -93,15 +95,15 @@ def jumping_motions(paths: Sequence[Discrete], paces: Sequence[PathPace | None] 
     bends = [np.zeros_like(path.grid.width) for path in paths]
     solutions = solved_together(paths, bends)
     known = {
-        k: pace.bend(paths[k].grid.nodes)
+        k: pace.second_derivative(paths[k].grid.nodes)
         for k, pace in enumerate(paces)
         if pace is not None and not _is_passable(solutions[k])
     }
     for k, solution in zip(known, solved_together([paths[k] for k in known], list(known.values())), strict=True):
         solutions[k], bends[k] = solution, known[k]
     motions = [
-        Jumping(run_of(solution, path, bend), bend, solution)
-        for solution, path, bend in zip(solutions, paths, bends, strict=True)
+        Jumping(run_of(solution, path, second_derivative), second_derivative, solution)
+        for solution, path, second_derivative in zip(solutions, paths, bends, strict=True)
     ]
     going = [k for k, motion in enumerate(motions) if motion.run is not None]
     for _ in range(BENT):
@@ -110,7 +112,7 @@ def jumping_motions(paths: Sequence[Discrete], paces: Sequence[PathPace | None] 
         better = [run_of(s, paths[k], change) for k, s, change in zip(going, following, changes, strict=True)]
         for k, solution, change, run in zip(going, following, changes, better, strict=True):
             if run is not None:
-                solutions[k], motions[k] = solution, motions[k]._replace(run=run, bend=change)
+                solutions[k], motions[k] = solution, motions[k]._replace(run=run, second_derivative=change)
         going = [k for k, run in zip(going, better, strict=True) if run is not None]
     return motions
 

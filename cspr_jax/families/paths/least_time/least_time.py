@@ -136,7 +136,7 @@ def _proved(
 ) -> Generator[Trial, CellSlacks, tuple[LeastTime, bool]]:
     # Tighten the limits on the grid until the motion keeps them everywhere, and tell whether it does. It yields motions
     # and receives the bounds of their slacks.
-    jumping, bend, first = start
+    jumping, second_derivative, first = start
     if jumping is None:
         return _without_motion(problem, path, first), False
     section = path.section
@@ -152,7 +152,7 @@ def _proved(
         motion = timed(section, path.grid, run)
         slacks = yield Trial(motion, path.grid.feed)
         margins = slacks.grown(margins, weight)
-        slower = None if slacks.is_met else _slower(path.with_margins(margins), run, bend, jerk)
+        slower = None if slacks.is_met else _slower(path.with_margins(margins), run, second_derivative, jerk)
     times = np.diff(np.asarray(motion.knots))
     speed = np.sqrt(run.x)
     names, binds = slacks.binding(path.grid.feed, section.feeds)
@@ -212,9 +212,9 @@ def _without_motion(problem: Problem, path: Discrete, solution: GridSolution) ->
 
 def _slow(path: Discrete) -> PathSpeeds:
     # A slow motion, whose tensions are about those at rest, to be shown where none is feasible.
-    share = path.grid.nodes / path.grid.nodes[-1]
+    fraction = path.grid.nodes / path.grid.nodes[-1]
     bump = 4.0 * SLOW**2 * path.largest / FASTER**2
-    x = (1.0 - share) * path.ends[0] + share * path.ends[1] + bump * share * (1.0 - share)
+    x = (1.0 - fraction) * path.ends[0] + fraction * path.ends[1] + bump * fraction * (1.0 - fraction)
     x[[0, -1]] = path.ends
     u = 0.5 * np.diff(x) / path.grid.width
     return PathSpeeds(x, u, u)
@@ -243,9 +243,9 @@ def _smoothed(path: Discrete, start: Smooth, ends: SectionEnds, jerk: float, tim
     )
 
 
-def _slower(path: Discrete, run: PathSpeeds, bend: np.ndarray, jerk: float) -> PathSpeeds | None:
+def _slower(path: Discrete, run: PathSpeeds, second_derivative: np.ndarray, jerk: float) -> PathSpeeds | None:
     # The fastest motion within tighter limits.
     if not np.isfinite(jerk):
-        return again([path], [bend])[0]
+        return again([path], [second_derivative])[0]
     start = Smooth(run.x, np.append(run.before, run.after[-1]))
     return _smoothed(path, start, SectionEnds(path.ends, run.rests), jerk, 1)

@@ -47,11 +47,11 @@ def dual_multipliers(
 ) -> tuple[Float[np.ndarray, "n_rows n_nodes"], Float[np.ndarray, "n_nodes-1"]]:
     """Multipliers of the half-planes, and of the caps."""
     problem = _Staggered(rows, ends)
-    for share in STARTS:
-        optimum = interior_point(problem, share * start)
+    for fraction in STARTS:
+        optimum = interior_point(problem, fraction * start)
         if optimum.is_optimal:
             break
-    of_nodes, of_cells = problem.parts(optimum.pressures)
+    of_nodes, of_cells = problem.parts(optimum.multipliers)
     return of_nodes / problem.weights, of_cells / (rows.cap * rows.width)
 
 
@@ -85,12 +85,12 @@ class _Staggered:
         total[:, :-1] -= self.after[:, :-1] * step
         return np.append(total, -step / self.cap)
 
-    def pushed(self, z: np.ndarray, pressures: np.ndarray) -> np.ndarray:
-        rows, caps = self.parts(pressures)
+    def pushed(self, z: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+        rows, caps = self.parts(multipliers)
         return np.sum((self.before * rows)[:, 1:] + (self.after * rows)[:, :-1], axis=0) + caps / self.cap
 
-    def residual(self, z: np.ndarray, pressures: np.ndarray) -> np.ndarray:
-        return self.pushed(z, pressures) - 0.5 * self.width * z**-1.5
+    def residual(self, z: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+        return self.pushed(z, multipliers) - 0.5 * self.width * z**-1.5
 
     def solved(self, z: np.ndarray, weights: np.ndarray, right: np.ndarray) -> np.ndarray:
         rows, caps = self.parts(weights)

@@ -58,14 +58,14 @@ class Places(NamedTuple):
     Fields:
         position: (k, 6, 3) Bernstein coefficients of their pieces, m.
         quaternion: (k, 6, 4) likewise; None for a point mass.
-        share: (k,) of the piece before the place.
+        fraction: (k,) of the piece before the place.
         width: (k,) of the pieces, m.
         offset: (k, 3) as of `Spline`, or None.
     """
 
     position: Any
     quaternion: Any
-    share: Any
+    fraction: Any
     width: Any
     offset: Any
 
@@ -118,10 +118,10 @@ def places_on(curve: Spline, coordinates: Float[np.ndarray, "k"], *, ahead: bool
     near = NEAR * float(np.diff(knots).min())
     piece = _pieces(knots, coordinates + (near if ahead else -near))
     width = np.diff(knots)[piece]
-    share = np.clip((coordinates - knots[piece]) / width, 0.0, 1.0)
+    fraction = np.clip((coordinates - knots[piece]) / width, 0.0, 1.0)
     turning = None if curve.quaternion is None else _raised(np.asarray(curve.quaternion))[piece]
     offset = None if curve.offset is None else np.broadcast_to(curve.offset, (len(piece), 3))
-    return Places(_raised(np.asarray(curve.position))[piece], turning, share, width, offset)
+    return Places(_raised(np.asarray(curve.position))[piece], turning, fraction, width, offset)
 
 
 def _raised(coefficients: np.ndarray) -> np.ndarray:
@@ -183,9 +183,9 @@ def _ended(start: np.ndarray, before: np.ndarray, jumps: np.ndarray) -> np.ndarr
 @persistent_jit(compiler_options=compile_options.least())
 def _derivatives(places: Places) -> Any:
     def one(place: Places):
-        rates = [piece_values(place.position, place.share, place.width)]
+        rates = [piece_values(place.position, place.fraction, place.width)]
         if place.quaternion is not None:
-            rates.append(piece_values(place.quaternion, place.share, place.width))
+            rates.append(piece_values(place.quaternion, place.fraction, place.width))
         return rates
 
     return jax.vmap(one)(places)

@@ -55,7 +55,7 @@ def refusal(problem: Problem, path: Discrete, solution: GridSolution) -> NoMotio
     static = _static_tension(problem, path, node)
     if 0 <= cell < n_cells:
         needed, allowed, rows = _meeting(path, solution, cell)
-        known = row_names(problem, state, *(np.asarray(share[cell]) for share in path.start[:2]))
+        known = row_names(problem, state, *(np.asarray(fraction[cell]) for fraction in path.start[:2]))
         # Half-planes of both ends of a cell follow each other; those beyond lead into the next set.
         names = tuple(known[row % len(known)] if row < 2 * len(known) else WAY_ON for row in rows)
         return NoMotion(coordinate, position, names, slope * needed, slope * allowed, static_tension=static)

@@ -63,8 +63,8 @@ class NodeRows(NamedTuple):
             return self
         chosen = []
         over = np.where(np.abs(self.u) > FLAT, self.u, 1.0)
-        for share in (1.0, SLOWER):
-            value = (self.most - share * self.x * x) / over
+        for fraction in (1.0, SLOWER):
+            value = (self.most - fraction * self.x * x) / over
             for sign in (1.0, -1.0):
                 bounds = np.where(sign * self.u > FLAT, sign * value, np.inf)
                 chosen.append(np.argpartition(bounds, NEAREST, axis=0)[:NEAREST])
@@ -137,7 +137,7 @@ class _Time(NamedTuple):
     # The duration, its gradient in x, and the bands of its Hessian: of x with itself, and with the next x.
     value: float
     gradient: np.ndarray
-    bend: np.ndarray
+    second_derivative: np.ndarray
     coupling: np.ndarray
 
 
@@ -148,28 +148,32 @@ def _time(x: np.ndarray, width: np.ndarray, rests: tuple[bool, bool]) -> _Time:
     both = np.where(moves, speed, 0.0)[1:] + np.where(moves, speed, 0.0)[:-1]
     scaled = 2.0 * width
     scaled[0], scaled[-1] = ((3.0 if rest else 2.0) * width[end] for end, rest in zip((0, -1), rests, strict=True))
-    gradient, bend = np.zeros(len(x)), np.zeros(len(x))
+    gradient, second_derivative = np.zeros(len(x)), np.zeros(len(x))
     for near in (slice(None, -1), slice(1, None)):
         gradient[near] -= 0.5 * scaled / (both**2 * speed[near])
-        bend[near] += 0.5 * scaled * (1.0 / (both**3 * speed[near] ** 2) + 0.5 / (both**2 * speed[near] ** 3))
+        second_derivative[near] += (
+            0.5 * scaled * (1.0 / (both**3 * speed[near] ** 2) + 0.5 / (both**2 * speed[near] ** 3))
+        )
     coupling = np.where(moves[1:] & moves[:-1], 0.5 * scaled / (both**3 * speed[1:] * speed[:-1]), 0.0)
-    return _Time(float(np.sum(scaled / both)), np.where(moves, gradient, 0.0), np.where(moves, bend, 1.0), coupling)
+    return _Time(
+        float(np.sum(scaled / both)), np.where(moves, gradient, 0.0), np.where(moves, second_derivative, 1.0), coupling
+    )
 
 
 class _Tangents(NamedTuple):
     # Tangents of the limit of the path jerk: +-(u1 - u0) share + (x0 + x1) level <= 1, (n_cells,).
-    share: np.ndarray
+    fraction: np.ndarray
     level: np.ndarray
 
 
 def _tangents(x: np.ndarray, width: np.ndarray, jerk: float, rests: tuple[bool, bool]) -> _Tangents:
     middle = 0.5 * (x[1:] + x[:-1])
     # 1 / sqrt x is above its tangent 1.5 / sqrt m - 0.5 x / m^1.5.
-    share, level = middle**0.5 / (1.5 * jerk * width), 1.0 / (6.0 * middle)
+    fraction, level = middle**0.5 / (1.5 * jerk * width), 1.0 / (6.0 * middle)
     for end, rest in zip((0, -1), rests, strict=True):
         if rest:  # the jerk of the cell is 2 x^1.5 / 9 D^2
-            share[end], level[end] = 0.0, (4.5 * width[end] ** 2 * jerk) ** (-2.0 / 3.0)
-    return _Tangents(share, level)
+            fraction[end], level[end] = 0.0, (4.5 * width[end] ** 2 * jerk) ** (-2.0 / 3.0)
+    return _Tangents(fraction, level)
 
 
 class _Problem:
@@ -208,23 +212,23 @@ class _Problem:
         return np.concatenate([slacks.ravel(), *(-side for side in self._turned(step))])
 
     def _turned(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        change, total = self.tangents.share * np.diff(z[:, 1]), self.tangents.level * (z[1:, 0] + z[:-1, 0])
+        change, total = self.tangents.fraction * np.diff(z[:, 1]), self.tangents.level * (z[1:, 0] + z[:-1, 0])
         return total + change, total - change
 
-    def pushed(self, z: np.ndarray, pressures: np.ndarray) -> np.ndarray:
-        of_rows = pressures[: self.u.size].reshape(self.u.shape)
+    def pushed(self, z: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+        of_rows = multipliers[: self.u.size].reshape(self.u.shape)
         pushed = np.zeros_like(z)
         pushed[:, 0], pushed[:, 1] = np.sum(self.x * of_rows, axis=0), np.sum(self.u * of_rows, axis=0)
-        up, down = pressures[self.u.size :].reshape(2, -1)
-        total, difference = (up + down) * self.tangents.level, (up - down) * self.tangents.share
+        up, down = multipliers[self.u.size :].reshape(2, -1)
+        total, difference = (up + down) * self.tangents.level, (up - down) * self.tangents.fraction
         pushed[:-1, 0] += total
         pushed[1:, 0] += total
         pushed[:-1, 1] -= difference
         pushed[1:, 1] += difference
         return np.where(self.free, pushed, 0.0)
 
-    def residual(self, z: np.ndarray, pressures: np.ndarray) -> np.ndarray:
-        residual = self.pushed(z, pressures)
+    def residual(self, z: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+        residual = self.pushed(z, multipliers)
         residual[:, 0] += _time(z[:, 0], self.width, self.ends.rests).gradient
         for side, nodes in enumerate((slice(None, -1), slice(1, None))):
             for column in (0, 1):
@@ -237,13 +241,13 @@ class _Problem:
         count, of_rows = len(z), weights[: self.u.size].reshape(self.u.shape)
         here, ahead = np.zeros((3, 3, count)), np.zeros((3, 3, count - 1))
         time = _time(z[:, 0], self.width, self.ends.rests)
-        here[0, 0] = time.bend + np.sum(of_rows * self.x**2, axis=0)
+        here[0, 0] = time.second_derivative + np.sum(of_rows * self.x**2, axis=0)
         here[0, 1] = np.sum(of_rows * self.x * self.u, axis=0)
         here[1, 1] = np.sum(of_rows * self.u**2, axis=0) + REGULAR
         ahead[0, 0] = time.coupling
         up, down = weights[self.u.size :].reshape(2, -1)
-        share, level = self.tangents
-        of_level, of_share, mixed = (up + down) * level**2, (up + down) * share**2, (up - down) * level * share
+        fraction, level = self.tangents
+        of_level, of_share, mixed = (up + down) * level**2, (up + down) * fraction**2, (up - down) * level * fraction
         for near, sign in ((slice(None, -1), -1.0), (slice(1, None), 1.0)):
             here[0, 0, near] += of_level
             here[1, 1, near] += of_share

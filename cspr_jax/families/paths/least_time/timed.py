@@ -45,10 +45,12 @@ def cell_times(run: PathSpeeds, width: Float[np.ndarray, "n_cells"]) -> Float[np
     # With s - s0 = D r^2 at a start from zero speed, and D (1 - (1 - r)^2) at an end, nothing is singular.
     r, weights = 0.5 * (_POINTS + 1.0), 0.5 * _WEIGHTS
     starts, ends = (run.x[:-1] == 0.0)[:, None], (run.x[1:] == 0.0)[:, None]
-    share = np.where(starts, r**2, np.where(ends, 1.0 - (1.0 - r) ** 2, r))
+    fraction = np.where(starts, r**2, np.where(ends, 1.0 - (1.0 - r) ** 2, r))
     stretch = np.where(starts, 2.0 * r, np.where(ends, 2.0 * (1.0 - r), 1.0))
-    bend = (run.after - run.before)[:, None]
-    x = run.x[:-1, None] + 2.0 * width[:, None] * (run.before[:, None] * share + 0.5 * bend * share**2)
+    second_derivative = (run.after - run.before)[:, None]
+    x = run.x[:-1, None] + 2.0 * width[:, None] * (
+        run.before[:, None] * fraction + 0.5 * second_derivative * fraction**2
+    )
     with np.errstate(invalid="ignore", divide="ignore"):  # of cells that no motion runs through
         times = width * np.sum(weights * stretch / np.sqrt(x), axis=1)
     for end, rest in zip((0, -1), run.rests, strict=True):
@@ -101,8 +103,8 @@ def distance_from_path(section: Section, grid: PathGrid, run: PathSpeeds, motion
     first, last = (tuple(x[:, None] for x in end) for end in ends)
     way = _quintic(first, last, times[:, None])
     largest = 0.0
-    for share in SHARES:
-        values = [_at(table, share) for table in (way, np.asarray(motion.position))]
+    for fraction in SHARES:
+        values = [_at(table, fraction) for table in (way, np.asarray(motion.position))]
         place, ahead, _ = derivatives(places_on(section.curve, values[0][:, 0], ahead=True))[0]
         # A body that turns on the spot has no direction.
         slopes = np.linalg.norm(ahead, axis=1, keepdims=True)
@@ -112,7 +114,7 @@ def distance_from_path(section: Section, grid: PathGrid, run: PathSpeeds, motion
     return largest
 
 
-def _at(table: np.ndarray, share: float) -> np.ndarray:
+def _at(table: np.ndarray, fraction: float) -> np.ndarray:
     while table.shape[1] > 1:
-        table = (1.0 - share) * table[:, :-1] + share * table[:, 1:]
+        table = (1.0 - fraction) * table[:, :-1] + fraction * table[:, 1:]
     return table[:, 0]

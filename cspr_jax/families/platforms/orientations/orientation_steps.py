@@ -44,14 +44,14 @@ class OrientationSamples(NamedTuple):
     """Determinants and vectors of cables of n poses.
 
     Fields:
-        share: (n,) determinant over the determinant of the reference orientation at the same place; NaN where the
+        fraction: (n,) determinant over the determinant of the reference orientation at the same place; NaN where the
             reference orientation is singular itself, or the place is not below the spools. On more than six cables the
             root of the determinant of the matrix times its transpose.
         gaps: (n, n_pairs, 3) shortest vectors between cables, m.
         cable_directions: (n, n_cables, 3) cables seen from the platform, m.
     """
 
-    share: np.ndarray
+    fraction: np.ndarray
     gaps: np.ndarray
     cable_directions: np.ndarray
 
@@ -84,15 +84,15 @@ def reference_share(robot: PlatformRobot, place: Float[np.ndarray, "3"]) -> floa
     """Determinant of the reference orientation at a place, if its sign is the same as in the middle."""
     if robot.n_cables > robot.dof:
         return 1.0
-    here, depth, share = _upright(robot, np.asarray(place, float))
-    return float(here) if float(depth) > 0.0 and bool(is_regular(share)) else np.nan
+    here, depth, fraction = _upright(robot, np.asarray(place, float))
+    return float(here) if float(depth) > 0.0 and bool(is_regular(fraction)) else np.nan
 
 
 @jax.jit
 def _upright(robot: PlatformRobot, place: Array) -> tuple[Array, Array, Array]:
     upright = jnp.eye(3)
-    share = determinant_share(robot, place, upright)
-    return normalised_determinant(robot, place, upright), plane_normal(robot) @ place, share
+    fraction = determinant_share(robot, place, upright)
+    return normalised_determinant(robot, place, upright), plane_normal(robot) @ place, fraction
 
 
 class OrientationSteps:
@@ -120,17 +120,19 @@ class OrientationSteps:
         sampled = in_batches(
             partial(_sampled, self._robot, pairs=self._pairs), (places, np.asarray(quaternions)), size=BATCH
         )
-        share, gaps, directions = sampled
+        fraction, gaps, directions = sampled
         # Cables that touch have a gap of rounding errors, whose direction means nothing.
         gaps[_squares(gaps) < (TOUCHING * self._size) ** 2] = 0.0
         # Neither does the sign of the height of cables that lie in the platform: they are put on one side of it.
         height, least = directions @ self._contacts.normal, TOUCHING * np.sqrt(_squares(directions))
         height = np.where(np.abs(height) < least, 2.0 * least * self._side - height, 0.0)
-        return OrientationSamples(share / self._reference, gaps, directions + height[..., None] * self._contacts.normal)
+        return OrientationSamples(
+            fraction / self._reference, gaps, directions + height[..., None] * self._contacts.normal
+        )
 
     def regular(self, samples: OrientationSamples) -> Bool[np.ndarray, "n"]:
         """Orientations that are not beyond a singularity."""
-        return is_regular(samples.share)
+        return is_regular(samples.fraction)
 
     def passable(
         self, samples: OrientationSamples, first: Int[np.ndarray, "n"], last: Int[np.ndarray, "n"]

@@ -93,8 +93,8 @@ class AttainabilityMap(OrientationWorkspaceMap):
             angles = np.concatenate([inside.angles for inside in sets])[valid]
             answers = self._attainable(places[place_index[valid]], angles, z0[place_index[valid]], margins=False)
             verdicts[valid], arcs[valid] = answers.verdict, answers.arcs
-        stops = np.cumsum(counts)[:-1]
-        pieces = zip(sets, np.split(arcs, stops), np.split(verdicts, stops), strict=True)
+        waypoints = np.cumsum(counts)[:-1]
+        pieces = zip(sets, np.split(arcs, waypoints), np.split(verdicts, waypoints), strict=True)
         rows = [_of_attained(*piece) for piece in pieces]
         columns = {name: np.array([row[name] for row in rows[: len(places)]]) for name in rows[0]}
         columns["main_reason"] = columns["main_reason"].astype(FLAGS)

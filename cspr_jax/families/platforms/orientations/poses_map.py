@@ -81,12 +81,14 @@ class PosesMap(PlatformMap):
         if start is None or start.position is None:
             return rest_poses(z0), np.full(count, AT_REST)
         place = np.tile(self._frame.inward(start.position), (count, 1))
-        turned = np.tile(self._frame.turned_quaternions(self._quaternion), (count, 1))
+        rotated = np.tile(self._frame.turned_quaternions(self._quaternion), (count, 1))
         if start.tilt_torsion is not None:
-            turned = orientations(self._frame, place, np.tile(start.tilt_torsion, (count, 1)))
+            rotated = orientations(self._frame, place, np.tile(start.tilt_torsion, (count, 1)))
         beta_hat = start.beta_hat
-        beta_hats = start_beta_hat(self._checker, (place, turned), z0) if beta_hat is None else np.full(count, beta_hat)
-        return (place, turned), beta_hats
+        beta_hats = (
+            start_beta_hat(self._checker, (place, rotated), z0) if beta_hat is None else np.full(count, beta_hat)
+        )
+        return (place, rotated), beta_hats
 
     def refuse_hopeless(self, grid: Grid) -> None:
         """Refuse targets that are all out of reach, and a robot that hangs nowhere; see `GridMap.refuse_hopeless`."""

@@ -28,13 +28,13 @@ class CablesOfStep(NamedTuple):
     Fields:
         rays: (m, n, n_cables, 3) from spool to platform, m.
         seen: (m, n, n_cables, 3) from platform to spool in platform axes, m.
-        bent: (n, n_cables) C h^2 / 8 of the rays, m.
+        deviation: (n, n_cables) C h^2 / 8 of the rays, m.
         seen_bent: (n,) C h^2 / 8 of the cables as the platform sees them, m.
     """
 
     rays: np.ndarray
     seen: np.ndarray
-    bent: np.ndarray
+    deviation: np.ndarray
     seen_bent: np.ndarray
 
 
@@ -65,8 +65,8 @@ def cables_meet(
     u, v = cables.rays[:, :, i], cables.rays[:, :, j]
     volume = (np.cross(apart, u) * v).sum(-1)
     step, block, pair = _sign_changes(volume, _size(apart) * (_size(u) * _size(v)).max(0))
-    first = _within(cables.rays, (step, block, i[pair]), cables.bent)
-    second = _within(cables.rays, (step, block, j[pair]), cables.bent)
+    first = _within(cables.rays, (step, block, i[pair]), cables.deviation)
+    second = _within(cables.rays, (step, block, j[pair]), cables.deviation)
     between = _Around(apart[pair], np.zeros(len(pair)))
     normal = first.cross(second)
     least = normal.dot(normal)[0]
@@ -85,8 +85,8 @@ def cables_hit(
     """Steps in which a cable lies on the platform for certain."""
     hits = np.full(cables.seen.shape[1], -1)
     step, block, cable = _sign_changes(cables.seen @ normal, _size(cables.seen).max(0))
-    bent = np.broadcast_to(cables.seen_bent[:, None], cables.seen.shape[1:3])
-    seen = _within(cables.seen, (step, block, cable), bent)
+    deviation = np.broadcast_to(cables.seen_bent[:, None], cables.seen.shape[1:3])
+    seen = _within(cables.seen, (step, block, cable), deviation)
     one, two = sides[cable, 0], sides[cable, 1]
     # The area that a vector spans with a side changes by no more than the side's length times how far the vector moves.
     inside = np.cross(two, seen.mean) @ normal > _size(two) * seen.off
@@ -102,11 +102,11 @@ def _sign_changes(values: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, ..
     return np.nonzero((is_high[:-1] & is_low[1:]) | (is_low[:-1] & is_high[1:]))
 
 
-def _within(vectors: np.ndarray, indices: tuple[np.ndarray, ...], bent: np.ndarray) -> _Around:
+def _within(vectors: np.ndarray, indices: tuple[np.ndarray, ...], deviation: np.ndarray) -> _Around:
     # Enclose vectors during the steps that begin at the given instants.
     step, block, cable = indices
     before, after = vectors[step, block, cable], vectors[step + 1, block, cable]
-    return _Around(0.5 * (before + after), 0.5 * _size(after - before) + bent[block, cable])
+    return _Around(0.5 * (before + after), 0.5 * _size(after - before) + deviation[block, cable])
 
 
 def _size(vectors: np.ndarray) -> np.ndarray:

@@ -49,16 +49,16 @@ class Reach(NamedTuple):
 
     Fields:
         speed: bound of |p'|, m.
-        bend: bound of |p''|, m.
-        growth: bound of the norm of the rotation matrix.
+        second_derivative: bound of |p''|, m.
+        radial_rate: bound of the norm of the rotation matrix.
         rotation_rate: bound of the norm of the derivative of the rotation matrix.
         omega: bound of |omega|, rad.
         angular_acceleration: bound of |omega'|, rad.
     """
 
     speed: Array
-    bend: Array
-    growth: Array
+    second_derivative: Array
+    radial_rate: Array
     rotation_rate: Array
     omega: Array
     angular_acceleration: Array
@@ -92,7 +92,7 @@ def reach(
     phase = math.pi * arcs * along, jnp.exp(math.pi * arcs * aside)
     sine, cosine = sincospi(arcs * middle.tau)
     first = _trigonometric((jnp.abs(sine), jnp.abs(cosine)), *phase)
-    speed, bend = _swing(segment, arcs, middle, (along, aside), sizes, first, kind)
+    speed, second_derivative = _swing(segment, arcs, middle, (along, aside), sizes, first, kind)
     if kind.plain:
         omega = math.pi * arcs
         beats = _Beats(first.cosine, omega * first.sine, omega * omega * first.cosine, first.aside)
@@ -113,7 +113,7 @@ def reach(
     angular_acceleration = beta2 * u + beta1 * u1 + beside * (beta1 * u1 + beta * u2)
     if not kind.from_rest:
         angular_acceleration = angular_acceleration + grown * beta * u1 * v1
-    return Reach(speed, bend, grown, 2.0 * grown * v1, 2.0 * omega, 2.0 * angular_acceleration)
+    return Reach(speed, second_derivative, grown, 2.0 * grown * v1, 2.0 * omega, 2.0 * angular_acceleration)
 
 
 def _polynomial_sizes(terms: Sequence[Array], along: Array) -> tuple[Array, ...]:
@@ -133,15 +133,15 @@ class _Beats(NamedTuple):
     # Bounds of |beta|, |beta'|, |beta''|, and the imaginary part of beta.
     value: Array
     rate: Array
-    bend: Array
+    second_derivative: Array
     aside: Array
 
 
-def _trigonometric(middle: tuple[Array, Array], along: Array, growth: Array) -> _Trigonometric:
+def _trigonometric(middle: tuple[Array, Array], along: Array, radial_rate: Array) -> _Trigonometric:
     # Bound sines and cosines within `along` of an angle whose |sin| and |cos| are `middle`; growth is exp of the
     # largest imaginary part.
-    shrunk = 1.0 / growth
-    cosh, sinh = 0.5 * (growth + shrunk), 0.5 * (growth - shrunk)
+    shrunk = 1.0 / radial_rate
+    cosh, sinh = 0.5 * (radial_rate + shrunk), 0.5 * (radial_rate - shrunk)
     near = jnp.minimum(along, 1.0)
     off = jnp.sqrt(near * near + sinh * sinh)
     sine, cosine = middle
@@ -174,12 +174,12 @@ def _swing(
         w1 = 2.0 * nu * nu * r1 * omega + (r1 * steady + r3) / omega
         across1 = nu * (r * steady + 3.0 * r2)
         speed = sine * _hypotenuse(w, across)
-        bend = _hypotenuse(omega * cosine * w + sine * w1, omega * cosine * across + sine * across1)
+        second_derivative = _hypotenuse(omega * cosine * w + sine * w1, omega * cosine * across + sine * across1)
     else:
         inner = r2 + r * steady
         speed = _hypotenuse(r1 * cosine + r * steady / omega * sine, nu * r1 * sine)
-        bend = _hypotenuse(inner * cosine + 2.0 * r1 * steady / omega * sine, nu * inner * sine)
-    return frame * speed, frame * bend
+        second_derivative = _hypotenuse(inner * cosine + 2.0 * r1 * steady / omega * sine, nu * inner * sine)
+    return frame * speed, frame * second_derivative
 
 
 def _hypotenuse(a: Array, b: Array) -> Array:
@@ -189,22 +189,22 @@ def _hypotenuse(a: Array, b: Array) -> Array:
 def _beat(segment: PlatformSegment, arcs: Array, middle: Middle, axes, first, third) -> _Beats:
     # Bound beta_ff of (3.93) by its terms.
     slerp, omega, nu = segment.slerp, math.pi * arcs, segment.precession / arcs
-    share = (1.0 - nu) * (1.0 + nu)
-    slope = (slerp.end_beta_hat - slerp.start_beta_hat) * share
-    h, steep = slerp.start_beta_hat * share + slope * middle.tau, jnp.abs(slope)
+    fraction = (1.0 - nu) * (1.0 + nu)
+    slope = (slerp.end_beta_hat - slerp.start_beta_hat) * fraction
+    h, steep = slerp.start_beta_hat * fraction + slope * middle.tau, jnp.abs(slope)
     nine, one = jnp.abs(9.0 + h) + steep * axes[0], jnp.abs(1.0 + h) + steep * axes[0]
     value = nine * first.cosine + one * third.cosine
     rate = steep * (first.cosine + third.cosine) + omega * (3.0 * one * third.sine + nine * first.sine)
-    bend = 2.0 * steep * omega * (3.0 * third.sine + first.sine)
-    bend = bend + omega * omega * (9.0 * one * third.cosine + nine * first.cosine)
+    second_derivative = 2.0 * steep * omega * (3.0 * third.sine + first.sine)
+    second_derivative = second_derivative + omega * omega * (9.0 * one * third.cosine + nine * first.cosine)
     aside = nine * first.aside + one * third.aside + steep * axes[1] * (first.cosine + third.cosine)
-    return _Beats(value * 0.125, rate * 0.125, bend * 0.125, aside * 0.125)
+    return _Beats(value * 0.125, rate * 0.125, second_derivative * 0.125, aside * 0.125)
 
 
 def _half_vector(segment: PlatformSegment, middle: Middle, axes, sizes, angle: Array) -> tuple[Array, ...]:
     # Bound |u|, |u'| and |u''|: u = W(s) times the vector part of the envelope, which is at the angle phi = Theta A.
     slerp = segment.slerp
-    rate, bend = angle * sizes[1], angle * sizes[2]
+    rate, second_derivative = angle * sizes[1], angle * sizes[2]
     grown = jnp.exp(axes[1] * rate)
     shrunk = 1.0 / grown
     cosh = 0.5 * (grown + shrunk)
@@ -216,7 +216,7 @@ def _half_vector(segment: PlatformSegment, middle: Middle, axes, sizes, angle: A
     s, s1 = jnp.minimum(1.0 + off, largest), largest
     by_angle = size * (w + w1 * s1)
     by_square = size * (w + 2.0 * w1 * s1 + w2 * s1 * s1 + w1 * s)
-    return size * w, by_angle * rate, by_square * rate * rate + by_angle * bend
+    return size * w, by_angle * rate, by_square * rate * rate + by_angle * second_derivative
 
 
 def _angle_ratio(off: Array) -> tuple[Array, ...]:

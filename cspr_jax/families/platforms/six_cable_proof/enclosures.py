@@ -89,7 +89,7 @@ class _Middle(NamedTuple):
     acceleration: np.ndarray
     force: np.ndarray
     moment: np.ndarray
-    whirl: np.ndarray
+    acceleration_matrix: np.ndarray
 
 
 class _Within(NamedTuple):
@@ -99,10 +99,10 @@ class _Within(NamedTuple):
     way: np.ndarray
     velocity: np.ndarray
     acceleration: np.ndarray
-    bent: np.ndarray
+    deviation: np.ndarray
     moved: np.ndarray
     force: np.ndarray
-    whirl: np.ndarray
+    acceleration_matrix: np.ndarray
 
 
 def _middle(robot: PlatformRobot, here: StateLanes, squared: np.ndarray) -> _Middle:
@@ -123,17 +123,17 @@ def _middle(robot: PlatformRobot, here: StateLanes, squared: np.ndarray) -> _Mid
     omega = in_platform(omega) / time[:, None]
     angular_acceleration = in_platform(angular_acceleration) / squared[:, None]
     velocity, acceleration = velocity / time[:, None], acceleration / squared[:, None]
-    whirl = _skew(angular_acceleration) + _skew(omega) @ _skew(omega)
+    acceleration_matrix = _skew(angular_acceleration) + _skew(omega) @ _skew(omega)
     inertia = np.asarray(robot.inertia) / float(robot.mass)
     moment = angular_acceleration @ inertia.T + np.cross(omega, omega @ inertia.T)
     return _Middle(
         away + arms,
         velocity[:, None] - np.cross(omega[:, None], away),
         velocity[:, None] + np.cross(omega[:, None], arms),
-        acceleration[:, None] + np.einsum("kij,nj->kni", whirl, arms),
+        acceleration[:, None] + np.einsum("kij,nj->kni", acceleration_matrix, arms),
         acceleration - float(robot.gravity) * rotation[:, 2],
         moment,
-        whirl,
+        acceleration_matrix,
     )
 
 
@@ -151,22 +151,22 @@ def _within(robot: PlatformRobot, middle: _Middle, moving: _Moving, half: np.nda
     half, radius, time = half[:, None], RADIUS / (math.pi * arcs[:, None]), np.sqrt(squared)
     arms = np.linalg.norm(np.asarray(robot.platform_points), axis=1)
     away = np.linalg.norm(middle.rays - np.asarray(robot.platform_points), axis=2) + half * near.speed
-    jerk = wide.bend / radius
-    force = jerk / squared + near.omega * (near.bend / squared + float(robot.gravity))
-    whirl = (wide.angular_acceleration / radius + 3.0 * near.omega * near.angular_acceleration) / squared
+    jerk = wide.second_derivative / radius
+    force = jerk / squared + near.omega * (near.second_derivative / squared + float(robot.gravity))
+    acceleration_matrix = (wide.angular_acceleration / radius + 3.0 * near.omega * near.angular_acceleration) / squared
     pace = near.speed + arms * near.omega
     turning = near.angular_acceleration + near.omega**2
-    pull = near.bend + arms * turning
-    steep = jerk + arms * wide.growth * (wide.angular_acceleration + wide.omega**2) / radius
-    bent = 0.5 * half**2 * (near.bend + 2.0 * near.omega * near.speed + turning * away)
+    pull = near.second_derivative + arms * turning
+    steep = jerk + arms * wide.radial_rate * (wide.angular_acceleration + wide.omega**2) / radius
+    deviation = 0.5 * half**2 * (near.second_derivative + 2.0 * near.omega * near.speed + turning * away)
     way = middle.pace * (half * time)[..., None]
     return _Within(
         way,
         half * (pull + near.omega * pace) / time,
         half * (steep + near.omega * pull) / squared,
-        bent,
-        largest_moves(way, bent),
-        *(half * x for x in (force, whirl)),
+        deviation,
+        largest_moves(way, deviation),
+        *(half * x for x in (force, acceleration_matrix)),
     )
 
 
@@ -194,7 +194,7 @@ def _distances(problem: Problem, pairs: tuple, middle: _Middle, within: _Within,
         _add_gap(columns, gaps[:, n], places[:, n], middle, within, tips, pair)
     for k in range(CABLES):
         e, height = unit_vectors(left[:, k]), np.linalg.norm(left[:, k], axis=1)
-        change = np.abs(np.sum(e * within.way[:, k], axis=1)) + within.bent[:, k]
+        change = np.abs(np.sum(e * within.way[:, k], axis=1)) + within.deviation[:, k]
         columns.add(-np.sum(e * middle.rays[:, k], axis=1), change, 1.0, height, 1.0)
     longest = touchable(problem).limits.cable_length_max
     for k, length in enumerate([] if longest is None else np.asarray(longest).tolist()):
@@ -212,7 +212,9 @@ def _add_gap(columns: _Columns, gaps, places, middle: _Middle, within: _Within, 
     along = [np.sum(e * within.way[:, k], axis=1) for k in pair]
     for first, last in itertools.product((1.0, 0.0), repeat=2):
         apart = (tips[j] - last * middle.rays[:, j]) - (tips[i] - first * middle.rays[:, i])
-        change = np.abs(first * along[0] - last * along[1]) + first * within.bent[:, i] + last * within.bent[:, j]
+        change = (
+            np.abs(first * along[0] - last * along[1]) + first * within.deviation[:, i] + last * within.deviation[:, j]
+        )
         swing = slope * (first * within.moved[:, i] + last * within.moved[:, j])
         tilted = np.sum(tilt * apart, axis=1), slope, swing
         columns.add(np.sum(e * apart, axis=1), change, first + last, gap, 2.0 - places.sum(1), tilted)
@@ -276,11 +278,11 @@ class Robustness:
             arms=points,
             force=middle.force,
             moment=middle.moment,
-            whirl=middle.whirl,
+            acceleration_matrix=middle.acceleration_matrix,
             way=within.way,
-            bent=within.bent,
+            deviation=within.deviation,
             force_change=within.force[:, 0],
-            whirl_change=within.whirl[:, 0],
+            acceleration_matrix_change=within.acceleration_matrix[:, 0],
             low=scale * low,
             high=scale * high,
             distances=_distances(self._problem, self._pairs, middle, within, met),

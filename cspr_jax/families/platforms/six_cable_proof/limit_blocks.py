@@ -60,7 +60,7 @@ class Sizes(NamedTuple):
         squared: (n,) T^2, s^2.
         z0: (n,) depth of P0, m.
         speed: (n,) bound of |p'| of the mass centre in normalised time, m.
-        bend: (n,) likewise of |p''|.
+        second_derivative: (n,) likewise of |p''|.
     """
 
     kappa: Sequence[Array]
@@ -71,7 +71,7 @@ class Sizes(NamedTuple):
     squared: Array
     z0: Array
     speed: Array
-    bend: Array
+    second_derivative: Array
 
 
 class Enclosed(NamedTuple):
@@ -81,13 +81,13 @@ class Enclosed(NamedTuple):
         coefficients: bounds of Bernstein coefficients, which allow for what the polynomials leave out.
         nodes: bounds of the values at the nodes, which allow for rounding.
         regular: as `coefficients`, of D.
-        share: as `nodes`, of D.
+        fraction: as `nodes`, of D.
     """
 
     coefficients: Pair
     nodes: Pair
     regular: Pair
-    share: Pair
+    fraction: Pair
 
 
 class LimitOnBlocks(NamedTuple):
@@ -136,9 +136,9 @@ def _tension_sizes(sizes: Sizes, _: Array) -> list[Array]:
 def _tension_slacks(enclosed: Enclosed, limit: Array, is_least: bool) -> Pair:
     limit, (low, high), (under, over) = limit[None, :, None], enclosed.coefficients, enclosed.nodes
     if is_least:
-        here, bound = at_most(over, enclosed.share) - limit, ratio(low, enclosed.regular) - limit
+        here, bound = at_most(over, enclosed.fraction) - limit, ratio(low, enclosed.regular) - limit
     else:
-        here, bound = limit + at_most(-under, enclosed.share), limit + ratio(-high, enclosed.regular)
+        here, bound = limit + at_most(-under, enclosed.fraction), limit + ratio(-high, enclosed.regular)
     return jnp.min(here, axis=1), jnp.min(bound, axis=(0, 1))
 
 
@@ -151,8 +151,8 @@ def _rates(here: Here) -> list[tuple[Array, Array, Array]]:
 def _speeds(here: Here, limit: Array) -> list[Pair]:
     values = []
     for k, (length, rate, _) in enumerate(_rates(here)):
-        share = rate * rate / (here.squared * limit[k] ** 2)
-        values.append((length / here.z0) ** 2 * (1.0 - share))
+        fraction = rate * rate / (here.squared * limit[k] ** 2)
+        values.append((length / here.z0) ** 2 * (1.0 - fraction))
     return _paired(values)
 
 
@@ -179,17 +179,17 @@ def _mass_centre_sizes(size: Array, largest: Array) -> list[Array]:
 
 def _accelerations(here: Here, limit: Array) -> list[Pair]:
     pairs = []
-    for k, (length, _, bend) in enumerate(_rates(here)):
+    for k, (length, _, second_derivative) in enumerate(_rates(here)):
         cubed = (length / here.z0) ** 3
-        pairs.append((cubed, cubed * bend / (here.squared * limit[k])))
+        pairs.append((cubed, cubed * second_derivative / (here.squared * limit[k])))
     return pairs
 
 
 def _acceleration_sizes(sizes: Sizes, limit: Array) -> list[Array]:
     bounds = []
     for k, (ray, pace, pull) in enumerate(zip(sizes.rays, sizes.paces, sizes.pulls, strict=True)):
-        bend = ray**2 * (2.0 * pace**2 + ray * pull) / (sizes.squared * sizes.z0**3 * limit[k])
-        bounds += [jnp.where(sizes.is_straight[k], (ray / sizes.z0) ** 3, jnp.inf), bend]
+        second_derivative = ray**2 * (2.0 * pace**2 + ray * pull) / (sizes.squared * sizes.z0**3 * limit[k])
+        bounds += [jnp.where(sizes.is_straight[k], (ray / sizes.z0) ** 3, jnp.inf), second_derivative]
     return bounds
 
 
@@ -215,7 +215,7 @@ QUANTITIES = {
     "mass_centre_acceleration": LimitOnBlocks(
         2,
         lambda here, limit: _of_mass_centre(here.state.acceleration, here.squared * limit),
-        lambda sizes, limit: _mass_centre_sizes(sizes.bend, sizes.squared * limit),
+        lambda sizes, limit: _mass_centre_sizes(sizes.second_derivative, sizes.squared * limit),
         _speed_slacks,
     ),
 }

@@ -69,8 +69,8 @@ def low_points(samples: Samples, selected: Bool[np.ndarray, "n"]) -> tuple[Int[n
     here, last = values[place, value, item], len(values) - 1
     before, after = (values[np.clip(place + k, 0, last), value, item] for k in (-1, 1))
     with np.errstate(invalid="ignore"):
-        bend = before - 2.0 * here + after
-    reaches = np.isfinite(bend) & (here - 0.25 * bend <= smallest[value, row[item]])
+        second_derivative = before - 2.0 * here + after
+    reaches = np.isfinite(second_derivative) & (here - 0.25 * second_derivative <= smallest[value, row[item]])
     return place[reaches], value[reaches], item[reaches]
 
 

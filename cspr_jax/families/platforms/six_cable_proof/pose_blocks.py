@@ -88,7 +88,7 @@ def place_blocks(
         return state(segments, arcs, instant_beside(middle, segments.sense, arcs, off * half), kind, one)
 
     bounds = reach(segments, arcs, middle, (half, jnp.zeros_like(half)), kind)
-    share = (2.0 * half / STEPS) ** 2 / 8.0
+    fraction = (2.0 * half / STEPS) ** 2 / 8.0
     turning = bounds.angular_acceleration + bounds.omega**2
     instant = stored(instant_beside(middle, segments.sense, arcs, jnp.zeros_like(half)), one)
     here = state(segments, arcs, instant, kind, one)
@@ -96,8 +96,12 @@ def place_blocks(
     away = [
         dot(x, x) for x in ([position[i] - problem.robot.base_points[k, i] for i in range(3)] for k in range(CABLES))
     ]
-    seen = turning * (jnp.sqrt(largest(away)) + half * bounds.speed) + bounds.bend + 2.0 * bounds.omega * bounds.speed
-    bends = stored(_Bends(bounds.bend * share, turning * share, seen * share), one)
+    seen = (
+        turning * (jnp.sqrt(largest(away)) + half * bounds.speed)
+        + bounds.second_derivative
+        + 2.0 * bounds.omega * bounds.speed
+    )
+    bends = stored(_Bends(bounds.second_derivative * fraction, turning * fraction, seen * fraction), one)
     gaps, left = _separators(problem.robot, platform, pairs, (position, rotation), one)
 
     def on(place):
@@ -122,7 +126,7 @@ def place_blocks(
         attained, place = jnp.stack(nodes, axis=1), jnp.zeros_like(half)
     else:
         attained, place = least_nodes(nodes, len(nodes) - 1, PLACES)
-    size = jnp.max(jnp.abs(problem.robot.base_points)) + segments.hub[:, 2]
+    size = jnp.max(jnp.abs(problem.robot.base_points)) + segments.center[:, 2]
     return PlaceBounds(
         jnp.min(jnp.real(first), axis=0) - POSE_ERROR * size,
         jnp.stack([jnp.min(x, axis=0) - step - POSE_ERROR for x, step in zip(nodes[:-1], steps, strict=True)]),

@@ -81,7 +81,7 @@ def _of_one_size(robot: PlatformRobot, segments: PlatformSegment) -> tuple[Platf
     )
     return smaller, dataclasses.replace(
         segments,
-        hub=segments.hub / unit,
+        center=segments.center / unit,
         start_radius=segments.start_radius / unit,
         end_radius=segments.end_radius / unit,
         regular=jnp.sign(segments.regular),
@@ -97,9 +97,10 @@ def _from_rest(robot: PlatformRobot, segments: PlatformSegment):
         here = swing(motions, row)
         cables = cable_lanes(robot, here.position, here.rotation)
         weight = tuple(dot(line, axis_inertia) for line in here.rotation)
-        whirl = cross(motions.axis, weight)
+        acceleration_matrix = cross(motions.axis, weight)
         moment = tuple(
-            here.angular_acceleration * a + here.squared_speed * b for a, b in zip(weight, whirl, strict=True)
+            here.angular_acceleration * a + here.squared_speed * b
+            for a, b in zip(weight, acceleration_matrix, strict=True)
         )
         force = (here.acceleration[0], here.acceleration[1], here.acceleration[2] - robot.gravity)
         return certain_tension(motions.rate, segments.regular, cables, balance(cables, force, moment))

@@ -55,8 +55,8 @@ def _is_flat(cables: CableLanes, balance: Balance) -> Array:
 
 def _smallest_tension(rate: Array, balance: Balance) -> Array:
     # Return the smallest tension over its value at rest in P0 if all were equal.
-    share = CABLES / (rate * balance.denominator)
-    return smallest([x * share for x in balance.numerators])
+    fraction = CABLES / (rate * balance.denominator)
+    return smallest([x * fraction for x in balance.numerators])
 
 
 def certain_tension(
@@ -95,7 +95,7 @@ def moving_slacks(
     each = {
         "tension": [robot.mass * x / balance.denominator * y for x, y in zip(balance.numerators, lengths, strict=True)],
         "speed": [jnp.abs(rate) / pace for rate in rates],
-        "acceleration": [jnp.abs(bend) / squared for bend in bends],
+        "acceleration": [jnp.abs(second_derivative) / squared for second_derivative in bends],
         "mass_centre_speed": [jnp.sqrt(dot(here.velocity, here.velocity)) / pace],
         "mass_centre_acceleration": [jnp.sqrt(dot(here.acceleration, here.acceleration)) / squared],
     }

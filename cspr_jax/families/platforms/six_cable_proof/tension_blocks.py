@@ -214,15 +214,15 @@ def _values(problem: Problem, block: _Block, here: StateLanes, *, margins: bool)
     inverse = 1.0 / balanced.volume
     squares = [dot(ray, ray) for ray in cables.rays]
     amplified = math.prod(squares[2::2], start=squares[0]) * inverse * inverse
-    share = inverse * inverse * inverse / block.regular
-    kappa = [x * (share * (CABLES * block.z0 / robot.gravity)) for x in balanced.numerators]
-    regular = balanced.denominator * share
+    fraction = inverse * inverse * inverse / block.regular
+    kappa = [x * (fraction * (CABLES * block.z0 / robot.gravity)) for x in balanced.numerators]
+    regular = balanced.denominator * fraction
     pairs = [*zip(kappa[::2], kappa[1::2], strict=True), (regular, amplified)]
     instant = Here(here, cables, kappa, block.squared, block.z0)
     for quantity, row in _quantities(problem).items():
         pairs += QUANTITIES[quantity].values(instant, getattr(problem.limits, row[0].name))
     if margins:
-        standing = cable_lanes(robot, tuple(block.segments.hub[:, i] for i in range(3)), _level(regular))
+        standing = cable_lanes(robot, tuple(block.segments.center[:, i] for i in range(3)), _level(regular))
         rest = [dot(ray, ray) for ray in standing.rays]
         lengths = [jnp.sqrt(a / b) for a, b in zip(rest, squares, strict=True)]
         shortened = math.prod(lengths[1:], start=lengths[0])
@@ -257,7 +257,7 @@ def _sizes(problem: Problem, block: _Block, bounds: Reach, along: Array, lengths
     robot, squared, z0 = problem.robot, block.squared, block.z0
     sizes = jnp.sqrt(jnp.sum(robot.platform_points**2, axis=1))
     arm, arms = jnp.sqrt(jnp.mean(sizes**2)), [sizes[k] for k in range(CABLES)]
-    shift, rotated = along * bounds.speed, jnp.minimum(along * bounds.rotation_rate, bounds.growth + 1.0)
+    shift, rotated = along * bounds.speed, jnp.minimum(along * bounds.rotation_rate, bounds.radial_rate + 1.0)
     moved = [shift + lever * rotated for lever in arms]
     rays = [ray + move for ray, move in zip(lengths[0], moved, strict=True)]
     columns = [
@@ -266,15 +266,20 @@ def _sizes(problem: Problem, block: _Block, bounds: Reach, along: Array, lengths
     ]
     inertia = robot.inertia / robot.mass
     apart = inertia - jnp.trace(inertia) / 3.0 * jnp.eye(3)
-    whirl = jnp.sqrt(jnp.sum(inertia**2)) * bounds.angular_acceleration + jnp.sqrt(jnp.sum(apart**2)) * bounds.omega**2
-    force = bounds.bend / squared + robot.gravity
-    wrench = jnp.sqrt(force**2 + (whirl / squared / (arm * bounds.growth)) ** 2)
-    whole = (arm * bounds.growth) ** 3 / jnp.abs(block.regular) * math.prod(columns[1:], start=columns[0])
+    acceleration_matrix = (
+        jnp.sqrt(jnp.sum(inertia**2)) * bounds.angular_acceleration + jnp.sqrt(jnp.sum(apart**2)) * bounds.omega**2
+    )
+    force = bounds.second_derivative / squared + robot.gravity
+    wrench = jnp.sqrt(force**2 + (acceleration_matrix / squared / (arm * bounds.radial_rate)) ** 2)
+    whole = (arm * bounds.radial_rate) ** 3 / jnp.abs(block.regular) * math.prod(columns[1:], start=columns[0])
     kappa = [CABLES * z0 / robot.gravity * whole * wrench / column for column in columns]
     paces = [bounds.speed + lever * bounds.rotation_rate for lever in arms]
-    pulls = [bounds.bend + lever * bounds.growth * (bounds.angular_acceleration + bounds.omega**2) for lever in arms]
+    pulls = [
+        bounds.second_derivative + lever * bounds.radial_rate * (bounds.angular_acceleration + bounds.omega**2)
+        for lever in arms
+    ]
     is_straight = [move < STRAIGHT * ray for ray, move in zip(lengths[0], moved, strict=True)]
-    cable_sizes = Sizes(kappa, rays, paces, pulls, is_straight, squared, z0, bounds.speed, bounds.bend)
+    cable_sizes = Sizes(kappa, rays, paces, pulls, is_straight, squared, z0, bounds.speed, bounds.second_derivative)
     largest = [*kappa, whole, jnp.zeros_like(whole)]
     for quantity, row in _quantities(problem).items():
         largest += QUANTITIES[quantity].sizes(cable_sizes, getattr(problem.limits, row[0].name))
@@ -292,19 +297,19 @@ def _bounds(problem: Problem, taken: _Taken) -> tuple[list[Array], list[Array]]:
         return middle[:, part] - off[None, part], middle[:, part] + off[None, part]
 
     one = slice(REGULAR, REGULAR + 1)
-    regular, share = around(coefficients, rests, one), around(values, taken.rounding, one)
+    regular, fraction = around(coefficients, rests, one), around(values, taken.rounding, one)
     # Among quotients with one denominator, the smallest has the smallest numerator.
     least = jnp.min(coefficients[:, :CABLES] - rests[None, :CABLES], axis=1, keepdims=True)
     doubt = jnp.max(taken.rounding[None, :CABLES], axis=1, keepdims=True)
     kappa = jnp.min(values[:, :CABLES], axis=1, keepdims=True) + doubt
-    nodes = [at_most(kappa, share)[:, 0], share[1][:, 0]]
+    nodes = [at_most(kappa, fraction)[:, 0], fraction[1][:, 0]]
     bound = [jnp.min(ratio(least, regular), axis=(0, 1)), jnp.min(regular[0], axis=(0, 1))]
     scale = scales(CABLES, problem.robot.mass * problem.robot.gravity, block.z0)
     part, slacks = slice(0, REGULAR + 2), {}
     for quantity, rows in _quantities(problem).items():
         factor, size = scale.get(quantity, (1.0, jnp.ones(())))
         part = slice(part.stop, part.stop + QUANTITIES[quantity].width)
-        enclosed = Enclosed(around(coefficients, rests, part), around(values, taken.rounding, part), regular, share)
+        enclosed = Enclosed(around(coefficients, rests, part), around(values, taken.rounding, part), regular, fraction)
         for row in rows:
             limit = getattr(problem.limits, row.name) * (factor / size)
             slacks[row.name] = QUANTITIES[quantity].slacks(enclosed, limit, row.sense == "least")

@@ -241,7 +241,7 @@ def _reordered(problem: Problem, order: list[int]) -> Problem:
 
 def determinant_at_rest(problem: Problem, segments: PlatformSegment) -> Float[np.ndarray, "n"]:
     """Determinant of the Jacobian J (3.5) in the rest point, with the sign that `wrench_lanes.balance` gives it."""
-    robot, (depths, inverse) = problem.robot, np.unique(np.asarray(segments.hub)[:, 2], return_inverse=True)
+    robot, (depths, inverse) = problem.robot, np.unique(np.asarray(segments.center)[:, 2], return_inverse=True)
     arms = np.asarray(robot.platform_points)
     forces = np.asarray(robot.base_points) - arms - np.array([0.0, 0.0, 1.0]) * depths[:, None, None]
     wrenches = np.concatenate([forces, np.cross(arms, forces)], axis=2)

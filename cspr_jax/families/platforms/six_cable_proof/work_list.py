@@ -78,8 +78,8 @@ class WorkList:
         for more in itertools.chain(AT_ONCE, itertools.repeat(AT_ONCE[-1])):
             is_open = self._take_in(blocks, bounds, last=halved >= HALVINGS)
             # All along ways on which a limit is touched, as on level ones along the floor, blocks stay open for long.
-            share = np.where((bounds.bound > -SIX_CABLES_UNDECIDED).all(0), 1.0 / TOUCHING, 1.0)
-            self.is_stuck |= np.bincount(blocks.row, share * is_open, len(self._arcs)) > OPEN * self._arcs
+            fraction = np.where((bounds.bound > -SIX_CABLES_UNDECIDED).all(0), 1.0 / TOUCHING, 1.0)
+            self.is_stuck |= np.bincount(blocks.row, fraction * is_open, len(self._arcs)) > OPEN * self._arcs
             is_open &= ~self.is_stuck[blocks.row]
             if not is_open.any():
                 break

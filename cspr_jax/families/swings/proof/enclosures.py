@@ -35,7 +35,7 @@ class _Known(NamedTuple):
     acceleration: Array
     low: Array
     high: Array
-    bent: Array
+    deviation: Array
     velocity_change: Array
     acceleration_change: Array
 
@@ -57,7 +57,7 @@ def _block(problem: Problem, segment: Segment, arcs: Array, start: Array, stop: 
     eta = jnp.min(instants.eta) - level, jnp.max(instants.eta) + level
     scale = segment.rate / robot.base_points.shape[0]
 
-    def share(top, is_low):
+    def fraction(top, is_low):
         # Bound tensions where eta is positive; a lower bound below zero is divided by the smallest eta.
         bottom = jnp.where((top > 0.0) == is_low, eta[1], eta[0])
         return jnp.where(eta[0] > 0.0, scale * top / bottom, jnp.where(is_low, -jnp.inf, jnp.inf))
@@ -68,8 +68,8 @@ def _block(problem: Problem, segment: Segment, arcs: Array, start: Array, stop: 
         position[None] - robot.base_points,
         velocity,
         acceleration,
-        share(jnp.min(kappa, axis=0) - taut, True),
-        share(jnp.max(kappa, axis=0) + taut, False),
+        fraction(jnp.min(kappa, axis=0) - taut, True),
+        fraction(jnp.max(kappa, axis=0) + taut, False),
         0.5 * half * half * pace.curvature,
         half * pace.curvature / time,
         half * pull.slope / time**2,
@@ -89,7 +89,7 @@ def enclosure(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"], b
     nothing, each = np.zeros(count), (count, n_cables, 3)
     half = 0.5 * (blocks.stop - blocks.start)
     way = (half * in_batches(_durations, items[:2], size=BATCH))[:, None] * known.velocity
-    moved = largest_moves(way, known.bent)[:, None]
+    moved = largest_moves(way, known.deviation)[:, None]
     lengths, longest = np.linalg.norm(known.rays, axis=2), touchable(problem).limits.cable_length_max
     room = np.zeros((count, 0)) if longest is None else np.asarray(longest) - lengths
     once = np.ones(room.shape)
@@ -100,11 +100,11 @@ def enclosure(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"], b
         arms=np.zeros((n_cables, 3)),
         force=known.acceleration - np.array([0.0, 0.0, float(problem.robot.gravity)]),
         moment=np.zeros((count, 3)),
-        whirl=np.zeros((count, 3, 3)),
+        acceleration_matrix=np.zeros((count, 3, 3)),
         way=np.broadcast_to(way[:, None], each),
-        bent=np.repeat(known.bent[:, None], n_cables, axis=1),
+        deviation=np.repeat(known.deviation[:, None], n_cables, axis=1),
         force_change=known.acceleration_change,
-        whirl_change=nothing,
+        acceleration_matrix_change=nothing,
         low=known.low,
         high=known.high,
         distances=Distances(room, moved * once, *(0.0 * once,) * 3, np.ones(room.shape[1]), room, once),

@@ -76,8 +76,8 @@ class _Closed(NamedTuple):
 
 
 def _bends(state: _AtInstant, limit: Array) -> tuple[Array, Array]:
-    bend = (state.length**2 * state.rate_slope - state.rate**2) / (limit * state.time**2)
-    return (state.length**3 - bend) / state.z0**3, (state.length**3 + bend) / state.z0**3
+    second_derivative = (state.length**2 * state.rate_slope - state.rate**2) / (limit * state.time**2)
+    return (state.length**3 - second_derivative) / state.z0**3, (state.length**3 + second_derivative) / state.z0**3
 
 
 def _lifted(over: _OverInterval, limit: Array) -> Array:
@@ -92,9 +92,9 @@ def _rated(over: _OverInterval, limit: Array) -> Array:
 
 
 def _bent(over: _OverInterval, limit: Array) -> Array:
-    length, bend = over.length, _bend(over.length, over.pace, over.pull, over.square)
+    length, second_derivative = over.length, _bend(over.length, over.pace, over.pull, over.square)
     cube = 6.0 * length.value * over.pace.slope**2 + 3.0 * length.value**2 * over.pace.curvature
-    return (cube + bend.curvature / (limit * over.time**2)) / over.z0**3
+    return (cube + second_derivative.curvature / (limit * over.time**2)) / over.z0**3
 
 
 def _square_share(vector: Vector, largest: Array) -> Array:
@@ -144,7 +144,7 @@ def limit_slacks(
     if not limits_set(limits):
         return ()
     position, velocity, acceleration = _path(segment, arcs, tau, state)
-    z0, time, weight = segment.hub[2], duration(segment, arcs), robot.mass * robot.gravity
+    z0, time, weight = segment.center[2], duration(segment, arcs), robot.mass * robot.gravity
     speed_square = dot(velocity, velocity)
 
     def cable_state(cable: int) -> _AtInstant:
@@ -176,8 +176,8 @@ def _path(segment: Segment, arcs: Array, tau: Array, state: Instant) -> tuple[Ve
     slope_r = r1 * cosine - r * segment.sense * steady / (math.pi * arcs) * sine
     slope_t = r1 * ratio * sine
     slope = axial * slope_r + lateral * slope_t, axial * slope_t - lateral * slope_r
-    bend = period * (state.d[0] - state.c[0]), period * (state.d[1] - state.c[1])
-    return _in_space(segment, state.c, segment.hub), _in_space(segment, slope), _in_space(segment, bend)
+    second_derivative = period * (state.d[0] - state.c[0]), period * (state.d[1] - state.c[1])
+    return _in_space(segment, state.c, segment.center), _in_space(segment, slope), _in_space(segment, second_derivative)
 
 
 def _in_space(segment: Segment, vector: Sequence[Array] | Array, origin: Sequence[Any] | Array = (0, 0, 0)) -> Vector:
@@ -197,7 +197,7 @@ def limit_curvatures(
     """Bound of the second derivative of each limit's slack over an interval."""
     if not limits_set(limits):
         return ()
-    z0, time, weight = segment.hub[2], duration(segment, arcs), robot.mass * robot.gravity
+    z0, time, weight = segment.center[2], duration(segment, arcs), robot.mass * robot.gravity
     pace, pull = pace_bounds(segment, arcs, over)
     eta = row_bounds(segment, arcs, over, segment.tilt)
     depth = row_bounds(segment, arcs, over, segment.plane[2])
@@ -224,11 +224,11 @@ def pace_bounds(segment: Segment, arcs: Num[Array, ""], over: Stretch) -> tuple[
     precession = math.pi * segment.precession
     one = jnp.ones_like(omega)
     wave = Bounds(one, omega, omega**2)
-    rho = (over.bend + over.size.times(jnp.abs(segment.end_curvature))).times(1.0 / period)
-    c = (over.size * wave).combined((over.size * wave).times(ratio)).turned(precession)
-    d_r = rho * wave + (over.growth * wave).times(2.0 * gain / omega)
+    rho = (over.second_derivative + over.size.times(jnp.abs(segment.end_curvature))).times(1.0 / period)
+    c = (over.size * wave).combined((over.size * wave).times(ratio)).rotated(precession)
+    d_r = rho * wave + (over.radial_rate * wave).times(2.0 * gain / omega)
     d_t = ((rho + over.size.times(2.0 * gain)) * wave).times(ratio)
-    return c, (d_r.combined(d_t).turned(precession) + c).times(period)  # c'' = T^2 lambda (d - c)
+    return c, (d_r.combined(d_t).rotated(precession) + c).times(period)  # c'' = T^2 lambda (d - c)
 
 
 def _lengths(robot: PointMassRobot, segment: Segment, over: Stretch, pace: Bounds, eta: Bounds) -> list[Bounds]:
@@ -236,11 +236,11 @@ def _lengths(robot: PointMassRobot, segment: Segment, over: Stretch, pace: Bound
     nearest = least_lengths(robot, segment, over, pace, eta)
     farthest = [x + over.radius * pace.slope for x in _at_middle(robot, segment, over)]
     bends = [pace.slope**2 / x + pace.curvature for x in nearest]
-    return [Bounds(x, pace.slope, bend) for x, bend in zip(farthest, bends, strict=True)]
+    return [Bounds(x, pace.slope, second_derivative) for x, second_derivative in zip(farthest, bends, strict=True)]
 
 
 def _at_middle(robot: PointMassRobot, segment: Segment, over: Stretch) -> list[Array]:
-    return _distances(robot, _in_space(segment, over.place, segment.hub))
+    return _distances(robot, _in_space(segment, over.place, segment.center))
 
 
 def _distances(robot: PointMassRobot, position: Vector | Array) -> list[Array]:
@@ -256,8 +256,8 @@ def least_lengths(robot: PointMassRobot, segment: Segment, over: Stretch, pace: 
     """
     tilt = segment.tilt[0] * over.place[0] + segment.tilt[1] * over.place[1]
     lowest = jnp.maximum(tilt - over.radius * eta.slope, -eta.value)
-    depth = jnp.maximum((1.0 + lowest) * segment.hub[2] / jnp.linalg.norm(plane_normal(robot)), 0.0)
-    each = zip(_at_middle(robot, segment, over), _distances(robot, segment.hub), strict=True)
+    depth = jnp.maximum((1.0 + lowest) * segment.center[2] / jnp.linalg.norm(plane_normal(robot)), 0.0)
+    each = zip(_at_middle(robot, segment, over), _distances(robot, segment.center), strict=True)
     return [largest([x - over.radius * pace.slope, y - pace.value, depth]) for x, y in each]
 
 

@@ -24,7 +24,7 @@ from cspr_jax.families.swings.hypocycloid import Segment, oscillation
 from cspr_jax.families.swings.proof.slacks import largest_term
 from cspr_jax.motion.amplitudes import Amplitude, derivatives
 from cspr_jax.numerics.batches import row_by_row
-from cspr_jax.numerics.elementary import lesser, sincospi
+from cspr_jax.numerics.elementary import nan_ignoring_min, sincospi
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
 if TYPE_CHECKING:
@@ -46,8 +46,12 @@ def sample_table(
     """Table of the factors of a check that do not depend on the points: of the phase pi p tau and of A."""
     phase = math.pi * arcs[:, None] * tau
     cosine, sine = jnp.asarray(np.cos(phase)), jnp.asarray(np.sin(phase))
-    size, slope, bend = (jnp.broadcast_to(v, phase.shape) for v in derivatives(amplitude, jnp.asarray(tau), order=2))
-    return jnp.stack([cosine, sine, size, bend, bend * cosine, slope * sine], axis=1).astype(dtype)
+    size, slope, second_derivative = (
+        jnp.broadcast_to(v, phase.shape) for v in derivatives(amplitude, jnp.asarray(tau), order=2)
+    )
+    return jnp.stack([cosine, sine, size, second_derivative, second_derivative * cosine, slope * sine], axis=1).astype(
+        dtype
+    )
 
 
 def smallest_sampled(
@@ -66,13 +70,13 @@ def smallest_sampled(
         p, table = candidate
         ratio, _, period = oscillation(segments, p)
         exists = period > SMALLEST_PERIOD
-        bend, growth = span / jnp.where(exists, period, 1.0), span * ((2.0 / math.pi) / p)
+        second_derivative, radial_rate = span / jnp.where(exists, period, 1.0), span * ((2.0 / math.pi) / p)
 
         def check(i, smallest):
             cosine, sine, size, a2, a2_cosine, a1_sine = (table[column, i] for column in range(6))
             lateral, axial, r, small = laterals[i], axials[i], start + span * size, ratio * sine
             c_r, c_t = r * cosine, small * r
-            d_r, d_t = bend * a2_cosine - growth * a1_sine, small * (bend * a2 + 2.0 * r)
+            d_r, d_t = second_derivative * a2_cosine - radial_rate * a1_sine, small * (second_derivative * a2 + 2.0 * r)
             c0, c1 = axial * c_r + lateral * c_t, axial * c_t - lateral * c_r
             d0, d1 = axial * d_r + lateral * d_t, axial * d_t - lateral * d_r
             cross = c_r * d_t - c_t * d_r
@@ -80,8 +84,10 @@ def smallest_sampled(
             pulls = [row[0] * d0 + row[1] * d1 + row[2] * cross for row in rows]
             # kappa_k = eta + pull_k; eta itself is the depth ratio
             # A NaN may be forgotten, which leaves an upper bound: `families.swings.proof.verdicts` decides.
-            lowest = lesser(lesser(pulls[0], pulls[1]), lesser(pulls[2], jnp.zeros_like(eta)))
-            return lesser(smallest, eta + lowest)
+            lowest = nan_ignoring_min(
+                nan_ignoring_min(pulls[0], pulls[1]), nan_ignoring_min(pulls[2], jnp.zeros_like(eta))
+            )
+            return nan_ignoring_min(smallest, eta + lowest)
 
         def several(j):
             smallest = check(UNROLL * j, jnp.full_like(span, jnp.inf))

@@ -70,8 +70,10 @@ def largest_term(amplitude: Amplitude, segment: Segment, arcs: Num[Array, ""]) -
     span = jnp.abs(segment.end_radius - segment.start_radius)
     largest = amplitude.largest.astype(span.dtype)
     radius = jnp.maximum(segment.start_radius, segment.end_radius) + span * (largest[0] - 1.0)
-    gain, bend = steady / period, jnp.abs(segment.end_curvature)
-    force = (span * largest[2] + bend * radius) / period + gain * (span * largest[1] / arcs + 2.0 * ratio * radius)
+    gain, second_derivative = steady / period, jnp.abs(segment.end_curvature)
+    force = (span * largest[2] + second_derivative * radius) / period + gain * (
+        span * largest[1] / arcs + 2.0 * ratio * radius
+    )
     pull = jnp.max(jnp.sum(jnp.abs(segment.pull), axis=-1))
     twist = jnp.max(jnp.abs(segment.twist))
     return 1.0 + radius * jnp.sum(jnp.abs(segment.tilt)) + force * (pull + radius * twist)
@@ -84,16 +86,16 @@ class Stretch(NamedTuple):
         middle: () of the interval.
         radius: () half of its width.
         size: bounds of r, as Bounds.
-        growth: bounds of r'.
-        bend: bounds of r''.
+        radial_rate: bounds of r'.
+        second_derivative: bounds of r''.
         place: (2,) position c in the middle, m.
     """
 
     middle: Array
     radius: Array
     size: Bounds
-    growth: Bounds
-    bend: Bounds
+    radial_rate: Bounds
+    second_derivative: Bounds
     place: Array
 
 
@@ -145,13 +147,13 @@ def row_bounds(
     x, y = tilt_r * over.size, (tilt_t * over.size).times(ratio)
     if pull is not None:
         pull_r, pull_t = _components(segment, pull, over)
-        rho = (over.bend + over.size.times(jnp.abs(segment.end_curvature))).times(1.0 / period)
+        rho = (over.second_derivative + over.size.times(jnp.abs(segment.end_curvature))).times(1.0 / period)
         x = x + pull_r * rho
         y = y + (pull_t * (rho + over.size.times(2.0 * gain))).times(ratio)
-        y = y + (pull_r * over.growth).times(2.0 * gain / omega)
+        y = y + (pull_r * over.radial_rate).times(2.0 * gain / omega)
     total = _oscillating(x, y, omega)
     if twist is not None:
-        e = (over.size * over.growth).times(gain * twist * ratio / omega)
+        e = (over.size * over.radial_rate).times(gain * twist * ratio / omega)
         total = total + _oscillating(e, (over.size * over.size).times(gain * twist * ratio), 2.0 * omega) + e
     return total
 

@@ -90,9 +90,9 @@ def block_bounds(
     weight = (jnp.arange(INTERVALS + 1, dtype=arcs.dtype) / INTERVALS)[:, None]
     tau = start[None] * (1.0 - weight) + stop[None] * weight
     values = jax.vmap(jax.vmap(partial(slacks, *problem)), in_axes=(None, None, 0))(segments, arcs, tau)
-    sampled, share = smallest_of_each(values), ((stop - start) / INTERVALS) ** 2 / 8.0
+    sampled, fraction = smallest_of_each(values), ((stop - start) / INTERVALS) ** 2 / 8.0
     bounds = jax.vmap(partial(curvatures, *problem))(segments, arcs, start, stop)
-    return sampled, tuple(low - bound * share for low, bound in zip(sampled, bounds, strict=True))
+    return sampled, tuple(low - bound * fraction for low, bound in zip(sampled, bounds, strict=True))
 
 
 @persistent_jit

@@ -55,8 +55,8 @@ def _squared(omega: Array, end: Array) -> Array:
 
 def _root(load: Array, inclination: Array, end: Array, values: tuple[Array, ...]) -> Array:
     # Return the largest root Omega of the envelope, for A, A', A'' at an instant.
-    size, slope, bend = values
-    c, swung = bend - size * end, inclination * size
+    size, slope, second_derivative = values
+    c, swung = second_derivative - size * end, inclination * size
     d = (1.0 - swung) * (1.0 + swung)
     half = swung * load * c - 2.0 * (load * slope) ** 2
     rest = load**2 * (c**2 + 4.0 * end * slope**2)

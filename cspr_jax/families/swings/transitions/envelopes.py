@@ -42,8 +42,8 @@ def lower_envelope(
 
 def _squared(load: Array, inclination: Array, n: Array, omega: Array, end: Array, values: tuple[Array, ...]) -> Array:
     # Return C^2 + S^2 of (1.33) and (1.34), for A, A', A''.
-    size, slope, bend = values
-    cosine = load * (bend - size * end) / omega - inclination * size
+    size, slope, second_derivative = values
+    cosine = load * (second_derivative - size * end) / omega - inclination * size
     sine = 4.0 * math.pi * n * load * slope / omega
     return cosine**2 + sine**2
 
@@ -91,7 +91,7 @@ def proved_envelope(
 
 def _curvature(load: Array, v: Array, n: Array, omega: Array, end: Array, stretch: _Stretch) -> Array:
     # Bound of the second derivative of C^2 + S^2 over an interval, from those of C, S and their derivatives.
-    a, share, gain = stretch.bounds, load / omega, 4.0 * math.pi * n * load / omega
-    c0, c1, c2 = (share * (a[j + 2] + a[j] * jnp.abs(end)) + v * a[j] for j in range(3))
+    a, fraction, gain = stretch.bounds, load / omega, 4.0 * math.pi * n * load / omega
+    c0, c1, c2 = (fraction * (a[j + 2] + a[j] * jnp.abs(end)) + v * a[j] for j in range(3))
     s0, s1, s2 = (gain * a[j + 1] for j in range(3))
     return 2.0 * (c1**2 + c0 * c2 + s1**2 + s0 * s2)

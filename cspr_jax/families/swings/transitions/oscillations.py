@@ -126,14 +126,14 @@ def _upper_bounds(amplitude: Amplitude, loads: tuple[jax.Array, jax.Array, jax.A
     # Bound 1 + v A cos - L h, the pseudotension under a load L = v + w_k, and the depth, which has L = 0.
     high, low, v = loads
     tau = (np.arange(SAMPLES) + 0.5) / SAMPLES
-    size, slope, bend = derivatives(amplitude, jnp.asarray(tau), order=2)
+    size, slope, second_derivative = derivatives(amplitude, jnp.asarray(tau), order=2)
     end = derivatives(amplitude, jnp.ones(()), order=2)[2]
 
     def one(n):
         omega = 2.0 * jnp.pi * n
         period = omega**2 - end
         cosine, sine = jnp.cos(omega * tau), jnp.sin(omega * tau)
-        h = ((bend - size * end) * cosine - 2.0 * omega * slope * sine) / period
+        h = ((second_derivative - size * end) * cosine - 2.0 * omega * slope * sine) / period
         worst = jnp.maximum(high[:, None] * h[None], low[:, None] * h[None])
         lowest = jnp.min(1.0 + v[:, None] * size[None] * cosine[None] - worst, axis=1)
         guard = ENVELOPE_ERROR * (1.0 + jnp.abs(v) + jnp.maximum(high, -low) * jnp.max(jnp.abs(h)))

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 def transition(robot: PointMassRobot, amplitude: Amplitude, target: Float[Array, "3"], z0: Float[Array, ""]) -> Segment:
     """The transition from rest in p0 to a target."""
     segment = hypocycloid.segment(robot, rest_point(z0), target, z0, odd=jnp.asarray(False))
-    bend = derivatives(amplitude, jnp.ones_like(z0), order=2)[2]
-    return dataclasses.replace(segment, end_curvature=bend)
+    second_derivative = derivatives(amplitude, jnp.ones_like(z0), order=2)[2]
+    return dataclasses.replace(segment, end_curvature=second_derivative)
 
 
 @jax.jit

@@ -21,12 +21,12 @@ class Transitions(Leg):
 
     step = 2
 
-    def __init__(self, stops: Waypoints) -> None:
+    def __init__(self, waypoints: Waypoints) -> None:
         """Refuse pairs of poses that a transition cannot join."""
-        super().__init__(stops)
-        pairs = list(zip(stops.poses[:-1], stops.poses[1:], strict=True))
+        super().__init__(waypoints)
+        pairs = list(zip(waypoints.poses[:-1], waypoints.poses[1:], strict=True))
         for i, (start, end) in enumerate(pairs):
-            _check_pair(stops, i, start, end)
+            _check_pair(waypoints, i, start, end)
         # A way back to rest runs against its normalised time, (1.56) to (1.58).
         self._backwards = np.array([end.rest for _, end in pairs])
         self._steady = np.array([not (start.rest or end.rest) for start, end in pairs])
@@ -48,15 +48,15 @@ class Transitions(Leg):
 
     def _answers_and_segments(self, problem: Problem, depths: np.ndarray) -> tuple[Answers, Segment]:
         count, z0 = len(depths), np.repeat(depths, len(self))
-        targets = self.stops.points(depths)[:, self._target].reshape(-1, 3)
+        targets = self.waypoints.points(depths)[:, self._target].reshape(-1, 3)
         is_steady = np.tile(self._steady, count)
         segments = _with_swings(transitions_to(problem, targets, z0), is_steady)
         answers = minimum_oscillations(
             problem,
             segments,
             z0,
-            max_arcs=self.stops.max_arcs,
-            arcs=np.tile(self.stops.arcs, count),
+            max_arcs=self.waypoints.max_arcs,
+            arcs=np.tile(self.waypoints.arcs, count),
             steady=is_steady,
         )
         return answers, segments
@@ -71,14 +71,14 @@ def _with_swings(segments: Segment, is_steady: np.ndarray) -> Segment:
     return jax.tree.map(choose, steady(segments), segments)
 
 
-def _check_pair(stops: Waypoints, i: int, start: Pose, end: Pose) -> None:
-    name, path = stops.name(i + 1), stops.path
+def _check_pair(waypoints: Waypoints, i: int, start: Pose, end: Pose) -> None:
+    name, path = waypoints.name(i + 1), waypoints.path
     if start.rest and end.rest:
         raise ConfigError(path, f"{name}.rest = true: must follow a target, not another rest")
     if not start.rest and not end.rest and start.position != end.position:
         raise ConfigError(
             path,
-            f"{name}.position = {shown(end.position)}: must be that of {stops.name(i)}, or at rest, in a plan of "
+            f"{name}.position = {shown(end.position)}: must be that of {waypoints.name(i)}, or at rest, in a plan of "
             'transitions (family = "hypocycloid-standard" joins two targets)',
         )
     if end.arcs is not None and end.arcs % 2:

@@ -30,12 +30,12 @@ def _extreme_pseudotensions(robot, limits, amplitude: Amplitude, segment: Segmen
     v = transition.inclination(segment)
     loads = v + transition.weights(segment)
     _, steady, period = oscillation(segment, arcs)
-    size, slope, bend = derivatives(amplitude, tau, order=2)
+    size, slope, second_derivative = derivatives(amplitude, tau, order=2)
     sine, cosine = sincospi(arcs * tau)
     # d of `hypocycloid.swing` over the radius; the sense of an even number of arcs is -1.
-    pull = (bend - size * segment.end_curvature) / period * cosine - 2.0 * steady / period * slope * sine / (
-        math.pi * arcs
-    )
+    pull = (
+        second_derivative - size * segment.end_curvature
+    ) / period * cosine - 2.0 * steady / period * slope * sine / (math.pi * arcs)
     level = 1.0 + v * size * cosine
     return level - jnp.maximum(jnp.max(loads), 0.0) * pull, level - jnp.minimum(jnp.min(loads), 0.0) * pull
 

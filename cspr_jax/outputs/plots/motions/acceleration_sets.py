@@ -88,7 +88,7 @@ def acceleration_set(result: Result, file: str, at: dict[str, float]) -> Acceler
         )
         low, high = (leaf(tensions) for tensions in tension_range(robot, build_limits(robot_file, keys, file)))
         limits = Limits(tension_min=low, tension_max=high)
-        positions, motion = frame.inward(result.data["position"]), frame.turned(result.data["acceleration"])
+        positions, motion = frame.inward(result.data["position"]), frame.rotated(result.data["acceleration"])
         if place is None:
             place = _tightest(robot, limits, positions, motion)
             words = f"{value(result, 't', result.axes['t'][place])} (smallest margin)"

@@ -66,12 +66,12 @@ def path_figure(result: Result, file: str) -> Figure:
 
 def _ways(result: Result, robot_file: RobotFile, keys: PlanFile) -> list[PathSamples]:
     time, ends = result.axes["t"], _poses(result, robot_file, keys)
-    starts, stops = (result.data.get(f"segment_{name}", np.empty(0)) for name in ("start", "end"))
+    starts, waypoints = (result.data.get(f"segment_{name}", np.empty(0)) for name in ("start", "end"))
     if len(ends) != len(starts) + 1:
         raise InputError("--quantity", "path_acceleration", "must be of a plan", fault="the plan has other segments")
     first = [_first_row(time, start) for start in starts] + [len(time)]
     ways = []
-    for k, (start, stop) in enumerate(zip(starts, stops, strict=True)):
+    for k, (start, stop) in enumerate(zip(starts, waypoints, strict=True)):
         rows, line = slice(first[k], first[k + 1]), ends[k + 1] - ends[k]
         length = float(np.linalg.norm(line))
         if not length > 0.0 or first[k] == first[k + 1]:

@@ -171,13 +171,13 @@ def _give_room(figure: Figure, style: Style) -> None:
             warnings.filterwarnings("always", "constrained_layout not applied")
             figure.draw_without_rendering()
         # Panels without room stay where they were.
-        share = 0.0 if caught else share_of_panels(figure)
-        if share >= LEAST_SHARE:
+        fraction = 0.0 if caught else share_of_panels(figure)
+        if fraction >= LEAST_SHARE:
             return
-        if style.size is None and 0.0 < share <= before:  # panels of a shape of their own
+        if style.size is None and 0.0 < fraction <= before:  # panels of a shape of their own
             figure.set_figheight(figure.get_figheight() / HIGHER)
             return
-        before = share
+        before = fraction
         if style.size is None:
             figure.set_figheight(HIGHER * figure.get_figheight())
         elif style.is_free and letters * SMALLER >= LEAST_LETTERS:
