@@ -10,7 +10,7 @@ TESTS := $(VENV)/.installed-tests
 INSTALL := pip install --quiet --disable-pip-version-check --no-compile
 
 # Two processes; a folder's tests, which share compiled programs, run in one of them.
-PYTEST = $(BIN)/python -m pytest -n 2 --dist loadscope --no-loadscope-reorder $(if $(SHARD),--shard $(SHARD))
+PYTEST = $(BIN)/python -m pytest -n 2 --dist loadscope --no-loadscope-reorder $(if $(SHARD),--shard=$(SHARD))
 
 # What another folder, or another version, is tried in: environments of their own, made anew.
 WHEEL := build/wheel
@@ -27,15 +27,15 @@ demo: $(STAMP)
 
 # Where time goes is in build/durations; SHARD=2/3 runs the second of three parts.
 test: $(TESTS)
-	$(PYTEST) --record build/durations/test.jsonl -m "not soak and not thorough and not prose"
+	$(PYTEST) --record=build/durations/test.jsonl -m "not soak and not thorough and not prose"
 
 # Longer cases of what the quick tests cover.
 thorough: $(TESTS)
-	$(PYTEST) --record build/durations/thorough.jsonl -m "thorough and not soak"
+	$(PYTEST) --record=build/durations/thorough.jsonl -m "thorough and not soak"
 
 # Both in one run, which compiles a program once.
 tests: $(TESTS)
-	$(PYTEST) --record build/durations/tests.jsonl -m "not soak and not prose"
+	$(PYTEST) --record=build/durations/tests.jsonl -m "not soak and not prose"
 
 # Full counts, new cases of what Hypothesis draws, and the shapes in signatures beside those of all calls.
 soak: $(TESTS)
