@@ -17,9 +17,10 @@ class Family:
     """Trajectory family.
 
     Fields:
-        name: in files. description: for people, without a full stop. legs: by patterns of motion of the robots that it
-        moves, rows of `robots.model.patterns`, the class that joins poses:
-            "module:Class".
+        name: in files.
+        description: for people, without a full stop.
+        legs: by patterns of motion of the robots that it moves, rows of `robots.model.patterns`, the class that joins
+            poses: "module:Class".
         free_end: whether A''(1) of its amplitude function is free: (1.27) and (1.28) in place of (2.49).
         rests_anywhere: whether its poses are at rest wherever they are, so that it knows neither P0 nor an amplitude
             function.

@@ -54,13 +54,16 @@ class MapKind:
         start: where its motions may start. "rest": at rest in P0, `trajectory.from` says so or is absent; "point": as
             `trajectory.from` or the axes from_x, from_y and from_z say; "pose": as `trajectory.from` says, with an
             orientation or without, at rest in P0 where it is absent.
-        needs: keys that must be given. takes: further keys that may be given, of those that only some kinds have.
-        one_of: keys of which exactly one must be given. limits: rows of `schema.limits.LIMITS` that it takes where it
-        takes limits; none: all. definitions: of the accessible set that it takes. is_over_orientations: whether its
-        grid has axes over all orientations besides those of the sweep file. cells: of a tile, at most, where the sweep
-        file does not say. cost: of a cell, by which a run is divided into tiles. patterns: of motion of the robots that
-        it moves, rows of `robots.model.patterns`, by which `config.equivalents` finds
-            which robot that is; none: robots go to its class as their files have them.
+        needs: keys that must be given.
+        takes: further keys that may be given, of those that only some kinds have.
+        one_of: keys of which exactly one must be given.
+        limits: rows of `schema.limits.LIMITS` that it takes where it takes limits; none: all.
+        definitions: of the accessible set that it takes.
+        is_over_orientations: whether its grid has axes over all orientations besides those of the sweep file.
+        cells: of a tile, at most, where the sweep file does not say.
+        cost: of a cell, by which a run is divided into tiles.
+        patterns: of motion of the robots that it moves, rows of `robots.model.patterns`, by which `config.equivalents`
+            finds which robot that is; none: robots go to its class as their files have them.
         by_processes: whether the command line has several processes compute its tiles, where nobody says how many: much
             of the work is outside of XLA, where threads of one process wait for each other.
         variants: rows of the same name for further trajectory families.

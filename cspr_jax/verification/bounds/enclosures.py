@@ -69,16 +69,20 @@ class Enclosure(NamedTuple):
     """Middle states and bounds of k blocks of motions; "in the middle" means at the middle instant.
 
     Fields:
-        rays: (k, n_cables, 3) from spool to attachment point in the middle, m. arms: (n_cables, 3) attachment points
-        from the mass centre, m; zero of a point mass. force: (k, 3) force that the cables supply, per mass, in the
-        middle, m/s^2. moment: (k, 3) moment of the cables about the mass centre, per mass, in the middle, m^2/s^2.
-        acceleration_matrix: (k, 3, 3) maps a point of the platform, from the mass centre, to its relative acceleration,
-        1/s^2. way: (k, n_cables, 3) how far the tangents of the rays lead from the middle to the stop, m. deviation:
-        (k, n_cables) largest distance of the rays from their tangents within the block, m. force_change: (k,) largest
-        change of the force from the middle, within the block, m/s^2. acceleration_matrix_change: (k,) largest such
-        change of `acceleration_matrix`, 1/s^2. low: (k, n_cables) lower bounds of the tensions per mass and length
-        within the block, 1/s^2. high: (k, n_cables) upper bounds of the tensions per mass and length, 1/s^2. distances:
-        distances that shrink as spools move. rates: motion of the attachment points.
+        rays: (k, n_cables, 3) from spool to attachment point in the middle, m.
+        arms: (n_cables, 3) attachment points from the mass centre, m; zero of a point mass.
+        force: (k, 3) force that the cables supply, per mass, in the middle, m/s^2.
+        moment: (k, 3) moment of the cables about the mass centre, per mass, in the middle, m^2/s^2.
+        acceleration_matrix: (k, 3, 3) maps a point of the platform, from the mass centre, to its relative
+            acceleration, 1/s^2.
+        way: (k, n_cables, 3) how far the tangents of the rays lead from the middle to the stop, m.
+        deviation: (k, n_cables) largest distance of the rays from their tangents within the block, m.
+        force_change: (k,) largest change of the force from the middle, within the block, m/s^2.
+        acceleration_matrix_change: (k,) largest such change of `acceleration_matrix`, 1/s^2.
+        low: (k, n_cables) lower bounds of the tensions per mass and length within the block, 1/s^2.
+        high: (k, n_cables) upper bounds of the tensions per mass and length, 1/s^2.
+        distances: distances that shrink as spools move.
+        rates: motion of the attachment points.
     """
 
     rays: np.ndarray
