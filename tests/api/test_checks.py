@@ -232,7 +232,7 @@ def test_positions_of_the_origin_of_a_platform():
     np.testing.assert_allclose(rows["mass_centre"][0], origin[0] + centre, atol=1e-9)
 
 
-@pytest.mark.parametrize("share", [-1e-7, 1e-7])
+@pytest.mark.parametrize("fraction", [-1e-7, 1e-7])
 def test_a_motion_on_its_limit_says_so(fraction):
     """A plumb swing that falls as fast as it can, by a ten-millionth slower or faster: its rows tell no more.
 

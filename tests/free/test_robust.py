@@ -74,7 +74,7 @@ def test_too_large_an_uncertainty_is_told():
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("share", [0.01, 0.05])
+@pytest.mark.parametrize("fraction", [0.01, 0.05])
 def test_near_the_plane_of_the_spools(fraction):
     spools = fraction * 0.26
     planned, frame = solve(PROTOTYPE, FAST, CLIMB, settings=FreeSettings())

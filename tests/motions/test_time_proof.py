@@ -14,12 +14,13 @@ import cspr_jax
 from cspr_jax.curves import interpolation
 from cspr_jax.curves.several import SeveralSplines
 from cspr_jax.curves.spline import Spline
+from cspr_jax.numerics.tolerances import TOUCHED
 from cspr_jax.robots import cables
 from cspr_jax.robots.contacts import clearance, interference, interference_lanes
 from cspr_jax.robots.model import shapes
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.platform import platform_robot
-from cspr_jax.robots.model.point_mass import plane_normal
+from cspr_jax.robots.model.point_mass import plane_normal, spool_radius
 from cspr_jax.robots.model.pulleys import exits
 from cspr_jax.robots.statics import wrench_balance
 from cspr_jax.robots.statics.kernel_axes import centred
@@ -266,7 +267,8 @@ def test_thick_cables_obstacles_and_floors():
     around = clearance.scene(robot, diameter=0.01, obstacles=bodies, body=shapes.box([0.0, 0.0, 0.0], [0.6] * 3))
     limits = Limits(floor=np.asarray(4.9))
     rows = criteria(robot, limits, around)
-    floor = Criterion(Verdict.BELOW_FLOOR, (), "m", allowed=4.9, sense="most")
+    touched = TOUCHED * float(spool_radius(robot))
+    floor = Criterion(Verdict.BELOW_FLOOR, (), "m", allowed=4.9, sense="most", allowance=touched)
     assert rows[1:3] == [floor, Criterion(Verdict.CABLE_CABLE, (0, 1), "m")]
     assert rows[-1] == rows[1] and rows[-2] == Criterion(Verdict.OBSTACLE, (), "m", 1)
     assert Criterion(Verdict.OBSTACLE, (3,), "m", 1) in rows and Criterion(Verdict.CABLE_PLATFORM, (3,), "m") in rows

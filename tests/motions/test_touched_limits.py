@@ -149,7 +149,7 @@ def tension_of_cables(spread: float, duration: float) -> np.ndarray:
     return np.linalg.solve(np.swapaxes(units, 1, 2), force[..., None])[..., 0]
 
 
-@pytest.mark.parametrize("share", [-SMALL, 0.0, SMALL])
+@pytest.mark.parametrize("fraction", [-SMALL, 0.0, SMALL])
 def test_cables_that_just_lose_their_tension_are_slack(fraction):
     """On a way up whose braking is a free fall at one time: its largest downward acceleration is that of gravity."""
     spread = 0.3

@@ -136,7 +136,7 @@ def test_the_judge_sees_faults(fault):
     assert any(text.startswith(fault + ":") for text in faults), faults
 
 
-@pytest.mark.parametrize("limit, share", [("tension_max", 0.9999), ("cable_speed_max", 0.9999)])
+@pytest.mark.parametrize("limit, fraction", [("tension_max", 0.9999), ("cable_speed_max", 0.9999)])
 def test_the_judge_sees_limits_that_are_touched(limit, fraction):
     """The fastest motions are on their limits: a smaller one is broken."""
     known = free_motion_times.reference("segment 1")

@@ -176,7 +176,7 @@ def test_level_circle_under_many_spools():
     assert bounds[1] / bounds[0] < 1.004
 
 
-@pytest.mark.parametrize("kind, share", [("2T-3", 0.945), ("3T-3", 0.985), ("1R2T-4", 0.965), ("3R3T-7", 0.988)])
+@pytest.mark.parametrize("kind, fraction", [("2T-3", 0.945), ("3T-3", 0.985), ("1R2T-4", 0.965), ("3R3T-7", 0.988)])
 def test_bounds_enclose_the_estimate(kind, fraction, cases):
     case = cases[kind]
     motion, above = least_time_bounds.above(case.robot, case.limits, case.path, 150)

@@ -109,7 +109,7 @@ def speed_at(t):
     return 30.0 * LENGTH / 2.0 * (t / 2.0) ** 2 * (1.0 - t / 2.0) ** 2
 
 
-@pytest.mark.parametrize("share", [1.0 - 1e-6, 1.0 + 1e-6])
+@pytest.mark.parametrize("fraction", [1.0 - 1e-6, 1.0 + 1e-6])
 def test_feeds_hold_over_their_pieces_alone(fraction):
     """Each piece may be just as fast as it is, its neighbours may not."""
     fastest = np.array([speed_at(np.clip(1.0, a, b)) for a, b in itertools.pairwise(KNOTS)])

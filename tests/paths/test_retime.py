@@ -217,7 +217,7 @@ def test_launches_have_their_time():
 
 
 @pytest.mark.parametrize(
-    ("count", "share"),
+    ("count", "fraction"),
     [
         # Motions all but turn back, within 1e-10 m: whether that is proved depends on rounding, and so on the code.
         pytest.param(5, 0.96, marks=pytest.mark.thorough),

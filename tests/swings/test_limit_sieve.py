@@ -91,7 +91,7 @@ def compare(seed, count):
 
 
 @pytest.mark.quick("0")
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, 3])
 def test_limits_are_met_by_the_arcs_of_a_full_search(seed):
     """Segments of a robot, some with an answer, some refused by limits; the soak has 100,000 segments."""
     feasible, refused = compare(seed, 40)

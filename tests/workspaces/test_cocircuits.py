@@ -47,7 +47,7 @@ def poses_of(drawn, rng, count):
 
 
 @pytest.mark.quick("2T-3-0.1", "3T-4-0.1", "3R3T-8-0.1")
-@pytest.mark.parametrize("share", [pytest.param(SHARES[0], marks=pytest.mark.thorough), *SHARES[1:]])
+@pytest.mark.parametrize("fraction", [pytest.param(SHARES[0], marks=pytest.mark.thorough), *SHARES[1:]])
 @pytest.mark.parametrize(("pattern", "n"), [*SIZES, *(pytest.param(*size, marks=pytest.mark.soak) for size in MORE)])
 def test_identities_of_the_margin(pattern, n, fraction):
     """Narrower limits shift it, other units scale it, another order of the cables changes nothing."""
@@ -78,7 +78,7 @@ def test_identities_of_the_margin(pattern, n, fraction):
 
 
 @pytest.mark.quick("2T-3-0.02", "3T-4-0.1", "1R2T-7-0.1")
-@pytest.mark.parametrize("share", SHARES)
+@pytest.mark.parametrize("fraction", SHARES)
 @pytest.mark.parametrize(
     ("pattern", "n"),
     [
