@@ -150,13 +150,15 @@ class Check(Displayed):
                 raise InputError("motion", type(motion).__name__, "a spline or a file: of others nothing is proved")
             plan = self.plan
             scene = scene_of(plan.problem.robot, plan.robot_file, plan.frame, plan.keys, NAME, trajectory=plan.keys)
-            least = least_stretching(lambda factor: proof_of(plan.problem, motion.stretched(factor), scene))
-            if not np.isfinite(least.factor):
-                return Stretched(np.nan, least.is_static, None)
-            factor = least.factor * (self.plan.keys.stretch or 1.0)
+            minimum = least_stretching(lambda factor: proof_of(plan.problem, motion.stretched(factor), scene))
+            if not np.isfinite(minimum.factor):
+                return Stretched(np.nan, minimum.is_static, None)
+            factor = minimum.factor * (self.plan.keys.stretch or 1.0)
             text = text_of(json.loads(self.plan.text) | {"stretch": factor})
             return Stretched(
-                least.factor, least.is_static, _check_of(self.plan.keys.model_copy(update={"stretch": factor}), text)
+                minimum.factor,
+                minimum.is_static,
+                _check_of(self.plan.keys.model_copy(update={"stretch": factor}), text),
             )
 
 
@@ -272,8 +274,8 @@ def _check_source(times: Any, samples: Mapping[str, Any], duration: float | None
     if is_file or is_motion or callable(times):
         kind = "a file" if is_file else "a motion" if is_motion else "a curve or a function"
         for name in (name for name, rows in samples.items() if rows is not None):
-            fault = f"given beside {kind} in place of times"
-            raise InputError(name, None, "must be absent; with an array of times (n,) s, samples", fault=fault)
+            error = f"given beside {kind} in place of times"
+            raise InputError(name, None, "must be absent; with an array of times (n,) s, samples", fault=error)
     if duration is not None and (is_file or is_motion or _is_curve(times) or not callable(times)):
         raise InputError("duration", duration, "absent but for a function of time")
 

@@ -164,8 +164,8 @@ def _verify(options: argparse.Namespace) -> int:
         if counts:  # a file that cannot be read has none
             print_line(f"{report['path']}: {counts}")
     again = "run the sweep" if "shards" in report else "run or plan it"
-    for fault in report["faults"]:
-        warn(f"{fault}: {again} again to make it anew")
+    for error in report["faults"]:
+        warn(f"{error}: {again} again to make it anew")
     unreadable = report.get("unreadable", [])
     for line in unreadable:
         warn(line)

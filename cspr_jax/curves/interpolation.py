@@ -85,8 +85,8 @@ def check_order(times: Float[np.ndarray, "n"], *, repeated: bool) -> None:
     steps = np.diff(times)
     early = np.flatnonzero(steps < 0.0 if repeated else steps <= 0.0)
     if len(early):
-        i, least = int(early[0]) + 1, "at least" if repeated else "more than"
-        allowed = f"{least} times[{i - 1}] = {float(times[i - 1])!r}: times must increase"
+        i, minimum = int(early[0]) + 1, "at least" if repeated else "more than"
+        allowed = f"{minimum} times[{i - 1}] = {float(times[i - 1])!r}: times must increase"
         raise InputError(f"times[{i}]", float(times[i]), allowed)
 
 

@@ -89,10 +89,10 @@ def noise_of(times: Float[np.ndarray, "n"], values: Float[np.ndarray, "n width"]
     if bending * arm <= ACCELERATION * GRAVITY:
         return None
     jumps = np.linalg.norm(np.diff(CubicSpline(times, values)(times, 2), axis=0), axis=1)
-    least = ACCELERATION * max(GRAVITY / arm, _calm(times, values, step, deviation))
-    if bending <= least or np.mean(jumps > least) < SHARE:
+    minimum = ACCELERATION * max(GRAVITY / arm, _calm(times, values, step, deviation))
+    if bending <= minimum or np.mean(jumps > minimum) < SHARE:
         return None
-    return Noise(deviation, bending, float(np.median(jumps[jumps > least])), rounding if is_rounded else 0.0)
+    return Noise(deviation, bending, float(np.median(jumps[jumps > minimum])), rounding if is_rounded else 0.0)
 
 
 def _calm(times: np.ndarray, values: np.ndarray, step: float, deviation: float) -> float:

@@ -95,15 +95,15 @@ def window_splines(
         table = window.table if z_axis is None else window.table.in_axes(z_axis)
         if "periodic" in (ends, ends or table.ends) and not (window.is_last and begin is None):
             raise InputError("ends", "periodic", "another one in tables that are read window by window")
-        whole = spline_of(table, interpolation=interpolation, ends=ends)
+        full = spline_of(table, interpolation=interpolation, ends=ends)
         begin = float(table.times[0]) if begin is None else begin
-        since, knots = table.times - table.times[0], np.asarray(whole.knots)
+        since, knots = table.times - table.times[0], np.asarray(full.knots)
         first, last = (int(np.searchsorted(knots, since[row])) for row in (window.first, window.last))
         if first == last:
             continue
-        quaternion = None if whole.quaternion is None else leaf(np.asarray(whole.quaternion)[first:last])
-        part = leaf(knots[first : last + 1] - knots[first]), leaf(np.asarray(whole.position)[first:last])
-        spline = dataclasses.replace(whole, knots=part[0], position=part[1], quaternion=quaternion)
+        quaternion = None if full.quaternion is None else leaf(np.asarray(full.quaternion)[first:last])
+        part = leaf(knots[first : last + 1] - knots[first]), leaf(np.asarray(full.position)[first:last])
+        spline = dataclasses.replace(full, knots=part[0], position=part[1], quaternion=quaternion)
         if before is not None and interpolation != "hermite":
             _check_window(before, spline)
         before = spline
@@ -138,9 +138,9 @@ def _check_joins(name: str, table: np.ndarray, width: np.ndarray, knots: np.ndar
         rounding = COEFFICIENT_ERROR * np.abs(table).max() / (1.0 if words == "value" else width.min())
         far = np.flatnonzero(jumps > MEETING * size * max(degree, 1) + rounding)
         if len(far):
-            fault = f"its {words} jumps by {jumps[far[0]]:.3g} at t = {knots[far[0] + 1]:.6g} s"
+            error = f"its {words} jumps by {jumps[far[0]]:.3g} at t = {knots[far[0] + 1]:.6g} s"
             raise InputError(
-                name, None, "must be continuous with its first derivative: no force makes a mass jump", fault=fault
+                name, None, "must be continuous with its first derivative: no force makes a mass jump", fault=error
             )
 
 

@@ -52,10 +52,10 @@ def smoothed(
     times, ends = table.times[rows], ends or table.ends
     kind = interpolation or table.interpolation
     kind = "quintic" if kind == "quintic" else "cubic"
-    least = LEAST_ROWS + (kind == "quintic")
+    minimum = LEAST_ROWS + (kind == "quintic")
     knots = _knots(times)
-    if len(knots) < least:
-        raise InputError("smooth", deviation, f"absent for {len(knots)} samples: must have {least} or more")
+    if len(knots) < minimum:
+        raise InputError("smooth", deviation, f"absent for {len(knots)} samples: must have {minimum} or more")
     groups = [("positions", "m", 1.0, deviation, table.positions[rows])]
     if table.quaternions is not None:
         groups.append(("orientations", "rad", 2.0, angle, continuous(table.quaternions[rows])))
@@ -75,8 +75,10 @@ def smoothed(
         conditions = [MOVING if is_moving else REST for is_moving in moves]
         result, away = fit.smooth(amount / factor, conditions, name, unit, factor)
         results.append(result)
-        rms, most = math.sqrt(float(np.mean(away**2))) * factor, float(away.max()) * factor
-        notes.append(f"smoothing moved {name} by {rms:.2g} {unit} in the root mean square, {most:.2g} {unit} at most")
+        rms, maximum = math.sqrt(float(np.mean(away**2))) * factor, float(away.max()) * factor
+        notes.append(
+            f"smoothing moved {name} by {rms:.2g} {unit} in the root mean square, {maximum:.2g} {unit} at most"
+        )
         words = [word for word, is_moving in zip(("begin", "end"), moves, strict=True) if is_moving and is_told]
         if words:
             notes.append(
@@ -124,10 +126,10 @@ class _Fit:
         straight = np.stack([np.ones(len(self.places)), self.places], axis=1)[:, : 1 + is_free]
         if not (self.is_periodic and self.sign < 0.0):
             line = straight @ np.linalg.lstsq(straight, values, rcond=None)[0]
-            most = _rms(line - values)
-            if most <= deviation:
+            maximum = _rms(line - values)
+            if maximum <= deviation:
                 words = "a straight line" if is_free else "rest at one place"
-                allowed = f"less than {factor * most:.2g} {unit}, by which {words} misses the {name}"
+                allowed = f"less than {factor * maximum:.2g} {unit}, by which {words} misses the {name}"
                 raise InputError("smooth", factor * deviation, allowed)
         coefficients = self._least(deviation, conditions, values)
         result, fitted = (np.tile(self.values[:1], (rows.shape[0], 1)) for rows in (self.at_knots, self.design))
@@ -144,10 +146,10 @@ class _Fit:
             if may_move[k]:
                 free = [MOVING if is_moving else REST for is_moving in may_move]
                 rest = [REST if j == k else condition for j, condition in enumerate(free)]
-                least, most = (
+                minimum, maximum = (
                     self._bending(self._weighed(deviation, self._space(each), values)) for each in (free, rest)
                 )
-                may_move[k] = most > COSTS * least
+                may_move[k] = maximum > COSTS * minimum
         return may_move
 
     def _least(self, deviation: float, conditions: list, values: np.ndarray) -> np.ndarray:
@@ -224,11 +226,11 @@ def _rms(away: np.ndarray) -> float:
 
 def _knots(times: np.ndarray) -> np.ndarray:
     # Indices of samples that are not much closer to each other than others: the rest count as samples alone.
-    least, indices = float(np.median(np.diff(times))) / CLOSER, [0]
-    if np.diff(times).min() >= least:
+    minimum, indices = float(np.median(np.diff(times))) / CLOSER, [0]
+    if np.diff(times).min() >= minimum:
         return np.arange(len(times))
     for k in range(1, len(times)):
-        if times[k] - times[indices[-1]] >= least:
+        if times[k] - times[indices[-1]] >= minimum:
             indices.append(k)
     if indices[-1] != len(times) - 1:
         indices[-1] = len(times) - 1

@@ -172,6 +172,6 @@ def _of_alike(
 
 def _narrowed(at: Callable[[np.ndarray], np.ndarray], tau: np.ndarray) -> np.ndarray:
     count = len(EXTREMES)
-    least, when = narrowed_places(lambda points: at(points)[..., :count], tau, at(tau)[..., :count])
+    minimum, when = narrowed_places(lambda points: at(points)[..., :count], tau, at(tau)[..., :count])
     nearest = np.diagonal(at(when)[..., count:], axis1=1, axis2=2)
-    return np.stack([least, when, nearest], axis=1)
+    return np.stack([minimum, when, nearest], axis=1)

@@ -104,10 +104,10 @@ def check_certain(
 def _limit(row: Limit, value: Any, n_cables: int, at: str) -> Array:
     allowed = row.allowed + f", or {n_cables}: one a cable" * row.per_cable
     values = numbers(f"{at}{row.name}", value, allowed)
-    least = -np.inf if row.is_height else 0.0 if row.from_zero else np.nextafter(0.0, 1.0)
+    minimum = -np.inf if row.is_height else 0.0 if row.from_zero else np.nextafter(0.0, 1.0)
     shapes = [(), (n_cables,)] if row.per_cable else [()]
     is_number = np.isfinite(values) | ((values == np.inf) & (row.name == "tension_max") & (values.ndim > 0))
-    if values.shape not in shapes or not ((values >= least) & is_number).all():
+    if values.shape not in shapes or not ((values >= minimum) & is_number).all():
         raise InputError(f"{at}{row.name}", value, allowed)
     if not row.is_height and ((values > 0.0) & (values < SMALLEST)).any():
         raise InputError(f"{at}{row.name}", value, f"{allowed}, at least {SMALLEST:g}")

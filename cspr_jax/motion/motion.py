@@ -119,8 +119,8 @@ class Backwards(Generic[Kind]):
 
     def bounds(self, start: np.ndarray, end: np.ndarray) -> StateBounds:
         """Bounds of the states, of a motion that has them; see `BoundedMotion.bounds`."""
-        whole, motion = float(self.duration()), cast(BoundedMotion, self.motion)
-        return state_bounds.backwards(motion.bounds(whole - end, whole - start))
+        full, motion = float(self.duration()), cast(BoundedMotion, self.motion)
+        return state_bounds.backwards(motion.bounds(full - end, full - start))
 
 
 @jax.tree_util.register_dataclass

@@ -72,10 +72,10 @@ def _of_point_mass(robot: PointMassRobot, state: State, z0: Array) -> list[Array
 def _of_platform(robot: PlatformRobot, state: State, z0: Array) -> list[Array]:
     center = rest_point(z0)
     at_rest = wrench_balance.normalised_determinant(robot, center, jnp.eye(3))
-    here = wrench_balance.normalised_determinant(robot, state.position, state.rotation)
+    current = wrench_balance.normalised_determinant(robot, state.position, state.rotation)
     with_pulleys = robot.pulleys is not None
     per_length = _per_length(robot, state) if with_pulleys else wrench_balance.tensions_per_length(robot, state)
-    return [robot.n_cables * z0 / robot.gravity * per_length, jnp.atleast_1d(here / at_rest)]
+    return [robot.n_cables * z0 / robot.gravity * per_length, jnp.atleast_1d(current / at_rest)]
 
 
 def sampled_margin(problem: Problem, motion: Motion, samples: int = 64) -> Float[Array, ""]:

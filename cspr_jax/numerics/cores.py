@@ -25,7 +25,7 @@ def quota(groups: Path = _GROUPS, mounted: Path = _MOUNTED) -> float:
         lines = groups.read_text("utf-8", "replace").splitlines()
     except OSError:
         return math.inf
-    least = math.inf
+    minimum = math.inf
     for line in lines:
         _, _, rest = line.partition(":")
         controllers, _, place = rest.partition(":")
@@ -36,8 +36,8 @@ def quota(groups: Path = _GROUPS, mounted: Path = _MOUNTED) -> float:
         for root in [mounted / controllers, mounted / "cpu"] if controllers else [mounted, mounted / "unified"]:
             path = PurePosixPath(place.lstrip("/"))
             for level in (path, *path.parents):
-                least = min(least, _granted(root / level))
-    return least
+                minimum = min(minimum, _granted(root / level))
+    return minimum
 
 
 def _granted(folder: Path) -> float:

@@ -24,12 +24,12 @@ def robots(names: Iterable[str | Path] = ()) -> list[dict[str, Any]]:
         robot_file = resolve_robot(str(name), "robots", Path())
         is_known = robot_file.file is not None and robot_file.file.parent == catalogue.CATALOGUE
         if is_known:
-            fault = FAULTS.get(robot_file.name)
+            error = FAULTS.get(robot_file.name)
         else:
             from cspr_jax.build.robots import fault_at_rest  # imports jax
 
-            fault = fault_at_rest(robot_file)
-        listed.append(robot_file.model_dump(exclude_none=True) | {"fault": fault})
+            error = fault_at_rest(robot_file)
+        listed.append(robot_file.model_dump(exclude_none=True) | {"fault": error})
     return listed
 
 

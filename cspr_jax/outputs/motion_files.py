@@ -74,8 +74,8 @@ def _states(robot, limits: Limits, motion: Motion, tau, *, rule: str, with_coupl
             of_cables["tension_couple"] = tension_couples(robot, state.position, state.acceleration)
         if isinstance(motion, TimedLine):
             way = motion.direction / jnp.linalg.norm(motion.direction)
-            least, largest = along(robot, limits, state.position, way)
-            of_cables["path_acceleration"] = jnp.stack([least, way @ state.acceleration, largest])
+            minimum, largest = along(robot, limits, state.position, way)
+            of_cables["path_acceleration"] = jnp.stack([minimum, way @ state.acceleration, largest])
         return state, of_cables
 
     return jax.vmap(one)(tau)

@@ -24,14 +24,14 @@ def path_columns(plan: PlannedMotions) -> dict[str, np.ndarray]:
 
 
 def _of_section(section: Any, number: int, start: float) -> dict[str, np.ndarray]:
-    least, plane = section.least, section.least.plane
-    flags = np.array([0, *(Verdict[name.criterion.upper()].value for name in least.names)], FLAGS)
-    cables = np.array([0, *(0 if name.cable is None else name.cable + 1 for name in least.names)], np.int16)
+    minimum, plane = section.least, section.least.plane
+    flags = np.array([0, *(Verdict[name.criterion.upper()].value for name in minimum.names)], FLAGS)
+    cables = np.array([0, *(0 if name.cable is None else name.cable + 1 for name in minimum.names)], np.int16)
     # Behind the last node there is no cell.
-    binds = np.append(least.binds, least.binds[-1:]) + 1
+    binds = np.append(minimum.binds, minimum.binds[-1:]) + 1
     segments = section.before + np.append(section.segments, section.segments[-1:]) + 1
     return {
-        "path_coordinate": start + least.coordinate,
+        "path_coordinate": start + minimum.coordinate,
         "path_section": np.full(len(binds), number, np.int16),
         "path_segment": segments.astype(np.int16),
         "path_speed": np.stack([plane.low, plane.high, plane.speed, plane.cap], axis=1),

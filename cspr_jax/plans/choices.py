@@ -141,9 +141,9 @@ def _best_inclination(problem: Problem, waypoints: Waypoints) -> float:
 
 def _fastest_depth(problem: Problem, sequence: PlanLegs) -> float:
     # The duration grows with the root of z0 between changes of the arcs: a coarse look, then a fine one at the best.
-    least = max(depths.least_depth(problem.robot, sequence.waypoints.targets), 1e-3)
+    minimum = max(depths.least_depth(problem.robot, sequence.waypoints.targets), 1e-3)
     safe = depths.conservative_depth(problem.robot, sequence.waypoints.targets)
-    trial = np.linspace(0.5 * least, max(1.5 * least, safe if np.isfinite(safe) else 0.0), DEPTHS)
+    trial = np.linspace(0.5 * minimum, max(1.5 * minimum, safe if np.isfinite(safe) else 0.0), DEPTHS)
     for _ in range(2):
         table = sequence.table(problem, trial)
         cost = np.where(table["feasible"], table["duration"], np.inf).sum(1)

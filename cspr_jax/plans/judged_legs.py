@@ -115,11 +115,11 @@ class JudgedLeg(Leg):
         robot, joined = problem.robot, dict[bytes, tuple[Answers, list[Motion]]]()
 
         def join(rows: np.ndarray, arcs: np.ndarray) -> tuple[Answers, list[Motion]]:
-            whole = prescribed.copy()
-            whole[rows] = arcs
-            key = whole.tobytes()
+            full = prescribed.copy()
+            full[rows] = arcs
+            key = full.tobytes()
             if key not in joined:
-                joined[key] = self._with(whole).join(plain, z0)
+                joined[key] = self._with(full).join(plain, z0)
             answers, motions = joined[key]
             if len(rows) == len(self):  # answers of lines have no rows
                 return answers, motions
@@ -129,8 +129,8 @@ class JudgedLeg(Leg):
         is_searched = is_determined or not has_pulleys
         if waypoints.robot_file.is_platform:  # whose motion depends on those before and behind it
             is_searched = not has_pulleys and len(self) == 1
-        most = waypoints.max_arcs if is_searched else 0
-        judged = judge.smallest(join, prescribed, step=self._leg.step, max_arcs=most)
+        maximum = waypoints.max_arcs if is_searched else 0
+        judged = judge.smallest(join, prescribed, step=self._leg.step, max_arcs=maximum)
         motions = join(np.arange(len(self)), judged.arcs)[1]
         from cspr_jax.verification.attained import attained
 

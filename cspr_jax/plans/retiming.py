@@ -214,8 +214,8 @@ def _unbounded(plan: PlannedMotions, faster: list[_Faster]) -> list[str]:
     numbers = list[int]()
     for one in faster:
         length = float(one.fastest.coordinate[-1])
-        most = FASTER * np.sqrt(float(plan.problem.robot.gravity) * length)
-        if np.nanmax(one.fastest.plane.speed, initial=0.0) > UNBOUNDED * most:
+        maximum = FASTER * np.sqrt(float(plan.problem.robot.gravity) * length)
+        if np.nanmax(one.fastest.plane.speed, initial=0.0) > UNBOUNDED * maximum:
             numbers += (one.ride.segments + 1).tolist()
     names = ", ".join(map(str, dict.fromkeys(numbers)))
     more = "give tension_max or a limit of speeds"

@@ -48,10 +48,10 @@ def least_time(cells: int = CELLS) -> dict[Key, float | None]:
     powers = np.moveaxis(CubicSpline(segments, keys["points"]).c[::-1], 0, 1)
     curve = Spline(leaf(segments), leaf(frame.inward(bernstein_of_powers(powers))), None)
     section = Section(curve, np.full(len(powers), np.inf), segments)
-    least = least_time_motion(problem, section, SectionSettings(cells, 0.0))
-    is_proved = proved_answers(problem, [least.motion], None).verdict[0] == 0
-    values = dict.fromkeys(PUBLISHED, least.duration if is_proved else None)
-    bound = least.lower_bound if np.isfinite(least.lower_bound) else None
+    minimum = least_time_motion(problem, section, SectionSettings(cells, 0.0))
+    is_proved = proved_answers(problem, [minimum.motion], None).verdict[0] == 0
+    values = dict.fromkeys(PUBLISHED, minimum.duration if is_proved else None)
+    bound = minimum.lower_bound if np.isfinite(minimum.lower_bound) else None
     return values | {("least time along the path", "lower bound, s", VARIANT): bound}
 
 

@@ -64,8 +64,8 @@ _laws = jax.jit(jax.vmap(s_curve))
 def _active() -> tuple[PublishedLine, PublishedLine, float]:
     # (24) and (25): the boundaries that hold the least time back, and the largest path acceleration.
     bounds, largest = _case()
-    least = _least(bounds)
-    up, down = int(least.up), int(least.down)
+    minimum = _least(bounds)
+    up, down = int(minimum.up), int(minimum.down)
     # Braking is seen from the end.
     slope = float(bounds.down_slope[down])
     lower = PublishedLine(-float(bounds.down[down]) - slope, slope)
@@ -90,8 +90,8 @@ def table_4_1() -> dict[Key, float | None]:
 
 def table_4_2() -> dict[Key, float | None]:
     """The acceleration s'' = slope t + intercept of the least time, range by range."""
-    least = _least(_case()[0])
-    exact = float(least.duration), float(least.duration * least.ratio)
+    minimum = _least(_case()[0])
+    exact = float(minimum.duration), float(minimum.duration * minimum.ratio)
     cells: dict[Key, float | None] = {}
     for reading, (time, p) in ((EXACT_TIMES, exact), (ROUNDED_TIMES, tuple(np.round(exact, 3)))):
         up, down = 8.0 / (p**2 * time), 8.0 / (time * (time - p) ** 2)

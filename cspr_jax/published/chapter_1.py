@@ -63,7 +63,7 @@ def table_1_2() -> dict[Key, float | None]:
     for name in ("A1", "A2", "A3"):
         stage(name)
         amplitude = named(name)
-        best, least = best_inclination(amplitude, w)
+        best, minimum = best_inclination(amplitude, w)
         cells[name, "optimal inclination", ""] = float(best)
         for column, v in (
             ("-v_opt", -best),
@@ -73,7 +73,7 @@ def table_1_2() -> dict[Key, float | None]:
             ("0.999", 0.999),
         ):
             cells[name, column, ""] = float(least_oscillations(amplitude, w, jnp.asarray(v)))
-        cells[name, "v_opt", ""] = float(least)
+        cells[name, "v_opt", ""] = float(minimum)
     return cells
 
 
@@ -88,8 +88,8 @@ def table_1_3() -> dict[Key, float | None]:
             cells["n", name, reading] = _horizontal(named(name), w)
             cells["n of (1.55)", name, reading] = float(many_oscillations(named(name), w))
         stage(f"{reading}, A_eff")
-        epsilon, least = best_epsilon(w)
-        cells["n", "A_eff", reading], cells["epsilon", "A_eff", reading] = least, epsilon
+        epsilon, minimum = best_epsilon(w)
+        cells["n", "A_eff", reading], cells["epsilon", "A_eff", reading] = minimum, epsilon
         cells["n of (1.55)", "A_eff", reading] = float(many_oscillations(named("effective", epsilon), w))
     return cells
 

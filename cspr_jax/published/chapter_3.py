@@ -73,8 +73,8 @@ def variant(definition: str, amplitude: str) -> str:
 @functools.lru_cache(maxsize=len(AMPLITUDES))
 def checker_of(amplitude: str) -> PlatformChecker:
     """Checker of the tables' motions."""
-    here = Path(__file__)
-    robot = kernel_robot(resolve_robot("laval-mssm", here, here.parent), TrajectoryKeys(), "laval-mssm")
+    current = Path(__file__)
+    robot = kernel_robot(resolve_robot("laval-mssm", current, current.parent), TrajectoryKeys(), "laval-mssm")
     problem = Problem(aligned(robot)[0], Limits(), named(*AMPLITUDES[amplitude]))
     return PlatformChecker(problem, PlatformMotionKind(from_rest=True), batch=MANY)
 

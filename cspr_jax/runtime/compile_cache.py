@@ -64,14 +64,14 @@ def opened(folder: Path, warn: Callable[[str], None]) -> Path:
     """The folder of this run, with all entries so far; its new entries are handed over at the end of the process."""
     if largest_size() >= 0 and importlib.util.find_spec("filelock") is None:
         raise OSError(errno.ENOTSUP, f"jax needs filelock for {MAX_SIZE}: pip install filelock")
-    whole, run_folder = folder / "whole", folder / f"{_OWN}-{socket.gethostname()}-{os.getpid()}"
+    full, run_folder = folder / "whole", folder / f"{_OWN}-{socket.gethostname()}-{os.getpid()}"
     check_owner(folder)
-    whole.mkdir(mode=PRIVATE, exist_ok=True)
-    check_owner(whole)
+    full.mkdir(mode=PRIVATE, exist_ok=True)
+    check_owner(full)
     _remove_leftovers(folder)
     shutil.rmtree(run_folder, ignore_errors=True)  # of a process of the same number
     run_folder.mkdir(mode=PRIVATE)
-    run = _KeptEntries(whole, run_folder, os.getpid())
+    run = _KeptEntries(full, run_folder, os.getpid())
     damaged = _take(run)
     if damaged:
         entries = "a damaged entry" if damaged == 1 else f"{damaged} damaged entries"
@@ -251,10 +251,10 @@ def _trim(whole: Path) -> None:
         with contextlib.suppress(FileNotFoundError):
             status = entry.lstat()
             sizes[entry] = status.st_mtime, status.st_size
-    most, size = largest_size(), 0
+    maximum, size = largest_size(), 0
     for i, entry in enumerate(sorted(sizes, key=lambda entry: sizes[entry], reverse=True)):
         size += sizes[entry][1]
-        if i >= LARGEST or 0 <= most < size:
+        if i >= LARGEST or 0 <= maximum < size:
             entry.unlink(missing_ok=True)
 
 

@@ -65,13 +65,13 @@ def _primitive() -> Primitive:
         return [jax.core.ShapedArray(shape, np.dtype(dtype)) for shape, dtype in program.results]
 
     def operations(context: Any, *values: Any, program: LoweredProgram) -> Any:
-        whole = context.module_context
+        full = context.module_context
         try:
-            module = mlir.ir.Module.parse(program.code, context=whole.context)
-            name = mlir.merge_mlir_modules(whole.module, program.name, module, dst_symtab=whole.symbol_table)
+            module = mlir.ir.Module.parse(program.code, context=full.context)
+            name = mlir.merge_mlir_modules(full.module, program.name, module, dst_symtab=full.symbol_table)
         except mlir.ir.MLIRError as error:
             raise ValueError("the program cannot be parsed") from error
-        types = [mlir.aval_to_ir_type(whole, result) for result in context.avals_out]
+        types = [mlir.aval_to_ir_type(full, result) for result in context.avals_out]
         return func.CallOp(types, mlir.ir.FlatSymbolRefAttr.get(name), values).results
 
     mlir.register_lowering(primitive, operations)

@@ -131,12 +131,12 @@ class Spread:
 def balanced(sizes: Sequence[float], count: int) -> list[list[int]]:
     """Groups of items that take nearly equally long."""
     groups: list[list[int]] = [[] for _ in range(min(count, len(sizes)))]
-    whole = [0.0] * len(groups)
+    full = [0.0] * len(groups)
     for k in sorted(range(len(sizes)), key=lambda k: -sizes[k]):
-        least = min(range(len(groups)), key=lambda g: (whole[g], len(groups[g])))
-        groups[least].append(k)
-        whole[least] += sizes[k]
-    return [groups[k] for k in sorted(range(len(groups)), key=lambda k: -whole[k])]
+        minimum = min(range(len(groups)), key=lambda g: (full[g], len(groups[g])))
+        groups[minimum].append(k)
+        full[minimum] += sizes[k]
+    return [groups[k] for k in sorted(range(len(groups)), key=lambda k: -full[k])]
 
 
 def _start(parent: int, begin: Callable[..., None] | None, arguments: tuple) -> None:

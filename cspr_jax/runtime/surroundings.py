@@ -113,8 +113,8 @@ def check_threads(count: int = 0) -> None:
 
 def check_threads_of_jax(processes: int = 0) -> None:
     """Refuse to begin where jax could not start its threads, or map what it compiles: LLVM would end the process."""
-    most = resource.getrlimit(resource.RLIMIT_AS)[0]
-    if 0 <= most < LEAST_MEMORY:
+    maximum = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if 0 <= maximum < LEAST_MEMORY:
         raise ResourceError(_MEMORY)
     if processes or "jax" not in sys.modules:
         check_threads((OF_JAX + FEW) * max(processes, 1) + OF_JAX_PER_CORE * max(cores(), processes))

@@ -185,9 +185,9 @@ def _folder(setting: str | Path | None, warn: Callable[[str], None]) -> Path | N
         home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     except RuntimeError:  # a user without a name, as in a container
         home = os.devnull
-    here = (compile_cache.FORMAT, *_versions(), sys.version, *_processor())
+    current = (compile_cache.FORMAT, *_versions(), sys.version, *_processor())
     shared = Path(setting or Path(home) / "cspr_jax")
-    folder = shared / hashlib.sha256(repr(here).encode()).hexdigest()[:16]
+    folder = shared / hashlib.sha256(repr(current).encode()).hexdigest()[:16]
     try:
         shared.parent.mkdir(parents=True, exist_ok=True)
         for place in (shared, folder):

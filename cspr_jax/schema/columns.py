@@ -43,5 +43,5 @@ class Columns:
         arrays = self.arrays()
         axes, shape = labelled.axes_of(dims, len(next(iter(arrays.values()))))
         check_axis(axis, tuple(axes))
-        whole = {name: values.reshape(*shape, *values.shape[1:]) for name, values in arrays.items()}
-        return best_of(whole, axis, axes[axis], list(axes).index(axis)).data
+        full = {name: values.reshape(*shape, *values.shape[1:]) for name, values in arrays.items()}
+        return best_of(full, axis, axes[axis], list(axes).index(axis)).data

@@ -180,8 +180,8 @@ def _check_size(counts: dict[str, int], tile: tuple[int, ...], usual: tuple[int,
             f"run.tile = {shown(list(tile))}: {tiles} tiles: must be so large that there are at most {LARGEST_TILES}, "
             f"or absent: then it is {list(usual)}",
         )
-    most = LARGEST_TILES * math.prod(usual)
-    raise ConfigError(path, f"{place} is too large: must be at most {most} cells; fewer points, or several sweeps")
+    maximum = LARGEST_TILES * math.prod(usual)
+    raise ConfigError(path, f"{place} is too large: must be at most {maximum} cells; fewer points, or several sweeps")
 
 
 def check_room(sweep: Sweep, directory: Path, done: float) -> None:

@@ -114,8 +114,8 @@ class Scheduler:
                 raise RefusedError(
                     *(f"workers differ: {line}: --accept-environment-change takes them" for line in lines)
                 )
-        here = environment()
-        if environments[0]["package"] != here["package"] and not self._accept:
+        current = environment()
+        if environments[0]["package"] != current["package"] and not self._accept:
             raise RefusedError(
                 "workers run another cspr_jax than this process: install the same one, or --accept-environment-change"
             )

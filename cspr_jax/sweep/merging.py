@@ -104,8 +104,8 @@ def _result_part(path: Path, file: Path) -> Part:
     except DamagedError as error:
         raise StoreError(printable(f"{file}: its environment: {error}")) from error
     data = {name: result.data[name] for name in sweep.store}
-    whole = np.ones(sweep.grid.shape, bool)
-    return Part(path, sweep, environment, data, whole, {}, "proved" in result.attributes)
+    full = np.ones(sweep.grid.shape, bool)
+    return Part(path, sweep, environment, data, full, {}, "proved" in result.attributes)
 
 
 class Merged:

@@ -62,10 +62,10 @@ def _near_zero(answers: dict[str, np.ndarray]) -> int:
 
 def _refuse(index: int, contradictions: dict[str, np.ndarray]) -> None:
     # Contradictions come from a broken processor, driver or compiler.
-    for fault, cells in contradictions.items():
+    for error, cells in contradictions.items():
         if cells.any():
             raise SelfCheckError(
-                f"tile {index}: {int(cells.sum())} of {cells.size} cells: {fault}; nothing of it was kept; "
+                f"tile {index}: {int(cells.sum())} of {cells.size} cells: {error}; nothing of it was kept; "
                 "check the machine, then run again"
             )
 

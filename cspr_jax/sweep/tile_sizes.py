@@ -50,5 +50,5 @@ def cell_seconds(kind: MapKind, keys: SweepFile) -> float:
 def tile_cells(kind: MapKind, keys: SweepFile, cells: int) -> int:
     """Choose the largest number of cells of a tile."""
     seconds = cell_seconds(kind, keys)
-    most = min(kind.cells, math.ceil(TILE_SECONDS / seconds))
-    return min(most, max(math.ceil(cells / FEWEST_TILES), math.ceil(SHORTEST_SECONDS / seconds)))
+    maximum = min(kind.cells, math.ceil(TILE_SECONDS / seconds))
+    return min(maximum, max(math.ceil(cells / FEWEST_TILES), math.ceil(SHORTEST_SECONDS / seconds)))

@@ -68,8 +68,8 @@ def _nearest(case: MotionProof) -> np.ndarray:
     # Criteria that may be the worst ones of their flags.
     low, high = (side / case.scales for side in (case.proof.low, case.proof.high))
     flags = np.array([row.flag.value for row in case.criteria])
-    least = np.array([high[flags == flag].min() for flag in flags])
-    return np.flatnonzero((low <= least) & np.isfinite(high))
+    minimum = np.array([high[flags == flag].min() for flag in flags])
+    return np.flatnonzero((low <= minimum) & np.isfinite(high))
 
 
 def _blocks(near: TimeBlocks, high: np.ndarray, columns: np.ndarray, duration: float) -> tuple[np.ndarray, np.ndarray]:

@@ -21,12 +21,12 @@ def feed_proof(motion: Any, feeds: Float[np.ndarray, "m"]) -> tuple[Criterion, T
     knots, largest = np.asarray(motion.knots), float(feeds[np.isfinite(feeds)].max())
 
     def slacks(start: np.ndarray, end: np.ndarray) -> BlockSlacks:
-        least, most = (side[:, None] for side in _extremes(feeds, knots, start, end))
+        minimum, maximum = (side[:, None] for side in _extremes(feeds, knots, start, end))
         low, high, *rises = speed_slacks(motion.bounds(start, end))
-        is_one = (least == most) & np.isfinite(most)
+        is_one = (minimum == maximum) & np.isfinite(maximum)
         return BlockSlacks(
-            np.where(np.isfinite(least), low + least, largest),
-            np.where(np.isfinite(most), high + most, largest),
+            np.where(np.isfinite(minimum), low + minimum, largest),
+            np.where(np.isfinite(maximum), high + maximum, largest),
             *(np.where(is_one, rise, 0.0) for rise in rises),
         )
 
@@ -43,5 +43,5 @@ def _extremes(
     first = np.clip(np.searchsorted(knots, start, side="right") - 1, 0, len(feeds) - 1)
     last = np.clip(np.searchsorted(knots, end, side="left"), first + 1, len(feeds))
     edges = np.stack([first, last], axis=1).ravel()
-    least = np.minimum.reduceat(np.append(feeds, np.inf), edges)[::2]
-    return least, np.maximum.reduceat(np.append(feeds, 0.0), edges)[::2]
+    minimum = np.minimum.reduceat(np.append(feeds, np.inf), edges)[::2]
+    return minimum, np.maximum.reduceat(np.append(feeds, 0.0), edges)[::2]

@@ -76,14 +76,14 @@ class Judge(NamedTuple):
         doubtful = is_free & ((trial.verdict | (0 if self.has_pulleys else answers.verdict)) & UNSURE != 0)
         # Over pulleys the family's choice says nothing.
         rows = np.flatnonzero(is_free & (self.has_pulleys | (answers.feasible & (verdict != 0))))
-        least = np.full(len(rows), step) if self.has_pulleys else answers.tried_arcs[rows] + step
+        minimum = np.full(len(rows), step) if self.has_pulleys else answers.tried_arcs[rows] + step
         none = np.zeros(len(arcs), bool)
         none[rows] = True
         while True:
-            rows, least = rows[least <= max_arcs], least[least <= max_arcs]
+            rows, minimum = rows[minimum <= max_arcs], minimum[minimum <= max_arcs]
             if not len(rows):
                 break
-            trial = self._trial(*join(rows, least if self.has_pulleys else -least), intervals=False)
+            trial = self._trial(*join(rows, minimum if self.has_pulleys else -minimum), intervals=False)
             doubtful[rows] |= (trial.verdict | (0 if self.has_pulleys else trial.answers.verdict)) & UNSURE != 0
             proved = np.flatnonzero(trial.verdict == 0)
             done = rows[proved]
@@ -92,7 +92,7 @@ class Judge(NamedTuple):
                 proofs[i] = trial.proofs[k]
             arcs[done], verdict[done], none[done] = trial.answers.tried_arcs[proved], 0, False
             goes_on = (trial.verdict != 0) & (self.has_pulleys | trial.answers.feasible)
-            rows, least = rows[goes_on], (least if self.has_pulleys else trial.answers.tried_arcs)[goes_on] + step
+            rows, minimum = rows[goes_on], (minimum if self.has_pulleys else trial.answers.tried_arcs)[goes_on] + step
         if self.has_pulleys and not max_arcs:  # the family has refuted smaller numbers for cables from points
             doubtful |= (arcs == 0) & (answers.tried_arcs > max(step, 1))
         verdict = np.where(none, np.where(doubtful, Verdict.UNDECIDED, verdict | FLAGS(Verdict.NO_ARCS)), verdict)

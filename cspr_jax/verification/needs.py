@@ -68,11 +68,11 @@ def needs(problem: Problem, motion: Motion, samples: int) -> list[Need]:
         return reached.reshape(*tau.shape, -1), slacks.reshape(*tau.shape, -1)
 
     tau = sample_times(motion, samples)
-    least, when = (x[0] for x in narrowed_places(lambda points: at(points)[1], tau, at(tau[None])[1]))
+    minimum, when = (x[0] for x in narrowed_places(lambda points: at(points)[1], tau, at(tau[None])[1]))
     column = np.arange(len(when))
     reached, first, worst = at(when[None])[0][0][column, column], 0, []
     for criterion in _criteria(robot, limits):
-        columns = least[first : first + len(criterion.cables)]
+        columns = minimum[first : first + len(criterion.cables)]
         k = int(np.argmin(np.where(np.isnan(columns), np.inf, columns)))
         numbers = float(when[first + k]), float(reached[first + k]), float(criterion.allowed[k])
         worst.append(Need(criterion.flag, criterion.cables[k], *numbers, criterion.unit, float(columns[k])))
@@ -124,8 +124,8 @@ def _values(
         depth = plane_normal(robot) @ state.position
         reached, slacks = [jnp.atleast_1d(depth)], [jnp.atleast_1d(depth / z0)]
         if isinstance(robot, PlatformRobot) and robot.n_cables == robot.dof:
-            here = wrench_balance.normalised_determinant(robot, state.position, state.rotation)
-            fraction = here / wrench_balance.normalised_determinant(robot, rest_point(z0), jnp.eye(3))
+            current = wrench_balance.normalised_determinant(robot, state.position, state.rotation)
+            fraction = current / wrench_balance.normalised_determinant(robot, rest_point(z0), jnp.eye(3))
             reached.append(jnp.atleast_1d(fraction))
             slacks.append(jnp.atleast_1d(fraction))
         if pairs and isinstance(robot, PlatformRobot):

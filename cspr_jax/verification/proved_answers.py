@@ -286,13 +286,13 @@ def sampled_proof(
     ).high
     times = tau * float(motion.duration())
     failing = [_runs(times, column) for column in (high < levels(rows)).T]
-    whole = np.array([[0.0, times[-1]]])
+    full = np.array([[0.0, times[-1]]])
     proof = TimeProof(
         low=np.full(high.shape[1], -np.inf),
         high=high.min(0),
         when=times[high.argmin(0)],
         failing=failing,
-        open=[whole] * high.shape[1],
+        open=[full] * high.shape[1],
         blocks=len(tau),
         near=_between(times, high),
     )

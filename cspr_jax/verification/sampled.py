@@ -25,16 +25,16 @@ def _slacks(motion: Motion, problem: Problem, tau) -> jax.Array:
 def sampled_answers(problem: Problem, motions: list[Motion], samples: int = 400) -> Answers:
     """Answers of motions that are only sampled."""
     tau = np.linspace(0.0, 1.0, samples + 1)
-    least, duration = [], []
+    minimum, duration = [], []
     for motion in motions:
         kernel = partial(_slacks, common_shape(motion), problem)
 
         def at(points: np.ndarray, kernel=kernel) -> np.ndarray:
             return in_batches(kernel, points.ravel(), size=BATCH).reshape(*points.shape, -1)
 
-        least.append(narrowed(at, tau, at(tau[None]))[0])
+        minimum.append(narrowed(at, tau, at(tau[None]))[0])
         duration.append(float(motion.duration()))
-    slack, slack_flags = np.array(least), flags(problem)
+    slack, slack_flags = np.array(minimum), flags(problem)
     broken = sum(
         (np.where(column <= 0.0, flag.value, 0) for flag, column in _by_flag(slack_flags, slack)), np.zeros(1, int)
     )

@@ -119,12 +119,12 @@ def _usual(high: np.ndarray, count: int) -> np.ndarray:
 
 def _least(motion: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
     # Smallest values of each motion, (count, n_criteria), inf for a motion without any.
-    least = np.full((count, values.shape[1]), np.inf)
+    minimum = np.full((count, values.shape[1]), np.inf)
     if len(motion):
         order = np.argsort(motion, kind="stable")
         firsts = np.flatnonzero(np.diff(motion[order], prepend=-1))
-        least[motion[order][firsts]] = np.minimum.reduceat(values[order], firsts)
-    return least
+        minimum[motion[order][firsts]] = np.minimum.reduceat(values[order], firsts)
+    return minimum
 
 
 def _narrowed(
@@ -138,11 +138,11 @@ def _narrowed(
     # Cut the blocks that may hold the smallest slack of a criterion until its bounds are close; tell how many more.
     count, leaves = len(usual), []
     more = np.zeros(count, int)
-    least = _grouped(_least(blocks.motion, blocks.slacks.high, count), groups)
+    minimum = _grouped(_least(blocks.motion, blocks.slacks.high, count), groups)
     while len(blocks.start):
         # Slacks are as large as they usually are: near zero no share of the smallest one is small enough.
         with np.errstate(invalid="ignore"):  # of bounds that are infinite
-            level = (least - CLOSE * np.fmax(np.abs(least), 0.1 * usual))[blocks.motion]
+            level = (minimum - CLOSE * np.fmax(np.abs(minimum), 0.1 * usual))[blocks.motion]
         matters = (blocks.slacks.low < level) & np.isfinite(level)
         is_open = matters.any(1) & (blocks.end - blocks.start > SHORTEST * resolution)
         is_open &= (more < NARROWING)[blocks.motion]
@@ -152,7 +152,7 @@ def _narrowed(
         leaves.append(outside)
         blocks = _bounded(slacks, *inner)
         more += np.bincount(blocks.motion, minlength=count)
-        least = np.minimum(least, _grouped(_least(blocks.motion, blocks.slacks.high, count), groups))
+        minimum = np.minimum(minimum, _grouped(_least(blocks.motion, blocks.slacks.high, count), groups))
     return joined(leaves), more
 
 

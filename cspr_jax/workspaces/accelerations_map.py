@@ -39,11 +39,11 @@ class FeasibleAccelerationMap(PointMassMap):
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
         feasible, margin = answers["verdict"] == 0, answers["acceleration_margin"]
         room, mass = (float(np.asarray(x)) for x in (BOUNDARY * self._problem.robot.gravity, self._problem.robot.mass))
-        level, most = answers["level_acceleration"], answers["level_acceleration_max"]
+        level, maximum = answers["level_acceleration"], answers["level_acceleration_max"]
         return {
             "a feasible cell with a margin below zero": feasible & ~(margin > -self._missed * self._weight / mass),
             "an infeasible cell with a margin above zero": ~feasible & (margin > room) & (answers["verdict"] != 2048),
             "a margin that limits of the tensions make larger": margin > answers["static_margin"] + room,
-            "a level acceleration above the largest": level > most * (1.0 + BOUNDARY) + room,
+            "a level acceleration above the largest": level > maximum * (1.0 + BOUNDARY) + room,
             "a number that is none": sum(np.isnan(values) for values in answers.values()) > 0,
         }

@@ -88,7 +88,7 @@ class WorkspaceMap(GridMap):
         return build_scene(self._robot, robot_file, self._frame, self._workspace, self._file, at="workspace.")
 
     def _speeds(self, robot_file: RobotFile) -> CableSpeeds | None:
-        workspace, most = self._workspace, self._limits.cable_speed_max
+        workspace, maximum = self._workspace, self._limits.cable_speed_max
         speed_keys = [name for name in ("speed", "angular_speed") if getattr(workspace, name) is not None]
         if not speed_keys:
             if getattr(self._keys.limits, SPEED) is not None:
@@ -99,10 +99,10 @@ class WorkspaceMap(GridMap):
             if name in speed_keys and not has:
                 why = "turns about its joint alone" if self._row.is_jointed else "does not turn"
                 raise ConfigError(self._file, f"workspace.{name}: must be absent: {robot_file.kind} {why}")
-        if most is None:
+        if maximum is None:
             raise ConfigError(self._file, f"workspace.{speed_keys[0]}: must be absent without limits.cable_speed_max")
         speed, angular_speed = workspace.speed or 0.0, workspace.angular_speed or 0.0
-        return cable_speeds(self._robot, np.asarray(most), speed=speed, angular_speed=angular_speed)
+        return cable_speeds(self._robot, np.asarray(maximum), speed=speed, angular_speed=angular_speed)
 
     def _unit_quaternions(self, quaternions: Sequence[list[float] | None], key: str) -> np.ndarray:
         # Return quaternions (k, 4) in the kernels' axes.

@@ -45,8 +45,8 @@ class Requirement:
 def check_cables(robot: AnyRobot) -> None:
     """Refuse robots with too many cables: the number of choices of cables grows with a power of it."""
     if math.comb(robot.n_cables, robot.dof - 1) > MOST_CHOICES:
-        most = max(n for n in range(robot.n_cables) if math.comb(n, robot.dof - 1) <= MOST_CHOICES)
-        allowed = f"at most {most} for workspaces of {robot.dof} degrees of freedom"
+        maximum = max(n for n in range(robot.n_cables) if math.comb(n, robot.dof - 1) <= MOST_CHOICES)
+        allowed = f"at most {maximum} for workspaces of {robot.dof} degrees of freedom"
         raise InputError("robot", None, f"must have {allowed}", fault=f"{robot.n_cables} cables")
 
 

@@ -127,8 +127,8 @@ def refuse_tracers(key: str, value: Any, instead: str) -> None:
     """Refuse what jax traces, anywhere in an argument of a function that computes with NumPy."""
     place = _traced_place(value)
     if place is not None:
-        fault = "a tracer of jax, as grad, jit and vmap pass"
-        raise InputError(key + place, None, f"must be numbers: {instead}", fault=fault)
+        error = "a tracer of jax, as grad, jit and vmap pass"
+        raise InputError(key + place, None, f"must be numbers: {instead}", fault=error)
 
 
 def word(*words: str) -> Rule:

@@ -180,12 +180,12 @@ def _is_real(tensor: np.ndarray, *, is_planar: bool) -> bool:
 
 def _of_cables(body: Body, swivels: np.ndarray) -> dict[str, Any]:
     cables, keys = body.cables, dict[str, Any]()
-    least = [cable.tension_min for cable in cables]
-    if any(low is not None for low in least):
-        keys["tension_min"] = _one([low or 0.0 for low in least])
-    most = [cable.tension_max if cable.tension_max <= LARGEST else math.inf for cable in cables]
-    if any(math.isfinite(high) for high in most):
-        keys["tension_max"] = _one(most)
+    minimum = [cable.tension_min for cable in cables]
+    if any(low is not None for low in minimum):
+        keys["tension_min"] = _one([low or 0.0 for low in minimum])
+    maximum = [cable.tension_max if cable.tension_max <= LARGEST else math.inf for cable in cables]
+    if any(math.isfinite(high) for high in maximum):
+        keys["tension_max"] = _one(maximum)
     if body.cable_diameter:
         keys["cable_diameter"] = body.cable_diameter
     if any(cable.radius > 0.0 for cable in cables):

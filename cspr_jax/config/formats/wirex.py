@@ -110,11 +110,13 @@ def _limit(root: Element, body: Body, file: Path) -> None:
     # The limits allow every application of the file. Zero stands for a largest load that is not known.
     applications = list(root.iter("application"))
     cables = [(one, "minimum_load", "cable") for one in root.findall("cable")]
-    least = [_load(*one, file) for one in [*((one, "min_cable_load", "application") for one in applications), *cables]]
-    most = [_load(one, "max_cable_load", "application", file) or math.inf for one in applications]
+    minimum = [
+        _load(*one, file) for one in [*((one, "min_cable_load", "application") for one in applications), *cables]
+    ]
+    maximum = [_load(one, "max_cable_load", "application", file) or math.inf for one in applications]
     for cable in body.cables:
-        cable.tension_min = max(least, default=0.0) or None
-        cable.tension_max = min(most, default=math.inf)
+        cable.tension_min = max(minimum, default=0.0) or None
+        cable.tension_max = min(maximum, default=math.inf)
 
 
 def _load(element: Element, key: str, place: str, file: Path) -> float:

@@ -37,7 +37,7 @@ def limit_slacks(
     rows, tables = limits_set(problem.limits), _tables(problem, motions, kappa, is_below)
     slacks = [_SLACKS[row.name](problem, getattr(problem.limits, row.name)) for row in rows]
     count = len(is_below)
-    whole = MinimumBlocks(np.arange(count), np.zeros(count, int), np.full(count, -1.0), np.full(count, 2.0))
+    full = MinimumBlocks(np.arange(count), np.zeros(count, int), np.full(count, -1.0), np.full(count, 2.0))
 
     def values(blocks: MinimumBlocks) -> tuple[np.ndarray, np.ndarray]:
         block_tables = {name: over(x[blocks.case], *_wide(blocks, x.ndim)) for name, x in tables.items()}
@@ -47,7 +47,7 @@ def limit_slacks(
         low, attained = (np.stack(x, axis=1) for x in zip(*pairs, strict=True))
         return low, attained
 
-    proved = smallest(whole, count, values, np.ones(len(rows)), size=TOGETHER)
+    proved = smallest(full, count, values, np.ones(len(rows)), size=TOGETHER)
     unknown = ~is_below[:, None] & np.array([row.quantity == "tension" for row in rows])[None]
     return Proved(*(np.where(unknown, -np.inf, x) for x in proved))
 
@@ -101,10 +101,10 @@ def _dot(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 def _tension(problem: Problem, limit, sense: float) -> Callable[[Items], Any]:
     robot = problem.robot
     unit = sense * robot.n_cables / float(robot.mass * robot.gravity)
-    most = np.asarray(limit)
+    maximum = np.asarray(limit)
 
     def slack(at: Items) -> Any:
-        return (at["kappa"] * at["square"] ** 0.5 * at["determinant"] ** -1.0 * float(robot.mass) - most) * unit
+        return (at["kappa"] * at["square"] ** 0.5 * at["determinant"] ** -1.0 * float(robot.mass) - maximum) * unit
 
     return slack
 

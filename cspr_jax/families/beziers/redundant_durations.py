@@ -42,8 +42,8 @@ CLOSE = 1e-9
 def _sampled(problem: Problem, motions: Bezier) -> jax.Array:
     # Return the smallest slack of each segment, (n,).
     tau = jnp.linspace(0.0, 1.0, SAMPLES)
-    least = jax.vmap(lambda motion: jax.vmap(lambda t: instant_slacks(problem, motion, t))(tau).min())(motions)
-    return jnp.where(jnp.isnan(least), -jnp.inf, least)
+    minimum = jax.vmap(lambda motion: jax.vmap(lambda t: instant_slacks(problem, motion, t))(tau).min())(motions)
+    return jnp.where(jnp.isnan(minimum), -jnp.inf, minimum)
 
 
 class _Segment:

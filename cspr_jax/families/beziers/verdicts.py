@@ -90,5 +90,5 @@ def smallest_slacks(problem: Problem, judgements: Verdicts) -> Float[np.ndarray,
     if robot.n_cables > robot.dof:
         margin = margin * robot.n_cables / float(robot.mass * robot.gravity)
     # Above the spools the room under limits of tensions is not known, and the depth decides.
-    least = np.where(np.isneginf(judgements.room), margin, np.minimum(margin, judgements.room))
-    return np.where(np.isnan(least), -np.inf, least)
+    minimum = np.where(np.isneginf(judgements.room), margin, np.minimum(margin, judgements.room))
+    return np.where(np.isnan(minimum), -np.inf, minimum)

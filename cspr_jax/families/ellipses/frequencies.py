@@ -114,8 +114,8 @@ def sampled_slacks(
     bounds = StateBounds(*(constant(jnp.asarray(x)) for x in states))
     tau = np.zeros(len(frequencies) * count)
     high = block_slacks(problem.robot, problem.limits, lambda start, end: bounds, tau, tau, scene).high
-    least = high[:, -len(criteria(problem.robot, problem.limits, scene)) :].reshape(len(frequencies), count, -1)
-    return least.min((1, 2))
+    minimum = high[:, -len(criteria(problem.robot, problem.limits, scene)) :].reshape(len(frequencies), count, -1)
+    return minimum.min((1, 2))
 
 
 @persistent_jit

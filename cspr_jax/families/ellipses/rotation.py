@@ -81,10 +81,10 @@ def rotation_bounds(rotation: Rotation, s: tuple, psi: tuple) -> RotationBounds:
     way, angle = _direction(rotation.turn)
     outer = _about(rotation.axis, psi[0])
     inner = dot(_rows(_about(way, s[0] * angle)), rotations.matrix(rotation.start).T[None])
-    whole = dot(_rows(outer), inner.each(lambda x: x.T[None]))
+    full = dot(_rows(outer), inner.each(lambda x: x.T[None]))
     spin, second_derivative = rotated(outer, s[1] * rotation.turn), rotated(outer, s[2] * rotation.turn)
     beat = psi[1] * rotation.axis
-    return RotationBounds(whole, beat + spin, psi[2] * rotation.axis + second_derivative + cross(beat, spin))
+    return RotationBounds(full, beat + spin, psi[2] * rotation.axis + second_derivative + cross(beat, spin))
 
 
 def _rows(matrix: AffineBounds) -> AffineBounds:

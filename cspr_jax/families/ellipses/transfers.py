@@ -96,9 +96,9 @@ def motion_between(amplitude: Amplitude, first: Turning, last: Turning, arcs: in
     mean = start + (end - start) * float(integral(amplitude).at(1.0))
     way, after = (swept / mean if step else 0.0), turns * full / end + (0.0 if step else swept / end)
     law = with_turns(amplitude, way / (way + after) if step else 0.0)
-    frequencies, whole = leaf([start, end]), leaf(way + after)
+    frequencies, complete = leaf([start, end]), leaf(way + after)
     rotation = rotation_between(first, last)
-    return EllipseMotion(first.ellipse, last.ellipse, frequencies, leaf(phase), law, integral(law), whole, rotation)
+    return EllipseMotion(first.ellipse, last.ellipse, frequencies, leaf(phase), law, integral(law), complete, rotation)
 
 
 def rotation_between(first: Turning, last: Turning) -> Rotation | None:

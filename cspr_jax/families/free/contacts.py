@@ -51,10 +51,10 @@ def apart(
     if not (missed > 0.0).any():
         return None
     size = float(spool_radius(tasks.robot))
-    least = {} if tasks.planes is None else dict(tasks.planes.least)
+    minimum = {} if tasks.planes is None else dict(tasks.planes.least)
     for k in np.flatnonzero(missed > 0.0).tolist():
-        least[k] = least.get(k, APART * size) + min(more(number) * float(missed[k]), MOST * size)
-    return _parted(question, tasks, unknowns, least, NEAR * size)
+        minimum[k] = minimum.get(k, APART * size) + min(more(number) * float(missed[k]), MOST * size)
+    return _parted(question, tasks, unknowns, minimum, NEAR * size)
 
 
 def around(
@@ -66,9 +66,9 @@ def around(
     if not any("obstacle" in pairs[k].kind for k in np.flatnonzero(is_met.any(axis=0))):
         return None
     segments = np.any(is_met.reshape(len(tasks.places[0]), -1), axis=1)
-    least = dict.fromkeys(np.flatnonzero(is_met.any(axis=0)).tolist(), APART * size)
+    minimum = dict.fromkeys(np.flatnonzero(is_met.any(axis=0)).tolist(), APART * size)
     deviation = Unknowns(*map(np.concatenate, zip(*_bent(tasks, unknowns, segments), strict=True)))
-    return _clear(question, tasks.taken(np.zeros(len(deviation.duration), int)), deviation, least)
+    return _clear(question, tasks.taken(np.zeros(len(deviation.duration), int)), deviation, minimum)
 
 
 def _clear(

@@ -205,8 +205,8 @@ def _keep(best: dict[int, SegmentMotion], rows: np.ndarray, of_task: np.ndarray,
         start = int(costs[lanes_of].argmin())
         nearest = lanes_of[start]
         before = best[k].cost if k in best else np.inf
-        least = min(costs[nearest], before)
-        room = least + SAME * abs(least)
+        minimum = min(costs[nearest], before)
+        room = minimum + SAME * abs(minimum)
         agreeing = set(np.flatnonzero(np.isfinite(costs[lanes_of]) & (costs[lanes_of] <= room)).tolist())
         if np.isfinite(before) and before <= room:
             agreeing.add(best[k].start)

@@ -46,8 +46,8 @@ def no_slower(
     """A motion that is at most as slow as closed forms through the same poses."""
     is_proved = bool(free.answers.feasible.all())
     for form in sorted(forms, key=lambda one: float(one.duration.sum())):
-        whole = float(form.duration.sum())
-        is_better = not is_proved or (settings.objective == "time" and whole < free.duration)
+        full = float(form.duration.sum())
+        is_better = not is_proved or (settings.objective == "time" and full < free.duration)
         is_short = settings.longest is None or bool((form.duration <= settings.longest).all())
         if is_better and is_short and form.is_feasible.all():
             spline = _followed(problem, scene, poses, settings, form)

@@ -66,11 +66,11 @@ class _Joined(NamedTuple):
 
 def check_searched(problem: Problem) -> None:
     """Refuse a problem for which no free motion is sought."""
-    robot, most = problem.robot, problem.limits.tension_max
+    robot, maximum = problem.robot, problem.limits.tension_max
     row = PATTERNS[robot.pattern]
     if row.is_jointed or row.along_line:
         raise InputError("pattern", robot.pattern, '"1T", "2T", "3T", "1R2T" or "3R3T" for free motions')
-    if most is None or not np.isfinite(np.asarray(most)).all():
+    if maximum is None or not np.isfinite(np.asarray(maximum)).all():
         raise InputError("tension_max", None, "a number, N: without it the least time is that of impulses")
 
 
@@ -132,8 +132,8 @@ def _sides(values: np.ndarray, part: float, most: float = np.inf) -> np.ndarray:
     # Bounds (2, s) of a value that is zero at singular poses, from values (k,) at the poses: motions stay on the side
     # of both ends, by this part of the smaller value, or by so much.
     ends = np.stack([values[:-1], values[1:]])
-    least = np.minimum(part * np.abs(ends).min(0), most)
-    return np.stack([np.where((ends > 0.0).all(0), least, -np.inf), np.where((ends < 0.0).all(0), -least, np.inf)])
+    minimum = np.minimum(part * np.abs(ends).min(0), most)
+    return np.stack([np.where((ends > 0.0).all(0), minimum, -np.inf), np.where((ends < 0.0).all(0), -minimum, np.inf)])
 
 
 def _depths(problem: Problem, poses: FreePoses) -> np.ndarray:

@@ -103,8 +103,8 @@ def more(number: int) -> float:
 
 def slacks_of(question: FreeQuestion, motions: list[Spline]) -> PieceSlacks:
     """Slacks of motions, one behind the other, over their pieces."""
-    whole = chained(motions)
-    return piece_slacks(question.problem, whole, np.asarray(whole.knots), question.scene)
+    full = chained(motions)
+    return piece_slacks(question.problem, full, np.asarray(full.knots), question.scene)
 
 
 def tightened(question: FreeQuestion, tasks: Tasks, slacks: PieceSlacks, number: int) -> Tasks | None:

@@ -102,13 +102,13 @@ def robust_proof(
     """The best motion for all robots within an uncertainty, from that of the planned robot."""
     all_robots, fewer = (for_all_robots(question, uncertainty, multiple) for multiple in (1.0, PART))
     try:
-        whole = _with_room(all_robots, tasks, tasks, unknowns)
-        part = None if whole else _with_room(fewer, tasks, tasks, unknowns)
-        whole = _with_room(all_robots, tasks, *part) if part else whole
+        full = _with_room(all_robots, tasks, tasks, unknowns)
+        part = None if full else _with_room(fewer, tasks, tasks, unknowns)
+        full = _with_room(all_robots, tasks, *part) if part else full
     except (KeyboardInterrupt, OutOfTime):
         return None
-    if whole:
-        return proved(all_robots, *whole)
+    if full:
+        return proved(all_robots, *full)
     return proved(fewer, *part) if part else None
 
 

@@ -48,11 +48,13 @@ def widened(question: FreeQuestion, tasks: Tasks, motions: list[Spline]) -> Task
     problem, limits, states = question.problem, question.limits, _states(tasks, motions)
     before, after = (all_robots_slacks(problem, states, multiple) for multiple in (0.0, 1.0))
     half, count = 0.5 * (limits.high - limits.low), before.shape[1]
-    most = LARGEST * np.where(np.isfinite(half) & (half > 0.0), half, 1.0)
+    maximum = LARGEST * np.where(np.isfinite(half) & (half > 0.0), half, 1.0)
     with np.errstate(invalid="ignore"):
         lost = np.maximum(np.nan_to_num(before - after, nan=0.0, posinf=np.inf), 0.0)
         rise, fall = (
-            np.max(np.where(side > 0.0, np.minimum(lost[..., None] * side, most), 0.0), axis=1).reshape(tasks.low.shape)
+            np.max(np.where(side > 0.0, np.minimum(lost[..., None] * side, maximum), 0.0), axis=1).reshape(
+                tasks.low.shape
+            )
             for side in (limits.rises[:count], limits.falls[:count])
         )
     depths = _depths(question, states, before, lost, tasks.basis.tau.size)

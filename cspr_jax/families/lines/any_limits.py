@@ -73,13 +73,13 @@ def gain(
     rows += [slacks(line, name, instants) for name in line.names if name in line.largest]
     still, moving = jnp.concatenate(rows, axis=-1)
     is_finite = jnp.isfinite(still)
-    most = jnp.where(is_finite, still, 1.0)
+    maximum = jnp.where(is_finite, still, 1.0)
     needed = jnp.where(is_finite, still - moving, 0.0)
-    most = jnp.concatenate([most, jnp.broadcast_to(largest[None, None, None], second_derivative.shape)], axis=-1)
+    maximum = jnp.concatenate([maximum, jnp.broadcast_to(largest[None, None, None], second_derivative.shape)], axis=-1)
     needed = jnp.concatenate([needed, jnp.abs(second_derivative)], axis=-1)
     is_known = jnp.concatenate([is_finite, jnp.ones_like(second_derivative, bool)], axis=-1)
-    above = _above(most, needed, is_known)
-    below = jnp.where((most < 0.0) & (needed < 0.0), most / jnp.where(needed < 0.0, needed, 1.0), 0.0)
+    above = _above(maximum, needed, is_known)
+    below = jnp.where((maximum < 0.0) & (needed < 0.0), maximum / jnp.where(needed < 0.0, needed, 1.0), 0.0)
     first, numbers = (tau <= middle)[..., None], _numbers(line, tensions, above.shape)
     halves = [jnp.where(half, above, jnp.inf) for half in (first, ~first)]
     up, down = (numbers.ravel()[jnp.argmin(half)] for half in halves)

@@ -92,9 +92,9 @@ def by_formula(
     """Least durations along straight lines under taut cables and the largest acceleration alone."""
     in_plane, largest = in_one_plane(robot), np.full(len(starts), float(max_acceleration))
     kernel = partial(_by_formula, robot, law=law, rule=rule, in_plane=in_plane)
-    least, bound, rest, depth, is_bounded = in_batches(kernel, (starts, ends, largest), size=BATCH)
-    duration = least.duration * (1.0 + fastest.LONGER) if in_plane else np.full(len(starts), np.nan)
-    fields = (duration, least.ratio, bound, rest, depth, is_bounded, least.up, least.down)
+    minimum, bound, rest, depth, is_bounded = in_batches(kernel, (starts, ends, largest), size=BATCH)
+    duration = minimum.duration * (1.0 + fastest.LONGER) if in_plane else np.full(len(starts), np.nan)
+    fields = (duration, minimum.ratio, bound, rest, depth, is_bounded, minimum.up, minimum.down)
     return Durations(*(np.array(x) for x in fields))
 
 
@@ -130,10 +130,10 @@ def by_search(
         limits=Limits(**{name: getattr(problem.limits, name) for name in moving(problem.limits)})
     )
     largest = np.full(len(starts), float(max_acceleration))
-    least = in_batches(partial(_by_search, moving_problem, law=law), (starts, ends, largest), size=BATCH_OF_SEARCH)
+    minimum = in_batches(partial(_by_search, moving_problem, law=law), (starts, ends, largest), size=BATCH_OF_SEARCH)
     rows = _bounds_of_rows(moving_problem)
     return dataclasses.replace(
-        timings, duration=least.duration, ratio=least.ratio, up=rows[least.up], down=rows[least.down]
+        timings, duration=minimum.duration, ratio=minimum.ratio, up=rows[minimum.up], down=rows[minimum.down]
     )
 
 
@@ -143,20 +143,20 @@ def _by_formula(robot: PointMassRobot, arguments, *, law: str, rule: str, in_pla
         faces = line_faces(robot, start, end, in_plane=in_plane)
         bounds = sides(faces, largest / jnp.linalg.norm(end - start))
         if law != "s-curve":
-            least = fastest.least_of_law(fixed_law(law), bounds)
+            minimum = fastest.least_of_law(fixed_law(law), bounds)
         elif rule == "optimum":
-            least = fastest.least_s_curve(bounds)
+            minimum = fastest.least_s_curve(bounds)
         else:
-            least = fastest.thesis_s_curve(bounds)
+            minimum = fastest.thesis_s_curve(bounds)
         sizes = jnp.stack([jnp.linalg.norm(faces.normal + t * faces.normal_change, axis=1) for t in (0.0, 1.0)])
         resting = -jnp.stack([faces.offset, faces.offset + faces.slope]) / jnp.where(sizes > 0.0, sizes, 1.0)
         there = faces.bounds[None] & jnp.stack([faces.first <= 0.0, faces.last >= 1.0])
         rest = jnp.min(jnp.where(there, resting, jnp.inf))
         is_bounded = jnp.isfinite(bounds.up).any() & jnp.isfinite(bounds.down).any()
         if not in_plane:
-            return least, fastest.least_time(bounds, everywhere=False), rest, jnp.asarray(jnp.inf), is_bounded
+            return minimum, fastest.least_time(bounds, everywhere=False), rest, jnp.asarray(jnp.inf), is_bounded
         depth = jnp.minimum(plane_normal(robot) @ start, plane_normal(robot) @ end)
-        return least, fastest.least_time(bounds), rest, depth, is_bounded & faces.bounds.any()
+        return minimum, fastest.least_time(bounds), rest, depth, is_bounded & faces.bounds.any()
 
     return jax.vmap(one)(*arguments)
 

@@ -65,14 +65,14 @@ def least_times(
     # A refuted motion has no duration; the duration is 0 s where both ends are one place.
     moves &= (judgements.verdict == 0) | (judgements.verdict == Verdict.UNDECIDED.value)
     nothing = np.where((judgements.verdict == 0) & ~moves, 0.0, np.nan)
-    duration, least = (np.where(moves, x, nothing) for x in (timings.duration, timings.least))
+    duration, minimum = (np.where(moves, x, nothing) for x in (timings.duration, timings.least))
     with np.errstate(invalid="ignore", divide="ignore"):
-        relative = np.where(least > 0.0, duration / least, np.nan)
+        relative = np.where(minimum > 0.0, duration / minimum, np.nan)
     return LeastTimes(
         verdict=judgements.verdict,
         duration=duration,
         acceleration_time=np.where(moves, timings.ratio, 0.5) * duration,
-        least_duration=least,
+        least_duration=minimum,
         duration_ratio=relative,
         rest_margin=np.where(timings.depth > 0.0, timings.rest, np.nan),
         active_up=np.where(moves, timings.up + 1, 0).astype(np.int16),

@@ -69,16 +69,16 @@ def _constants(lines: LineSlacks, edges: np.ndarray) -> tuple[np.ndarray, np.nda
     # The rate of a cable over s' grows along the line.
     ends = [(x - line.nearest) * line.square[..., None] for x in (first, last)]
     rates = [x / np.sqrt((x / line.square[..., None]) ** 2 * line.square[..., None] + line.apart) for x in ends]
-    least = np.where(rates[0] * rates[1] > 0.0, np.minimum(*np.abs(rates)), 0.0)
+    minimum = np.where(rates[0] * rates[1] > 0.0, np.minimum(*np.abs(rates)), 0.0)
     speed = np.full_like(up, np.inf)
     with np.errstate(divide="ignore"):
         if "cable_speed_max" in line.largest:
-            speed = (line.largest["cable_speed_max"] / least).min(-1)
+            speed = (line.largest["cable_speed_max"] / minimum).min(-1)
         if "cable_acceleration_max" in line.largest:
             # A cable that is paid out has l'' >= l_s s'', one that is wound in has l'' >= |l_s| (-s'').
-            most = line.largest["cable_acceleration_max"] / least
-            up = np.minimum(up, np.where(rates[0] > 0.0, most, np.inf).min(-1))
-            down = np.minimum(down, np.where(rates[1] < 0.0, most, np.inf).min(-1))
+            maximum = line.largest["cable_acceleration_max"] / minimum
+            up = np.minimum(up, np.where(rates[0] > 0.0, maximum, np.inf).min(-1))
+            down = np.minimum(down, np.where(rates[1] < 0.0, maximum, np.inf).min(-1))
         length = np.sqrt(line.square)
         if "speed_max" in line.largest:
             speed = np.minimum(speed, line.largest["speed_max"][..., 0] / length)

@@ -29,11 +29,11 @@ class LeastTimeMap(FromPlacesMap):
 
     def contradictions(self, answers: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Cells whose numbers contradict each other; see `GridMap.contradictions`."""
-        feasible, duration, least = answers["verdict"] == 0, answers["duration"], answers["least_duration"]
+        feasible, duration, minimum = answers["verdict"] == 0, answers["duration"], answers["least_duration"]
         p, undecided = answers["acceleration_time"], answers["verdict"] == Verdict.UNDECIDED.value
         return {
             "a feasible cell without a duration": feasible & ~(duration >= 0.0),
-            "a duration below the least one": feasible & ~(duration >= least * (1.0 - 1e-9)),
+            "a duration below the least one": feasible & ~(duration >= minimum * (1.0 - 1e-9)),
             "a time of acceleration outside of the duration": feasible & ~((p >= 0.0) & (p <= duration)),
             "an infeasible cell with a duration": ~feasible & ~undecided & np.isfinite(duration),
             "rest at both ends of a feasible cell is none": feasible & ~(answers["rest_margin"] > 0.0),

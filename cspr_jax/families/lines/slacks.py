@@ -89,7 +89,7 @@ def line_slacks(problem: Problem, start: Float[Array, "3"], end: Float[Array, "3
     apart = jnp.sum((rays - nearest[:, None] * direction[None]) ** 2, axis=1)
     change = jnp.sum(faces.normal_change**2, axis=1)
     narrowest = -jnp.sum(faces.normal * faces.normal_change, axis=1) / jnp.where(change > 0.0, change, 1.0)
-    least = jnp.sum((faces.normal + narrowest[:, None] * faces.normal_change) ** 2, axis=1)
+    minimum = jnp.sum((faces.normal + narrowest[:, None] * faces.normal_change) ** 2, axis=1)
     at = jnp.clip(narrowest, 0.0, 1.0)
     size = jnp.linalg.norm(faces.normal + at[:, None] * faces.normal_change, axis=1)
     spans = (size > 0.0) & ((faces.along != 0.0) | (faces.along_change != 0.0)).any(1)
@@ -106,7 +106,7 @@ def line_slacks(problem: Problem, start: Float[Array, "3"], end: Float[Array, "3
         along_change=faces.along_change / over[:, None],
         normal_change_square=change / over**2,
         narrowest=narrowest,
-        least_size=least / over**2,
+        least_size=minimum / over**2,
         spans=spans,
         low=low,
         high=high,
@@ -121,12 +121,12 @@ def line_slacks(problem: Problem, start: Float[Array, "3"], end: Float[Array, "3
 def _tensions(problem: Problem) -> tuple[dict[str, Array], dict[str, Array]]:
     # The group of the largest tension keeps the smallest tension too.
     robot, none = problem.robot, jnp.zeros(problem.robot.n_cables)
-    least, most = tension_range(robot, problem.limits)
+    minimum, maximum = tension_range(robot, problem.limits)
     low, high = {TAUT: none}, {TAUT: none + jnp.inf}
     if problem.limits.tension_min is not None:
-        low["tension_min"], high["tension_min"] = least / robot.mass, none + jnp.inf
+        low["tension_min"], high["tension_min"] = minimum / robot.mass, none + jnp.inf
     if problem.limits.tension_max is not None:
-        low["tension_max"], high["tension_max"] = least / robot.mass, most / robot.mass
+        low["tension_max"], high["tension_max"] = minimum / robot.mass, maximum / robot.mass
     return low, high
 
 

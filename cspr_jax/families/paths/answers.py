@@ -70,21 +70,21 @@ class SectionAnswer(NamedTuple):
 
     def to_dict(self) -> dict[str, Any]:
         """The section as a plan's JSON has it."""
-        least = self.least
-        points = np.asarray(least.motion.position)
+        minimum = self.least
+        points = np.asarray(minimum.motion.position)
         nodes = np.concatenate([points[:, 0], points[-1:, -1]])
-        lowest = float(np.nanmax(least.plane.low, initial=0.0))
+        lowest = float(np.nanmax(minimum.plane.low, initial=0.0))
         return {
             "segments": [self.before + segment for segment in self.ends],
             "length": float(np.linalg.norm(np.diff(nodes, axis=0), axis=1).sum()),
-            "duration": least.duration,
-            "lower_bound": least.lower_bound,
-            "gap": 1.0 - least.lower_bound / least.duration,
-            "ramp_time": least.ramp_time,
-            "ramp_cost": least.duration / least.jumping - 1.0 if least.ramp_time else math.nan,
-            "path_deviation": least.deviation,
+            "duration": minimum.duration,
+            "lower_bound": minimum.lower_bound,
+            "gap": 1.0 - minimum.lower_bound / minimum.duration,
+            "ramp_time": minimum.ramp_time,
+            "ramp_cost": minimum.duration / minimum.jumping - 1.0 if minimum.ramp_time else math.nan,
+            "path_deviation": minimum.deviation,
             "least_speed": lowest or None,
-            "binding": _binding([(least, np.diff(np.asarray(least.motion.knots)))]),
+            "binding": _binding([(minimum, np.diff(np.asarray(minimum.motion.knots)))]),
             "jumps": self.jumps,
         }
 
@@ -92,10 +92,10 @@ class SectionAnswer(NamedTuple):
 def _binding(parts: Iterable[tuple[LeastTime, np.ndarray]]) -> list[dict[str, Any]]:
     # Tell what binds, the longest first, over cells that take these times.
     shares, total = dict[BindingName, float](), 0.0
-    for least, times in parts:
+    for minimum, times in parts:
         total += float(times.sum())
-        for k, name in enumerate(least.names):
-            shares[name] = shares.get(name, 0.0) + float(times[least.binds == k].sum())
+        for k, name in enumerate(minimum.names):
+            shares[name] = shares.get(name, 0.0) + float(times[minimum.binds == k].sum())
     order = sorted((name for name in shares if shares[name] > 0.0), key=lambda name: -shares[name])
     return [
         {"criterion": name.criterion, "cable": name.cable, "words": name.words, "share": shares[name] / total}

@@ -238,9 +238,9 @@ def _cells(course: Course, grid: int) -> int:
     # Cells of the grids of a course; what would not be proved is refused before it takes hours.
     cells = sum(max(grid, len(track.s) - 1) for track in course.tracks)
     if cells > MOST_CELLS:
-        fault = f"{_parts(len(course.tracks))}: {cells:,} cells"
+        error = f"{_parts(len(course.tracks))}: {cells:,} cells"
         allowed = f'must be {MOST_CELLS:,} at most: blend corners (corner = "blend"), a smaller grid, or several plans'
-        raise InputError("grid", None, allowed, fault=fault)
+        raise InputError("grid", None, allowed, fault=error)
     return cells
 
 

@@ -176,10 +176,10 @@ def _about_one_axis(
     # The envelope leaves the reference orientation along one axis: the angle is 2 beta Theta_env A.
     axis = tuple(segment.slerp.across[:, i] for i in range(1, 4))
     beta, beta1, beta2 = beats
-    whole = 2.0 * segment.slerp.angle
-    sine, cosine = stored(sincospi(whole * beta * instant.a / math.pi), one)
-    rate = whole * (beta1 * instant.a + beta * instant.a1)
-    second_derivative = whole * (beta2 * instant.a + 2.0 * beta1 * instant.a1 + beta * instant.a2)
+    full = 2.0 * segment.slerp.angle
+    sine, cosine = stored(sincospi(full * beta * instant.a / math.pi), one)
+    rate = full * (beta1 * instant.a + beta * instant.a1)
+    second_derivative = full * (beta2 * instant.a + 2.0 * beta1 * instant.a1 + beta * instant.a2)
     return about_axis(axis, sine, cosine), tuple(rate * e for e in axis), tuple(second_derivative * e for e in axis)
 
 

@@ -91,7 +91,7 @@ def redundant_arcs(
     tried = np.where(trials.arcs > 0, trials.arcs, np.where(trials.undecided > 0, trials.undecided, trials.best))
     chosen = pick(parities, np.arange(count), tried)
     measured = partial(_measured, segments=chosen, tried=tried)
-    least, refused = measured(problem, rows=np.arange(count)), np.flatnonzero(trials.arcs == 0)
+    minimum, refused = measured(problem, rows=np.arange(count)), np.flatnonzero(trials.arcs == 0)
     flags = (Verdict.WRENCH_INFEASIBLE, Verdict.ABOVE_SPOOLS, *(row.flag for row in other_limits(problem.limits)))
     broken = np.zeros(count, int)
     is_broken = measured(touchable(problem), rows=refused) <= 0.0
@@ -104,9 +104,9 @@ def redundant_arcs(
         tried_arcs=tried,
         verdict=np.where(trials.arcs > 0, fewer, none).astype(FLAGS),
         duration=duration,
-        margin=least[:, 0],
+        margin=minimum[:, 0],
         margin_bound=trials.bound,
-        limit_margin=least[:, BASIC:].min(1, initial=np.inf),
+        limit_margin=minimum[:, BASIC:].min(1, initial=np.inf),
         feasible_at_infinity=infinity,
         tolerated=nothing,
         not_tolerated=nothing,
@@ -124,10 +124,10 @@ def _try(problem: Problem, parities: dict[int, Segment], rows: np.ndarray, numbe
     # Try a number of arcs for some of the segments.
     segments = parities[number % 2]
     for samples in (FEW, MANY):
-        least = least_slacks(touchable(problem), segments, rows, number, samples).min(1)
-        better = least > trials.reached[rows]
-        trials.best[rows[better]], trials.reached[rows[better]] = number, least[better]
-        rows = rows[least > 0.0]
+        minimum = least_slacks(touchable(problem), segments, rows, number, samples).min(1)
+        better = minimum > trials.reached[rows]
+        trials.best[rows[better]], trials.reached[rows[better]] = number, minimum[better]
+        rows = rows[minimum > 0.0]
         if not len(rows):
             return
     weight = float(problem.robot.mass * problem.robot.gravity) / problem.robot.n_cables

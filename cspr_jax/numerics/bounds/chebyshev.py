@@ -39,11 +39,11 @@ def bernstein() -> Float[np.ndarray, "n+1 n+1"]:
     """Matrix from values at the nodes to Bernstein coefficients."""
     places = [(1 + Fraction(float(x))) / 2 for x in nodes()]
     scale = max(place.denominator for place in places)  # a power of two, as all of them
-    whole, columns = [int(place * scale) for place in places], []
-    for k, place in enumerate(whole):
+    full, columns = [int(place * scale) for place in places], []
+    for k, place in enumerate(full):
         # Lagrange's polynomial of one node, a product of linear ones: coefficients of (1 - t)^(n - j) t^j.
         powers, size = [1], 1
-        for other in whole[:k] + whole[k + 1 :]:
+        for other in full[:k] + full[k + 1 :]:
             powers = [(scale - other) * a - other * b for a, b in zip([0, *powers], [*powers, 0], strict=True)]
             size *= place - other
         # Python rounds quotients of integers once, however large they are; no -0.

@@ -43,9 +43,9 @@ def _swapped(count: int, place: Array) -> Array:
 def size_range(number: AffineBounds) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
     """Bounds of the absolute value."""
     low, high = number.low(), number.high()
-    least = jnp.where(low > 0.0, low, jnp.where(high < 0.0, -high, 0.0))
-    most = number.size()
-    return least, jnp.where(jnp.isnan(most), jnp.inf, most)
+    minimum = jnp.where(low > 0.0, low, jnp.where(high < 0.0, -high, 0.0))
+    maximum = number.size()
+    return minimum, jnp.where(jnp.isnan(maximum), jnp.inf, maximum)
 
 
 def changes_sign(number: AffineBounds) -> Float[Array, "..."]:

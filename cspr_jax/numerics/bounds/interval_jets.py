@@ -132,9 +132,9 @@ class Jet:
 
 def lowest(ends: Float[np.ndarray, "2 ..."], jet: Jet) -> Float[np.ndarray, "..."]:
     """Lower bounds of a function over blocks."""
-    least = ends.min(0)
+    minimum = ends.min(0)
     with np.errstate(invalid="ignore"):
-        low = least - np.maximum(jet.second_derivative[1], 0.0) / 8.0
+        low = minimum - np.maximum(jet.second_derivative[1], 0.0) / 8.0
         # A function whose slope has one sign is nowhere below its lower end.
         steady = (jet.slope[0] >= 0.0) | (jet.slope[1] <= 0.0)
-    return np.where(steady, least, np.where(np.isnan(low), -np.inf, low))
+    return np.where(steady, minimum, np.where(np.isnan(low), -np.inf, low))

@@ -65,18 +65,18 @@ def about_axis(axis: Vector, sine: Float[Array, "..."], cosine: Float[Array, "..
 
 def smallest(values: Sequence[Array]) -> Float[Array, "..."]:
     """The smallest of several arrays, case by case; NaN stays NaN."""
-    least = values[0]
+    minimum = values[0]
     for value in values[1:]:
-        least = jnp.minimum(least, value)
-    return least
+        minimum = jnp.minimum(minimum, value)
+    return minimum
 
 
 def largest(values: Sequence[Array]) -> Float[Array, "..."]:
     """The largest of several arrays, case by case; NaN stays NaN."""
-    most = values[0]
+    maximum = values[0]
     for value in values[1:]:
-        most = jnp.maximum(most, value)
-    return most
+        maximum = jnp.maximum(maximum, value)
+    return maximum
 
 
 def smallest_of_each(arrays: Sequence[Array]) -> tuple[Float[Array, "..."], ...]:

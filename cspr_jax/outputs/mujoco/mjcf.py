@@ -153,8 +153,8 @@ def _sides(body: Suspended, moved: Played) -> np.ndarray:
     start, end = -np.arctan(LEAD), np.max(np.asarray(way.wrapped) / radii + np.arctan2(way.free, radii), axis=0)
     lost = np.flatnonzero(~(end - start < 2.0 * np.pi - ROOM))
     if len(lost):
-        fault = f"MuJoCo cannot wrap cable {int(body.wheels[lost[0]]) + 1} around its pulley all along its motion"
-        raise ConfigError("plan", f"has no model for MuJoCo: {fault}")
+        error = f"MuJoCo cannot wrap cable {int(body.wheels[lost[0]]) + 1} around its pulley all along its motion"
+        raise ConfigError("plan", f"has no model for MuJoCo: {error}")
     return 0.5 * (start + end)
 
 
@@ -203,8 +203,8 @@ def _followers(tendons: ElementTree.Element, equality: ElementTree.Element, body
 
 def _motors(actuators: ElementTree.Element, body: Suspended, moved: Played) -> None:
     # A positive control shortens the cable; no cable pushes. Without a limit there is room for a controller.
-    most = np.maximum(moved.tension.max(0), 0.0)
-    largest = np.maximum(np.where(np.isfinite(body.tension_max), body.tension_max, 2.0 * most.max()), most)
+    maximum = np.maximum(moved.tension.max(0), 0.0)
+    largest = np.maximum(np.where(np.isfinite(body.tension_max), body.tension_max, 2.0 * maximum.max()), maximum)
     for k, tension in enumerate(largest.tolist(), 1):
         limits = {"ctrllimited": "true", "ctrlrange": [0.0, tension]}
         _add(actuators, "motor", name=f"tension_{k}", tendon=f"cable_{k}", gear=-1.0, **limits)

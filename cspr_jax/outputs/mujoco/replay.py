@@ -88,8 +88,8 @@ class PlayedPlan:
             "turn_in_one_go": self._largest(self.through.rotated, "rad"),
             "tension": self._largest(of_cables, "N") | {"cable": int(cable[of_cables.argmax()]) + 1},
         }
-        whole = {"robot": self.robot, "mujoco": self.mujoco, "duration": float(self.time[-1]), "steps": self.steps}
-        return whole | {"largest_deviation": deviations}
+        full = {"robot": self.robot, "mujoco": self.mujoco, "duration": float(self.time[-1]), "steps": self.steps}
+        return full | {"largest_deviation": deviations}
 
     def _largest(self, values: np.ndarray, units: str) -> dict[str, Any]:
         row = int(values.argmax())
@@ -104,8 +104,10 @@ class PlayedPlan:
             far, turn = deviations[f"path{name}"], deviations[f"turn{name}"]
             angle = f" and {two_digits(turn['value'])} rad" if self.played.rotated.any() else ""
             text.append(f"path, {how}: at most {two_digits(far['value'])} m{angle} off the plan, {_place(far)}")
-        most = deviations["tension"]
-        text.append(f"tensions: at most {two_digits(most['value'])} N off, cable {most['cable']}, {_place(most)}")
+        maximum = deviations["tension"]
+        text.append(
+            f"tensions: at most {two_digits(maximum['value'])} N off, cable {maximum['cable']}, {_place(maximum)}"
+        )
         return text
 
 

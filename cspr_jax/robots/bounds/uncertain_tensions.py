@@ -77,11 +77,11 @@ def uncertain_tensions(
     block = _UnitBlock(inverse, matrix, _across(robot, state, cables, unit), tilt, tensions)
     centre = _centre_change(robot, state, inverse * unit[None], sizes[1]) + SURPLUS * jnp.max(tensions.size())
     within, displaced = block.changes(inverse)
-    most = _solution(within + displaced, displaced @ tensions.size() + centre)
-    down, up = most, most
+    maximum = _solution(within + displaced, displaced @ tensions.size() + centre)
+    down, up = maximum, maximum
     if robot.n_cables == robot.dof:
-        down, up = _closer(block, displaced, within @ most + centre, limits[0], centre)
-        down, up = jnp.fmin(most, down), jnp.fmin(most, up)
+        down, up = _closer(block, displaced, within @ maximum + centre, limits[0], centre)
+        down, up = jnp.fmin(maximum, down), jnp.fmin(maximum, up)
     low, high = tensions.low() - down, tensions.high() + up
     is_known = jnp.isfinite(low).all() & jnp.isfinite(high).all()
     # A tension at a tilted unit vector is that of its cable over the length of the vector, at least 1.

@@ -81,8 +81,8 @@ def witness_tensions(
         tension, is_regular = _solution(matrix, back, wrench, 0.5 * (before + after), 0.5 * (after - before))
         above = _face_margin(matrix, inverse, wrench, (low, high), face)
     if tension.square is not None:
-        least = jnp.min(jnp.minimum(tension.low() - low, high - tension.high()))
-        below = jnp.broadcast_to(jnp.where(is_regular, least, -jnp.inf), (2,))
+        minimum = jnp.min(jnp.minimum(tension.low() - low, high - tension.high()))
+        below = jnp.broadcast_to(jnp.where(is_regular, minimum, -jnp.inf), (2,))
         return WitnessTensions(tension, below, above, is_regular, inverse)
     # The smallest of functions above lines is above the line between the smallest values at both ends.
     lines = tension.middle - tension.slope, tension.middle + tension.slope

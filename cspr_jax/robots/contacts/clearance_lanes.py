@@ -102,10 +102,10 @@ def _outside_box(a: Vector, u: Vector, half: Numbers) -> Array:
     part = jnp.where(is_first, zero, jnp.where(is_last, one, _fraction(part)))
     # If the slope in a plane is small beside its own rounding, that plane is the better place.
     first, *others = (_beyond(_along(a, u, place), half) for place in (part, start, stop))
-    least = dot(first, first)
+    minimum = dot(first, first)
     for beyond in others:
-        least = nan_ignoring_min(dot(beyond, beyond), least)
-    return jnp.sqrt(least)
+        minimum = nan_ignoring_min(dot(beyond, beyond), minimum)
+    return jnp.sqrt(minimum)
 
 
 def _beyond(point: Vector, half: Numbers) -> Vector:
@@ -136,11 +136,11 @@ def _parting(a: Vector, u: Vector, half: Numbers) -> Array:
 
 def nearest(values: Sequence[Array]) -> Complex[Array, "..."]:
     """The smallest of several arrays and its index, as one complex number, since XLA computes two outputs twice."""
-    least, place = values[0], jnp.zeros_like(values[0])
+    minimum, place = values[0], jnp.zeros_like(values[0])
     for k, value in enumerate(values[1:], 1):
-        is_less = value < least
-        least, place = jnp.where(is_less, value, least), jnp.where(is_less, np.asarray(k, value.dtype), place)
-    return lax.complex(least, place)
+        is_less = value < minimum
+        minimum, place = jnp.where(is_less, value, minimum), jnp.where(is_less, np.asarray(k, value.dtype), place)
+    return lax.complex(minimum, place)
 
 
 class Polyhedron(NamedTuple):

@@ -134,8 +134,8 @@ def depth_bound(body: Solid, planes: FacePlanes) -> Float[Array, ""]:
     part = inner_fractions(start.middle, end.middle, planes)[:, None]
     points = start * (1.0 - part) + end * part
     heights = dot(points.each(lambda x: x[:, None]), planes.normals[None]) - planes.offsets[None]
-    least = jnp.min(jnp.max(heights.high(), axis=1))
-    return jnp.where(least < 0.0, least, jnp.inf)
+    minimum = jnp.min(jnp.max(heights.high(), axis=1))
+    return jnp.where(minimum < 0.0, minimum, jnp.inf)
 
 
 def inner_fractions(
@@ -189,8 +189,8 @@ def nearest_features(p: Float[Array, "m 3"], q: Float[Array, "k 3"], first: Soli
     if len(first.faces):
         parts.append(_over(q, p, first.faces).T ** 2)
     places = [jnp.argmin(part) for part in parts]
-    least = jnp.stack([part.reshape(-1)[place] for part, place in zip(parts, places, strict=True)])
-    best = jnp.argmin(least)
+    minimum = jnp.stack([part.reshape(-1)[place] for part, place in zip(parts, places, strict=True)])
+    best = jnp.argmin(minimum)
     numbers = [
         jnp.stack([place // part.shape[1], place % part.shape[1]]) for part, place in zip(parts, places, strict=True)
     ]

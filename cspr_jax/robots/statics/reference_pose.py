@@ -89,14 +89,14 @@ def reference_pose(robot: PlatformRobot, z0: float) -> Reference:
         size, still = (np.asarray(x) for x in _standing(rotated, center))
     place = f"the reference pose (platform level and at rest, z0 = {z0:g} m)"
     if not wrench_balance.is_regular(abs(size)):
-        fault = f"{place} is singular (determinant {size:.1g}, at least {wrench_balance.SINGULAR:g} counts): "
-        raise InputError("platform_points", None, _CHANGE_LINES, fault=fault + _free(rotated, center))
+        error = f"{place} is singular (determinant {size:.1g}, at least {wrench_balance.SINGULAR:g} counts): "
+        raise InputError("platform_points", None, _CHANGE_LINES, fault=error + _free(rotated, center))
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):  # all tensions may be zero, or not finite
         fraction = still / np.abs(still).mean()
     if not (np.isfinite(fraction) & (fraction > SMALLEST_TENSION)).all():
         slack = int(np.argmin(np.where(np.isfinite(fraction), fraction, -np.inf)))
-        fault = f"in {place} cable {slack + 1} is slack: it would need {fraction[slack]:.3g} of the mean tension"
-        raise InputError("platform_points", None, _CHANGE_LOAD, fault=fault)
+        error = f"in {place} cable {slack + 1} is slack: it would need {fraction[slack]:.3g} of the mean tension"
+        raise InputError("platform_points", None, _CHANGE_LOAD, fault=error)
     return Reference(rotated, rotation, float(size), fraction)
 
 

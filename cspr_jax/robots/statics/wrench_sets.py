@@ -66,9 +66,9 @@ class Faces:
     def margin(self, values: Float[Array, "... n_components"]) -> Float[Array, "..."]:
         """Distance to the nearest face."""
         slacks = self.slacks(values)
-        least, spanned = jnp.min(slacks, axis=-1), jnp.isfinite(self.offsets).any(-1)
-        flat = jnp.where(spanned, jnp.minimum(least, 0.0), -jnp.linalg.norm(values - self.apex, axis=-1))
-        return jnp.where(self.is_regular, least, flat)
+        minimum, spanned = jnp.min(slacks, axis=-1), jnp.isfinite(self.offsets).any(-1)
+        flat = jnp.where(spanned, jnp.minimum(minimum, 0.0), -jnp.linalg.norm(values - self.apex, axis=-1))
+        return jnp.where(self.is_regular, minimum, flat)
 
     def rounding(self, values: Float[Array, "... n_components"]) -> Float[Array, "..."]:
         """Bound of the rounding error of the smallest slack."""

@@ -249,12 +249,12 @@ def _step(solutions: AllTensions, low: Array, high: Array, search: _ActiveSet) -
     way, loss = projected(solutions.kernel, is_held, side * solutions.kernel[:, sought], jnp.zeros_like(excess))
     square = jnp.dot(way, way)
     is_blocked = (is_held.sum() >= way.size) | (square <= DEPENDENT**2)
-    whole = jnp.where(is_blocked, jnp.inf, distance / jnp.where(is_blocked, 1.0, square))
+    full = jnp.where(is_blocked, jnp.inf, distance / jnp.where(is_blocked, 1.0, square))
     losing = is_held & (search.sides * loss > 0.0)
     until = jnp.where(losing, search.pulls / jnp.where(losing, loss, 1.0), jnp.inf)
     first = jnp.argmin(until)
-    length = jnp.minimum(whole, until[first])
-    is_stuck, is_reached = jnp.isinf(length), whole <= until[first]
+    length = jnp.minimum(full, until[first])
+    is_stuck, is_reached = jnp.isinf(length), full <= until[first]
     length = jnp.where(is_stuck, 0.0, length)
     let_go = (jnp.arange(excess.size) == first) & ~is_reached
     pulls = search.pulls + length * (jnp.where(is_sought, side, 0.0) - loss)

@@ -68,14 +68,14 @@ def _all_tensions(matrix: Array, wrench: Array, one: Array) -> tuple[list[Array]
         along.append(stored((wrench[i] - (_dot(products, along) if units else 0.0)) * inverse, one))
         units.append([x * inverse for x in left])
         lengths.append(length)
-    least = [_dot(along, [unit[k] for unit in units]) for k in range(count)]
+    minimum = [_dot(along, [unit[k] for unit in units]) for k in range(count)]
     kernel: list[list[Array]] = []
     for _ in range(count - dof):
         # Take the cable whose unit vector has the longest component normal to the rows so far.
         rest = [1.0 - _dot(column, column) for column in ([unit[k] for unit in units] for k in range(count))]
-        place, most = jnp.zeros_like(rest[0]), rest[0]
+        place, maximum = jnp.zeros_like(rest[0]), rest[0]
         for k, value in enumerate(rest[1:], 1):
-            place, most = jnp.where(value > most, float(k), place), jnp.where(value > most, value, most)
+            place, maximum = jnp.where(value > maximum, float(k), place), jnp.where(value > maximum, value, maximum)
         place = stored(place, one)
         left, _ = _apart([jnp.where(place == k, 1.0, 0.0) for k in range(count)], units, one)
         inverse = 1.0 / jnp.sqrt(_dot(left, left))
@@ -84,19 +84,19 @@ def _all_tensions(matrix: Array, wrench: Array, one: Array) -> tuple[list[Array]
     shortest, longest = lengths[0], lengths[0]
     for length in lengths[1:]:
         shortest, longest = nan_ignoring_min(length, shortest), jnp.where(length > longest, length, longest)
-    return least, kernel, shortest / longest
+    return minimum, kernel, shortest / longest
 
 
 def _interval(values: Lanes, rates: Lanes, low: Lanes, high: Lanes, rounding: Array) -> tuple[Array, Array]:
     """Ends of the interval of s in which values + s * rates keep limits, in reverse order where it is empty."""
     first, last = jnp.full_like(values[0], -jnp.inf), jnp.full_like(values[0], jnp.inf)
-    for value, rate, least, most in zip(values, rates, low, high, strict=True):
+    for value, rate, minimum, maximum in zip(values, rates, low, high, strict=True):
         moves = jnp.abs(rate) > FLAT
         inverse = 1.0 / jnp.where(moves, rate, 1.0)
-        to_least, to_most = (least - rounding - value) * inverse, (most + rounding - value) * inverse
+        to_least, to_most = (minimum - rounding - value) * inverse, (maximum + rounding - value) * inverse
         near, far = nan_ignoring_min(to_least, to_most), jnp.where(to_least > to_most, to_least, to_most)
         # A tension with rate zero keeps its limits everywhere or nowhere.
-        is_kept = (value >= least - rounding) & (value <= most + rounding)
+        is_kept = (value >= minimum - rounding) & (value <= maximum + rounding)
         near, far = jnp.where(moves, near, -jnp.inf), jnp.where(moves | is_kept, far, -jnp.inf)
         far = jnp.where(moves | ~is_kept, far, jnp.inf)
         first, last = jnp.where(near > first, near, first), nan_ignoring_min(far, last)
@@ -189,18 +189,18 @@ def _residual(matrix: Array, wrench: Array, tensions: Lanes) -> Array:
 def _of_batch(batch: tuple[np.ndarray, ...]) -> tuple[tuple[Array, ...], Array, Array, Array]:
     matrix, wrench, low, high = (np.ascontiguousarray(np.moveaxis(x, 0, -1)) for x in batch)
     lows, highs = list(low), list(high)
-    least, kernel, fraction = _all_tensions(matrix, wrench, np.ones(()))
-    size = _size(least, lows)
+    minimum, kernel, fraction = _all_tensions(matrix, wrench, np.ones(()))
+    size = _size(minimum, lows)
     if len(kernel) == 1:
-        points = [_in_interval(least, kernel, lows, highs, size)]
+        points = [_in_interval(minimum, kernel, lows, highs, size)]
     else:
         # Take each cable in turn as the first, so that one compiled function serves all.
         points = []
         for k in range(len(lows)):
-            rolled = [[x[k], *x[:k], *x[k + 1 :]] for x in (least, *kernel, lows, highs)]
+            rolled = [[x[k], *x[:k], *x[k + 1 :]] for x in (minimum, *kernel, lows, highs)]
             points.append(_on_line(rolled[0], rolled[1:3], *rolled[3:], size))
-    point = _shortest(least, lows, highs, size, points)
-    tensions = _tensions(least, kernel, point)
+    point = _shortest(minimum, lows, highs, size, points)
+    tensions = _tensions(minimum, kernel, point)
     return tuple(tensions), _residual(matrix, wrench, tensions), _verdict(tensions, lows, highs, point), fraction
 
 

@@ -78,10 +78,10 @@ def datasets(file: h5py.File, names: Iterable[str], *, is_joined: bool = False) 
 def refuse_dense(datasets: Iterable[ReadableDataset], size: int, *, densest: int = DENSEST) -> None:
     """Refuse datasets that hold much more than their file can, or much less than it has."""
     readable = list(datasets)
-    total, most = sum(one.size for one in readable), _PLENTY + densest * size
-    if total > most:
+    total, maximum = sum(one.size for one in readable), _PLENTY + densest * size
+    if total > maximum:
         raise DamagedError(
-            f"it says it holds {total / 1e9:.3g} GB: must be at most {most / 1e9:.3g} GB in a file of its size"
+            f"it says it holds {total / 1e9:.3g} GB: must be at most {maximum / 1e9:.3g} GB in a file of its size"
         )
     stored = sum(one.stored + _PER_CHUNK * one.chunks for one in readable)
     if size > _PLENTY + 1.2 * stored:

@@ -181,7 +181,7 @@ class Reader:
             MAP_KINDS.complete()
         rows = json.dumps([dataclasses.asdict(quantity) for quantity in from_outside()])
         command = [sys.executable, "-I", "-c", _CODE, "\n".join(_places()), home, rows]
-        here, there = socket.socketpair()
+        current, there = socket.socketpair()
         with there:
             try:
                 # A session of its own: Ctrl-C is for us.
@@ -195,10 +195,10 @@ class Reader:
                     start_new_session=True,
                 )
             except OSError as error:
-                here.close()
+                current.close()
                 line = f"{path}: no process could be started to read it: {error.strerror}"
                 raise StoreError(printable(line)) from error
-        self._channel, self._pipe = here, here.makefile("rb", buffering=0)
+        self._channel, self._pipe = current, current.makefile("rb", buffering=0)
         try:
             self._header(self._pipe, patience=None)
         except EOFError as error:

@@ -74,10 +74,10 @@ class Result:
         """The map with the best point of each of some axes chosen for every cell: the answer to "at any z0?"."""
         if not self.is_map:
             raise InputError("--best", " ".join(axes), "absent for a motion")
-        whole = self
+        full = self
         for axis in axes:
-            whole = whole._without(axis)
-        return whole
+            full = full._without(axis)
+        return full
 
     def _without(self, axis: str) -> "Result":
         check_axis(axis, tuple(self.axes))
@@ -240,8 +240,8 @@ def _motion(
         raise DamagedError("it is not a motion of two cables or more")
     # Motions of straight lines know no P0.
     known = ({"mass": LARGEST_MASS} if keeps_robot else {}) | ({"z0": LARGEST_LENGTH} if "z0" in attributes else {})
-    for name, most in known.items():
-        if not 1.0 / most <= attributes.get(name, 0.0) <= most:
+    for name, maximum in known.items():
+        if not 1.0 / maximum <= attributes.get(name, 0.0) <= maximum:
             raise DamagedError(f"{name} = {shown(attributes.get(name))}: must be a number > 0")
     widths = {
         "quaternion": 4,

@@ -45,8 +45,8 @@ def swing_bounds(
             (r2 + r * steady) * sine * nu,
         )
     # Into the axes of the robot.
-    here, velocity, acceleration = (
+    current, velocity, acceleration = (
         rotated(segment.plane, stacked([axial * x + lateral * y, axial * y - lateral * x]))
         for x, y in (place, pace, second_derivative)
     )
-    return here + segment.center, velocity * (1.0 / duration), acceleration * (1.0 / duration**2)
+    return current + segment.center, velocity * (1.0 / duration), acceleration * (1.0 / duration**2)

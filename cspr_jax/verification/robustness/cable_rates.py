@@ -25,7 +25,7 @@ def rates_hold(
     ball = np.minimum((known.moved + spools[:, None]) / influence.lengths, 1.0)
     units, rates = known.rays / influence.lengths[..., None], known.rates
     slowest, fastest = _along(units, rates.velocity, ball)
-    least, most = _along(units, rates.acceleration, ball)
+    minimum, maximum = _along(units, rates.acceleration, ball)
     pace = np.linalg.norm(rates.velocity, axis=2)
     short, long = influence.lengths * (1.0 - ball), influence.lengths * (1.0 + ball)
     speed = np.maximum(np.abs(slowest), np.abs(fastest)) + rates.velocity_change
@@ -33,8 +33,8 @@ def rates_hold(
     across = (pace + rates.velocity_change) ** 2 - np.maximum(low, 0.0) ** 2
     inward = np.maximum(np.maximum(pace - rates.velocity_change, 0.0) ** 2 - speed**2, 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        up = across / short + most + rates.acceleration_change
-        down = inward / long + least - rates.acceleration_change
+        up = across / short + maximum + rates.acceleration_change
+        down = inward / long + minimum - rates.acceleration_change
     second_derivative = np.where(short > 0.0, np.maximum(np.abs(up), np.abs(down)), np.inf)
     return ((speed <= largest[0]) & (second_derivative <= largest[1])).all(1)
 

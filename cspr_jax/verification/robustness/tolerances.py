@@ -216,8 +216,8 @@ def _reachable(pool: Pool, multiples: np.ndarray) -> np.ndarray:
     if not fails.any():
         return multiples
     failing = middles.part(fails)
-    least = _held(failing, multiples)
-    return np.where(least < multiples, _near(least), multiples)
+    minimum = _held(failing, multiples)
+    return np.where(minimum < multiples, _near(minimum), multiples)
 
 
 def _looked_at(requirements: Requirements, enclose: Callable[[Blocks], Enclosure], blocks: Blocks) -> _Open:
@@ -298,6 +298,6 @@ def _held(left: Pool, multiples: np.ndarray) -> np.ndarray:
         middle = 0.5 * (low + high)
         held = left.hold(middle)
         low, high = np.where(held, middle, low), np.where(held, high, middle)
-    least = multiples.copy()
-    np.minimum.at(least, row, low)
-    return least
+    minimum = multiples.copy()
+    np.minimum.at(minimum, row, low)
+    return minimum

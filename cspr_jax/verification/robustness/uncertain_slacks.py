@@ -117,11 +117,11 @@ def _cable_slacks(
     parts = [jnp.min(tensions.low - low[None], axis=0)]
     parts += [] if limits.tension_max is None else [jnp.min(high[None] - tensions.high, axis=0)]
     parts = [jnp.min(jnp.concatenate(parts), keepdims=True)] if robot.n_cables > robot.dof else parts
-    most = _largest(robot, limits, state, cables, fraction.spools)
+    maximum = _largest(robot, limits, state, cables, fraction.spools)
     for row in limits_set(limits):
         if row.quantity != "tension":
             limit = jnp.broadcast_to(getattr(limits, row.name), robot.n_cables if row.per_cable else 1)
-            parts.append(limit - most.get(row.quantity, jnp.full(limit.shape, -jnp.inf)))
+            parts.append(limit - maximum.get(row.quantity, jnp.full(limit.shape, -jnp.inf)))
     return parts
 
 

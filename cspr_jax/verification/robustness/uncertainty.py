@@ -111,15 +111,15 @@ def _changes(
 ) -> tuple[np.ndarray, np.ndarray]:
     # Bound the changes of rays within blocks, and by displaced spools, along vectors (k, ..., n_cables, 3).
     shape = (len(vectors), *(1,) * (vectors.ndim - 3), *known.deviation.shape[1:])
-    whole = np.linalg.norm(vectors, axis=-1)
+    full = np.linalg.norm(vectors, axis=-1)
     units = (known.rays / influence.lengths[..., None]).reshape(*shape, 3)
     way, deviation, off, tilt = (
         known.way.reshape(*shape, 3),
         *(x.reshape(shape) for x in (known.deviation, far.off, far.tilt)),
     )
     along = np.sum(vectors * units, axis=-1)
-    across = np.sqrt(np.maximum(whole**2 - along**2, 0.0))
-    return np.abs(np.sum(vectors * way, axis=-1)) + whole * deviation, off * np.minimum(whole, across + whole * tilt)
+    across = np.sqrt(np.maximum(full**2 - along**2, 0.0))
+    return np.abs(np.sum(vectors * way, axis=-1)) + full * deviation, off * np.minimum(full, across + full * tilt)
 
 
 @UNKNOWN
@@ -227,12 +227,12 @@ def holds(
 
 def _least(known: Enclosure, influence: Influence, requirements: Requirements, fraction: _Share) -> np.ndarray:
     # Return the smallest tensions per mass and length that are allowed within blocks.
-    least = np.repeat(SIX_CABLES_UNDECIDED * requirements.slack[:, None], influence.lengths.shape[1], axis=1)
+    minimum = np.repeat(SIX_CABLES_UNDECIDED * requirements.slack[:, None], influence.lengths.shape[1], axis=1)
     limit = requirements.limits.tension_min
     if limit is None:
-        return least
+        return minimum
     near = influence.lengths - known.moved
-    return np.maximum(least, limit / (near * (requirements.mass / fraction.factor)[:, None]))
+    return np.maximum(minimum, limit / (near * (requirements.mass / fraction.factor)[:, None]))
 
 
 def _tensions_hold(
@@ -244,8 +244,8 @@ def _tensions_hold(
         return is_met
     near, far = influence.lengths - known.moved, influence.lengths + known.moved
     longest = far / np.sqrt(1.0 - np.minimum(fraction.spools[:, None] / near, 1.0) ** 2)
-    most = (known.high + changes.up) * longest * (requirements.mass * fraction.factor)[:, None]
-    return is_met & (most <= limit).all(1)
+    maximum = (known.high + changes.up) * longest * (requirements.mass * fraction.factor)[:, None]
+    return is_met & (maximum <= limit).all(1)
 
 
 class WorstDisplacements(NamedTuple):

@@ -60,10 +60,10 @@ def least_margins(
     high: Float[np.ndarray, "n_cables"],
 ) -> Float[np.ndarray, "n"]:
     """Lower bounds of the tension margin over cells."""
-    least, most = tension_bounds(cells, tensions, wrench, low, high)
+    minimum, maximum = tension_bounds(cells, tensions, wrench, low, high)
     with np.errstate(invalid="ignore"):
-        below = np.where(np.isfinite(high), high - most, np.inf)
-    margin = np.minimum(least - low, below).min(1)
+        below = np.where(np.isfinite(high), high - maximum, np.inf)
+    margin = np.minimum(minimum - low, below).min(1)
     return np.where(np.isnan(margin), -np.inf, margin)
 
 
@@ -79,10 +79,10 @@ def tension_bounds(
         densities = tensions / cells.lengths
         weights = np.minimum(tensions - low, high - tensions) / cells.lengths
         way = _way(cells, densities, weights, wrench)
-        least, most = _tension_range(cells, densities, weights, way)
+        minimum, maximum = _tension_range(cells, densities, weights, way)
         lost = CELL_ERROR * (np.abs(tensions) + np.abs(low) + np.where(np.isfinite(high), np.abs(high), 0.0))
         is_known = ((weights > 0.0) & (cells.shortest > 0.0) & np.isfinite(way.rest)).all(1, keepdims=True)
-        return np.where(is_known, least - lost, -np.inf), np.where(is_known, most + lost, np.inf)
+        return np.where(is_known, minimum - lost, -np.inf), np.where(is_known, maximum + lost, np.inf)
 
 
 def _way(cells: Cells, densities: np.ndarray, weights: np.ndarray, wrench: np.ndarray) -> _Way:
@@ -102,10 +102,10 @@ def _way(cells: Cells, densities: np.ndarray, weights: np.ndarray, wrench: np.nd
     off, exits = np.zeros(len(size)), np.zeros((*densities.shape, densities.shape[1], 3))
     if cells.moves.any():
         moved = -inverse[:, None] @ cells.wrenches  # (n, 3, m, n_exits)
-        most = np.linalg.norm(moved, axis=(1, 2)) * cells.moves
-        off = (most * densities).sum(1)
+        maximum = np.linalg.norm(moved, axis=(1, 2)) * cells.moves
+        off = (maximum * densities).sum(1)
         exits = (back[:, None] @ (moved * densities[:, None, None])).transpose(0, 2, 3, 1)
-        lost = lost + np.sqrt(1.0 + defect) * _length(most * weights)
+        lost = lost + np.sqrt(1.0 + defect) * _length(maximum * weights)
     defect = defect + lost
     supplied = (cells.matrices @ densities[..., None])[..., 0]
     sizes = np.abs(cells.matrices) @ np.abs(densities)[..., None]
@@ -151,10 +151,10 @@ def _tension_range(
     middle = lengths * densities
     lengthened = np.eye(lengths.shape[1])[None, ..., None] * (cells.rays * (densities / lengths)[..., None])[:, :, None]
     rest = rest + _over_exits(cells, relative[..., None, None] * way.exits + lengthened) + cells.moves * spread
-    least = middle - reach(linear) + least_quadratic(quadratic) - rest
-    most = middle + reach(linear) - least_quadratic(-quadratic) + rest
+    minimum = middle - reach(linear) + least_quadratic(quadratic) - rest
+    maximum = middle + reach(linear) - least_quadratic(-quadratic) + rest
     radius = cells.radius[:, None]
     longest = lengths + radius + cells.moves
-    least = np.where(lowest >= 0.0, np.maximum(least, cells.shortest * lowest), longest * lowest)
-    most = np.minimum(most + 0.5 * (radius + cells.moves) ** 2 / cells.shortest * highest, longest * highest)
-    return least, np.where(highest >= 0.0, most, 0.0)
+    minimum = np.where(lowest >= 0.0, np.maximum(minimum, cells.shortest * lowest), longest * lowest)
+    maximum = np.minimum(maximum + 0.5 * (radius + cells.moves) ** 2 / cells.shortest * highest, longest * highest)
+    return minimum, np.where(highest >= 0.0, maximum, 0.0)

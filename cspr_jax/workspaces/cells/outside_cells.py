@@ -68,13 +68,13 @@ def are_beyond(
     """Tell whether a wrench is beyond what tensions can give at every position of cells."""
     with np.errstate(all="ignore"):
         products, others = products_of(cells, normals, held, wrenches), _others(cells, held)
-        least, most = (side[:, :-1] for side in products.ends)
+        minimum, maximum = (side[:, :-1] for side in products.ends)
         # For each other cable one limit counts at the centre; where the other limit counts, it costs something.
         is_positive = products.value[:, :-1] > 0.0
         is_bounded = np.isfinite(high)
         limits = np.where(others, np.where(is_positive & is_bounded, high, low), 0.0)
-        wrong = np.maximum(np.where(is_positive, -least, most), 0.0)
-        is_kept = (~others | is_bounded | (most <= 0.0)).all(1)
+        wrong = np.maximum(np.where(is_positive, -minimum, maximum), 0.0)
+        is_kept = (~others | is_bounded | (maximum <= 0.0)).all(1)
         room = np.where(is_bounded, high - low, 0.0)
         cost = np.where(others, room * wrong * cells.lengths / cells.shortest, 0.0).sum(1)
         slack = least_slacks(cells, products, limits) - cost
@@ -88,8 +88,8 @@ def are_one_sided(
     """Tell whether cables fail to resist every wrench at every position of cells."""
     with np.errstate(all="ignore"):
         products = products_of(cells, normals, held, np.zeros_like(normals))
-        least = products.ends[0][:, :-1]
-        is_proved = (~_others(cells, held) | (least > CELL_ERROR * np.abs(products.value[:, :-1]))).all(1)
+        minimum = products.ends[0][:, :-1]
+        is_proved = (~_others(cells, held) | (minimum > CELL_ERROR * np.abs(products.value[:, :-1]))).all(1)
         return is_proved & (cells.shortest > 0.0).all(1)
 
 
@@ -169,7 +169,7 @@ def least_slacks(cells: Cells, products: Products, limits: Float[np.ndarray, "n 
     shift, radius = reach(steps), cells.radius[:, None]
     regularization = radius**2 * cells.lengths / cells.shortest**3 + cells.moves * cells.lengths / cells.shortest**2
     cable_rests = products.rest[:, :-1]
-    most = np.abs(value) + reach(linear) + second + cable_rests
-    rest = cable_rests * (1.0 + shift) + second * shift + most * regularization
+    maximum = np.abs(value) + reach(linear) + second + cable_rests
+    rest = cable_rests * (1.0 + shift) + second * shift + maximum * regularization
     rest = products.rest[:, -1] + (np.abs(limits) * rest).sum(1)
     return middle - reach(along) + least_quadratic(bends) - rest

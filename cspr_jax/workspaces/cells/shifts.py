@@ -50,21 +50,21 @@ def shifts(
 ) -> Shifts:
     """Bounds of movements while robots move within their cells."""
     targets = in_batches(lambda x: geometry.attachments(robot, *x), (positions, quaternions), size=BATCH)
-    rays, most = targets - np.asarray(robot.base_points), reach[:, None]
+    rays, maximum = targets - np.asarray(robot.base_points), reach[:, None]
     if robot.pulleys is None:
-        free = np.linalg.norm(rays, axis=2) - most
-        return Shifts(reach, np.zeros(len(reach)), unit_changes(most, free), free)
+        free = np.linalg.norm(rays, axis=2) - maximum
+        return Shifts(reach, np.zeros(len(reach)), unit_changes(maximum, free), free)
     radius, axes = np.asarray(robot.pulleys.radius), np.asarray(robot.pulleys.axes)
     high = (rays * axes).sum(2)
     wide = np.linalg.norm(rays - high[..., None] * axes, axis=2)
     # The distance from the centre of the pulley, which swivels with the cable, changes by no more than the robot moves.
-    out = np.hypot(wide - radius, high) - most
+    out = np.hypot(wide - radius, high) - maximum
     free = np.sqrt(np.maximum(np.square(np.maximum(out, 0.0)) - radius**2, 0.0))
-    wide = np.maximum(wide - most, 0.0)
+    wide = np.maximum(wide - maximum, 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        exits = most * np.fmax(radius / free, 2.0 * radius / wide)
+        exits = maximum * np.fmax(radius / free, 2.0 * radius / wide)
     exits = np.where(radius > 0.0, np.fmin(exits, BAND * radius), 0.0)
-    return Shifts(reach, exits.max(1), unit_changes(most, np.minimum(free, wide)), free)
+    return Shifts(reach, exits.max(1), unit_changes(maximum, np.minimum(free, wide)), free)
 
 
 def leaving_points(

@@ -101,8 +101,8 @@ def closure_margin(matrix: Float[np.ndarray, "dof n_cables"], choices: CableSubs
     if basis.shape[1] < len(matrix):
         return -1.0
     other = components != 0.0
-    most, least = components.max(1, initial=-np.inf, where=other), components.min(1, initial=np.inf, where=other)
-    rarer = np.minimum(most, -least) / np.abs(components).max(1)
+    maximum, minimum = components.max(1, initial=-np.inf, where=other), components.min(1, initial=np.inf, where=other)
+    rarer = np.minimum(maximum, -minimum) / np.abs(components).max(1)
     # A component that is zero here, but not at every pose, may have either sign.
     always = len(matrix) - 1 + _always_zero(components, choices)
     has_more = (~other).sum(1) > always

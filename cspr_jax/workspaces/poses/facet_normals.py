@@ -170,8 +170,8 @@ def block(columns: Sequence[Column], wrenches: Sequence[Column]) -> Block:
         first = [pulls_on_force[j] * determinant - sum(pulls[n][j] * last[n] for n in range(3)) for j in range(3)]
         tensions.append([*first, *(volume * x for x in last)])
     # All tensions are products of two remaining moments and of factors not above 1.
-    most = largest([jnp.abs(x) for left in lefts for x in left])
-    return Block(tensions, volume * determinant, most * most)
+    maximum = largest([jnp.abs(x) for left in lefts for x in left])
+    return Block(tensions, volume * determinant, maximum * maximum)
 
 
 def base_order(matrices: Float[np.ndarray, "n 6 n_cables"]) -> tuple[int, ...]:

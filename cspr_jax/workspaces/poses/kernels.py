@@ -117,8 +117,8 @@ def _least(
             lower, upper = margins.closure_margin(facet_normal)
         else:
             lower, upper = judged(facet_normal, *asking)
-        least = jnp.minimum(jnp.real(bounds), lower), jnp.minimum(jnp.imag(bounds), upper)
-        return lax.complex(*least), None
+        minimum = jnp.minimum(jnp.real(bounds), lower), jnp.minimum(jnp.imag(bounds), upper)
+        return lax.complex(*minimum), None
 
     largest_one = jnp.inf * jnp.ones_like(template)
     if measure == "tensions":  # no margin is larger than half the range of a cable

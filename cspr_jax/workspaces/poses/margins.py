@@ -75,14 +75,14 @@ def length(vector: Sequence[Array]) -> Float[Array, "..."]:
 def supports(normal: Column, wrenches: Wrenches) -> tuple[Array, Array]:
     """Largest products of a normal, and of its negative, with the wrenches of a set."""
     products = [product(normal, point) for point in wrenches.points]
-    most, least = largest(products), largest([-value for value in products])
+    maximum, minimum = largest(products), largest([-value for value in products])
     spreads = list[Array]()
     if wrenches.box is not None:
         spreads.append(product([jnp.abs(x) for x in normal], list(wrenches.box)))
     spreads += [length([x * axis for x, axis in zip(normal, axes, strict=True)]) for axes in wrenches.ellipsoids]
     for spread in spreads:
-        most, least = most + spread, least + spread
-    return most, least
+        maximum, minimum = maximum + spread, minimum + spread
+    return maximum, minimum
 
 
 def bounded_margin(pull: CocircuitLimits, most: Array, least: Array) -> Bounds:

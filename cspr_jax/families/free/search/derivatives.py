@@ -129,12 +129,12 @@ def _chained(
     push = multipliers @ slope
     side = scale * (second_derivative @ along - power * push / duration)
     corner = along @ second_derivative @ along + jnp.dot(push, power * (power + 1.0) * flat) / duration**2
-    whole: list[list[Any]] = [
+    full: list[list[Any]] = [
         [second_derivative * jnp.outer(scale, scale), side[:, None]],
         [side[None], corner[None, None]],
     ]
     slopes = jnp.concatenate([slope * scale[None], (slope @ along)[:, None]], axis=1)
-    return jnp.pad(slopes, [(0, 0), (0, 1)]), jnp.pad(jnp.block(whole), (0, 1))
+    return jnp.pad(slopes, [(0, 0), (0, 1)]), jnp.pad(jnp.block(full), (0, 1))
 
 
 def instant_values(

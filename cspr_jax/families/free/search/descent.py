@@ -62,16 +62,16 @@ def descended(points: SearchPoints, step: Step, levels: Levels) -> SearchPoints:
         part, change = points.taken(rows), step.taken(rows)
         trial = _moved(part.unknowns, change.change, primal[rows], dual[rows])
         residual, level = part.tasks.residual(trial), levels.taken(rows)
-        least = before[rows] + DESCENT * primal[rows] * change.fall + 1e-12 * np.abs(before[rows])
+        minimum = before[rows] + DESCENT * primal[rows] * change.fall + 1e-12 * np.abs(before[rows])
         # Not above: a merit that is no number does not fall.
-        is_over = ~(_merit(part.tasks, trial, residual, level) <= least)
+        is_over = ~(_merit(part.tasks, trial, residual, level) <= minimum)
         if not is_over.any():
             break
         rows, part, change, level = rows[is_over], part.taken(is_over), change.taken(is_over), level.taken(is_over)
         trial, missed = trial.taken(is_over), residual[is_over] - part.residual - wide(primal[rows]) * change.missed
         correction = _correction(part, trial, change, missed, level)
         trial = trial._replace(values=trial.values + correction)
-        falls = _merit(part.tasks, trial, part.tasks.residual(trial), level) <= least[is_over]
+        falls = _merit(part.tasks, trial, part.tasks.residual(trial), level) <= minimum[is_over]
         corrections[rows[falls]] = correction[falls]
         rows = rows[~falls]
         if not len(rows):

@@ -144,17 +144,17 @@ def bounds(robot: AnyRobot, limits: Limits, rows: Sequence[Criterion], is_timed:
     values = [_Value(low[k], high[k], slack, over, k, 1.0 / weight) for k in numbers]
     for row in other_rows(limits):
         limit = np.broadcast_to(getattr(limits, row.name), robot.n_cables if row.per_cable else 1)
-        for k, most in enumerate(limit):
+        for k, maximum in enumerate(limit):
             # Squares change twice as much.
-            change = 1.0 / size if row.is_height else (2.0 if row.of_mass_centre else 1.0) / most
-            top = most / size if row.is_height else 1.0
+            change = 1.0 / size if row.is_height else (2.0 if row.of_mass_centre else 1.0) / maximum
+            top = maximum / size if row.is_height else 1.0
             bottom = -1.0 if row.quantity in ("speed", "acceleration") else -np.inf
             values.append(_Value(bottom, top, row.flag, row.flag, k if row.per_cable else -1, change))
     is_regular, _ = judged_poses(robot)
     is_divided = isinstance(robot, PlatformRobot) or in_one_plane(robot)
     if keeps_depth(robot):
-        least = DEPTH if is_divided else -np.inf
-        values.append(_Value(least, np.inf, Verdict.ABOVE_SPOOLS, Verdict.FEASIBLE, -1, 1.0 / size))
+        minimum = DEPTH if is_divided else -np.inf
+        values.append(_Value(minimum, np.inf, Verdict.ABOVE_SPOOLS, Verdict.FEASIBLE, -1, 1.0 / size))
     if is_timed:
         values.append(_Value(-np.inf, 1.0, Verdict.FEASIBLE, Verdict.FEASIBLE, -1, 0.0))
     if is_regular:

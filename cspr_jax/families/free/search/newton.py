@@ -55,10 +55,10 @@ def gathered(basis: Basis, push: np.ndarray) -> np.ndarray:
     d = (push.shape[-1] - SCALARS) // 3
     places = push[..., :-SCALARS].reshape(*push.shape[:-1], 3, d)
     local = np.einsum("mnrk,lsmnrd->lsmkd", basis.rows, places, optimize=True)
-    whole = np.zeros((*push.shape[:2], basis.controls, d))
+    full = np.zeros((*push.shape[:2], basis.controls, d))
     for m in range(len(basis.tau)):
-        whole[:, :, m : m + LOCAL] += local[:, :, m]
-    return np.concatenate([whole.reshape(*push.shape[:2], -1), push[..., -SCALARS:].sum((2, 3))], axis=-1)
+        full[:, :, m : m + LOCAL] += local[:, :, m]
+    return np.concatenate([full.reshape(*push.shape[:2], -1), push[..., -SCALARS:].sum((2, 3))], axis=-1)
 
 
 def _assembled(basis: Basis, second_derivative: np.ndarray) -> np.ndarray:
@@ -71,14 +71,14 @@ def _assembled(basis: Basis, second_derivative: np.ndarray) -> np.ndarray:
     weights[:, :, -SCALARS:, -SCALARS:] = np.eye(SCALARS)
     local = np.einsum("mnya,lsmnyb->lsmab", weights, second_derivative @ weights, optimize=True)
     size, last = LOCAL * d, basis.controls * d
-    whole = np.zeros((*second_derivative.shape[:2], last + SCALARS, last + SCALARS))
+    full = np.zeros((*second_derivative.shape[:2], last + SCALARS, last + SCALARS))
     for k in range(m):
         part = slice(k * d, k * d + size)
-        whole[:, :, part, part] += local[:, :, k, :size, :size]
-        whole[:, :, part, last:] += local[:, :, k, :size, size:]
-    whole[:, :, last:, last:] = local[:, :, :, size:, size:].sum(2)
-    whole[:, :, last:, :last] = transposed(whole[:, :, :last, last:])
-    return whole
+        full[:, :, part, part] += local[:, :, k, :size, :size]
+        full[:, :, part, last:] += local[:, :, k, :size, size:]
+    full[:, :, last:, last:] = local[:, :, :, size:, size:].sum(2)
+    full[:, :, last:, :last] = transposed(full[:, :, :last, last:])
+    return full
 
 
 def _segments(

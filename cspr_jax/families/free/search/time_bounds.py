@@ -57,7 +57,8 @@ def _time_bound(problem: Problem, motion: Spline) -> float:
     way = positions[1] - positions[0]
     bounds = [_of_mass_centre(problem, way)]
     speed, rise = (
-        np.inf if most is None else np.asarray(most) for most in (limits.cable_speed_max, limits.cable_acceleration_max)
+        np.inf if maximum is None else np.asarray(maximum)
+        for maximum in (limits.cable_speed_max, limits.cable_acceleration_max)
     )
     paid = np.abs(lengths[1] - lengths[0])
     bounds.append(float(np.max(least_time(paid, rise, rise, speed))))
@@ -79,14 +80,14 @@ def _of_mass_centre(problem: Problem, way: np.ndarray) -> float:
     along = directions @ np.array([level, way[2]])
     directions = directions * np.where(along < 0.0, -1.0, 1.0)[:, None]
     pull = float(np.sum(np.asarray(tension_range(robot, limits)[1]))) / float(robot.mass)
-    most = np.inf if limits.acceleration_max is None else float(limits.acceleration_max)
+    maximum = np.inf if limits.acceleration_max is None else float(limits.acceleration_max)
     heights, is_point = np.asarray(robot.base_points)[:, 2], not isinstance(robot, PlatformRobot)
     is_level = float(np.ptp(heights)) <= LEVEL * float(spool_radius(robot)) and robot.pulleys is None
     pulls_up = is_point and is_level and judged_poses(robot)[1]
 
     def largest(down: np.ndarray) -> np.ndarray:
         fraction = np.sqrt(np.clip(1.0 - np.maximum(down, 0.0) ** 2, 0.0, 1.0)) if pulls_up else np.ones_like(down)
-        return np.clip(np.minimum(fraction + SLANTED, 1.0) * pull + float(robot.gravity) * down, 0.0, most)
+        return np.clip(np.minimum(fraction + SLANTED, 1.0) * pull + float(robot.gravity) * down, 0.0, maximum)
 
     speed = np.inf if limits.speed_max is None else float(limits.speed_max)
     with np.errstate(divide="ignore"):  # where nothing moves

@@ -47,6 +47,6 @@ def _of_faces(problem: Problem, state: State, shares: np.ndarray) -> list[RowNam
     cables = [cable for others in beside for cable in others] * 2
     is_least = [tensions[cable] @ fraction < 0.0 for cable, fraction in zip(cables, shares, strict=False)]
     return [
-        (Verdict.SLACK_CABLE if least else Verdict.OVER_TENSION, cable)
-        for least, cable in zip(is_least, cables, strict=True)
+        (Verdict.SLACK_CABLE if minimum else Verdict.OVER_TENSION, cable)
+        for minimum, cable in zip(is_least, cables, strict=True)
     ]

@@ -96,9 +96,9 @@ def path_rows(robot: AnyRobot, limits: Limits, state: State, speed: Float[Array,
     cap = jnp.square(speed) / jnp.maximum(jnp.sum(state.velocity**2), TINY)
     _, rate, second_derivative = cable_motion(robot, state)
     if limits.cable_acceleration_max is not None:
-        most = jnp.broadcast_to(jnp.asarray(limits.cable_acceleration_max), rate.shape)
+        maximum = jnp.broadcast_to(jnp.asarray(limits.cable_acceleration_max), rate.shape)
         both = (jnp.concatenate([side, -side]) for side in (rate, second_derivative))
-        parts.append((*both, *[jnp.concatenate([most, most])] * 2))
+        parts.append((*both, *[jnp.concatenate([maximum, maximum])] * 2))
     if limits.cable_speed_max is not None:
         cap = jnp.minimum(cap, jnp.min(jnp.square(limits.cable_speed_max) / jnp.maximum(rate**2, TINY)))
     if limits.acceleration_max is not None:
@@ -127,8 +127,8 @@ def tension_faces(robot: AnyRobot, limits: Limits, matrix: Float[Array, "dof n_c
     kernel = all_tensions(matrix, jnp.zeros(dof)).kernel if count > dof else jnp.zeros((0, count))
     one_sided = jnp.sum(one_sided_faces(matrix, kernel)[..., None] * is_beside, axis=1)
     along = jnp.concatenate([one_sided, -one_sided])
-    least = jnp.where(along > 0.0, along * low[None], jnp.where(along < 0.0, along * high[None], 0.0)).sum(1)
-    return TensionFaces(along, jnp.where((along != 0.0).any(1), least, -jnp.inf))
+    minimum = jnp.where(along > 0.0, along * low[None], jnp.where(along < 0.0, along * high[None], 0.0)).sum(1)
+    return TensionFaces(along, jnp.where((along != 0.0).any(1), minimum, -jnp.inf))
 
 
 def _of_tensions(robot: AnyRobot, limits: Limits, wrenches: UnitWrenches) -> tuple[Array, ...]:
@@ -138,11 +138,11 @@ def _of_tensions(robot: AnyRobot, limits: Limits, wrenches: UnitWrenches) -> tup
     momentum, second_derivative, rest = (
         jnp.sum(faces.along * (inverse @ x)[None], axis=1) / weight for x in wrenches[1:]
     )
-    most = rest - jnp.where(bounds, faces.least, 0.0) / weight
+    maximum = rest - jnp.where(bounds, faces.least, 0.0) / weight
     size = jnp.sum(jnp.abs(faces.along), axis=1) / weight
     # A face without a bound is 0 <= 1.
     momentum, second_derivative, size = (jnp.where(bounds, x, 0.0) for x in (-momentum, -second_derivative, size))
-    return momentum, second_derivative, jnp.where(bounds, most, 1.0), size
+    return momentum, second_derivative, jnp.where(bounds, maximum, 1.0), size
 
 
 def tangent_directions(velocity: Float[Array, "3"], acceleration: Float[Array, "3"]) -> Float[Array, "n_tangents 3"]:

@@ -99,8 +99,8 @@ class Discrete:
         if jump > SAME * np.abs(self.start.x).max():
             before = [np.concatenate([s[:1], e]).T for s, e in zip(self.start[:3], self.end[:3], strict=True)]
             sides = [np.concatenate(pair) for pair in zip(sides, before, strict=True)]
-        u, x, most = sides
-        return NodeRows(u, x, most, self.cap(), self.grid.width)
+        u, x, maximum = sides
+        return NodeRows(u, x, maximum, self.cap(), self.grid.width)
 
     def dual_rows(self) -> SideRows:
         """Half-planes of the dual problem."""

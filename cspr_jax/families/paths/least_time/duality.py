@@ -245,6 +245,6 @@ def _of_wrenches(robot: AnyRobot, limits: Limits, state: StateBounds, cell: _Cel
 
 def _turning_axes(robot: Any, pushed: StateBounds, cables: CableBounds) -> AffineBounds:
     # Bound what axes that turn with the platform add to the momentum's derivative: e' . L = e . (L x omega).
-    whole = balance_bounds(dataclasses.replace(robot, pattern=RIGID), pushed, cables)[1].each(lambda x: x[3:])
-    moment = cross(whole, pushed.angular_acceleration).each(lambda x: x[:, None])
+    full = balance_bounds(dataclasses.replace(robot, pattern=RIGID), pushed, cables)[1].each(lambda x: x[3:])
+    moment = cross(full, pushed.angular_acceleration).each(lambda x: x[:, None])
     return balanced_part(robot, pushed.rotation, moment * 0.0, moment).each(lambda x: x[:, 0])

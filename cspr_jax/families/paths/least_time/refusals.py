@@ -86,16 +86,16 @@ def _meeting(path: Discrete, solution: GridSolution, cell: int) -> tuple[float, 
     u = np.concatenate([start.u[cell], end.u[cell] + twice * end.x[cell], [twice, -twice]])
     x = np.concatenate([start.x[cell], end.x[cell], [1.0, -1.0]])
     ahead = [solution.high[cell + 1], -solution.low[cell + 1]]
-    most = np.concatenate([start.most[cell], end.most[cell], ahead])
+    maximum = np.concatenate([start.most[cell], end.most[cell], ahead])
     table = np.stack([np.where(u > FLAT, u, 0.0), np.where(u < -FLAT, u, 0.0), x], axis=1)
     bounds = [(None, None), (None, None), (0.0, float(path.cap()[cell]))]
-    optimum = linprog([-1.0, 1.0, 0.0], table, most, bounds=bounds)
+    optimum = linprog([-1.0, 1.0, 0.0], table, maximum, bounds=bounds)
     best = 0.0 if optimum.x is None else optimum.x[2]
     over = np.where(np.abs(u) > FLAT, u, 1.0)
-    values = (most - x * best) / over
+    values = (maximum - x * best) / over
     upper, lower = np.where(u > FLAT, values, np.inf), np.where(u < -FLAT, values, -np.inf)
-    least, largest = int(lower.argmax()), int(upper.argmin())
-    if upper[largest] >= lower[least]:  # a half-plane that does not bound the path acceleration forbids the place
-        alone = int(np.where(np.abs(u) > FLAT, np.inf, most - x * best).argmin())
+    minimum, largest = int(lower.argmax()), int(upper.argmin())
+    if upper[largest] >= lower[minimum]:  # a half-plane that does not bound the path acceleration forbids the place
+        alone = int(np.where(np.abs(u) > FLAT, np.inf, maximum - x * best).argmin())
         return np.nan, np.nan, (alone,)
-    return float(lower[least]), float(upper[largest]), (least, largest)
+    return float(lower[minimum]), float(upper[largest]), (minimum, largest)

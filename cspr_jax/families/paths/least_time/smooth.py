@@ -69,13 +69,13 @@ class NodeRows(NamedTuple):
                 bounds = np.where(sign * self.u > FLAT, sign * value, np.inf)
                 chosen.append(np.argpartition(bounds, NEAREST, axis=0)[:NEAREST])
         places = np.concatenate(chosen)
-        u, x, most = (np.take_along_axis(side, places, axis=0) for side in (self.u, self.x, self.most))
-        return NodeRows(u, x, most, self.cap, self.width)
+        u, x, maximum = (np.take_along_axis(side, places, axis=0) for side in (self.u, self.x, self.most))
+        return NodeRows(u, x, maximum, self.cap, self.width)
 
     def beside(self, others: "NodeRows") -> "NodeRows":
         """These half-planes and others."""
-        u, x, most = (np.concatenate(pair) for pair in zip(self[:3], others[:3], strict=True))
-        return NodeRows(u, x, most, self.cap, self.width)
+        u, x, maximum = (np.concatenate(pair) for pair in zip(self[:3], others[:3], strict=True))
+        return NodeRows(u, x, maximum, self.cap, self.width)
 
     def with_cap(
         self,
@@ -87,8 +87,8 @@ class NodeRows(NamedTuple):
         """Half-planes with the cap as the last one."""
         ones = np.ones((1, len(self.cap)))
         pairs = (self.u, 0.0 * ones), (self.x, ones / self.cap), (self.most, ones)
-        u, x, most = (np.concatenate(pair) for pair in pairs)
-        return u, x, most
+        u, x, maximum = (np.concatenate(pair) for pair in pairs)
+        return u, x, maximum
 
 
 class Smooth(NamedTuple):
@@ -239,25 +239,25 @@ class _Problem:
     def solved(self, z: np.ndarray, weights: np.ndarray, right: np.ndarray) -> np.ndarray:
         # Matrix of neighbouring nodes: (row, column) of one node, and (row of one, column of the next).
         count, of_rows = len(z), weights[: self.u.size].reshape(self.u.shape)
-        here, ahead = np.zeros((3, 3, count)), np.zeros((3, 3, count - 1))
+        current, ahead = np.zeros((3, 3, count)), np.zeros((3, 3, count - 1))
         time = _time(z[:, 0], self.width, self.ends.rests)
-        here[0, 0] = time.second_derivative + np.sum(of_rows * self.x**2, axis=0)
-        here[0, 1] = np.sum(of_rows * self.x * self.u, axis=0)
-        here[1, 1] = np.sum(of_rows * self.u**2, axis=0) + REGULAR
+        current[0, 0] = time.second_derivative + np.sum(of_rows * self.x**2, axis=0)
+        current[0, 1] = np.sum(of_rows * self.x * self.u, axis=0)
+        current[1, 1] = np.sum(of_rows * self.u**2, axis=0) + REGULAR
         ahead[0, 0] = time.coupling
         up, down = weights[self.u.size :].reshape(2, -1)
         fraction, level = self.tangents
         of_level, of_share, mixed = (up + down) * level**2, (up + down) * fraction**2, (up - down) * level * fraction
         for near, sign in ((slice(None, -1), -1.0), (slice(1, None), 1.0)):
-            here[0, 0, near] += of_level
-            here[1, 1, near] += of_share
-            here[0, 1, near] += sign * mixed
+            current[0, 0, near] += of_level
+            current[1, 1, near] += of_share
+            current[0, 1, near] += sign * mixed
         ahead[:2, :2] += np.array([[of_level, mixed], [-mixed, -of_share]])
-        here[1, 0] = here[0, 1]
-        here[2, :2, :-1] = here[:2, 2, :-1] = self.cells[0]
-        here[2, 2, -1] = 1.0
+        current[1, 0] = current[0, 1]
+        current[2, :2, :-1] = current[:2, 2, :-1] = self.cells[0]
+        current[2, 2, -1] = 1.0
         ahead[2, :2] = self.cells[1]
-        return solve_banded((BANDS, BANDS), self._bands(here, ahead), right.ravel(), check_finite=False).reshape(
+        return solve_banded((BANDS, BANDS), self._bands(current, ahead), right.ravel(), check_finite=False).reshape(
             z.shape
         )
 

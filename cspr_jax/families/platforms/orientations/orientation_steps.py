@@ -84,8 +84,8 @@ def reference_share(robot: PlatformRobot, place: Float[np.ndarray, "3"]) -> floa
     """Determinant of the reference orientation at a place, if its sign is the same as in the middle."""
     if robot.n_cables > robot.dof:
         return 1.0
-    here, depth, fraction = _upright(robot, np.asarray(place, float))
-    return float(here) if float(depth) > 0.0 and bool(is_regular(fraction)) else np.nan
+    current, depth, fraction = _upright(robot, np.asarray(place, float))
+    return float(current) if float(depth) > 0.0 and bool(is_regular(fraction)) else np.nan
 
 
 @jax.jit
@@ -124,8 +124,8 @@ class OrientationSteps:
         # Cables that touch have a gap of rounding errors, whose direction means nothing.
         gaps[_squares(gaps) < (TOUCHING * self._size) ** 2] = 0.0
         # Neither does the sign of the height of cables that lie in the platform: they are put on one side of it.
-        height, least = directions @ self._contacts.normal, TOUCHING * np.sqrt(_squares(directions))
-        height = np.where(np.abs(height) < least, 2.0 * least * self._side - height, 0.0)
+        height, minimum = directions @ self._contacts.normal, TOUCHING * np.sqrt(_squares(directions))
+        height = np.where(np.abs(height) < minimum, 2.0 * minimum * self._side - height, 0.0)
         return OrientationSamples(
             fraction / self._reference, gaps, directions + height[..., None] * self._contacts.normal
         )

@@ -76,9 +76,9 @@ class AttainabilityMap(OrientationWorkspaceMap):
         self, places: np.ndarray, angles: np.ndarray, z0: np.ndarray, *, margins: bool
     ) -> PlatformMotionAnswers:
         # Search for motions to orientations of (n, 3) angles at (n, 3) places, both in the kernels' axes.
-        values, most = self._orientations.values or VALUES, self._keys.trajectory.max_arcs
+        values, maximum = self._orientations.values or VALUES, self._keys.trajectory.max_arcs
         arguments = self._checker, places, angles, z0
-        return attainable(*arguments, max_arcs=most, values=values, symmetry=self._alike, margins=margins)
+        return attainable(*arguments, max_arcs=maximum, values=values, symmetry=self._alike, margins=margins)
 
     def _places(self, places: np.ndarray, z0: np.ndarray) -> dict[str, np.ndarray]:
         fine, coarse = (self._sets(places, k) for k in (1, 2))

@@ -72,8 +72,8 @@ class PosesMap(PlatformMap):
             each = PlatformMotion(segments, self._problem.amplitude, leaf(answers.tried_arcs), kind)
             return answers, SeveralMotions(each, answers.duration, partial(several_bounds, kind=kind), orders=4)
 
-        most = self._keys.trajectory.max_arcs
-        return clear_motions(self._problem, self._scene, join, len(motions.z0), max_arcs=most)
+        maximum = self._keys.trajectory.max_arcs
+        return clear_motions(self._problem, self._scene, join, len(motions.z0), max_arcs=maximum)
 
     def _starts(self, z0: np.ndarray) -> tuple[Poses, np.ndarray]:
         # Return the poses at the starts, and the values of beta-hat there.

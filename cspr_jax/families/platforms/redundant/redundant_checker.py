@@ -70,15 +70,15 @@ class MarginSieve:
             alive = np.flatnonzero(~is_refuted)
             if not len(alive):
                 break
-            least = self._least(rows(segments, alive), arcs, tau[start : start + CHUNK])
-            is_refuted[alive] = ~(least[:, : None if limits else 1] > -SAMPLES_UNDECIDED).all(1)
+            minimum = self._least(rows(segments, alive), arcs, tau[start : start + CHUNK])
+            is_refuted[alive] = ~(minimum[:, : None if limits else 1] > -SAMPLES_UNDECIDED).all(1)
         return is_refuted
 
     def _least(self, segments: PlatformSegment, arcs: int, tau: np.ndarray) -> np.ndarray:
         # Return (n, n_slacks), the margin first, without the distances between cables.
         motions = Motions(segments, np.full(len(segments.rate), arcs))
-        least = self._checker.values(motions, np.tile(tau, (len(motions.arcs), 1)))[:, :, :-1].min(1)
-        return np.where(np.isnan(least), -np.inf, least)
+        minimum = self._checker.values(motions, np.tile(tau, (len(motions.arcs), 1)))[:, :, :-1].min(1)
+        return np.where(np.isnan(minimum), -np.inf, minimum)
 
 
 class RedundantChecker(MotionChecker):
@@ -211,13 +211,13 @@ class RedundantChecker(MotionChecker):
         if not is_open.any():
             return checks
         motions, samples = motions.rows(is_open), samples[is_open]
-        least, when = self._smallest(motions, tau, samples, whole)
+        minimum, when = self._smallest(motions, tau, samples, whole)
         if len(self._knots):  # slacks may jump at knots
-            beside = self.values(motions, np.tile(self._knots, (len(least), 1)))
-            when = np.where(beside.min(1) < least, self._knots[beside.argmin(1)], when)
-            least = np.minimum(least, beside.min(1))
-        judged = self._judged(least, self._met(motions, tau), self.durations(*motions), counted[BASIC:])
-        judged.instant[:] = _refuted_at(least[:, :-1], when[:, :-1])
+            beside = self.values(motions, np.tile(self._knots, (len(minimum), 1)))
+            when = np.where(beside.min(1) < minimum, self._knots[beside.argmin(1)], when)
+            minimum = np.minimum(minimum, beside.min(1))
+        judged = self._judged(minimum, self._met(motions, tau), self.durations(*motions), counted[BASIC:])
+        judged.instant[:] = _refuted_at(minimum[:, :-1], when[:, :-1])
         checks.put(np.flatnonzero(is_open), judged)
         return checks
 
@@ -225,12 +225,12 @@ class RedundantChecker(MotionChecker):
         self, motions: Motions, tau: np.ndarray, samples: np.ndarray, whole: bool
     ) -> tuple[np.ndarray, np.ndarray]:
         # Return smallest values (n, n_values), and their instants.
-        least, when = samples.min(1), tau[samples.argmin(1)]
-        is_near = np.logical_or(whole, ~(least > NEAR * np.abs(samples).max(1)).all(1))
+        minimum, when = samples.min(1), tau[samples.argmin(1)]
+        is_near = np.logical_or(whole, ~(minimum > NEAR * np.abs(samples).max(1)).all(1))
         if is_near.any():
             rows_near = motions.rows(is_near)
-            least[is_near], when[is_near] = narrowed_places(partial(self.values, rows_near), tau, samples[is_near])
-        return least, when
+            minimum[is_near], when[is_near] = narrowed_places(partial(self.values, rows_near), tau, samples[is_near])
+        return minimum, when
 
     def _met(self, motions: Motions, tau: np.ndarray) -> np.ndarray:
         # Find motions in which cables pass through each other between samples.

@@ -69,12 +69,12 @@ def cables_meet(
     second = _within(cables.rays, (step, block, j[pair]), cables.deviation)
     between = _Around(apart[pair], np.zeros(len(pair)))
     normal = first.cross(second)
-    least = normal.dot(normal)[0]
-    inside = least > 0.0
+    minimum = normal.dot(normal)[0]
+    inside = minimum > 0.0
     for other in (second, first):
         # Bound the share of a cable at which the lines are nearest, times the square of the normal.
         low, high = between.cross(other).dot(normal)
-        inside &= (low > 0.0) & (high < least)
+        inside &= (low > 0.0) & (high < minimum)
     meets[block[inside]] = step[inside]
     return meets
 

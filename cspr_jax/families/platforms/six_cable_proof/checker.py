@@ -65,11 +65,11 @@ def slacks_at(problem: Problem, items, *, pairs: tuple, kind: PlatformMotionKind
     """Slacks and distances between cables at instants."""
     segments, arcs, tau = items
     instant = instant_lanes(problem.amplitude, segments.sense, arcs, tau)
-    here = state(segments, arcs, instant, kind)
-    cables = cable_lanes(problem.robot, here.position, here.rotation)
+    current = state(segments, arcs, instant, kind)
+    cables = cable_lanes(problem.robot, current.position, current.rotation)
     slacks = [
         *moving_slacks(problem, segments, arcs, instant, kind),
-        *still_slacks(problem, segments, here, cables),
+        *still_slacks(problem, segments, current, cables),
     ]
     squares = [dot(gap, gap) for gap in interference_lanes.gaps(problem.robot.base_points, pairs, cables)]
     nearest = jnp.sqrt(smallest(squares)) if squares else jnp.full_like(segments.rate, jnp.inf)
@@ -134,13 +134,13 @@ class PlatformChecker(MotionChecker):
         """Smallest slacks at some instants; see `MotionChecker.sampled`."""
         motions, size = Motions(segments, np.full(len(segments.rate), arcs)), max(SAMPLES // len(tau), 1)
         kernel = partial(slacks_at, self.problem, pairs=self._places.pairs, kind=self.kind)
-        least = []
+        minimum = []
         for start in range(0, len(motions.arcs), size):
             row = np.repeat(np.arange(start, min(start + size, len(motions.arcs))), len(tau))
             instants = np.tile(tau, len(row) // len(tau))
             slacks = in_batches(kernel, (*motions.items(row), instants), size=self.batch)
-            least.append(np.stack(slacks[:-1], axis=1).reshape(-1, len(tau), len(self.flags)).min(1))
-        return np.concatenate(least)
+            minimum.append(np.stack(slacks[:-1], axis=1).reshape(-1, len(tau), len(self.flags)).min(1))
+        return np.concatenate(minimum)
 
     def check(
         self,
@@ -183,16 +183,16 @@ class PlatformChecker(MotionChecker):
         checks.bound[open_rows] = np.where(
             is_proved, np.minimum(tensions.bound[open_rows, 0], places.bound[:, 0]), np.nan
         )
-        least = self._attained(tensions.attained[open_rows], places.attained)
+        minimum = self._attained(tensions.attained[open_rows], places.attained)
         if margins:
             samples = _samples(moving, tensions, open_rows), _samples(still, places, np.arange(len(open_rows)))
-            self._narrow(least, part, samples, np.logical_or(whole, is_proved))
-        verdict = self._verdict(least[:-1], is_proved, places, ignored)
+            self._narrow(minimum, part, samples, np.logical_or(whole, is_proved))
+        verdict = self._verdict(minimum[:-1], is_proved, places, ignored)
         if ignored is None:
             self._weigh(checks, open_rows, part, verdict)
         checks.verdict[open_rows] = np.where(is_finite, verdict, Verdict.NOT_FINITE.value)
-        checks.slack[open_rows] = np.where(is_finite, least[:-1], np.nan).T
-        checks.gap[open_rows] = np.where(is_finite, least[-1], np.nan)
+        checks.slack[open_rows] = np.where(is_finite, minimum[:-1], np.nan).T
+        checks.gap[open_rows] = np.where(is_finite, minimum[-1], np.nan)
         return checks
 
     def _compile(self, motions: Motions, *, margins: bool) -> None:

@@ -58,12 +58,12 @@ class _Moving(NamedTuple):
 def _moving(problem: Problem, one: Array, items, *, kind: PlatformMotionKind) -> _Moving:
     segments, arcs, start, stop = items
     middle, half = middle_of(problem.amplitude, 0.5 * (start + stop)), 0.5 * (stop - start)
-    here = state(segments, arcs, instant_beside(middle, segments.sense, arcs, jnp.zeros_like(half)), kind)
+    current = state(segments, arcs, instant_beside(middle, segments.sense, arcs, jnp.zeros_like(half)), kind)
     near, wide = (
         reach(segments, arcs, middle, (half + radius, radius), kind)
         for radius in (jnp.zeros_like(half), RADIUS / (math.pi * arcs))
     )
-    return stored(_Moving(here, squared_duration(segments, arcs), near, wide), one)
+    return stored(_Moving(current, squared_duration(segments, arcs), near, wide), one)
 
 
 @partial(jax.jit, static_argnames="pairs")
@@ -181,10 +181,10 @@ class _Columns:
 
     def distances(self) -> Distances:
         *each, spools = zip(*self._columns, strict=True)
-        bound, change, tilt, slope, swing, here, here_spools = (
+        bound, change, tilt, slope, swing, current, here_spools = (
             np.stack([np.broadcast_to(x, self._count) for x in column], axis=1) for column in each
         )
-        return Distances(bound, change, tilt, slope, swing, np.array(spools), here, here_spools)
+        return Distances(bound, change, tilt, slope, swing, np.array(spools), current, here_spools)
 
 
 def _distances(problem: Problem, pairs: tuple, middle: _Middle, within: _Within, met) -> Distances:

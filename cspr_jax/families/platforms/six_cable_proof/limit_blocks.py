@@ -136,10 +136,10 @@ def _tension_sizes(sizes: Sizes, _: Array) -> list[Array]:
 def _tension_slacks(enclosed: Enclosed, limit: Array, is_least: bool) -> Pair:
     limit, (low, high), (under, over) = limit[None, :, None], enclosed.coefficients, enclosed.nodes
     if is_least:
-        here, bound = at_most(over, enclosed.fraction) - limit, ratio(low, enclosed.regular) - limit
+        current, bound = at_most(over, enclosed.fraction) - limit, ratio(low, enclosed.regular) - limit
     else:
-        here, bound = limit + at_most(-under, enclosed.fraction), limit + ratio(-high, enclosed.regular)
-    return jnp.min(here, axis=1), jnp.min(bound, axis=(0, 1))
+        current, bound = limit + at_most(-under, enclosed.fraction), limit + ratio(-high, enclosed.regular)
+    return jnp.min(current, axis=1), jnp.min(bound, axis=(0, 1))
 
 
 def _rates(here: Here) -> list[tuple[Array, Array, Array]]:

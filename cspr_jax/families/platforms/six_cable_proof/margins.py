@@ -58,19 +58,19 @@ def low_points(samples: Samples, selected: Bool[np.ndarray, "n"]) -> tuple[Int[n
     values, row = samples.values, samples.row
     smallest = np.full((values.shape[1], len(selected)), np.inf)
     lowest = values.min(0)
-    for least, block_values in zip(smallest, lowest, strict=True):
-        np.minimum.at(least, row, block_values)
+    for minimum, block_values in zip(smallest, lowest, strict=True):
+        np.minimum.at(minimum, row, block_values)
     falls = values[1:] < values[:-1]
     side = np.ones_like(falls[:1])
     is_low = np.concatenate([side, falls]) & np.concatenate([~falls, side])
     with np.errstate(invalid="ignore"):  # infinities beside infinities
         is_low &= (np.ptp(values, axis=0) > LEVEL) & selected[row]
     place, value, item = np.nonzero(is_low)
-    here, last = values[place, value, item], len(values) - 1
+    current, last = values[place, value, item], len(values) - 1
     before, after = (values[np.clip(place + k, 0, last), value, item] for k in (-1, 1))
     with np.errstate(invalid="ignore"):
-        second_derivative = before - 2.0 * here + after
-    reaches = np.isfinite(second_derivative) & (here - 0.25 * second_derivative <= smallest[value, row[item]])
+        second_derivative = before - 2.0 * current + after
+    reaches = np.isfinite(second_derivative) & (current - 0.25 * second_derivative <= smallest[value, row[item]])
     return place[reaches], value[reaches], item[reaches]
 
 

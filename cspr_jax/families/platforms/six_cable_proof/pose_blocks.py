@@ -91,8 +91,8 @@ def place_blocks(
     fraction = (2.0 * half / STEPS) ** 2 / 8.0
     turning = bounds.angular_acceleration + bounds.omega**2
     instant = stored(instant_beside(middle, segments.sense, arcs, jnp.zeros_like(half)), one)
-    here = state(segments, arcs, instant, kind, one)
-    position, rotation = stored((here.position, here.rotation), one)
+    current = state(segments, arcs, instant, kind, one)
+    position, rotation = stored((current.position, current.rotation), one)
     away = [
         dot(x, x) for x in ([position[i] - problem.robot.base_points[k, i] for i in range(3)] for k in range(CABLES))
     ]

@@ -79,9 +79,9 @@ def cables_beside(
     """Cables at one instant beside the middle of each of many blocks."""
     segments, arcs, middles, off = items
     instant = instant_beside(middle_of(problem.amplitude, middles), segments.sense, arcs, off)
-    here = state(segments, arcs, instant, kind)
-    cables = cable_lanes(problem.robot, here.position, here.rotation)
-    return interference_lanes.as_arrays(cables.rays, interference_lanes.cable_directions(cables, here.rotation))
+    current = state(segments, arcs, instant, kind)
+    cables = cable_lanes(problem.robot, current.position, current.rotation)
+    return interference_lanes.as_arrays(cables.rays, interference_lanes.cable_directions(cables, current.rotation))
 
 
 class PlaceCertifier:

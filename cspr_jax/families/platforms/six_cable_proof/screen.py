@@ -94,15 +94,15 @@ def _from_rest(robot: PlatformRobot, segments: PlatformSegment):
     axis_inertia = tuple(dot([inertia[i, j] for j in range(3)], motions.axis) for i in range(3))
 
     def at(row):
-        here = swing(motions, row)
-        cables = cable_lanes(robot, here.position, here.rotation)
-        weight = tuple(dot(line, axis_inertia) for line in here.rotation)
+        current = swing(motions, row)
+        cables = cable_lanes(robot, current.position, current.rotation)
+        weight = tuple(dot(line, axis_inertia) for line in current.rotation)
         acceleration_matrix = cross(motions.axis, weight)
         moment = tuple(
-            here.angular_acceleration * a + here.squared_speed * b
+            current.angular_acceleration * a + current.squared_speed * b
             for a, b in zip(weight, acceleration_matrix, strict=True)
         )
-        force = (here.acceleration[0], here.acceleration[1], here.acceleration[2] - robot.gravity)
+        force = (current.acceleration[0], current.acceleration[1], current.acceleration[2] - robot.gravity)
         return certain_tension(motions.rate, segments.regular, cables, balance(cables, force, moment))
 
     return at

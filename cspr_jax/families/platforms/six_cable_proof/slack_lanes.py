@@ -71,9 +71,9 @@ def lowest_tension(
     robot: PlatformRobot, segment: PlatformSegment, arcs: Array, instant: InstantLanes, kind: PlatformMotionKind
 ) -> Float[Array, "n"]:
     """The smallest tension at one instant of many segments."""
-    here = state(segment, arcs, instant, kind)
-    cables = cable_lanes(robot, here.position, here.rotation)
-    balance = _balanced(robot, here, cables, squared_duration(segment, arcs))
+    current = state(segment, arcs, instant, kind)
+    cables = cable_lanes(robot, current.position, current.rotation)
+    balance = _balanced(robot, current, cables, squared_duration(segment, arcs))
     return certain_tension(segment.rate, segment.regular, cables, balance)
 
 
@@ -82,26 +82,28 @@ def moving_slacks(
 ) -> list[Array]:
     """Smallest slacks of the criteria that depend on the motion, at one instant of many segments."""
     robot, limits = problem.robot, problem.limits
-    here, squared = state(segment, arcs, instant, kind), squared_duration(segment, arcs)
-    cables = cable_lanes(robot, here.position, here.rotation)
-    balance = _balanced(robot, here, cables, squared)
+    current, squared = state(segment, arcs, instant, kind), squared_duration(segment, arcs)
+    cables = cable_lanes(robot, current.position, current.rotation)
+    balance = _balanced(robot, current, cables, squared)
     is_flat = _is_flat(cables, balance)
     values = [jnp.where(is_flat, jnp.inf, _smallest_tension(segment.rate, balance))]
     rows = _limit_rows(limits, of_motion=True)
     if not rows:
         return values
-    lengths, rates, bends = cable_rates(cables, here.velocity, here.acceleration, here.omega, here.angular_acceleration)
+    lengths, rates, bends = cable_rates(
+        cables, current.velocity, current.acceleration, current.omega, current.angular_acceleration
+    )
     pace, scale = jnp.sqrt(squared), scales(CABLES, robot.mass * robot.gravity, robot.gravity / segment.rate)
     each = {
         "tension": [robot.mass * x / balance.denominator * y for x, y in zip(balance.numerators, lengths, strict=True)],
         "speed": [jnp.abs(rate) / pace for rate in rates],
         "acceleration": [jnp.abs(second_derivative) / squared for second_derivative in bends],
-        "mass_centre_speed": [jnp.sqrt(dot(here.velocity, here.velocity)) / pace],
-        "mass_centre_acceleration": [jnp.sqrt(dot(here.acceleration, here.acceleration)) / squared],
+        "mass_centre_speed": [jnp.sqrt(dot(current.velocity, current.velocity)) / pace],
+        "mass_centre_acceleration": [jnp.sqrt(dot(current.acceleration, current.acceleration)) / squared],
     }
     for row in rows:
-        least = _least(row, limits, each[row.quantity], scale)
-        values.append(jnp.where(is_flat, jnp.inf, least) if row.quantity == "tension" else least)
+        minimum = _least(row, limits, each[row.quantity], scale)
+        values.append(jnp.where(is_flat, jnp.inf, minimum) if row.quantity == "tension" else minimum)
     return values
 
 

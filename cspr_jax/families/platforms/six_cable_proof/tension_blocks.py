@@ -130,8 +130,8 @@ def tension_ranges(problem: Problem, one: Float[Array, ""], items, *, kind: Plat
     taken = _taken(problem, one, items, kind=kind, margins=False)
     low, high = (_coefficients(taken.values) + sign * taken.rests[None] for sign in (-1.0, 1.0))
     regular = low[:, REGULAR, None], high[:, REGULAR, None]
-    least, most = ratio(low[:, :CABLES], regular), ratio(-high[:, :CABLES], regular)
-    return TensionRange(jnp.min(least, axis=0), -jnp.min(most, axis=0), *_allowances(taken))
+    minimum, maximum = ratio(low[:, :CABLES], regular), ratio(-high[:, :CABLES], regular)
+    return TensionRange(jnp.min(minimum, axis=0), -jnp.min(maximum, axis=0), *_allowances(taken))
 
 
 def _coefficients(values: Array) -> Array:
@@ -271,8 +271,8 @@ def _sizes(problem: Problem, block: _Block, bounds: Reach, along: Array, lengths
     )
     force = bounds.second_derivative / squared + robot.gravity
     wrench = jnp.sqrt(force**2 + (acceleration_matrix / squared / (arm * bounds.radial_rate)) ** 2)
-    whole = (arm * bounds.radial_rate) ** 3 / jnp.abs(block.regular) * math.prod(columns[1:], start=columns[0])
-    kappa = [CABLES * z0 / robot.gravity * whole * wrench / column for column in columns]
+    full = (arm * bounds.radial_rate) ** 3 / jnp.abs(block.regular) * math.prod(columns[1:], start=columns[0])
+    kappa = [CABLES * z0 / robot.gravity * full * wrench / column for column in columns]
     paces = [bounds.speed + lever * bounds.rotation_rate for lever in arms]
     pulls = [
         bounds.second_derivative + lever * bounds.radial_rate * (bounds.angular_acceleration + bounds.omega**2)
@@ -280,7 +280,7 @@ def _sizes(problem: Problem, block: _Block, bounds: Reach, along: Array, lengths
     ]
     is_straight = [move < STRAIGHT * ray for ray, move in zip(lengths[0], moved, strict=True)]
     cable_sizes = Sizes(kappa, rays, paces, pulls, is_straight, squared, z0, bounds.speed, bounds.second_derivative)
-    largest = [*kappa, whole, jnp.zeros_like(whole)]
+    largest = [*kappa, full, jnp.zeros_like(full)]
     for quantity, row in _quantities(problem).items():
         largest += QUANTITIES[quantity].sizes(cable_sizes, getattr(problem.limits, row[0].name))
     return largest
@@ -299,11 +299,11 @@ def _bounds(problem: Problem, taken: _Taken) -> tuple[list[Array], list[Array]]:
     one = slice(REGULAR, REGULAR + 1)
     regular, fraction = around(coefficients, rests, one), around(values, taken.rounding, one)
     # Among quotients with one denominator, the smallest has the smallest numerator.
-    least = jnp.min(coefficients[:, :CABLES] - rests[None, :CABLES], axis=1, keepdims=True)
+    minimum = jnp.min(coefficients[:, :CABLES] - rests[None, :CABLES], axis=1, keepdims=True)
     doubt = jnp.max(taken.rounding[None, :CABLES], axis=1, keepdims=True)
     kappa = jnp.min(values[:, :CABLES], axis=1, keepdims=True) + doubt
     nodes = [at_most(kappa, fraction)[:, 0], fraction[1][:, 0]]
-    bound = [jnp.min(ratio(least, regular), axis=(0, 1)), jnp.min(regular[0], axis=(0, 1))]
+    bound = [jnp.min(ratio(minimum, regular), axis=(0, 1)), jnp.min(regular[0], axis=(0, 1))]
     scale = scales(CABLES, problem.robot.mass * problem.robot.gravity, block.z0)
     part, slacks = slice(0, REGULAR + 2), {}
     for quantity, rows in _quantities(problem).items():

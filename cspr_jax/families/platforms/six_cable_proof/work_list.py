@@ -99,9 +99,9 @@ class WorkList:
 
     def _take_in(self, blocks: Blocks, bounds: BlockBounds, *, last: bool) -> np.ndarray:
         # Take in the bounds of blocks; return the mask of blocks to be halved.
-        least, low = bounds.nodes.min(0).T, bounds.bound.T
-        _lower(self.attained, blocks.row, least)
-        slack = least[:, : low.shape[1]]
+        minimum, low = bounds.nodes.min(0).T, bounds.bound.T
+        _lower(self.attained, blocks.row, minimum)
+        slack = minimum[:, : low.shape[1]]
         # NaN refutes nothing, and proves nothing.
         self._note_instants(blocks, bounds)
         self.is_refuted[blocks.row[(slack < -self._near).any(1)]] = True
@@ -109,7 +109,7 @@ class WorkList:
         is_proved = is_above.all(1) & bounds.is_enough(self.attained)
         with np.errstate(invalid="ignore"):  # infinities: singular poses, blocks without a bound
             is_known = ((slack - low <= 0.5 * self._near) & ~is_above).any(1)
-        is_done = is_proved | is_known | last | np.isnan(least).any(1)
+        is_done = is_proved | is_known | last | np.isnan(minimum).any(1)
         self.is_stuck[blocks.row[is_done & ~is_proved]] = True
         _lower(self.bound, blocks.row[is_done], low[is_done])
         return ~is_done & ~(self.is_refuted | self.is_stuck)[blocks.row]

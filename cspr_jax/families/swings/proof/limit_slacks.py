@@ -81,8 +81,8 @@ def _bends(state: _AtInstant, limit: Array) -> tuple[Array, Array]:
 
 
 def _lifted(over: _OverInterval, limit: Array) -> Array:
-    whole = over.kappa._replace(value=1.0 + over.kappa.value)
-    lift = (whole * over.length).times(1.0 / (over.n_cables * over.z0))
+    full = over.kappa._replace(value=1.0 + over.kappa.value)
+    lift = (full * over.length).times(1.0 / (over.n_cables * over.z0))
     return (lift + over.eta.times(limit / over.weight)).curvature
 
 

@@ -191,9 +191,9 @@ def margins(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]) -> 
         return each_margin(problem, segments, arcs)
     table = blocks(problem.amplitude, int(np.max(arcs)))
     both = sum(sizes[:BASIC]), sum(sizes[BASIC:])
-    least = smallest_values(Functions(smooth_slacks, both), problem, segments, arcs, table)
-    smallest = np.repeat(least, [BASIC, len(sizes) - BASIC], axis=1)
-    unclear = np.flatnonzero(~(np.isfinite(least) & (least > 0.0)).all(1))
+    minimum = smallest_values(Functions(smooth_slacks, both), problem, segments, arcs, table)
+    smallest = np.repeat(minimum, [BASIC, len(sizes) - BASIC], axis=1)
+    unclear = np.flatnonzero(~(np.isfinite(minimum) & (minimum > 0.0)).all(1))
     if len(unclear):
         part, numbers = jax.tree.map(lambda leaf: np.asarray(leaf)[unclear], (segments, np.asarray(arcs)))
         smallest[unclear] = each_margin(problem, part, numbers)

@@ -122,14 +122,14 @@ def _peaks(function: Callable[[tuple[Array, ...]], Array], points: tuple[Array, 
         return (jnp.where(leads, value, first), jnp.where(leads, place, at_first)), (next_one, at_next)
 
     def step(state, point):
-        before, here, place, peaks = state
+        before, current, place, peaks = state
         after = function(point)
-        is_peak = (here >= before) & (here >= after)
-        return (here, after, place + 1, take(peaks, jnp.where(is_peak, here, -jnp.inf), place)), None
+        is_peak = (current >= before) & (current >= after)
+        return (current, after, place + 1, take(peaks, jnp.where(is_peak, current, -jnp.inf), place)), None
 
     start = (none, none, nowhere - 1, ((none, nowhere), (none, nowhere)))
-    (before, here, place, peaks), _ = lax.scan(step, start, points, unroll=UNROLL)
-    peaks = take(peaks, jnp.where(here >= before, here, -jnp.inf), place)
+    (before, current, place, peaks), _ = lax.scan(step, start, points, unroll=UNROLL)
+    peaks = take(peaks, jnp.where(current >= before, current, -jnp.inf), place)
     return jnp.stack([peaks[0][1], peaks[1][1]]), peaks[0][0]
 
 

@@ -79,9 +79,9 @@ def proved_envelope(
     def one(load):
         def step(state, stretch):
             before, worst = state
-            here = _squared(load, inclination, n, omega, end, stretch.values)
+            current = _squared(load, inclination, n, omega, end, stretch.values)
             hidden = stretch.width**2 / 8.0 * _curvature(jnp.abs(load), jnp.abs(inclination), n, omega, end, stretch)
-            return (here, jnp.maximum(worst, jnp.maximum(before, here) + hidden)), None
+            return (current, jnp.maximum(worst, jnp.maximum(before, current) + hidden)), None
 
         start = _squared(load, inclination, n, omega, end, derivatives(amplitude, jnp.zeros_like(n), order=2))
         return lax.scan(step, (start, start), _stretches(amplitude), unroll=UNROLL)[0][1]

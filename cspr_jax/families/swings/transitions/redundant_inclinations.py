@@ -37,7 +37,7 @@ def redundant_inclinations(
 ) -> Float[np.ndarray, "n"]:
     """The inclination of each target that needs the fewest oscillations; of these the one with the largest slack."""
     largest = LARGEST_INCLINATION / max(float(np.asarray(problem.amplitude.largest)[0]), 1.0)
-    best, most = np.zeros(len(targets)), np.full(len(targets), -np.inf)
+    best, maximum = np.zeros(len(targets)), np.full(len(targets), -np.inf)
     is_open = targets @ np.asarray(plane_normal(problem.robot)) > 0.0
     for arcs in range(2, 2 * max(max_arcs // 2, 1) + 1, 2):
         rows = np.flatnonzero(is_open)
@@ -54,8 +54,8 @@ def redundant_inclinations(
             tried = np.clip(v[:, None] + step * np.linspace(-1.0, 1.0, FINER), -largest, largest)
             slacks, step = slack(tried, MANY), 2.0 * step / (FINER - 1)
         v, highest = _at(tried, slacks.argmax(1)), slacks.max(1)
-        gains = highest > most[rows]
-        best[rows[gains]], most[rows[gains]] = v[gains], highest[gains]
+        gains = highest > maximum[rows]
+        best[rows[gains]], maximum[rows[gains]] = v[gains], highest[gains]
         is_open[rows] = highest <= 0.0
     return best
 
@@ -76,5 +76,5 @@ def _slacks(
     places = np.repeat(targets, inclinations.shape[1], axis=0)
     kernel = jax.vmap(partial(depth_for, problem.robot))
     segments = transitions(problem, places, np.asarray(kernel(jnp.asarray(places), jnp.asarray(inclinations.ravel()))))
-    least = least_slacks(problem, segments, np.arange(len(places)), arcs, samples)
-    return least.min(1).reshape(inclinations.shape)
+    minimum = least_slacks(problem, segments, np.arange(len(places)), arcs, samples)
+    return minimum.min(1).reshape(inclinations.shape)

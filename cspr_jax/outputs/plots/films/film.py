@@ -61,8 +61,8 @@ def film(
         raise InputError("--speed", speed, "a number > 0")
     time = np.asarray(columns["t"], float)
     seconds = float(time[-1] - time[0]) / speed
-    most = OF_PAGES if ending == ".html" else MOST
-    rate = next((rate for rate in RATES if seconds * rate <= most), RATES[-1])
+    maximum = OF_PAGES if ending == ".html" else MOST
+    rate = next((rate for rate in RATES if seconds * rate <= maximum), RATES[-1])
     # The end is shown, at most a part of a picture too late.
     count = int(np.ceil(seconds * rate - 1e-9)) + 1
     instants = np.minimum(time[0] + np.arange(count) * speed / rate, time[-1])

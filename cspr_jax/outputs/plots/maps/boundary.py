@@ -93,8 +93,8 @@ def boundary(sides: BoundarySides) -> Boundary:
     pairs, pieces = np.unique(np.stack([inner, outer], -1).reshape(-1, 2), axis=0, return_inverse=True)
     pieces = pieces.reshape(inner.shape)
     # Some pieces in a layer without thickness have the same corner twice.
-    whole = (np.diff(np.sort(pieces, axis=1), axis=1) > 0).all(1)
-    return Boundary(_crossings(sides, pairs), pieces[whole], (outer < 0).any(1)[whole])
+    full = (np.diff(np.sort(pieces, axis=1), axis=1) > 0).all(1)
+    return Boundary(_crossings(sides, pairs), pieces[full], (outer < 0).any(1)[full])
 
 
 def _simplices(is_in: np.ndarray) -> list[tuple[np.ndarray, int]]:

@@ -75,8 +75,8 @@ def comparison_figure(compared: list[Compared], fixed: list[str]) -> Figure:
             legend |= draw_obstacles(panel, one.result, plane, place)
         legend |= mark(panel, first, "verdict", plane, place)
         for i, one in enumerate(compared):
-            here = {} if over is None else {over: int(np.abs(one.result.axes[over] - height).argmin())}
-            legend |= _outline(panel, sides_of(one.result, plane, one.at | here), i)
+            current = {} if over is None else {over: int(np.abs(one.result.axes[over] - height).argmin())}
+            legend |= _outline(panel, sides_of(one.result, plane, one.at | current), i)
     if plane[1] == "z" and first.attributes.get("z_axis", "down") == "down":
         drawn[0].yaxis.set_inverted(True)
     for panel in bottom:

@@ -75,10 +75,10 @@ def conditions(result: Result) -> str:
 
 def _tensions(limits: dict, robot: RobotFile) -> str:
     low, high = (limits.get(name, getattr(robot, name)) for name in ("tension_min", "tension_max"))
-    least = _numbers(0.0 if low is None else low)
+    minimum = _numbers(0.0 if low is None else low)
     if high is None or not np.isfinite(high).any():
-        return f"above {least} N"
-    return f"{least} to {_numbers(high)} N"
+        return f"above {minimum} N"
+    return f"{minimum} to {_numbers(high)} N"
 
 
 def _numbers(limit) -> str:

@@ -94,7 +94,7 @@ def _as_drawn(result: Result, name: str, across: str, line: PlottedLine) -> Plot
 
 def _draw(panel: Axes, lines: list[PlottedLine]) -> None:
     for i, line in enumerate(lines):
-        whole = line.values.dtype.kind in "iu"
+        full = line.values.dtype.kind in "iu"
         panel.plot(
             line.points,
             line.values,
@@ -102,7 +102,7 @@ def _draw(panel: Axes, lines: list[PlottedLine]) -> None:
             linestyle=STYLES[i],
             color=COLOURS[i],
             linewidth=1.3,
-            drawstyle="steps-mid" if whole else "default",
+            drawstyle="steps-mid" if full else "default",
             label=line.name or None,
         )
     for line in lines:

@@ -137,8 +137,8 @@ def _contains(section: _Section, point: np.ndarray) -> bool:
         name = axis.removeprefix("from_")
         if axis not in section.place:
             continue
-        here = section.place[axis]
-        points = section.result.axes.get(axis, np.array([here]))
+        current = section.place[axis]
+        points = section.result.axes.get(axis, np.array([current]))
         gaps = points - _coordinate(name, point[None], section.centre, None)[0]
         if name == "azimuth":
             if np.hypot(*(point - section.centre)[:2]) < 1e-9:
@@ -149,8 +149,8 @@ def _contains(section: _Section, point: np.ndarray) -> bool:
         steps = np.diff(ordered)
         # Take the step towards the point; beyond the last step, the last one.
         side = int(np.searchsorted(ordered, points[nearest])) - (gaps[nearest] > 0.0)
-        step = steps[min(max(side, 0), len(steps) - 1)] if len(steps) else 2e-6 * max(1.0, abs(here))
-        if points[nearest] != here or abs(gaps[nearest]) > 0.5 * step:
+        step = steps[min(max(side, 0), len(steps) - 1)] if len(steps) else 2e-6 * max(1.0, abs(current))
+        if points[nearest] != current or abs(gaps[nearest]) > 0.5 * step:
             return False
     return True
 

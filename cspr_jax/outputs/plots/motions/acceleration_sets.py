@@ -76,8 +76,8 @@ def acceleration_set(result: Result, file: str, at: dict[str, float]) -> Acceler
     """Feasible accelerations at an instant of a motion."""
     robot_file, keys = robot_and_plan(result, file, "acceleration")
     if robot_file.is_platform:
-        fault = f'"acceleration" of {robot_file.kind}'
-        raise InputError("--quantity", "acceleration", "must be of a motion of a point mass", fault=fault)
+        error = f'"acceleration" of {robot_file.kind}'
+        raise InputError("--quantity", "acceleration", "must be of a motion of a point mass", fault=error)
     place, words = None, ""
     for axis, instant in at.items():
         place, words = nearest(result, axis, instant)  # it refuses all but t
@@ -92,9 +92,9 @@ def acceleration_set(result: Result, file: str, at: dict[str, float]) -> Acceler
         if place is None:
             place = _tightest(robot, limits, positions, motion)
             words = f"{value(result, 't', result.axes['t'][place])} (smallest margin)"
-        here = slice(place, place + 1)
-        faces = faces_of(robot, limits, positions[here])
-        margin = judged(robot, faces, faces, positions[here], motion[here])[0]
+        current = slice(place, place + 1)
+        faces = faces_of(robot, limits, positions[current])
+        margin = judged(robot, faces, faces, positions[current], motion[current])[0]
     if not np.asarray(faces.is_regular)[0]:
         raise InputError("--at", words, "an instant at which the cables span the space, or the plane of a planar robot")
     upward = np.array([*frame.signs[:2], -1.0])
@@ -120,9 +120,9 @@ def _tightest(robot: PointMassRobot, limits: Limits, positions: np.ndarray, moti
     # Return the row with the smallest margin.
     margins = []
     for first in range(0, len(positions), ROWS):
-        here, accelerations = positions[first : first + ROWS], motion[first : first + ROWS]
-        faces = faces_of(robot, limits, here)
-        margins.append(judged(robot, faces, faces, here, accelerations)[0])
+        current, accelerations = positions[first : first + ROWS], motion[first : first + ROWS]
+        faces = faces_of(robot, limits, current)
+        margins.append(judged(robot, faces, faces, current, accelerations)[0])
     return int(np.nanargmin(np.concatenate(margins)))
 
 

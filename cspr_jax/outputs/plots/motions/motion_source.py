@@ -99,16 +99,16 @@ def _check_cables(result: Result, file: str, robot_file: RobotFile, path: object
         gap = np.abs(np.linalg.norm(robot.attached - robot.base, axis=2) - length)
         row, cable = np.unravel_index(gap.argmax(), gap.shape)
         if gap[row, cable] > SAME_LENGTH * length.max():
-            fault = f"cable {cable + 1} is {length[row, cable]:.6g} m long at t = {result.axes['t'][row]:.6g} s"
-            raise ConfigError(path, f"its robot {robot_file.name} is not that of {file}, where {fault}")
+            error = f"cable {cable + 1} is {length[row, cable]:.6g} m long at t = {result.axes['t'][row]:.6g} s"
+            raise ConfigError(path, f"its robot {robot_file.name} is not that of {file}, where {error}")
 
 
 def robot_and_plan(result: Result, file: str, quantity: str) -> tuple[RobotFile, PlanFile]:
     """Robot and plan of a motion."""
     if not keeps_plan(result):
-        fault = f'"{quantity}" of a motion that keeps no robot and no plan'
+        error = f'"{quantity}" of a motion that keeps no robot and no plan'
         allowed = "must have its plan, --plan FILE.toml, or its robot, --robot, or be an HDF5 file of `cspr plan -o`"
-        raise InputError("--quantity", quantity, allowed, fault=fault)
+        raise InputError("--quantity", quantity, allowed, fault=error)
     settings, text = (str(result.attributes[name]) for name in ("robot_settings", "plan"))
     # The settings were checked when the file was read.
     robot_file = checked(RobotFile, json.loads(settings), file)

@@ -97,9 +97,9 @@ def _first_row(time: np.ndarray, start: float) -> int:
 
 
 def _draw(panel: Axes, way: PathSamples, max_acceleration: float | None) -> None:
-    least, actual, largest = way.rates.T
+    minimum, actual, largest = way.rates.T
     far = BEYOND * (np.abs(actual).max() or 1.0)
-    low, high = (np.clip(bound, -2.0 * far, 2.0 * far) for bound in (least, largest))
+    low, high = (np.clip(bound, -2.0 * far, 2.0 * far) for bound in (minimum, largest))
     panel.fill_between(way.s, low, high, color=COLOURS[5], alpha=0.3, linewidth=0.0, label="feasible")
     panel.plot(way.s, low, color=COLOURS[1], linewidth=1.3, linestyle="--", label="least feasible")
     panel.plot(way.s, high, color=COLOURS[0], linewidth=1.3, linestyle="-.", label="largest feasible")

@@ -43,7 +43,7 @@ def _extremes(values: dict[str, np.ndarray]) -> list[int]:
     counts = next((values[name] for name in ("arcs", "oscillations") if name in values), None)
     if counts is not None and "margin" in values:
         for number in np.unique(counts):
-            least = np.where(counts == number, values["margin"], np.inf)
-            if np.isfinite(least).any():
-                cells.append(int(np.argmin(least)))
+            minimum = np.where(counts == number, values["margin"], np.inf)
+            if np.isfinite(minimum).any():
+                cells.append(int(np.argmin(minimum)))
     return cells

@@ -118,13 +118,13 @@ def _paths(columns: Mapping[str, np.ndarray]) -> dict[str, Any] | None:
     # Path speeds, and for each node the words of the limit that binds behind it.
     if "path_speed" not in columns or len(columns["path_speed"]) > MOST_NODES:
         return None
-    least, largest, actual, allowed = np.asarray(columns["path_speed"]).T
+    minimum, largest, actual, allowed = np.asarray(columns["path_speed"]).T
     flags, cables = (np.asarray(columns[name]).tolist() for name in ("path_binds", "path_binding_cable"))
     words = [
         criterion_words(Verdict(flag), cable - 1 if cable else None) if flag else "nothing"
         for flag, cable in zip(flags, cables, strict=True)
     ]
-    speeds = {"least": least, "largest": largest, "actual": actual, "allowed": allowed}
+    speeds = {"least": minimum, "largest": largest, "actual": actual, "allowed": allowed}
     return {
         "s": np.round(np.asarray(columns["path_coordinate"], float), 6).tolist(),
         **{name: [_number(round(value, 6)) for value in values.tolist()] for name, values in speeds.items()},

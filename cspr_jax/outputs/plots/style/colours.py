@@ -54,32 +54,32 @@ def scale_of(data: np.ndarray, *, signed: bool = False) -> Scale:
     data = data.astype(float)  # the largest number is beyond those of single precision
     inside = data[np.abs(data) < LARGEST]
     low, high = (float(inside.min()), float(inside.max())) if inside.size else (0.0, 1.0)
-    least, most = low, high
+    minimum, maximum = low, high
     if signed:
-        most = _bulk(np.abs(inside)) if inside.size else 1.0
+        maximum = _bulk(np.abs(inside)) if inside.size else 1.0
         high = max(abs(low), abs(high)) or 1.0
-        most = most if high > STRETCH * most > 0.0 else high
-        least, low = -most, -high
+        maximum = maximum if high > STRETCH * maximum > 0.0 else high
+        minimum, low = -maximum, -high
     elif inside.size:
         upper, lower = _bulk(inside), -_bulk(-inside)
-        most = upper if high - low > STRETCH * (upper - low) > 0.0 else high
-        least = lower if most - low > STRETCH * (most - lower) > 0.0 else low
-    above, below = bool((data > most).any()), bool((data < least).any())
+        maximum = upper if high - low > STRETCH * (upper - low) > 0.0 else high
+        minimum = lower if maximum - low > STRETCH * (maximum - lower) > 0.0 else low
+    above, below = bool((data > maximum).any()), bool((data < minimum).any())
     colours = matplotlib.colormaps["PuOr_r" if signed else "cividis"].with_extremes(bad=NONE_COLOUR)
-    if most <= least:
-        most = least + (abs(least) or 1.0)
+    if maximum <= minimum:
+        maximum = minimum + (abs(minimum) or 1.0)
     extend = {(False, False): "neither", (True, False): "max", (False, True): "min"}.get((above, below), "both")
     # An infinite value has no number to show.
     ends = data[np.isfinite(data)]
-    words = [f"up to {float(ends.max()):.3g}"] if (ends > most).any() else []
-    words += [f"down to {float(ends.min()):.3g}"] if (ends < least).any() else []
-    whole = bool((inside == np.round(inside)).all())
+    words = [f"up to {float(ends.max()):.3g}"] if (ends > maximum).any() else []
+    words += [f"down to {float(ends.min()):.3g}"] if (ends < minimum).any() else []
+    full = bool((inside == np.round(inside)).all())
     return Scale(
         colours,
-        Normalize(least, most),
+        Normalize(minimum, maximum),
         extend,
         ", ".join(words),
-        whole=whole,
+        whole=full,
         missing=bool(np.isnan(data).any()),
     )
 
@@ -93,22 +93,22 @@ def _bulk(values: np.ndarray) -> float:
 def _of_counts(data: np.ndarray) -> Scale:
     # Counts from 1 on have a colour each; 0 and less stand for none.
     counts = data[data > 0]
-    least, most = (int(counts.min()), int(counts.max())) if counts.size else (1, 1)
+    minimum, maximum = (int(counts.min()), int(counts.max())) if counts.size else (1, 1)
     bulk = int(_bulk(counts)) if counts.size else 1
-    stretched = most - least + 1 > max(TOLD_APART, STRETCH * (bulk - least + 1))
-    end = max(bulk, least + TOLD_APART // 2) if stretched else most
-    number, more, none = end - least + 1, end < most, bool((data <= 0).any())
+    stretched = maximum - minimum + 1 > max(TOLD_APART, STRETCH * (bulk - minimum + 1))
+    end = max(bulk, minimum + TOLD_APART // 2) if stretched else maximum
+    number, more, none = end - minimum + 1, end < maximum, bool((data <= 0).any())
     shades = matplotlib.colormaps["viridis"](np.linspace(0.0, 1.0, number + more))
-    bounds = np.arange(least, end + 2) - 0.5
+    bounds = np.arange(minimum, end + 2) - 0.5
     step = next(step * 10**k for k in range(10) for step in (1, 2, 5) if number <= 12 * step * 10**k)
-    ticks = [float(tick) for tick in range(-(-least // step) * step, end + 1, step)] or [float(least)]
+    ticks = [float(tick) for tick in range(-(-minimum // step) * step, end + 1, step)] or [float(minimum)]
     texts = [f"{tick:.0f}" for tick in ticks]
     if none:
         bounds = np.concatenate([[min(-0.5, float(data.min()) - 0.5)], bounds])
         ticks, texts = [float(bounds[:2].mean()), *ticks], ["none", *texts]
     shown = [NONE_COLOUR, *shades[:number]] if none else list(shades[:number])
     colours = ListedColormap(shown).with_extremes(over=shades[-1])
-    beyond, extend = (f"up to {most}", "max") if more else ("", "neither")
+    beyond, extend = (f"up to {maximum}", "max") if more else ("", "neither")
     return Scale(colours, BoundaryNorm(bounds, len(shown)), extend, beyond, (ticks, texts), whole=True)
 
 

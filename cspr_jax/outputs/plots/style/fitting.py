@@ -116,8 +116,8 @@ def _fit_title(figure: Figure, room: float, *, has_title: bool, lines: int | Non
         return
     first = title.split("\n")[0]
     line = f"{first.split(':')[0]}: {doubts[0]}" if doubts and has_title else first
-    for most in range(len(line), SHORTEST, -1):
-        text.set_text(shortened(line, most))
+    for maximum in range(len(line), SHORTEST, -1):
+        text.set_text(shortened(line, maximum))
         if text.get_window_extent().width <= room:
             return
 

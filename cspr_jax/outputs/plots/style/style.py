@@ -151,9 +151,9 @@ def laid_out(figure: Figure, style: Style) -> None:
         letters = part if is_rigid else style.font_size / Style().font_size
         width, height = style.width / INCH, height * min(1.0, math.sqrt(part * letters))
     figure.set_size_inches(width, height)
-    most = math.floor(math.sqrt(LARGEST_PIXELS / (width * height)))
-    if style.dpi > most:
-        raise InputError("--dpi", style.dpi, f"at most {most} for {width * INCH:.3g}x{height * INCH:.3g} cm")
+    maximum = math.floor(math.sqrt(LARGEST_PIXELS / (width * height)))
+    if style.dpi > maximum:
+        raise InputError("--dpi", style.dpi, f"at most {maximum} for {width * INCH:.3g}x{height * INCH:.3g} cm")
     with _no_missing_letters():
         fit(figure, has_title=style.has_title, lines=1 if width * INCH < NARROW else None)
         _give_room(figure, style)
