@@ -224,8 +224,9 @@ def nearest_weights(
     """Weights of corners, which make the nearest points."""
     (first, second), (edges, s, t) = features.bodies, features.nearest_on_edges(p, q)
 
-    def spread(count: int, corners: Array, shares: list[Array]) -> Array:
-        return sum(jnp.where(jnp.arange(count) == corners[k], fraction, 0.0) for k, fraction in enumerate(shares))  # type: ignore[return-value]
+    def spread(count: int, corners: Array, fractions: list[Array]) -> Array:
+        parts = (jnp.where(jnp.arange(count) == corners[k], part, 0.0) for k, part in enumerate(fractions))
+        return sum(parts, start=jnp.zeros(count))
 
     def on_edge(count: int, edge: Array, part: Array) -> Array:
         return spread(count, edge, [1.0 - part, part])
