@@ -15,19 +15,43 @@ SOURCES = {path.relative_to(PACKAGE).as_posix(): path.read_text("utf-8") for pat
 # Words that say nothing of what they stand for, as names.
 FUNCTION_WORDS = {"found", "given", "own", "asked", "every", "some", "which", "now", "wanted", "told", "kept"}
 FUNCTION_WORDS |= {"mine", "like"}
+# Words that the field has better ones for: those of a private vocabulary, and those that could mean anything. Rows of
+# tables and of matrices keep their name, so `row` and `rows` are not among them.
+RETIRED = set(
+    """
+    apart band bands beat bend bent cocircuit cocircuits course courses curved demands eliminated fall fault gathered
+    growth here hub instant instants judge judged keys known leaf least lesser look mark marks meetings most needs
+    outcome pace place places pressures pull pulls push pushed reach room seal settle several share shares sieve size
+    slope still stops stored stretch surroundings taken telling track tracks turned way ways whirl whole
+    """.split()
+)
+# Names that users have in their programs, tables and files stay what they are.
+PUBLIC = {
+    "api/families/platform_searches.py": {"place"},
+    "api/files/imports.py": {"keys"},
+    "api/files/pictures.py": {"size"},
+    "api/files/replays.py": {"size"},
+    "config/keys/obstacles.py": {"size"},
+    "config/keys/trajectory.py": {"beat"},
+    "config/plan.py": {"least", "stretch"},
+    "outputs/volumes.py": {"least", "most"},
+    "schema/families.py": {"keys"},
+    "schema/map_kinds.py": {"needs", "stored"},
+}
 # How many there are still: to be lowered by who removes some, and never to be raised.
 ALLOWED = {"names": 7, "docstrings": 0, "comments": 0}
+ALLOWED_RETIRED = 1967
 FRAGMENT = re.compile(r"(Of|What|Where|Whether|Those)\b")
 
 
 def bound_names(tree):
-    """Names of variables, arguments and functions, where they are bound."""
+    """Names of variables, arguments, functions and classes, where they are bound."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
             yield node.id
         elif isinstance(node, ast.arg):
             yield node.arg
-        elif isinstance(node, ast.FunctionDef):
+        elif isinstance(node, ast.FunctionDef | ast.ClassDef):
             yield node.name
 
 
@@ -55,6 +79,15 @@ def test_allowances_shrink():
     }
     assert all(counts[kind] <= most for kind, most in ALLOWED.items()), counts
     assert all(counts[kind] > most - 10 for kind, most in ALLOWED.items()), f"lower the allowances to {counts}"
+
+
+def test_retired_names_disappear():
+    names = {
+        module: [name for name in bound_names(ast.parse(source)) if name.strip("_").lower() in RETIRED]
+        for module, source in SOURCES.items()
+    }
+    counts = {module: sum(name not in PUBLIC.get(module, ()) for name in bound) for module, bound in names.items()}
+    assert sum(counts.values()) <= ALLOWED_RETIRED, {module: count for module, count in counts.items() if count}
 
 
 def test_a_class_name_is_bound_once():
