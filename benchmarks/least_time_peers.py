@@ -26,7 +26,7 @@ from cspr_jax.families.paths.least_time.tightening import cell_slacks
 from cspr_jax.families.paths.least_time.timed import cell_times, timed
 from cspr_jax.motion.amplitudes import named
 from cspr_jax.motion.problem import Problem
-from cspr_jax.numerics.elementary import double_precision, leaf
+from cspr_jax.numerics.elementary import as_float64, double_precision
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.statics.kernel_axes import centred
 
@@ -45,7 +45,7 @@ def work(rng, kind, count):
     robot, reference, ranges, _ = any_motion_cases.random_robot(rng, kind)
     prepared, frame = centred(robot_of(robot))
     weight = robot["mass"] * robot["gravity"]
-    low, high = (leaf(np.full(prepared.n_cables, fraction * weight)) for fraction in TENSIONS)
+    low, high = (as_float64(np.full(prepared.n_cables, fraction * weight)) for fraction in TENSIONS)
     sections = []
     for _ in range(count):
         points = reference + 0.5 * ranges * rng.uniform(-1.0, 1.0, (6, 3))

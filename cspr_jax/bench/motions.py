@@ -14,7 +14,7 @@ from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import SelfCheckError
 from cspr_jax.motion.amplitudes import named
 from cspr_jax.motion.problem import Problem
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.verification.proved_answers import MotionProof, proof_of, proofs_of
@@ -48,7 +48,7 @@ EIGHT = Region("cogiro", (0.0, 0.0, 4.0), 1.5, 0.05, (100.0, 5000.0))
 def problem(region: Region) -> Problem:
     """Robot and limits of a region."""
     robot = centred(load_robot(region.robot))[0]
-    low, high = (leaf(np.full(robot.n_cables, value)) for value in region.tensions)
+    low, high = (as_float64(np.full(robot.n_cables, value)) for value in region.tensions)
     return Problem(robot, Limits(tension_min=low, tension_max=high), named("quintic"))
 
 

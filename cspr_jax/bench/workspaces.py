@@ -10,7 +10,7 @@ import numpy as np
 from cspr_jax.bench.timing import best
 from cspr_jax.build.robots import load_robot
 from cspr_jax.numerics.batches import in_threads, room
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.frames import IDENTITY
 from cspr_jax.robots.contacts import clearance_kernels
 from cspr_jax.robots.contacts.clearance import scene
@@ -57,7 +57,7 @@ def _poses(robot: PointMassRobot | PlatformRobot, count: int, dtype: str) -> Sam
 
 def _four_cables() -> PointMassRobot:
     spools = [[-2.0, -1.0, 0.0], [2.0, -1.0, 0.0], [2.0, 1.0, 0.0], [-2.0, 1.0, 0.0]]
-    limits = Limits(tension_min=leaf(np.full(4, 1.0)), tension_max=leaf(np.full(4, 100.0)))
+    limits = Limits(tension_min=as_float64(np.full(4, 1.0)), tension_max=as_float64(np.full(4, 100.0)))
     return point_mass_robot(spools, mass=2.0, limits=limits)
 
 
@@ -68,7 +68,7 @@ def _twelve_cables() -> PlatformRobot:
         [[x, y, z] for x in signs for y in signs for z in signs] + [[x, y, 0.0] for x in signs for y in signs]
     )
     shape = np.array([0.3, 0.2, 0.25]) * corners[:, [1, 2, 0]] * np.array([1.0, -1.0, 1.0])
-    limits = Limits(tension_min=leaf(np.full(12, 10.0)), tension_max=leaf(np.full(12, 2000.0)))
+    limits = Limits(tension_min=as_float64(np.full(12, 10.0)), tension_max=as_float64(np.full(12, 2000.0)))
     return platform_robot(3.0 * corners, shape, mass=50.0, inertia=np.eye(3), limits=limits)
 
 
@@ -98,7 +98,7 @@ def clearance_rate(dtype: str) -> float:
     corners = np.array([[x, y, z] for x in signs for y in signs for z in signs])
     robot = platform_robot(corners * [5.0, 4.0, 3.0], corners * [0.4, 0.3, 0.2], mass=1.0, inertia=np.eye(3))
     among = scene(robot, diameter=0.01)
-    of_robot = clearance_kernels.Points(*map(leaf, (among.base_points, among.platform_points, among.diameters)))
+    of_robot = clearance_kernels.Points(*map(as_float64, (among.base_points, among.platform_points, among.diameters)))
     points = jax.tree.map(lambda x: np.asarray(x, dtype), of_robot)
     size, pairs = room(PAIRS_BATCH), np.array(among.pairs, np.int32)
     all_poses = _poses(robot, 4 * size, dtype)

@@ -15,7 +15,7 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.curves.reading import pieces_of, spline_of
 from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import InputError
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.frames import IDENTITY, Frame
 from cspr_jax.numerics.linear.rotations import products
 from cspr_jax.robots.cables import AnyRobot
@@ -66,7 +66,7 @@ def source_spline(
     spline = spline_of(source.in_axes(z_axis), interpolation=interpolation, ends=ends)
     if is_platform and spline.quaternion is None:
         turning = np.zeros((len(spline.knots) - 1, 1, 4)) + np.eye(4)[0]
-        return dataclasses.replace(spline, quaternion=leaf(turning))
+        return dataclasses.replace(spline, quaternion=as_float64(turning))
     if not is_platform and spline.quaternion is not None:
         raise InputError("quaternions", None, "must be absent for a point mass", fault="orientations")
     return spline
@@ -96,7 +96,9 @@ def kept_to(pattern: str, spline: Spline, *, is_planar: bool) -> Spline:
             allowed = "must be those of the joint about which the robot turns, the same everywhere"
             raise InputError("positions", None, allowed, fault=f"they differ by {moved:.3g} m")
         position[:] = position[0, 0]
-    return dataclasses.replace(spline, position=leaf(position), quaternion=None if turning is None else leaf(turning))
+    return dataclasses.replace(
+        spline, position=as_float64(position), quaternion=None if turning is None else as_float64(turning)
+    )
 
 
 def moving_ends(source: Any, ends: str | None) -> list[str]:
@@ -127,11 +129,11 @@ def placed_inward(
     if turning is not None:
         rows = frame.turned_quaternions(np.asarray(turning)).reshape(-1, 4)
         # A product is linear in the quaternion, and so in its coefficients.
-        turning = leaf(products(rows, (reference * BACK)[None]).reshape(turning.shape))
-    moved = dataclasses.replace(spline, position=leaf(frame.inward(spline.position)), quaternion=turning)
+        turning = as_float64(products(rows, (reference * BACK)[None]).reshape(turning.shape))
+    moved = dataclasses.replace(spline, position=as_float64(frame.inward(spline.position)), quaternion=turning)
     if centre is None or not np.any(centre) or turning is None:
         return moved
-    return dataclasses.replace(moved, offset=leaf(_rotation(reference).apply(frame.rotated(centre))))
+    return dataclasses.replace(moved, offset=as_float64(_rotation(reference).apply(frame.rotated(centre))))
 
 
 def centre_from(robot_file: RobotFile, point: str | None) -> Float[np.ndarray, "3"] | None:

@@ -17,7 +17,7 @@ from scipy.interpolate import BSpline, CubicSpline, PPoly, make_interp_spline
 from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import InputError
 from cspr_jax.numerics.bounds.piecewise_bounds import bernstein_of_powers
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 
 if TYPE_CHECKING:
     from jaxtyping import Float
@@ -60,7 +60,7 @@ def interpolated(
         degree = 3 if accelerations is None else 5
         table = hermite(since, [positions, velocities] + ([] if accelerations is None else [accelerations]))
     turning = None if quaternions is None else _spline(since, continuous(np.asarray(quaternions, float)), degree, ends)
-    curve = Spline(leaf(since), leaf(table), None if turning is None else leaf(turning))
+    curve = Spline(as_float64(since), as_float64(table), None if turning is None else as_float64(turning))
     return dataclasses.replace(curve, interpolation=interpolation, ends="" if interpolation == "hermite" else ends)
 
 

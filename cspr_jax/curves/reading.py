@@ -19,7 +19,7 @@ from cspr_jax.curves.interpolation import check_order, check_steps, continuous, 
 from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import InputError
 from cspr_jax.numerics.bounds.piecewise_bounds import bernstein_of_powers
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear import rotations
 
 # Shares of the largest coefficient by which pieces may miss each other, and by which windows may.
@@ -101,8 +101,8 @@ def window_splines(
         first, last = (int(np.searchsorted(knots, since[row])) for row in (window.first, window.last))
         if first == last:
             continue
-        quaternion = None if full.quaternion is None else leaf(np.asarray(full.quaternion)[first:last])
-        part = leaf(knots[first : last + 1] - knots[first]), leaf(np.asarray(full.position)[first:last])
+        quaternion = None if full.quaternion is None else as_float64(np.asarray(full.quaternion)[first:last])
+        part = as_float64(knots[first : last + 1] - knots[first]), as_float64(np.asarray(full.position)[first:last])
         spline = dataclasses.replace(full, knots=part[0], position=part[1], quaternion=quaternion)
         if before is not None and interpolation != "hermite":
             _check_window(before, spline)
@@ -122,8 +122,8 @@ def _of_pieces(pieces: MotionPieces, interpolation: str | None, ends: str | None
     for name, table in (("position", pieces.position), ("quaternion", quaternion)):
         if table is not None:
             _check_joins(name, table, width, pieces.knots - pieces.knots[0])
-    since = leaf(pieces.knots - pieces.knots[0])
-    return Spline(since, leaf(pieces.position), None if quaternion is None else leaf(quaternion))
+    since = as_float64(pieces.knots - pieces.knots[0])
+    return Spline(since, as_float64(pieces.position), None if quaternion is None else as_float64(quaternion))
 
 
 def _check_joins(name: str, table: np.ndarray, width: np.ndarray, knots: np.ndarray) -> None:
@@ -163,8 +163,8 @@ def _of_rates(table: MotionTable) -> Spline:
         plain = _without_joins(table)
         rotated = interpolated(plain.times, plain.positions, plain.quaternions, interpolation="cubic")
         quaternion = np.asarray(rotated.quaternion)
-    curve = Spline(leaf(knots), leaf(hermite(since, derivatives)), None, interpolation="hermite")
-    return curve if quaternion is None else dataclasses.replace(curve, quaternion=leaf(quaternion))
+    curve = Spline(as_float64(knots), as_float64(hermite(since, derivatives)), None, interpolation="hermite")
+    return curve if quaternion is None else dataclasses.replace(curve, quaternion=as_float64(quaternion))
 
 
 def _pure(vectors: np.ndarray) -> np.ndarray:

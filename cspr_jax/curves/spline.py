@@ -13,7 +13,7 @@ from jax import Array
 
 from cspr_jax.curves.blocks import spline_bounds
 from cspr_jax.numerics.bounds.affine_bounds import cross, rotated
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear import rotations
 from cspr_jax.robots.bounds.state_bounds import StateBounds
 from cspr_jax.robots.model.state import State
@@ -46,7 +46,7 @@ class Spline:
     knots: Array
     position: Array
     quaternion: Array | None
-    z0: Any = dataclasses.field(default_factory=lambda: leaf(1.0))
+    z0: Any = dataclasses.field(default_factory=lambda: as_float64(1.0))
     offset: Array | None = None
     interpolation: str = "pieces"
     ends: str = ""
@@ -73,7 +73,7 @@ class Spline:
             return self
         tables = {name: getattr(self, name) for name in ("knots", "position", "quaternion")}
         longer: dict[str, Any] = {
-            name: leaf(np.concatenate([np.repeat(np.asarray(table)[:1], more, axis=0), table]))
+            name: as_float64(np.concatenate([np.repeat(np.asarray(table)[:1], more, axis=0), table]))
             for name, table in tables.items()
             if table is not None
         }
@@ -81,7 +81,7 @@ class Spline:
 
     def stretched(self, factor: float) -> "Spline":
         """The motion run more slowly, or faster."""
-        return dataclasses.replace(self, knots=leaf(np.asarray(self.knots) * factor))
+        return dataclasses.replace(self, knots=as_float64(np.asarray(self.knots) * factor))
 
     def breaks(self) -> Array:
         """Breaks; see `Motion.breaks`."""
@@ -131,7 +131,7 @@ def part(spline: Spline, first: int, last: int) -> Spline:
     knots = spline.knots[first : last + 1]
     turning = None if spline.quaternion is None else spline.quaternion[first:last]
     return dataclasses.replace(
-        spline, knots=leaf(knots - knots[0]), position=spline.position[first:last], quaternion=turning
+        spline, knots=as_float64(knots - knots[0]), position=spline.position[first:last], quaternion=turning
     )
 
 
@@ -140,11 +140,11 @@ def chained(splines: Sequence[Spline]) -> Spline:
     ends = np.concatenate([[0.0], np.cumsum([spline.knots[-1] for spline in splines])])
     knots = [spline.knots[:-1] + start for spline, start in zip(splines, ends[:-1], strict=True)]
     tables: dict[str, Any] = {
-        name: leaf(np.concatenate([getattr(spline, name) for spline in splines]))
+        name: as_float64(np.concatenate([getattr(spline, name) for spline in splines]))
         for name in ("position", "quaternion")
         if getattr(splines[0], name) is not None
     }
-    return dataclasses.replace(splines[0], knots=leaf(np.append(np.concatenate(knots), ends[-1])), **tables)
+    return dataclasses.replace(splines[0], knots=as_float64(np.append(np.concatenate(knots), ends[-1])), **tables)
 
 
 def piece_state(

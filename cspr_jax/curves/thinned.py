@@ -7,7 +7,7 @@ import numpy as np
 
 from cspr_jax.curves.interpolation import hermite
 from cspr_jax.curves.spline import Spline
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 
 JUMP = 1e-6  # share of the largest acceleration by which one jumps, but for rounding, where legs meet
 
@@ -24,10 +24,10 @@ def thinned(spline: Spline, first: int) -> Spline:
     rows = np.flatnonzero(is_kept)
     times = np.repeat(knots[rows], 2)[1:-1]
     fewer: dict[str, Any] = {
-        name: leaf(hermite(times, [_between(starts[rows[:-1]], ends[rows[1:] - 1]) for starts, ends in pairs]))
+        name: as_float64(hermite(times, [_between(starts[rows[:-1]], ends[rows[1:] - 1]) for starts, ends in pairs]))
         for name, pairs in sides.items()
     }
-    return dataclasses.replace(spline, knots=leaf(knots[rows]), **fewer)
+    return dataclasses.replace(spline, knots=as_float64(knots[rows]), **fewer)
 
 
 def _sides(table: np.ndarray, width: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:

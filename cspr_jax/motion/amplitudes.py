@@ -18,7 +18,7 @@ from jax import Array
 
 from cspr_jax.errors import InputError
 from cspr_jax.errors.suggestions import one_of
-from cspr_jax.numerics.elementary import leaf, polynomial
+from cspr_jax.numerics.elementary import as_float64, polynomial
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
 if TYPE_CHECKING:
@@ -109,7 +109,13 @@ def from_pieces(
             extremes[j, i] = _extremes(curve.deriv(j) if j else curve, ends[i] - origin, ends[i + 1] - origin)
     largest = np.abs(extremes).max((1, 2)) * (1.0 + 1e-9)
     return Amplitude(
-        leaf(knots), leaf(origins), leaf(table), leaf(largest), leaf(extremes[0].min()), leaf(extremes[0].max()), name
+        as_float64(knots),
+        as_float64(origins),
+        as_float64(table),
+        as_float64(largest),
+        as_float64(extremes[0].min()),
+        as_float64(extremes[0].max()),
+        name,
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.errors import InputError
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.frames import frame_of
 from cspr_jax.robots.model.limits import NO_LIMITS, Limits, Uncertainty
 from cspr_jax.robots.model.parallel_pairs import ParallelPairs
@@ -32,7 +32,7 @@ def limits_of(
     if low is not None and high is not None and not (low < high).all():
         raise InputError(f"{at}tension_min", low.tolist(), "below tension_max for every cable")
     if values["floor"] is not None:
-        values["floor"] = leaf(frame_of(robot.base_points, robot.z_axis).depth(values["floor"]))
+        values["floor"] = as_float64(frame_of(robot.base_points, robot.z_axis).depth(values["floor"]))
     values |= _narrowed(values, limits.get("tension_margin"), n_cables, at)
     uncertain = limits.get("uncertainty")
     uncertain = defaults.get("uncertainty") if uncertain is None else uncertain
@@ -48,7 +48,7 @@ def _narrowed(values: Mapping[str, Any], margin: float | None, n_cables: int, at
     high = None if high is None else high - margin
     if high is not None and not (low < high).all():
         raise InputError(f"{at}tension_margin", margin, "less than half of the range of tensions of every cable")
-    return {"tension_min": leaf(low), "tension_max": None if high is None else leaf(high)}
+    return {"tension_min": as_float64(low), "tension_max": None if high is None else as_float64(high)}
 
 
 def _uncertainty(uncertainty: Any, at: str) -> Uncertainty:
@@ -58,7 +58,7 @@ def _uncertainty(uncertainty: Any, at: str) -> Uncertainty:
         number = numbers(f"{at}{row.name}", value, row.allowed)
         if number.shape != () or not row.least <= number <= row.largest:
             raise InputError(f"{at}{row.name}", value, row.allowed)
-        values[row.name] = leaf(number)
+        values[row.name] = as_float64(number)
     return Uncertainty(**values)
 
 
@@ -111,13 +111,13 @@ def _limit(row: Limit, value: Any, n_cables: int, at: str) -> Array:
         raise InputError(f"{at}{row.name}", value, allowed)
     if not row.is_height and ((values > 0.0) & (values < SMALLEST)).any():
         raise InputError(f"{at}{row.name}", value, f"{allowed}, at least {SMALLEST:g}")
-    return leaf(np.broadcast_to(values, (n_cables,) if row.per_cable else ()))
+    return as_float64(np.broadcast_to(values, (n_cables,) if row.per_cable else ()))
 
 
 def pair_limits(limits: Limits, pairs: ParallelPairs) -> Limits:
     """Limits of the three cables that stand for pairs of six."""
     values: dict[str, Any] = {
-        row.name: leaf(pairs.bound(value, is_tension=row.quantity == "tension", is_least=row.sense == "least"))
+        row.name: as_float64(pairs.bound(value, is_tension=row.quantity == "tension", is_least=row.sense == "least"))
         for row in LIMITS
         if row.per_cable and (value := getattr(limits, row.name)) is not None
     }

@@ -102,7 +102,7 @@ def double_precision() -> Iterator[None]:
         yield
 
 
-def leaf(value) -> Array:
+def as_float64(value) -> Array:
     """A float64 NumPy array, as a leaf of a pytree that compiled functions take."""
     return value if isinstance(value, jax.core.Tracer) else cast(Array, np.asarray(value, float))
 

@@ -18,7 +18,7 @@ from cspr_jax.families.paths.least_time.least_time import least_time_motion
 from cspr_jax.motion.amplitudes import named
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.bounds.piecewise_bounds import bernstein_of_powers
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.published.chapter_1 import Key
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.point_mass import point_mass_robot
@@ -46,7 +46,7 @@ def least_time(cells: int = CELLS) -> dict[Key, float | None]:
     problem = Problem(robot, _limits(keys["limits"], robot.n_cables), named("quintic"))
     segments = np.arange(float(len(keys["points"])))
     powers = np.moveaxis(CubicSpline(segments, keys["points"]).c[::-1], 0, 1)
-    curve = Spline(leaf(segments), leaf(frame.inward(bernstein_of_powers(powers))), None)
+    curve = Spline(as_float64(segments), as_float64(frame.inward(bernstein_of_powers(powers))), None)
     section = Section(curve, np.full(len(powers), np.inf), segments)
     minimum = least_time_motion(problem, section, SectionSettings(cells, 0.0))
     is_proved = proved_answers(problem, [minimum.motion], None).verdict[0] == 0
@@ -58,12 +58,12 @@ def least_time(cells: int = CELLS) -> dict[Key, float | None]:
 def _limits(keys: dict[str, float], n_cables: int) -> Limits:
     # The effector has 1 kg, so that tensions over the mass are tensions.
     def of_cables(name: str):
-        return leaf(np.full(n_cables, keys[name]))
+        return as_float64(np.full(n_cables, keys[name]))
 
     return Limits(
         tension_min=of_cables("tension_min_per_mass"),
         tension_max=of_cables("tension_max_per_mass"),
         cable_speed_max=of_cables("cable_speed_max"),
         cable_acceleration_max=of_cables("cable_acceleration_max"),
-        speed_max=leaf(keys["speed_max"]),
+        speed_max=as_float64(keys["speed_max"]),
     )

@@ -13,7 +13,7 @@ import jax
 import numpy as np
 
 from cspr_jax.numerics.batches import in_batches
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.published.chapter_1 import Key
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.platform import platform_robot
@@ -83,7 +83,7 @@ def _conditions() -> tuple[Inside, Inside]:
     # The conditions of the closed form and of all tensions. Without a wrench mass and inertia do not matter.
     robot, frame = centred(platform_robot(BASE, PLATFORM, mass=1.0, inertia=np.eye(3), z_axis="up"))
     wrenches = required_wrenches(robot, frame, points=np.zeros((1, 6)))
-    demand = requirement(robot, FEASIBLE, Limits(tension_min=leaf(LOW), tension_max=leaf(HIGH)), wrenches)
+    demand = requirement(robot, FEASIBLE, Limits(tension_min=as_float64(LOW), tension_max=as_float64(HIGH)), wrenches)
     search, upright = WorkspaceSearch(robot, demand), frame.turned_quaternions(np.array([[1.0, 0.0, 0.0, 0.0]]))
     rule = jax.vmap(lambda matrix: closed_form(matrix, np.zeros(6), LOW, HIGH).is_within)
 

@@ -12,7 +12,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.errors import InputError
-from cspr_jax.numerics.elementary import leaf, solved
+from cspr_jax.numerics.elementary import as_float64, solved
 from cspr_jax.robots.model.limits import NO_LIMITS, Limits
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot
@@ -51,7 +51,7 @@ def with_cables(robot: RobotKind, *, cable_diameter=None, pulley_radius=None, pu
     if cable_diameter is not None:
         if not 0.0 <= cable_diameter < np.inf:
             raise InputError("cable_diameter", cable_diameter, "a number >= 0, in m")
-        changes["cable_diameter"] = leaf(cable_diameter)
+        changes["cable_diameter"] = as_float64(cable_diameter)
     if pulley_radius is not None:
         pulleys = pulleys_of(pulley_radius, pulley_axes, robot.n_cables, robot.z_axis)
         if PATTERNS[robot.pattern].is_planar and np.asarray(pulleys.axes)[:, 1].any():

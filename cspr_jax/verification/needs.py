@@ -13,7 +13,7 @@ from cspr_jax.motion.limits import limits_set, scales, slack, values
 from cspr_jax.motion.motion import Motion, common_shape, sample_times
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.search.minima import narrowed_places
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.contacts.interference import gaps
@@ -86,7 +86,7 @@ def _with_tensions(robot: AnyRobot, limits: Limits) -> Limits:
         return dataclasses.replace(limits, tension_min=None, tension_max=None)
     if limits.tension_min is not None:
         return limits
-    return dataclasses.replace(limits, tension_min=leaf(np.zeros(robot.n_cables)))
+    return dataclasses.replace(limits, tension_min=as_float64(np.zeros(robot.n_cables)))
 
 
 def _pairs(robot: AnyRobot) -> tuple[tuple[int, int], ...]:

@@ -16,7 +16,7 @@ from jax import Array
 
 from cspr_jax.errors import InputError
 from cspr_jax.numerics.batches import in_batches, in_parts
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.frames import IDENTITY
 from cspr_jax.numerics.tolerances import BOUNDARY, FORMULAS_UNDECIDED, TOUCHED
 from cspr_jax.robots.cables import AnyRobot
@@ -221,8 +221,12 @@ class WorkspaceSearch:
 
         options = {"measure": self._measure, "is_bounded": bool(np.isfinite(self.requirement.high).all())}
         robot, ordered = cast(self.robot), list(self._order) if by_null_space else slice(None)
-        limits = leaf(self.requirement.low[ordered]), leaf(self.requirement.high[ordered]), leaf(self._normals_unit)
-        tension_limits, length, fixed = cast((kernels.TensionLimits(*limits), leaf(self._length), self._fixed))
+        limits = (
+            as_float64(self.requirement.low[ordered]),
+            as_float64(self.requirement.high[ordered]),
+            as_float64(self._normals_unit),
+        )
+        tension_limits, length, fixed = cast((kernels.TensionLimits(*limits), as_float64(self._length), self._fixed))
         choices = self._relations if by_null_space else self._choices
         choices = choices._replace(counts=cast(choices.counts))
 
@@ -277,9 +281,11 @@ class WorkspaceSearch:
     def _fixed(self) -> Wrenches:
         # Return the required wrenches that do not depend on the pose, as that of a body on a joint does.
         required = self._wrenches
-        points = [] if required.points is None else [[leaf(x) for x in point] for point in required.points]
+        points = [] if required.points is None else [[as_float64(x) for x in point] for point in required.points]
         return Wrenches(
-            points, None if required.box is None else leaf(required.box), [leaf(x) for x in required.ellipsoids]
+            points,
+            None if required.box is None else as_float64(required.box),
+            [as_float64(x) for x in required.ellipsoids],
         )
 
     def _touching(self, poses: Poses, margin: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 
 from cspr_jax.errors import InputError
 from cspr_jax.numerics.batches import in_batches
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.frames import IDENTITY
 from cspr_jax.numerics.linear.rotations import matrix
 from cspr_jax.robots.model.parallel_pairs import ParallelPairs, parallel_pairs
@@ -73,7 +73,11 @@ class SensitivitySearch:
         if quaternions is None and pairs is not None:
             points = np.asarray(robot.platform_points)
             first, second = points[pairs.cables[:, 0]], points[pairs.cables[:, 1]]
-            geometry = (leaf(pairs.exit_points), leaf(second - first), leaf(np.sqrt((points**2).sum(1).mean())))
+            geometry = (
+                as_float64(pairs.exit_points),
+                as_float64(second - first),
+                as_float64(np.sqrt((points**2).sum(1).mean())),
+            )
             return in_batches(partial(_of_pairs, geometry), positions, size=BATCH)
         quaternions = np.tile(IDENTITY, (len(positions), 1)) if quaternions is None else quaternions
         return in_batches(partial(_of_platform, robot), (positions, quaternions), size=BATCH)

@@ -16,7 +16,7 @@ from cspr_jax.families.ellipses.rotation import Rotation, turn_between
 from cspr_jax.families.ellipses.rotation_frequencies import rotation_frequencies
 from cspr_jax.motion.amplitudes import named
 from cspr_jax.motion.problem import Problem
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear import rotations
 from cspr_jax.robots.model.limits import NO_LIMITS
 from cspr_jax.robots.statics.kernel_axes import prepared
@@ -34,12 +34,16 @@ def motion():
     rng = np.random.default_rng(7)
 
     def ellipse():
-        return Ellipse(*(leaf(rng.normal(0.0, 0.5, 3)) for _ in range(3)))
+        return Ellipse(*(as_float64(rng.normal(0.0, 0.5, 3)) for _ in range(3)))
 
     law = with_turns(named("quintic"), 0.6)
     turn = turn_between(unit(rng, 4), unit(rng, 4))
-    rotation = Rotation(leaf(unit(rng, 4)), turn, leaf(unit(rng, 3)), leaf([0.1, 0.3]), leaf([0.4, -0.2]))
-    return EllipseMotion(ellipse(), ellipse(), leaf([2.0, 1.5]), leaf(0.3), law, integral(law), leaf(TIME), rotation)
+    rotation = Rotation(
+        as_float64(unit(rng, 4)), turn, as_float64(unit(rng, 3)), as_float64([0.1, 0.3]), as_float64([0.4, -0.2])
+    )
+    return EllipseMotion(
+        ellipse(), ellipse(), as_float64([2.0, 1.5]), as_float64(0.3), law, integral(law), as_float64(TIME), rotation
+    )
 
 
 def test_rates_are_derivatives(motion):
@@ -107,7 +111,7 @@ def test_rotation_at_a_natural_frequency_needs_no_other_tensions():
     robot, _ = prepared(cspr_jax.load_robot("laval-mssm"))
     rng = np.random.default_rng(5)
     inertia = np.diag([0.004, 0.005, 0.008])
-    robot = dataclasses.replace(robot, inertia=leaf(inertia))
+    robot = dataclasses.replace(robot, inertia=as_float64(inertia))
     problem, place = Problem(robot, NO_LIMITS, named("quintic")), np.array([0.05, -0.1, 0.9])
     rotated = np.asarray(rotations.matrix(jnp.asarray(unit(rng, 4) * 0.05 + np.array([0.95, 0.0, 0.0, 0.0]))))
     rotated = np.linalg.qr(rotated)[0] * np.sign(np.diag(np.linalg.qr(rotated)[1]))

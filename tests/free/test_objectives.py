@@ -12,7 +12,7 @@ from cspr_jax.families.free.search import interior_point
 from cspr_jax.families.free.search.newton import newton_step
 from cspr_jax.motion.amplitudes import named
 from cspr_jax.motion.problem import Problem
-from cspr_jax.numerics.elementary import double_precision, leaf
+from cspr_jax.numerics.elementary import as_float64, double_precision
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.point_mass import guided_robot
 from cspr_jax.robots.statics.kernel_axes import centred
@@ -39,7 +39,7 @@ def test_energy_of_a_guided_weight(monkeypatch):
     mass, gravity, way = 2.0, 9.81, 0.3
     with double_precision():
         robot, frame = centred(guided_robot([[0.0, 0.0, 0.0], [0.0, 0.0, 2.0]], mass=mass, gravity=gravity))
-        push = leaf(np.full(2, 9.0 * mass * gravity))
+        push = as_float64(np.full(2, 9.0 * mass * gravity))
         problem = Problem(robot, Limits(tension_min=-push, tension_max=push), named("A1"))
         places = frame.inward(np.array([[0.0, 0.0, 0.6], [0.0, 0.0, 0.6 + way]]))
         poses = FreePoses(places, None, np.zeros((2, 3)), np.full((2, 3), np.nan), 1.0)

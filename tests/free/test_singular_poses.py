@@ -16,7 +16,7 @@ from cspr_jax.families.free.search.derivatives import instant_values, residuals
 from cspr_jax.families.free.search.determinants import determinant, unit_wrenches, with_derivatives
 from cspr_jax.motion.amplitudes import named
 from cspr_jax.motion.problem import Problem
-from cspr_jax.numerics.elementary import double_precision, leaf
+from cspr_jax.numerics.elementary import as_float64, double_precision
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.statics.wrench_balance import at_rest
 
@@ -52,7 +52,7 @@ def robot_of(robot, pattern="3R3T"):
 
 
 def problem_of(robot, tension=60.0):
-    return Problem(ours(robot), Limits(tension_max=leaf(np.full(6, tension))), named("A1"))
+    return Problem(ours(robot), Limits(tension_max=as_float64(np.full(6, tension))), named("A1"))
 
 
 def expected(robot, position, rotation):
@@ -72,18 +72,18 @@ def test_determinant_is_that_of_the_oracle():
             position = rng.uniform([-0.4, -0.4, 0.8], [0.4, 0.4, 1.8])
             turn = oracle.matrix(rng.normal(size=4))
             turn, _ = np.linalg.qr(turn)
-            here = float(determinant(prepared, at_rest(leaf(position), leaf(turn))))
+            here = float(determinant(prepared, at_rest(as_float64(position), as_float64(turn))))
             assert here == pytest.approx(expected(robot, position, turn), rel=1e-9)
 
 
 def test_second_derivatives_at_a_singular_pose_are_numbers():
     """All cables are vertical: the matrix has rank 3, and cofactors of the whole vanish."""
-    robot, still = general(), leaf(np.eye(3))
+    robot, still = general(), as_float64(np.eye(3))
     robot = oracle.Robot(robot.platform * [1.0, 1.0, 0.0], robot.platform, robot.mass, robot.inertia)
     with double_precision():
         prepared = ours(robot)
         regular = with_derivatives(
-            lambda p: unit_wrenches(prepared, at_rest(p, still)), leaf(np.array([0.0, 0.0, 1.4]))
+            lambda p: unit_wrenches(prepared, at_rest(p, still)), as_float64(np.array([0.0, 0.0, 1.4]))
         )
     assert abs(float(regular.value)) < 1e-12
     assert all(np.isfinite(part).all() for part in regular)
@@ -105,7 +105,7 @@ def test_derivatives_are_finite_differences(pattern, longest):
     tensions, reference = rng.uniform(0.1, 0.5, (1, d)), np.array([[1.0, 0.0, 0.0, 0.0]])
 
     with double_precision():
-        problem = Problem(robot_of(robot, pattern), Limits(tension_max=leaf(np.full(d, 60.0))), named("A1"))
+        problem = Problem(robot_of(robot, pattern), Limits(tension_max=as_float64(np.full(d, 60.0))), named("A1"))
         count = residuals(problem.robot, problem.limits, longest, reference, place, np.array([0.8]), tensions).shape[1]
         multipliers = rng.normal(size=(1, count))
 
@@ -133,7 +133,7 @@ def at_place(problem, place):
         quaternion, position = np.array([1.0, 0.0, place[2], 0.0]), np.array([place[0], 0.0, place[1]])
     turn = oracle.matrix(quaternion / np.linalg.norm(quaternion))
     with double_precision():
-        return float(determinant(problem.robot, at_rest(leaf(position), leaf(turn))))
+        return float(determinant(problem.robot, at_rest(as_float64(position), as_float64(turn))))
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -11,7 +11,7 @@ from cspr_jax.curves.spline import Spline
 from cspr_jax.families.free.search.time_bounds import least_time, time_bounds
 from cspr_jax.motion.amplitudes import named
 from cspr_jax.motion.problem import Problem
-from cspr_jax.numerics.elementary import double_precision, leaf
+from cspr_jax.numerics.elementary import as_float64, double_precision
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.statics.kernel_axes import centred
 
@@ -52,9 +52,9 @@ def test_spools_that_pull_down():
     points = [[1.0, 0.0, 0.0], [-0.5, 0.8, 0.0], [-0.5, -0.8, 3.0]]
     with double_precision():
         robot, _ = centred(cspr_jax.point_mass(points, mass=1.0, name="slanted"))
-        problem = Problem(robot, Limits(tension_max=leaf(np.full(3, 100.0))), named("A1"))
+        problem = Problem(robot, Limits(tension_max=as_float64(np.full(3, 100.0))), named("A1"))
         places = np.array([[0.0, 0.0, 2.0 + 0.2 * k] for k in range(6)])
-        fall = Spline(leaf(np.array([0.0, 1.0])), leaf(places[[[0, 0, 0, 5, 5, 5]]]), None)
+        fall = Spline(as_float64(np.array([0.0, 1.0])), as_float64(places[[[0, 0, 0, 5, 5, 5]]]), None)
         (bound,) = time_bounds(problem, [fall])
     assert bound <= float(least_time(np.array(1.0), 300.0 + 9.81, 300.0 - 9.81, np.inf))
 

@@ -18,7 +18,7 @@ from cspr_jax.families.swings.transitions.transition import transition
 from cspr_jax.motion import amplitudes
 from cspr_jax.motion.motion import Backwards
 from cspr_jax.motion.platform_kind import PlatformMotionKind
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.statics.kernel_axes import centred
 
 # A polynomial of a user, whose end bends; it serves transitions alone.
@@ -35,31 +35,31 @@ def float64():
 
 def line(law, rng):
     law = s_curve(rng.uniform(0.2, 0.8)) if law == "s-curve" else fixed_law(law)
-    return TimedLine(rng.normal(size=3), rng.normal(size=3), law, leaf(rng.uniform(0.5, 5.0)))
+    return TimedLine(rng.normal(size=3), rng.normal(size=3), law, as_float64(rng.uniform(0.5, 5.0)))
 
 
 def curve(rng):
-    return Bezier(*rng.normal(size=(3, 3)), leaf(rng.uniform(0.5, 5.0)), leaf(1.0))
+    return Bezier(*rng.normal(size=(3, 3)), as_float64(rng.uniform(0.5, 5.0)), as_float64(1.0))
 
 
 def swing(amplitude, rng):
     robot = centred(cspr_jax.load_robot("prototype"))[0]
     places, arcs = rng.uniform([-0.3, -0.3, 0.7], [0.3, 0.3, 1.3], (2, 3)), int(rng.integers(2, 13))
-    segment = hypocycloid.segment(robot, *places, leaf(0.8), odd=np.asarray(arcs % 2 == 1))
-    return Hypocycloid(segment, amplitude, leaf(arcs))
+    segment = hypocycloid.segment(robot, *places, as_float64(0.8), odd=np.asarray(arcs % 2 == 1))
+    return Hypocycloid(segment, amplitude, as_float64(arcs))
 
 
 def from_rest(rng):
     robot = centred(cspr_jax.load_robot("prototype"))[0]
-    segment = transition(robot, BENT, rng.uniform([-0.3, -0.3, 0.7], [0.3, 0.3, 1.3]), leaf(0.8))
-    return Backwards(Hypocycloid(segment, BENT, leaf(2 * rng.integers(1, 6))))
+    segment = transition(robot, BENT, rng.uniform([-0.3, -0.3, 0.7], [0.3, 0.3, 1.3]), as_float64(0.8))
+    return Backwards(Hypocycloid(segment, BENT, as_float64(2 * rng.integers(1, 6))))
 
 
 def pose(kind, amplitude, rng):
     arcs = int(rng.integers(2, 13))
     ends = random_pose(rng), random_pose(rng)
     segment = made(ours(MSSM), *ends, Z0, tuple(rng.uniform(-6.0, 1.0, 2)), arcs)
-    return PlatformMotion(segment, amplitude, leaf(arcs), kind)
+    return PlatformMotion(segment, amplitude, as_float64(arcs), kind)
 
 
 CASES = {

@@ -16,7 +16,7 @@ from cspr_jax.families.swings.proof import verdicts as swing_proof
 from cspr_jax.motion import amplitudes
 from cspr_jax.motion.motion import Backwards
 from cspr_jax.motion.problem import Problem
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots import cables
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.statics.kernel_axes import centred
@@ -51,7 +51,7 @@ def swings(problem: Problem, seed: int):
     parities, _ = segments_between(problem, starts, ends, np.full(COUNT, 0.75))
     segments = pick(parities, np.arange(COUNT), arcs)
     motions = [
-        Hypocycloid(jax.tree.map(lambda x, i=i: np.asarray(x)[i], segments), problem.amplitude, leaf(arcs[i]))
+        Hypocycloid(jax.tree.map(lambda x, i=i: np.asarray(x)[i], segments), problem.amplitude, as_float64(arcs[i]))
         for i in range(COUNT)
     ]
     return segments, arcs, motions
@@ -97,7 +97,7 @@ def test_platforms_on_six_cables_get_the_verdict_of_their_own_proof():
         for p in arcs.tolist()
     ]
     checks = checker.check(stacked(segments), arcs)
-    motions = [PlatformMotion(*each) for each in zip(segments, [EFFECTIVE] * COUNT, map(leaf, arcs), strict=True)]
+    motions = [PlatformMotion(*each) for each in zip(segments, [EFFECTIVE] * COUNT, map(as_float64, arcs), strict=True)]
     problem = Problem(checker.problem.robot, Limits(), EFFECTIVE)
     answers = proved_answers(problem, motions)
     is_taut = (checks.slack[:, :2] > 0.0).all(1)
@@ -140,5 +140,5 @@ def test_one_open_criterion_leaves_a_motion_undecided():
 def test_no_duration_is_no_motion():
     problem = problem_of()
     motion = swings(problem, 5)[2][0]
-    still = dataclasses.replace(motion, arcs=leaf(np.nan))
+    still = dataclasses.replace(motion, arcs=as_float64(np.nan))
     assert proved.proved(problem, still).verdict == Verdict.NOT_FINITE.value

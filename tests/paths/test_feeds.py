@@ -9,7 +9,7 @@ import cspr_jax
 from cspr_jax.curves.spline import Spline
 from cspr_jax.motion.amplitudes import named
 from cspr_jax.motion.problem import Problem
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.outputs.path_lines import path_lines
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.verification.feeds import feed_proof
@@ -102,7 +102,9 @@ def law() -> Spline:
         pieces.append(np.array([row[0] for row in rows]))
         rest = np.array([row[-1] for row in rows])[::-1]
     way = np.array([0.6, 0.0, -0.8])
-    return Spline(leaf(KNOTS), leaf(np.array([0.0, 0.0, 1.2]) + LENGTH * np.stack(pieces)[..., None] * way), None)
+    return Spline(
+        as_float64(KNOTS), as_float64(np.array([0.0, 0.0, 1.2]) + LENGTH * np.stack(pieces)[..., None] * way), None
+    )
 
 
 def speed_at(t):

@@ -15,7 +15,7 @@ from cspr_jax.families.paths.least_time.timed import timed
 from cspr_jax.motion.amplitudes import named
 from cspr_jax.motion.motion import Placed
 from cspr_jax.motion.problem import Problem
-from cspr_jax.numerics.elementary import double_precision, leaf
+from cspr_jax.numerics.elementary import as_float64, double_precision
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.statics.kernel_axes import centred
 
@@ -42,7 +42,7 @@ def test_bounds_over_cells_hold_the_smallest_slacks(kind):
         "cable_speed_max": 0.6 * pace * ones,
         "cable_acceleration_max": 0.5 * 9.81 * ones,
     }
-    problem = Problem(prepared, Limits(**{name: leaf(value) for name, value in values.items()}), named("A1"))
+    problem = Problem(prepared, Limits(**{name: as_float64(value) for name, value in values.items()}), named("A1"))
     points = [reference + 0.5 * ranges * rng.uniform(-1.0, 1.0, (5, 3)) for _ in range(2)]
     with double_precision():
         sections = [section_of(path_rows.through(each), frame) for each in points]

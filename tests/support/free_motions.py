@@ -11,7 +11,7 @@ from cspr_jax.families.free.poses import FreePoses
 from cspr_jax.families.free.problem import FreeSettings
 from cspr_jax.motion.amplitudes import named
 from cspr_jax.motion.problem import Problem
-from cspr_jax.numerics.elementary import double_precision, leaf
+from cspr_jax.numerics.elementary import as_float64, double_precision
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.statics.kernel_axes import centred
 from support.least_time import robot_of
@@ -49,7 +49,7 @@ class Judged:
 def problem_of(robot, limits):
     """The problem of a robot of the reference, with its limits (a floor from the spools), and the frame of its axes."""
     prepared, frame = centred(robot_of(robot))
-    values = {name: value if name == "uncertainty" else leaf(value) for name, value in limits.items()}
+    values = {name: value if name == "uncertainty" else as_float64(value) for name, value in limits.items()}
     return Problem(prepared, Limits(**values), named("A1")), frame
 
 

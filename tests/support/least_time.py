@@ -15,7 +15,7 @@ from cspr_jax.motion.amplitudes import named
 from cspr_jax.motion.motion import Placed
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.bounds.piecewise_bounds import bernstein_of_powers
-from cspr_jax.numerics.elementary import double_precision, leaf
+from cspr_jax.numerics.elementary import as_float64, double_precision
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.schema.verdicts import Verdict
@@ -53,7 +53,9 @@ def solve(robot, path, limits, grid=500, ramp_time=0.0):
     with double_precision():
         prepared, frame = centred(robot_of(robot))
         sizes = {name: np.ones(prepared.n_cables) for name in limits if name not in ("speed_max", "acceleration_max")}
-        problem = Problem(prepared, Limits(**{k: leaf(v * sizes.get(k, 1.0)) for k, v in limits.items()}), named("A1"))
+        problem = Problem(
+            prepared, Limits(**{k: as_float64(v * sizes.get(k, 1.0)) for k, v in limits.items()}), named("A1")
+        )
         section = section_of(path, frame)
         least = least_time_motion(problem, section, SectionSettings(grid, ramp_time))
         # The reference knows no bodies.
@@ -76,8 +78,8 @@ def section_of(path, frame):
 
     quaternion = None
     if path.quaternions is not None:
-        quaternion = leaf(table(path.quaternions) * np.concatenate([[1.0], frame.signs]))
-    curve = Spline(leaf(knots), leaf(frame.inward(table(path.positions))), quaternion)
+        quaternion = as_float64(table(path.quaternions) * np.concatenate([[1.0], frame.signs]))
+    curve = Spline(as_float64(knots), as_float64(frame.inward(table(path.positions))), quaternion)
     return Section(curve, np.full(len(knots) - 1, np.inf), knots)
 
 

@@ -28,7 +28,7 @@ from cspr_jax.motion.amplitudes import Amplitude, named
 from cspr_jax.motion.motion import Motion, Placed, inward
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.motion.problem import Problem
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.frames import IDENTITY, Frame
 from cspr_jax.robots import cables
 from cspr_jax.robots.cables import AnyRobot
@@ -155,7 +155,7 @@ def platform_motion(
     prepared_robot, frame = _prepared(robot, ("3R3T",), "a platform on six cables or more", any_cables=True)
     function, p = amplitude_of(amplitude, free_end=False), jnp.asarray(arcs, float)
     places = _places(robot, frame, start, end, z0)
-    quaternions = [jnp.asarray(frame.turned_quaternions(leaf(one)), float) for one in orientations]
+    quaternions = [jnp.asarray(frame.turned_quaternions(as_float64(one)), float) for one in orientations]
     beta_hats = (jnp.asarray(beta_hat[0], float), jnp.asarray(beta_hat[1], float))
     first, last = zip(places, quaternions, strict=True)
     geometry = pose_segment(prepared_robot, first, last, jnp.asarray(z0, float), beta_hats, odd=jnp.mod(p, 2.0) == 1.0)

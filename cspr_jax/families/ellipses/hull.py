@@ -9,7 +9,7 @@ from jax import Array
 from scipy.spatial import ConvexHull
 
 from cspr_jax.errors import InputError
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.point_mass import SPATIAL, PointMassRobot, plane_normal, spool_radius
 
@@ -45,7 +45,7 @@ def hull_of(robot: AnyRobot) -> SpoolHull:
         allowed = "must lie in one plane, for a formula of the frequencies"
         raise InputError("base_points", None, allowed, fault="spools in several planes")
     edges = np.stack([_gradient(points[:, :2][ends], robot.dof) for ends in edge_ends(points, robot.dof)])
-    return SpoolHull(leaf(edges), leaf(normal), leaf(robot.gravity))
+    return SpoolHull(as_float64(edges), as_float64(normal), as_float64(robot.gravity))
 
 
 def formula_hull(robot: AnyRobot) -> SpoolHull | None:

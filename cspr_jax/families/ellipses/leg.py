@@ -29,7 +29,7 @@ from cspr_jax.motion.leg import JoinedLeg, Leg
 from cspr_jax.motion.motion import Motion
 from cspr_jax.motion.problem import Problem
 from cspr_jax.motion.waypoints import Waypoints
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear import rotations
 from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.robots.contacts.clearance import Scene
@@ -107,7 +107,11 @@ class Ellipses(Leg):
         at, answers = self._of_launch - 1, cast(EllipseAnswers, joined.answers)
         way = cast(EllipseMotion, joined.motions[at])
         # Late objects are released behind the segment: on the next one, else on the same ellipse.
-        after = joined.motions[at + 1] if at + 1 < len(self) else turning(way.last, way.frequencies[1], leaf(0.0), 1.0)
+        after = (
+            joined.motions[at + 1]
+            if at + 1 < len(self)
+            else turning(way.last, way.frequencies[1], as_float64(0.0), 1.0)
+        )
         return launch_outcome(
             table,
             frame,

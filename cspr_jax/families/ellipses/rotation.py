@@ -18,7 +18,7 @@ from jax import Array
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, cross, dot, rotated
 from cspr_jax.numerics.bounds.function_bounds import sincospi
 from cspr_jax.numerics.bounds.rotation_bounds import RotationBounds
-from cspr_jax.numerics.elementary import leaf, length
+from cspr_jax.numerics.elementary import as_float64, length
 from cspr_jax.numerics.linear import rotations
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def turn_between(start: Float[np.ndarray, "4"], end: Float[np.ndarray, "4"]) -> 
     quaternion = quaternion * (1.0 if quaternion[0] >= 0.0 else -1.0)
     sine = float(np.linalg.norm(quaternion[1:]))
     angle = 2.0 * math.atan2(sine, quaternion[0])
-    return leaf(quaternion[1:] * (angle / sine if sine > 0.0 else 2.0))
+    return as_float64(quaternion[1:] * (angle / sine if sine > 0.0 else 2.0))
 
 
 def _quaternion(axis: Array, angle: Array) -> Array:

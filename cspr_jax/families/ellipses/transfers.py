@@ -11,7 +11,7 @@ from cspr_jax.families.ellipses.motion import EllipseMotion, integral, with_turn
 from cspr_jax.families.ellipses.rotation import Rotation, turn_between
 from cspr_jax.motion.amplitudes import Amplitude
 from cspr_jax.motion.problem import Problem
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.verification.proved_answers import MotionProof, proof_of, sampled_proof
 
@@ -96,9 +96,11 @@ def motion_between(amplitude: Amplitude, first: Turning, last: Turning, arcs: in
     mean = start + (end - start) * float(integral(amplitude).at(1.0))
     way, after = (swept / mean if step else 0.0), turns * full / end + (0.0 if step else swept / end)
     law = with_turns(amplitude, way / (way + after) if step else 0.0)
-    frequencies, complete = leaf([start, end]), leaf(way + after)
+    frequencies, complete = as_float64([start, end]), as_float64(way + after)
     rotation = rotation_between(first, last)
-    return EllipseMotion(first.ellipse, last.ellipse, frequencies, leaf(phase), law, integral(law), complete, rotation)
+    return EllipseMotion(
+        first.ellipse, last.ellipse, frequencies, as_float64(phase), law, integral(law), complete, rotation
+    )
 
 
 def rotation_between(first: Turning, last: Turning) -> Rotation | None:
@@ -107,7 +109,13 @@ def rotation_between(first: Turning, last: Turning) -> Rotation | None:
         return None
     axis = last.axis if last.oscillation.any() else first.axis
     turn = turn_between(first.quaternion, last.quaternion)
-    return Rotation(leaf(first.quaternion), turn, leaf(axis), leaf(first.oscillation), leaf(last.oscillation))
+    return Rotation(
+        as_float64(first.quaternion),
+        turn,
+        as_float64(axis),
+        as_float64(first.oscillation),
+        as_float64(last.oscillation),
+    )
 
 
 def least_way(

@@ -21,7 +21,7 @@ from cspr_jax.families.free.search.interior_point import started
 from cspr_jax.families.free.search.tasks import OUTER, Tasks
 from cspr_jax.motion.motion import Motion, common_shape, states_at
 from cspr_jax.numerics.batches import in_batches
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.rotations import products
 from cspr_jax.robots.cables import AnyRobot, tensions
 from cspr_jax.robots.model.limits import Limits
@@ -44,7 +44,8 @@ def followed(tasks: Tasks, motions: list[Motion], duration: Float[np.ndarray, "s
         return splines
     turnings = [_turning(tasks, i, *pair) for i, pair in enumerate(zip(motions, duration.tolist(), strict=True))]
     return [
-        dataclasses.replace(spline, quaternion=leaf(table)) for spline, table in zip(splines, turnings, strict=True)
+        dataclasses.replace(spline, quaternion=as_float64(table))
+        for spline, table in zip(splines, turnings, strict=True)
     ]
 
 

@@ -14,7 +14,7 @@ from cspr_jax.families.free.poses import FreePoses, check_searched
 from cspr_jax.families.free.search.time_bounds import time_bounds
 from cspr_jax.families.free.static_poses import OF_PLACES
 from cspr_jax.maps.proved_map import ProvedMap, proved_columns
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.model.point_mass import rest_point
 from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.proved_answers import ProvedAnswers, answers_of, judge_all_robots, proofs_of
@@ -73,7 +73,7 @@ class FreeMap(ProvedMap):
             FreePoses(pair, units, np.zeros((2, 3)), accelerations, depth)
             for pair, depth in zip(pairs, depths.tolist(), strict=True)
         ]
-        lines = [Spline(leaf(np.array([0.0, 1.0])), leaf(pair[None]), self._turning()) for pair in pairs]
+        lines = [Spline(as_float64(np.array([0.0, 1.0])), as_float64(pair[None]), self._turning()) for pair in pairs]
         columns["lower_bound"][rows] = time_bounds(self._problem, lines)
         motions = free_motions(self._problem, self._scene, poses)
         if len(motions.rows):
@@ -84,7 +84,9 @@ class FreeMap(ProvedMap):
 
     def _still(self, places: np.ndarray) -> ProvedAnswers:
         # A second of rest in each place.
-        motions = [Spline(leaf(np.array([0.0, 1.0])), leaf(place[None, None]), self._turning()) for place in places]
+        motions = [
+            Spline(as_float64(np.array([0.0, 1.0])), as_float64(place[None, None]), self._turning()) for place in places
+        ]
         several = SeveralSplines(motions)
         proofs = proofs_of(self._problem, several.bounds, several.durations, self._scene, several.jumps)
         answers = answers_of(proofs, several.durations)
@@ -94,4 +96,4 @@ class FreeMap(ProvedMap):
     def _turning(self) -> Array | None:
         if self._unit is None:
             return None
-        return leaf(self._frame.turned_quaternions(self._unit[None])[None])
+        return as_float64(self._frame.turned_quaternions(self._unit[None])[None])

@@ -18,7 +18,7 @@ from cspr_jax.families.free.search.instants import DEPTH, ValueBounds, coordinat
 from cspr_jax.families.free.search.objectives import Objective
 from cspr_jax.families.free.search.tasks import Tasks, Unknowns
 from cspr_jax.motion.problem import Problem
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear import rotations
 from cspr_jax.numerics.linear.rotations import products
 from cspr_jax.robots.cables import AnyRobot
@@ -102,7 +102,7 @@ def _joined(problem: Problem, poses: FreePoses) -> _Joined:
 
 def determinants(problem: Problem, poses: FreePoses) -> Float[np.ndarray, "k"]:
     """Determinants at poses of a platform with as many cables as degrees of freedom; see `determinants.determinant`."""
-    return np.asarray(_determinants(problem.robot, leaf(poses.positions), leaf(poses.quaternions)))
+    return np.asarray(_determinants(problem.robot, as_float64(poses.positions), as_float64(poses.quaternions)))
 
 
 @jax.jit
@@ -225,7 +225,7 @@ def motions_of(tasks: Tasks, unknowns: Unknowns, z0: float) -> list[Spline]:
             turning = np.zeros((*table.shape[:2], 4))
             turning[..., 0] = 1.0
             turning[..., 1 + about] = table[..., len(along) :]
-            quaternion = leaf(products(turning.reshape(-1, 4), reference[None]).reshape(turning.shape))
+            quaternion = as_float64(products(turning.reshape(-1, 4), reference[None]).reshape(turning.shape))
         knots = np.linspace(0.0, duration, len(table) + 1)
-        motions.append(Spline(leaf(knots), leaf(position), quaternion, leaf(z0)))
+        motions.append(Spline(as_float64(knots), as_float64(position), quaternion, as_float64(z0)))
     return motions

@@ -12,7 +12,7 @@ from cspr_jax.families.free.problem import planned_problem
 from cspr_jax.maps.proved_map import CONTACTS
 from cspr_jax.motion.cause import Cause
 from cspr_jax.motion.problem import Problem
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.schema.verdicts import Verdict
@@ -27,7 +27,11 @@ def first_refused(problem: Problem, scene: Scene | None, poses: FreePoses, frame
     """The first pose that no motion can have."""
     units = [None] * len(poses.positions) if poses.quaternions is None else list(poses.quaternions)
     at_rest = [
-        Spline(leaf(np.array([0.0, 1.0])), leaf(position[None, None]), None if unit is None else leaf(unit[None, None]))
+        Spline(
+            as_float64(np.array([0.0, 1.0])),
+            as_float64(position[None, None]),
+            None if unit is None else as_float64(unit[None, None]),
+        )
         for position, unit in zip(poses.positions, units, strict=True)
     ]
     answers = proved_answers(planned_problem(problem), at_rest, scene)

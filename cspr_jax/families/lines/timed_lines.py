@@ -14,7 +14,7 @@ from cspr_jax.families.lines.motion import TimedLine
 from cspr_jax.families.lines.verdicts import laws_of
 from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.problem import Problem
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 
 if TYPE_CHECKING:
     from jaxtyping import Float
@@ -92,4 +92,4 @@ def motions_of(
         ratios = answers.acceleration_time / answers.duration
     laws = laws_of(law, np.where(np.isfinite(ratios), ratios, 0.5))
     rows = (starts, ends - starts, laws, answers.duration)
-    return [TimedLine(*jax.tree.map(lambda x, i=i: leaf(x[i]), rows)) for i in range(len(starts))]
+    return [TimedLine(*jax.tree.map(lambda x, i=i: as_float64(x[i]), rows)) for i in range(len(starts))]

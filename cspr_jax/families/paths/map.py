@@ -11,7 +11,7 @@ from cspr_jax.families.paths.batch import least_times
 from cspr_jax.families.paths.geometry.path_specs import course_through
 from cspr_jax.families.paths.geometry.section import Section
 from cspr_jax.maps.proved_map import ProvedMap, joined_columns, proved_columns
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.frames import IDENTITY
 from cspr_jax.verification.proved_answers import proved_answers
 
@@ -63,5 +63,5 @@ class PathsMap(ProvedMap):
 
     def _still(self, place: np.ndarray) -> Spline:
         # A second of rest in a place.
-        unit = None if self._unit is None else leaf(self._unit[None, None])
-        return self._placed(Spline(leaf(np.array([0.0, 1.0])), leaf(place[None, None]), unit))
+        unit = None if self._unit is None else as_float64(self._unit[None, None])
+        return self._placed(Spline(as_float64(np.array([0.0, 1.0])), as_float64(place[None, None]), unit))

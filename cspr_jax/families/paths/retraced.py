@@ -20,7 +20,7 @@ from cspr_jax.families.paths.geometry.section import Section
 from cspr_jax.families.paths.geometry.waypoints import MotionSequence, MovingPlaces, SmoothPart
 from cspr_jax.families.paths.least_time.jumping import PathPace
 from cspr_jax.motion.motion import Motion
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.platform import PlatformRobot
 
@@ -220,8 +220,8 @@ def _curve(
     coordinates = (knots[:-1, None] + np.cumsum(ways, axis=1)[:, :-1]).ravel()
     off = BPoly(np.moveaxis(table, 1, 0), knots)(coordinates) - signed(inner, np.repeat(pieces.number, 3)).place
     distances = _distances(off, inner, motions.size).reshape(len(times), -1).max(1)
-    quaternion = leaf(table[:, :, AXES:]) if table.shape[2] > AXES else None
-    return Spline(leaf(knots), leaf(table[:, :, :AXES]), quaternion), distances
+    quaternion = as_float64(table[:, :, AXES:]) if table.shape[2] > AXES else None
+    return Spline(as_float64(knots), as_float64(table[:, :, :AXES]), quaternion), distances
 
 
 def _direction(beside: MovingPlaces, times: np.ndarray) -> np.ndarray:

@@ -25,7 +25,7 @@ from cspr_jax.motion.motion import Motion
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.motion.problem import Problem
 from cspr_jax.motion.waypoints import Waypoints
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear import rotations
 from cspr_jax.numerics.linear.frames import IDENTITY
 from cspr_jax.robots.contacts.interference import contacts, gaps
@@ -93,7 +93,9 @@ class _Poses(Leg):
             raise ConfigError(self.waypoints.path, self.waypoints.robot_file.typed(error)) from error
         answers, segments = self._search(problem, np.array([z0]), is_final=True)
         pairs = zip(each(segments, len(self)), answers.tried_arcs, strict=True)
-        return answers, [PlatformMotion(segment, problem.amplitude, leaf(arcs), self._kind) for segment, arcs in pairs]
+        return answers, [
+            PlatformMotion(segment, problem.amplitude, as_float64(arcs), self._kind) for segment, arcs in pairs
+        ]
 
     def answers(self, problem: Problem, depths: np.ndarray) -> PlatformMotionAnswers:
         """Answers for several depths; see `Leg.answers`."""

@@ -13,7 +13,7 @@ from jax import Array
 
 from cspr_jax.curves.spline import turning_of
 from cspr_jax.errors import InputError
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear import rotations
 from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.robots.model.state import State
@@ -64,7 +64,7 @@ class FunctionMotion:
 
     def stretched(self, factor: float) -> "FunctionMotion":
         """The motion run more slowly, or faster; see `Spline.stretched`."""
-        return dataclasses.replace(self, factor=leaf(self.factor * factor))
+        return dataclasses.replace(self, factor=as_float64(self.factor * factor))
 
 
 def function_motion(
@@ -88,4 +88,4 @@ def function_motion(
         turning = jnp.asarray(frame.turned_quaternions(value[3:])) if size == (7,) else jnp.eye(4)[0]
         return jnp.concatenate([place, rotations.product(turning, back)])
 
-    return FunctionMotion(leaf(duration), leaf(1.0), leaf(1.0), inward)
+    return FunctionMotion(as_float64(duration), as_float64(1.0), as_float64(1.0), inward)

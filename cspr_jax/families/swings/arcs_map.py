@@ -11,7 +11,7 @@ from cspr_jax.families.swings.arcs import arcs_and_segments, minimum_arcs
 from cspr_jax.families.swings.hypocycloid import Hypocycloid, several_bounds
 from cspr_jax.maps.grid_map import PointMassMap
 from cspr_jax.motion.answers import Answers
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.schema.tiles import Grid
 
 _OF_STARTS = ("from_x", "from_y", "from_z", "z0")
@@ -43,7 +43,7 @@ class MinimumArcsMap(PointMassMap):
 
         def join(rows: np.ndarray, arcs: np.ndarray) -> tuple[Answers, SeveralMotions]:
             answers, segments = arcs_and_segments(self._problem, *(x[rows] for x in points), arcs=arcs, **settings)
-            motions = Hypocycloid(segments, self._problem.amplitude, leaf(answers.tried_arcs))
+            motions = Hypocycloid(segments, self._problem.amplitude, as_float64(answers.tried_arcs))
             return answers, SeveralMotions(motions, answers.duration, several_bounds)
 
         return clear_motions(self._problem, self._scene, join, len(cells["z0"]), max_arcs=max_arcs)

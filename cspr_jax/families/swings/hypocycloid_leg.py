@@ -10,7 +10,7 @@ from cspr_jax.motion.leg import Leg, each
 from cspr_jax.motion.motion import Motion
 from cspr_jax.motion.problem import Problem
 from cspr_jax.motion.waypoints import Waypoints
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 
 
 class Hypocycloids(Leg):
@@ -28,7 +28,7 @@ class Hypocycloids(Leg):
         """Join the points; see `Leg.join`."""
         answers, segments = self._answers_and_segments(problem, np.array([z0]))
         pairs = zip(each(segments, len(self)), answers.tried_arcs, strict=True)
-        return answers, [Hypocycloid(segment, problem.amplitude, leaf(arcs)) for segment, arcs in pairs]
+        return answers, [Hypocycloid(segment, problem.amplitude, as_float64(arcs)) for segment, arcs in pairs]
 
     def answers(self, problem: Problem, depths: np.ndarray) -> Answers:
         """Answers for several depths; see `Leg.answers`."""

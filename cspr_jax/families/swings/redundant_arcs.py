@@ -22,7 +22,7 @@ from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.limits import other_limits, other_slacks
 from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.search.minima import narrowed
 from cspr_jax.robots.model.point_mass import plane_normal
 from cspr_jax.robots.statics.wrench_sets import tension_range
@@ -140,7 +140,7 @@ def _try(problem: Problem, parities: dict[int, Segment], rows: np.ndarray, numbe
 
 
 def _motion(problem: Problem, segments: Segment, i: int, number: int) -> Hypocycloid:
-    return Hypocycloid(jax.tree.map(lambda x: np.asarray(x)[i], segments), problem.amplitude, leaf(number))
+    return Hypocycloid(jax.tree.map(lambda x: np.asarray(x)[i], segments), problem.amplitude, as_float64(number))
 
 
 def least_slacks(

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from cspr_jax.errors import ConfigError, shown
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.outputs.motion_files import LARGEST_ROWS, rows_at
 from cspr_jax.plans.planning import PlannedMotions
@@ -134,7 +134,7 @@ def suspended(plan: PlannedMotions) -> Suspended:
         inertia = world.turned_tensor(plan.frame.turned_tensor(np.asarray(robot.inertia)))
     pulleys = robot.pulleys
     if pulleys is not None:
-        pulleys = Pulleys(pulleys.radius, leaf(world.rotated(plan.frame.rotated(np.asarray(pulleys.axes)))))
+        pulleys = Pulleys(pulleys.radius, as_float64(world.rotated(plan.frame.rotated(np.asarray(pulleys.axes)))))
     limits = [getattr(keys, "tension_max", None) for keys in (plan.keys, written)]
     limit = next((value for value in limits if value is not None), np.inf)
     return Suspended(

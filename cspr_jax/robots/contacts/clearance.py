@@ -14,7 +14,7 @@ import numpy as np
 
 from cspr_jax.errors import InputError
 from cspr_jax.numerics.batches import in_batches, in_parts, in_threads, room
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.contacts import clearance_kernels as kernels
 from cspr_jax.robots.model.platform import PlatformRobot, pairs_apart
 from cspr_jax.robots.model.point_mass import PointMassRobot
@@ -239,7 +239,7 @@ def _terms(scene: Scene, origin: np.ndarray, dtype: np.dtype):
     """Compiled functions of poses, each with its kind and the number of its first meeting."""
     count, first = len(scene.base_points), 0
     points = _cast(
-        kernels.Points(*map(leaf, (scene.base_points - origin, scene.platform_points, scene.diameters))), dtype
+        kernels.Points(*map(as_float64, (scene.base_points - origin, scene.platform_points, scene.diameters))), dtype
     )
     if scene.pairs:
         pairs = np.array(scene.pairs, np.int32)
@@ -267,12 +267,14 @@ def _cast(tree, dtype: np.dtype):
 
 def _solid(shape: Obstacle | Hull, origin: np.ndarray):
     if isinstance(shape, Sphere):
-        return kernels.Ball(*map(leaf, (shape.centre - origin, shape.radius)))
+        return kernels.Ball(*map(as_float64, (shape.centre - origin, shape.radius)))
     if isinstance(shape, Cylinder):
-        return kernels.Rod(*map(leaf, (shape.start - origin, shape.end - shape.start, shape.radius)))
+        return kernels.Rod(*map(as_float64, (shape.start - origin, shape.end - shape.start, shape.radius)))
     if isinstance(shape, Box):
-        return kernels.Brick(*map(leaf, (shape.centre - origin, shape.half, shape.rotation)))
-    return kernels.Polyhedron(*map(leaf, (shape.normals, shape.offsets, shape.triangles, shape.edges, shape.sides)))
+        return kernels.Brick(*map(as_float64, (shape.centre - origin, shape.half, shape.rotation)))
+    return kernels.Polyhedron(
+        *map(as_float64, (shape.normals, shape.offsets, shape.triangles, shape.edges, shape.sides))
+    )
 
 
 def _corners(shape: Body) -> np.ndarray:

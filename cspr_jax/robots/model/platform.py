@@ -16,7 +16,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.errors import InputError
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.model.body_geometry import checked_centre, checked_inertia, checked_platform, is_same
 from cspr_jax.robots.model.limits import NO_LIMITS, Limits
 from cspr_jax.robots.model.patterns import PATTERNS
@@ -176,8 +176,8 @@ def platform_robot(  # noqa: PLR0913
             )
     joints = tuple(int((platform == point).all(1).argmax()) for point in platform)
     points = platform if row.is_jointed else platform - centre
-    numbers = (leaf(base), leaf(points), leaf(mass), leaf(tensor), leaf(gravity))
-    return PlatformRobot(*numbers, joints, limits or NO_LIMITS, name, z_axis, pattern, leaf(centre))
+    numbers = (as_float64(base), as_float64(points), as_float64(mass), as_float64(tensor), as_float64(gravity))
+    return PlatformRobot(*numbers, joints, limits or NO_LIMITS, name, z_axis, pattern, as_float64(centre))
 
 
 def across_line(robot: PlatformRobot) -> Float[Array, "3 2"]:

@@ -16,7 +16,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.errors import InputError
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.model.limits import NO_LIMITS, Limits
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.pulleys import Pulleys, exits
@@ -139,7 +139,9 @@ def point_mass_robot(
         _check_planar(points)
     check_numbers(mass, gravity)
     check_axis(z_axis)
-    return PointMassRobot(leaf(points), leaf(mass), leaf(gravity), limits or NO_LIMITS, name, z_axis, row.dof)
+    return PointMassRobot(
+        as_float64(points), as_float64(mass), as_float64(gravity), limits or NO_LIMITS, name, z_axis, row.dof
+    )
 
 
 planar_robot = functools.partial(point_mass_robot, pattern="2T")

@@ -18,7 +18,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.errors import InputError
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.lanes import Vector, combined, dot
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def pulleys_of(radius, axes, n_cables: int, z_axis: str) -> Pulleys:
         raise InputError("pulley_axes", directions.tolist(), "vectors that are not zero")
     directions = directions / largest
     units = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
-    return Pulleys(leaf(np.broadcast_to(sizes, (n_cables,))), leaf(np.broadcast_to(units, (n_cables, 3))))
+    return Pulleys(as_float64(np.broadcast_to(sizes, (n_cables,))), as_float64(np.broadcast_to(units, (n_cables, 3))))
 
 
 def exits(

@@ -3,7 +3,7 @@
 import dataclasses
 from typing import Any, TypeVar
 
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.frames import Frame, frame_of
 from cspr_jax.robots.model.limits import NO_LIMITS
 from cspr_jax.robots.model.platform import PlatformRobot
@@ -18,14 +18,14 @@ RobotKind = TypeVar("RobotKind", bound=PointMassRobot | PlatformRobot)
 def centred(robot: RobotKind) -> tuple[RobotKind, Frame]:
     """A robot as the kernels take it: origin at the centroid of its spools, z down, without limits."""
     frame = frame_of(robot.base_points, robot.z_axis)
-    changes: dict[str, Any] = {"base_points": leaf(frame.inward(robot.base_points)), "z_axis": "down"}
+    changes: dict[str, Any] = {"base_points": as_float64(frame.inward(robot.base_points)), "z_axis": "down"}
     if isinstance(robot, PlatformRobot):
-        changes["platform_points"] = leaf(frame.rotated(robot.platform_points))
-        changes["inertia"] = frame.turned_tensor(leaf(robot.inertia))
+        changes["platform_points"] = as_float64(frame.rotated(robot.platform_points))
+        changes["inertia"] = frame.turned_tensor(as_float64(robot.inertia))
         if robot.centre_of_mass is not None:
-            changes["centre_of_mass"] = leaf(frame.rotated(robot.centre_of_mass))
+            changes["centre_of_mass"] = as_float64(frame.rotated(robot.centre_of_mass))
     if robot.pulleys is not None:
-        changes["pulleys"] = Pulleys(robot.pulleys.radius, leaf(frame.rotated(robot.pulleys.axes)))
+        changes["pulleys"] = Pulleys(robot.pulleys.radius, as_float64(frame.rotated(robot.pulleys.axes)))
     return dataclasses.replace(robot, limits=NO_LIMITS, **changes), frame
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.errors import InputError
-from cspr_jax.numerics.elementary import double_precision, leaf
+from cspr_jax.numerics.elementary import as_float64, double_precision
 from cspr_jax.numerics.linear.lanes import about_axis
 from cspr_jax.numerics.linear.rotations import about_vertical
 from cspr_jax.robots.model.platform import PlatformRobot
@@ -75,9 +75,11 @@ def aligned(robot: PlatformRobot) -> tuple[PlatformRobot, Float[np.ndarray, "3 3
         rotation = _level_and_straight(robot)
         if np.abs(rotation - np.eye(3)).max() < ALIGNED:
             rotation = np.eye(3)
-    points, inertia = leaf(robot.platform_points) @ rotation.T, rotation @ leaf(robot.inertia) @ rotation.T
-    centre = None if robot.centre_of_mass is None else leaf(leaf(robot.centre_of_mass) @ rotation.T)
-    rotated = dataclasses.replace(robot, platform_points=leaf(points), inertia=leaf(inertia), centre_of_mass=centre)
+    points, inertia = as_float64(robot.platform_points) @ rotation.T, rotation @ as_float64(robot.inertia) @ rotation.T
+    centre = None if robot.centre_of_mass is None else as_float64(as_float64(robot.centre_of_mass) @ rotation.T)
+    rotated = dataclasses.replace(
+        robot, platform_points=as_float64(points), inertia=as_float64(inertia), centre_of_mass=centre
+    )
     return rotated, rotation
 
 
@@ -157,7 +159,7 @@ def _to_vertical(normal: np.ndarray) -> np.ndarray:
     sine, cosine = np.linalg.norm(axis), normal[2]
     if sine < ALIGNED:
         return np.diag([1.0, np.sign(cosine), np.sign(cosine)])
-    return np.array(about_axis(axis / sine, leaf(sine), leaf(cosine)))
+    return np.array(about_axis(axis / sine, as_float64(sine), as_float64(cosine)))
 
 
 def _straightest(points: np.ndarray, base: np.ndarray) -> tuple[float, float]:

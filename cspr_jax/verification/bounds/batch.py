@@ -10,7 +10,7 @@ import jax
 import numpy as np
 
 from cspr_jax.numerics.batches import in_batches
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.bounds.state_bounds import StateBounds
 from cspr_jax.verification.bounds.amplitude_bounds import time_bounds
 
@@ -31,7 +31,7 @@ class SeveralMotions:
 
     def __getitem__(self, i: int) -> Any:
         segment, arcs = self._rows(i)
-        return dataclasses.replace(self._motions, segment=segment, arcs=leaf(arcs))
+        return dataclasses.replace(self._motions, segment=segment, arcs=as_float64(arcs))
 
     def taken(self, chosen: np.ndarray) -> "SeveralMotions":
         """Some of the motions."""

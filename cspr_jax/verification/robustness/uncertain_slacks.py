@@ -22,7 +22,7 @@ from jax import Array
 from cspr_jax.motion.limits import limits_set
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, norm
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.bounds.contact_bounds import contact_bounds
 from cspr_jax.robots.bounds.state_bounds import CableBounds, StateBounds, attachments, balance_bounds, cable_bounds
 from cspr_jax.robots.bounds.uncertain_tensions import UncertainTensions, centre_wrench, uncertain_tensions, with_mass
@@ -60,8 +60,10 @@ def share_of(limits: Limits, multiple: Float[np.ndarray, "k"]) -> Share:
     """Multiples of an uncertainty."""
     uncertainty: Any = limits.uncertainty
     with np.errstate(over="ignore"):
-        factor = leaf(float(uncertainty.mass_factor) ** multiple)
-    spools, centre = (leaf(multiple * float(size)) for size in (uncertainty.spool_positions, uncertainty.mass_centre))
+        factor = as_float64(float(uncertainty.mass_factor) ** multiple)
+    spools, centre = (
+        as_float64(multiple * float(size)) for size in (uncertainty.spool_positions, uncertainty.mass_centre)
+    )
     return Share(spools, centre, factor)
 
 

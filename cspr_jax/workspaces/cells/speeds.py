@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cspr_jax.numerics.batches import in_batches
-from cspr_jax.numerics.elementary import leaf, unit_vectors
+from cspr_jax.numerics.elementary import as_float64, unit_vectors
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import PlatformRobot
@@ -92,5 +92,5 @@ def cable_speeds(robot: AnyRobot, most: np.ndarray, *, speed: float, angular_spe
     """Velocities that an effector must be able to have."""
     if isinstance(robot, PlatformRobot) and not PATTERNS[robot.pattern].is_jointed and robot.centre_of_mass is not None:
         points = np.asarray(robot.platform_points) + np.asarray(robot.centre_of_mass)
-        robot = dataclasses.replace(robot, platform_points=leaf(points))
+        robot = dataclasses.replace(robot, platform_points=as_float64(points))
     return CableSpeeds(robot, speed, angular_speed, np.broadcast_to(np.asarray(most, float), (robot.n_cables,)))

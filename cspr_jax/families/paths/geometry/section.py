@@ -12,7 +12,7 @@ from scipy.interpolate import BPoly
 
 from cspr_jax.curves.interpolation import continuous, hermite, interpolated
 from cspr_jax.curves.spline import Spline
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 
 if TYPE_CHECKING:
     from jaxtyping import Float
@@ -112,7 +112,9 @@ def section_of(track: Track, quaternions: Float[np.ndarray, "k 4"] | None = None
             rates = interpolated(track.marks, np.zeros((len(units), 3)), units, ends="natural")
             curve = BPoly(np.moveaxis(np.asarray(rates.quaternion), 1, 0), track.marks)
             turning = hermite(track.s, [curve(track.s, order) for order in range(3)])
-    curve = Spline(leaf(np.unique(track.s)), leaf(track.table()), None if turning is None else leaf(turning))
+    curve = Spline(
+        as_float64(np.unique(track.s)), as_float64(track.table()), None if turning is None else as_float64(turning)
+    )
     return Section(curve, track.speed[np.diff(track.s) > 0.0], track.marks)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from cspr_jax.curves.spline import Spline
 from cspr_jax.families.paths.geometry.section import Section
 from cspr_jax.families.paths.least_time.nodes import PathGrid, derivatives, places_on
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 
 if TYPE_CHECKING:
     from jaxtyping import Float
@@ -84,8 +84,10 @@ def timed(section: Section, grid: PathGrid, run: PathSpeeds) -> Spline:
         tables.append(_quintic(rates[0], rates[1], times[:, None]))
     position, quaternion = tables[0], tables[1] if len(tables) > 1 else None
     knots = np.concatenate([[0.0], np.cumsum(times)])
-    turning = None if quaternion is None else leaf(quaternion)
-    return dataclasses.replace(section.curve, knots=leaf(knots), position=leaf(position), quaternion=turning)
+    turning = None if quaternion is None else as_float64(quaternion)
+    return dataclasses.replace(
+        section.curve, knots=as_float64(knots), position=as_float64(position), quaternion=turning
+    )
 
 
 def _quintic(start: tuple, end: tuple, width: np.ndarray) -> np.ndarray:

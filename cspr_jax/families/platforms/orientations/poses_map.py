@@ -18,7 +18,7 @@ from cspr_jax.families.platforms.motion_checker import MANY
 from cspr_jax.families.platforms.platform_segment import PlatformMotion, several_bounds
 from cspr_jax.families.platforms.pose_targets import Poses, pose_arcs, rest_poses, start_beta_hat
 from cspr_jax.maps.grid_map import PlatformMap
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.statics.reference_pose import reference_pose
 from cspr_jax.schema.quantities import TILT_TORSION
 from cspr_jax.schema.tiles import Grid
@@ -69,7 +69,7 @@ class PosesMap(PlatformMap):
             answers = self._answers(cases, arcs)
             chosen = cases._replace(beta_hats=(answers.beta_hat[:, 0], answers.beta_hat[:, 1]))
             segments = segments_with(self._problem.robot, chosen, answers.tried_arcs)
-            each = PlatformMotion(segments, self._problem.amplitude, leaf(answers.tried_arcs), kind)
+            each = PlatformMotion(segments, self._problem.amplitude, as_float64(answers.tried_arcs), kind)
             return answers, SeveralMotions(each, answers.duration, partial(several_bounds, kind=kind), orders=4)
 
         maximum = self._keys.trajectory.max_arcs

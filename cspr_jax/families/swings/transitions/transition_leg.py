@@ -13,7 +13,7 @@ from cspr_jax.motion.leg import Leg, each
 from cspr_jax.motion.motion import Backwards, Motion
 from cspr_jax.motion.problem import Problem
 from cspr_jax.motion.waypoints import Waypoints
-from cspr_jax.numerics.elementary import leaf
+from cspr_jax.numerics.elementary import as_float64
 
 
 class Transitions(Leg):
@@ -38,7 +38,7 @@ class Transitions(Leg):
         answers, segments = self._answers_and_segments(problem, np.array([z0]))
         motions: list[Motion] = []
         for i, segment in enumerate(each(segments, len(self))):
-            motion = Hypocycloid(segment, problem.amplitude, leaf(answers.tried_arcs[i]))
+            motion = Hypocycloid(segment, problem.amplitude, as_float64(answers.tried_arcs[i]))
             motions.append(Backwards(motion) if self._backwards[i] else motion)
         return answers, motions
 

@@ -7,7 +7,7 @@ import numpy as np
 from cspr_jax.build.limits import build_limits
 from cspr_jax.build.robots import gravity_of, kernel_robot
 from cspr_jax.errors import InputError
-from cspr_jax.numerics.elementary import double_precision, leaf
+from cspr_jax.numerics.elementary import as_float64, double_precision
 from cspr_jax.numerics.linear.frames import frame_of
 from cspr_jax.outputs.plots.motions.motion_source import robot_and_plan
 from cspr_jax.outputs.plots.selection import nearest
@@ -86,7 +86,7 @@ def acceleration_set(result: Result, file: str, at: dict[str, float]) -> Acceler
             kernel_robot(robot_file, keys, file, any_cables=True),
             frame_of(robot_file.base_points, robot_file.z_axis),
         )
-        low, high = (leaf(tensions) for tensions in tension_range(robot, build_limits(robot_file, keys, file)))
+        low, high = (as_float64(tensions) for tensions in tension_range(robot, build_limits(robot_file, keys, file)))
         limits = Limits(tension_min=low, tension_max=high)
         positions, motion = frame.inward(result.data["position"]), frame.rotated(result.data["acceleration"])
         if place is None:
