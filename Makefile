@@ -6,7 +6,9 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 TESTS := $(VENV)/.installed-tests
 
-# Python compiles modules when they are first imported; most of those installed never are.
+# Python compiles modules when they are first imported, and most of those installed never are. It must keep what it
+# compiled, whatever an image says: tests start hundreds of processes.
+unexport PYTHONDONTWRITEBYTECODE
 INSTALL := pip install --quiet --disable-pip-version-check --no-compile
 
 # Two processes; a folder's tests, which share compiled programs, run in one of them.
