@@ -116,18 +116,22 @@ def pytest_collection():
 
 
 def _mark(items, is_part: bool):
-    """Cases that `quick` does not name are thorough; a name that no case has is an error. Hypothesis' are `drawn`."""
+    """Cases that `quick` does not name are thorough, or soak if there is a `ci` that does not name them either.
+
+    A name that no case has is an error. Hypothesis' are `drawn`.
+    """
     cases = collections.defaultdict(set)
     for item in items:
         if getattr(item.obj, "is_hypothesis_test", False):
             item.add_marker("drawn")
-        for mark in item.iter_markers("quick"):
-            cases[item.nodeid.partition("[")[0], mark.args].add(item.callspec.id)
-            if item.callspec.id not in mark.args:
-                item.add_marker("thorough")
-    unknown = [(test, name) for (test, names), known in cases.items() for name in names if name not in known]
+        names = {mark.name: mark.args for mark in item.iter_markers() if mark.name in ("quick", "ci")}
+        for mark in names.items():
+            cases[item.nodeid.partition("[")[0], *mark].add(item.callspec.id)
+        if names and item.callspec.id not in names.get("quick", ()):
+            item.add_marker("thorough" if item.callspec.id in names.get("ci", (item.callspec.id,)) else "soak")
+    unknown = [(test, name) for (test, _, names), known in cases.items() for name in names if name not in known]
     if unknown and not is_part:
-        raise pytest.UsageError(f"quick names cases that there are not: {unknown}")
+        raise pytest.UsageError(f"quick or ci names cases that there are not: {unknown}")
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -65,6 +65,7 @@ CASES = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("case", ["point mass", pytest.param("platform", marks=pytest.mark.thorough)])
 def test_gradients_are_those_of_finite_differences(case):
     """With respect to every coordinate of the spools and of the target, and to z0."""

@@ -1,6 +1,7 @@
 """Published tables and rates from Python: those of the commands."""
 
 import jax
+import pytest
 from outputs.test_outputs import cspr, strict_json
 
 import cspr_jax
@@ -15,6 +16,7 @@ def test_tables(capsys):
     assert lines == [f"{name}  {title}" for name, title in cspr_jax.list_tables().items()]
 
 
+@pytest.mark.thorough
 def test_the_benchmark(small_bench):
     with jax.enable_x64(False):
         found = cspr_jax.benchmark()

@@ -320,6 +320,7 @@ def test_answers_for_xarray(prototype):
             answers.to_xarray(wrong)
 
 
+@pytest.mark.thorough
 def test_answers_between_poses_for_xarray():
     """beta-hat has a value at either end."""
     fields = {name: np.arange(6.0) for name in inspect.signature(PlatformMotionAnswers).parameters}

@@ -69,6 +69,7 @@ def test_rates_of_workspaces(few_poses):
     assert len(workspaces.lines(found)) == 9 and "first" in workspaces.lines(found)[1]
 
 
+@pytest.mark.thorough
 def test_the_rate_of_records(monkeypatch):
     """What is timed is decided, else it is no rate."""
     monkeypatch.setattr(timing, "REPEATS", 1)

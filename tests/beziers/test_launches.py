@@ -218,6 +218,7 @@ def halfway(points, time, until):
     return position, 2.0 * ((s - 1.0) * start + (1.0 - 2.0 * s) * middle + s * end) * s1, 0.0 * position
 
 
+@pytest.mark.thorough
 def test_scatter_to_first_order(throw):
     """Small errors scatter as derivatives say; errors add up in squares; twice the error is twice the scatter."""
     robot, own = throw

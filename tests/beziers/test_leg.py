@@ -169,6 +169,7 @@ def test_every_duration_is_given_and_the_total_is_to_be_least(tmp_path):
     assert code == 2 and 'least = "total"' in err
 
 
+@pytest.mark.thorough
 def test_answers_for_xarray(tmp_path):
     (tmp_path / "plan.toml").write_text(text([1.0, None], places=PLACES[:3]))
     data = cspr_jax.plan(tmp_path / "plan.toml").answers.to_xarray()

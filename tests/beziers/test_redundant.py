@@ -49,6 +49,7 @@ def test_given_durations_are_proved_and_margins_are_those_of_linear_programs(rob
     assert start <= cause.t <= end <= 3.0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_durations_are_an_interval_whose_ends_are_those_of_linear_programs(robot):
     base, places = CASES[robot]
@@ -70,6 +71,7 @@ def test_durations_are_an_interval_whose_ends_are_those_of_linear_programs(robot
         cspr_jax.bezier_durations(loaded, places[:1], places[1:2], accelerations=[[1.0, 0.0, 0.0]])
 
 
+@pytest.mark.thorough
 def test_a_curve_that_depends_on_its_duration_has_no_interval_but_a_least_duration(tmp_path):
     """The second segment goes on with the acceleration of the first."""
     base, places = CASES["boralugoda-planar-three"]
@@ -121,7 +123,7 @@ def test_the_least_duration_under_limits(limits, name):
         assert distance(base, points, time * (1.0 + 1e-6), low=5.0, high=75.0) > 0.0
 
 
-@pytest.mark.thorough
+@pytest.mark.soak
 def test_the_least_total():
     """Shorter than one segment after the other, proved, and a little less is not feasible."""
     base, places = CASES["boralugoda-planar-three"]
@@ -135,6 +137,7 @@ def test_the_least_total():
     assert not each.feasible or times.sum() <= each.answers.duration.sum() * (1.0 + 1e-9)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("least", ["each", pytest.param("total", marks=pytest.mark.thorough)])
 def test_nothing_bounds_the_accelerations_of_cables_that_pull_against_each_other(least):
     """A square of cables without largest tensions gives any acceleration; with them a least duration exists."""
@@ -183,7 +186,7 @@ def landing(base, outcome, target, errors):
     return (place + velocity * time)[:2]
 
 
-@pytest.mark.thorough
+@pytest.mark.soak
 def test_maps_of_launches_have_the_numbers_of_proofs():
     robot, start = cspr_jax.load_robot("boralugoda-planar-three"), [20.0, 0.0, 10.0]
     answers = cspr_jax.launch_range(robot, [[70.0, 0.0, -20.0], [500.0, 0.0, -20.0]], start=start, population=32)

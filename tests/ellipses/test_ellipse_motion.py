@@ -72,6 +72,7 @@ def test_bounds_contain_samples():
         assert (np.asarray(band.radius)[1:] < 60.0 * ((end - start)[1:, None] * 3.0 * np.pi) ** 2 + 1e-12).all()
 
 
+@pytest.mark.thorough
 def test_words_for_frequencies():
     rng = np.random.default_rng(1)
     spools, checked = triangle(rng), 0

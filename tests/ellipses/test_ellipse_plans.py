@@ -180,7 +180,7 @@ def random_plan(rng):
     return made(spools, poses, max_arcs=12, **(limits if rng.random() < 0.5 else {}))
 
 
-@pytest.mark.thorough
+@pytest.mark.soak
 def test_random_plans():
     rng = np.random.default_rng(0)
     feasible = [check_plan(random_plan(rng)).answers.feasible for _ in range(12)]

@@ -134,6 +134,7 @@ def compare_intervals(rng, triangles, each, instants):
     return counts
 
 
+@pytest.mark.thorough
 def test_frequencies_are_those_of_bisection():
     assert (compare_intervals(np.random.default_rng(2), 2, 16, 201) > 5).all()
 

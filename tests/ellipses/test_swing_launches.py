@@ -168,7 +168,7 @@ def test_a_late_object_is_on_what_follows(thrown):
         )
 
 
-@pytest.mark.quick("0.0")
+@pytest.mark.thorough
 @pytest.mark.parametrize("radius", [0.0, 0.08])
 def test_errors_of_redundant_cables_and_over_pulleys(radius):
     """Derivatives are those of differences; the place has the least sum of squares of what lengths miss."""
@@ -214,6 +214,7 @@ def test_the_least_energy():
     np.testing.assert_allclose(launch["landing"], TARGET, atol=1e-9)
 
 
+@pytest.mark.thorough
 def test_the_least_energy_under_a_low_ceiling():
     """A target so far that the slowest release would rise above the spools: no feasible one is slower."""
     far = np.array([16.0, 3.0, 0.6])
@@ -233,6 +234,7 @@ def test_the_least_energy_under_a_low_ceiling():
     assert edge * (1.0 - 2e-3) < time < edge
 
 
+@pytest.mark.thorough
 def test_the_least_energy_above_a_floor():
     """By hand: 0.6 m below the centre, a floor bounds the vertical velocity as a ceiling does."""
     change = {"time": None, "choose": "energy"}

@@ -66,6 +66,7 @@ def test_other_families_are_asked(asked):
     assert len(asked["question"][-1]) == 1
 
 
+@pytest.mark.thorough
 def test_forms_keep_limits_of_the_mass_centre(asked):
     """A form that breaks one is none, and does not stand in."""
     problem, scene, poses, settings = asked["question"][:4]
@@ -103,6 +104,7 @@ def test_starts_of_the_segments_in_question(asked):
     assert begun.controls.shape == (4, 1, 29, 3)
 
 
+@pytest.mark.thorough
 def test_a_search_from_forms_goes_on_from_what_was_best(asked):
     """It keeps what the usual starts have led to, and begins from nothing but the forms."""
     problem, scene, poses, settings = asked["question"][:4]
@@ -164,6 +166,7 @@ def test_a_closed_form_that_does_not_serve(asked, change):
         assert no_slower.no_slower(free, problem, scene, poses, settings, [form]) is free
 
 
+@pytest.mark.thorough
 def test_ctrl_c_keeps_what_is_proved(monkeypatch):
     """While other families are asked."""
 

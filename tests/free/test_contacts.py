@@ -159,6 +159,7 @@ def test_a_motion_leads_round_what_is_in_its_way():
     assert durations[0] < durations[1] < 1.5 * durations[0]
 
 
+@pytest.mark.thorough
 def test_a_motion_gives_way_to_what_it_only_grazes():
     """A pole beside the motion: the first planes are enough, and the motion is hardly slower."""
     keys = BESIDE | {"obstacle": [IN_THE_WAY | {"centre": [0.045, -0.05, 0.85 + 0.11]}]}
@@ -259,6 +260,7 @@ def test_motions_are_bent_along_the_segments_in_question():
     np.testing.assert_allclose(sum(middle[:4])[0], 0.0, atol=1e-12)
 
 
+@pytest.mark.thorough
 def test_nothing_is_bounded_where_bodies_are_apart():
     rng = np.random.default_rng(3)
     with double_precision():

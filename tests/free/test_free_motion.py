@@ -79,6 +79,7 @@ def test_the_way_back_takes_as_long(aside):
     assert solve(RING, LIMITS, ASIDE[::-1])[0].duration == pytest.approx(aside[0].duration, rel=SAME)
 
 
+@pytest.mark.thorough
 def test_mirrored_and_turned_poses_take_as_long(aside):
     turn = np.array([[-0.5, -np.sqrt(0.75), 0.0], [np.sqrt(0.75), -0.5, 0.0], [0.0, 0.0, 1.0]])
     axis = RING["base_points"][0, :2] / np.linalg.norm(RING["base_points"][0, :2])
@@ -89,6 +90,7 @@ def test_mirrored_and_turned_poses_take_as_long(aside):
         assert free.duration == pytest.approx(aside[0].duration, rel=SAME)
 
 
+@pytest.mark.thorough
 def test_larger_and_heavier_robots(aside):
     """Lengths four times as large: twice as long. Masses and tensions alike: as long."""
     large = least_time_forms.ring_robot(3, 4.0, 2.0)
@@ -107,6 +109,7 @@ def test_accelerations_at_poses_are_those_that_are_given(aside):
     assert free.duration > aside[0].duration
 
 
+@pytest.mark.thorough
 def test_segments_together_share_their_acceleration_and_lose_no_time(aside):
     places = np.array([*ASIDE, [0.1, -0.3, 1.2]])
     free, frame = solve(RING, LIMITS, places)
@@ -123,6 +126,7 @@ def test_segments_together_share_their_acceleration_and_lose_no_time(aside):
     assert free.duration < solve(RING, LIMITS, places, resting)[0].duration
 
 
+@pytest.mark.thorough
 def test_redundant_cables_carry_a_motion_below_their_spools():
     """The fastest search passes through the plane of the spools between two instants, where no proof can follow."""
     limits = {"tension_max": np.full(4, 2.5 * WEIGHT)}
@@ -193,6 +197,7 @@ def test_few_intervals_are_tried_where_no_start_has_led_to_a_motion(monkeypatch,
     assert free.answers.feasible.all()
 
 
+@pytest.mark.thorough
 def test_no_motion_is_found_above_what_cables_carry():
     limits = LIMITS | {"tension_max": np.full(3, 0.2 * WEIGHT)}
     free, _ = solve(RING, limits, ASIDE, np.zeros((2, 3)))
@@ -208,6 +213,7 @@ def test_a_largest_tension_is_needed():
         solve(RING, {"tension_max": most}, ASIDE)
 
 
+@pytest.mark.ci("0")
 @pytest.mark.thorough
 @pytest.mark.parametrize("i", range(6))
 def test_table_2_1(i):

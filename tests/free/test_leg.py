@@ -59,6 +59,7 @@ def test_hypocycloids_go_on_from_free_motions():
     assert planned.feasible
 
 
+@pytest.mark.thorough
 def test_accelerations_of_a_file():
     """In the axes of a file with z up, and 0 at rest."""
     chosen = [{"position": [0.0, 0.0, 1.5], "rest": True}, {"position": [0.05, 0.0, 1.4]}]
@@ -66,6 +67,7 @@ def test_accelerations_of_a_file():
     np.testing.assert_allclose(ends(planned.motions[0]).acceleration, [[0.0] * 3, [0.0, 0.1, -0.2]], atol=1e-6)
 
 
+@pytest.mark.thorough
 def test_energy_between_velocities():
     """In the axes of a file with z up; no bound of the time is told where a motion does not begin at rest."""
     chosen = [{"position": [0.0, 0.0, 1.5], "velocity": [0.3, 0.0, 0.1]}, {"position": [0.1, 0.0, 1.4], "rest": True}]
@@ -83,6 +85,7 @@ def test_energy_between_velocities():
     assert segment["energy"] == pytest.approx(np.trapezoid(squares, rows["t"]), rel=1e-3)
 
 
+@pytest.mark.ci("cogiro-1500.0-3.0-place1-0.48")
 @pytest.mark.thorough
 @pytest.mark.parametrize(
     ("robot", "tension_max", "z0", "place", "longest"),

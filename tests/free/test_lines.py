@@ -103,6 +103,7 @@ def begun():
     return (*box[0], planned)
 
 
+@pytest.mark.thorough
 def test_searches_begin_from_lines_that_are_no_slower_than_straight_ones(begun):
     arguments, free, planned = begun
     (line,) = arguments[6]
@@ -133,6 +134,7 @@ def test_lines_stand_in_where_nothing_is_proved(monkeypatch, begun, rows):
         assert segment["energy"] > 0.0 and segment["lower_bound"] < segment["duration"]
 
 
+@pytest.mark.thorough
 def test_a_slower_motion_gives_way_to_a_line(monkeypatch, begun):
     """Of other objectives it does not."""
     arguments, free, _ = begun
@@ -144,6 +146,7 @@ def test_a_slower_motion_gives_way_to_a_line(monkeypatch, begun):
     assert energy.answers.source.tolist() == ["free", "free"]
 
 
+@pytest.mark.thorough
 def test_accelerations_that_are_asked_for_are_kept(monkeypatch, begun):
     """At rest a line begins and ends without acceleration; one that begins otherwise does not stand in."""
     _, free, _ = begun
@@ -218,6 +221,7 @@ def test_poses_that_no_motion_can_have_are_refused_at_once(tmp_path, monkeypatch
     assert err.count("\n") == 1 and line in err
 
 
+@pytest.mark.ci("eight")
 @pytest.mark.thorough
 @pytest.mark.parametrize("kind", ["six pulleys", "eight"])
 def test_platforms(kind):

@@ -64,7 +64,7 @@ def test_targets():
     check_cell(*cells[0.6, 1.5])
 
 
-@pytest.mark.thorough
+@pytest.mark.soak
 def test_times_of_table_2_1():
     """A second optimiser finds the same times; an infeasible pair among them changes nothing."""
     names = [f"segment {number}" for number in range(1, 7)]
@@ -105,6 +105,7 @@ def test_cells_in_space_are_what_plans_say():
     assert cells[0][1]["clearance"] > 0.0
 
 
+@pytest.mark.thorough
 def test_motions_lead_round_obstacles():
     """The fastest motions without the sphere pass through it, and both targets can be held beside it."""
     sweep = {

@@ -31,6 +31,7 @@ def best(objective, limits=LIMITS, **settings):
     return free
 
 
+@pytest.mark.thorough
 def test_energy_of_a_guided_weight(monkeypatch):
     """Cubics have the least sum of squared accelerations: of m^2 (g^2 T + 12 d^2 / T^3) half is paid for by a cable up
     and one down, which may push; it is least at T^2 = 6 d / g.
@@ -53,6 +54,7 @@ def test_energy_of_a_guided_weight(monkeypatch):
             assert free.energy[0] == pytest.approx(energy, rel=1e-3)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("objective", ["tension", "margin"])
 def test_least_time_within_the_best_level_is_the_longest_duration(objective):
     """Within the tensions of the best motion, no motion is faster than it."""
@@ -70,12 +72,14 @@ def test_least_time_within_the_best_level_is_the_longest_duration(objective):
     assert best("time", within).duration == pytest.approx(LONGEST, rel=3e-3)
 
 
+@pytest.mark.thorough
 def test_each_objective_is_the_best_in_what_it_is_for():
     energies = {name: best(name, longest=LONGEST).energy[0] for name in ("time", "energy", "tension", "margin")}
     assert all(energies["energy"] < energy for name, energy in energies.items() if name != "energy")
     assert best("time").duration < LONGEST
 
 
+@pytest.mark.quick("time")
 @pytest.mark.parametrize("objective", ["time", "tension", "margin"])
 def test_no_segment_is_shorter_than_limits_allow(objective):
     """The least time is 0.68 s; in less the best tensions break their limits."""
@@ -83,6 +87,7 @@ def test_no_segment_is_shorter_than_limits_allow(objective):
     assert not free.is_optimal
 
 
+@pytest.mark.thorough
 def test_a_sequence_has_the_sum_of_its_segments():
     settings = QUICK._replace(objective="energy")
     places = np.array([*ASIDE, [0.1, -0.3, 1.2]])

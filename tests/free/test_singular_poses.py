@@ -90,7 +90,8 @@ def test_second_derivatives_at_a_singular_pose_are_numbers():
     np.testing.assert_allclose(regular.cofactors, 0.0, atol=1e-12)
 
 
-@pytest.mark.quick("3R3T-None")
+@pytest.mark.ci("3R3T-None", "1R2T-longest2")
+@pytest.mark.thorough
 @pytest.mark.parametrize(("pattern", "longest"), [("3R3T", None), ("3R3T", np.array(3.0)), ("1R2T", np.array(3.0))])
 def test_derivatives_are_finite_differences(pattern, longest):
     """By coordinates, their derivatives and the duration. The determinant is last, and changes with coordinates."""
@@ -158,6 +159,7 @@ def test_bounds_are_on_the_side_of_both_ends(seed):
         assert ((low > 0.0) | (high < 0.0)).all()
 
 
+@pytest.mark.thorough
 def test_nothing_is_sought_across_singular_poses(tmp_path):
     """Below and above the spools."""
     code, out, err = plan(tmp_path, GREENLINE)

@@ -59,6 +59,7 @@ def test_spools_that_pull_down():
     assert bound <= float(least_time(np.array(1.0), 300.0 + 9.81, 300.0 - 9.81, np.inf))
 
 
+@pytest.mark.thorough
 def test_speeds_of_cables():
     line = {"points": [[0.0, 0.0, 1.0], [0.0, 0.0, 1.4]], "ramp_time": 0.0, "grid": 100}
     keys = {"schema": 1, "robot": "prototype", "family": "path", "path": line}

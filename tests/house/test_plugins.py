@@ -55,6 +55,7 @@ def test_a_family_and_its_map_from_an_empty_folder(tmp_path):
     assert (code, err) == (0, "") and (tmp_path / "run" / "durations.h5").is_file()
 
 
+@pytest.mark.thorough
 def test_a_map_from_an_empty_folder(tmp_path):
     shutil.copy(DOCS / "examples" / "spool_distances.py", tmp_path)
     installed(tmp_path, "add_map.md")

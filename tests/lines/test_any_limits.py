@@ -165,6 +165,7 @@ def test_no_motion_exceeds_the_largest_acceleration(law, limits):
     assert (fraction > 1.0 - 1e-6).all()  # the limit binds
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("law", ["quintic", "s-curve"])
 def test_the_proof_covers_the_largest_acceleration(law):
     """A motion that is a little too fast is not feasible, whatever search it came from."""

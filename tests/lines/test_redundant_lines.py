@@ -16,6 +16,7 @@ CASES = {
 }
 
 
+@pytest.mark.ci("boralugoda-planar-three-s-curve-limits3", "boralugoda-rectangle-s-curve-limits6")
 @pytest.mark.parametrize(
     ("robot", "family", "limits"),
     [

@@ -172,6 +172,7 @@ def test_a_picture_says_what_it_chose(capsys, tmp_path, figures):
     assert figures[1].legends[0].get_texts()[0].get_text() == "no value"
 
 
+@pytest.mark.thorough
 def test_a_picture_says_that_it_shows_the_first(capsys, tmp_path, figures):
     """Of an axis for which it has no room, and that nobody fixed."""
     path = made(tmp_path / "map.h5", GRID | {"z0": DEPTHS})
@@ -226,6 +227,7 @@ def test_instants_and_cables_are_no_choice(tmp_path):
         best_of({"feasible_at_infinity": np.ones(2)}, "z0", np.arange(2.0), 0)
 
 
+@pytest.mark.thorough
 def test_a_page_of_the_best_points(tmp_path):
     """Its cells are those of the reduced map, and motions of cells start from P0 at the depth chosen."""
     axes = {"x": [0.2, 0.4], "y": [0.0, 0.1], "z": [1.0], "z0": [1.0, 1.5]}

@@ -159,6 +159,7 @@ def test_rows_of_the_package_fit():
         assert kind.load().__name__ == f"{parts}Map"
 
 
+@pytest.mark.thorough
 def test_a_robot_is_one_file(tmp_path, monkeypatch):
     """A file in the catalogue's folder is listed, and plans use it by its name."""
     folder = tmp_path / "catalogue"

@@ -136,6 +136,7 @@ def between(peaks):
     return float(0.5 * (middle[gap] + middle[gap + 1]))
 
 
+@pytest.mark.ci("minimum-arcs-False", "minimum-oscillations-False", "poses-False", "redundant arcs-False")
 @pytest.mark.parametrize(("kind", "is_turned"), cases())
 def test_motions_of_their_own_time_are_judged(tmp_path, kind, is_turned):
     keys = {"map": kind} | FIXED[kind]
@@ -167,6 +168,7 @@ def test_motions_of_their_own_time_are_judged(tmp_path, kind, is_turned):
         assert 0 < changed < len(motions)
 
 
+@pytest.mark.ci("least-time-False", "paths-False")
 @pytest.mark.thorough
 @pytest.mark.parametrize("is_turned", [False, pytest.param(True, marks=pytest.mark.soak)])
 @pytest.mark.parametrize("kind", FASTEST)
@@ -193,6 +195,7 @@ def test_motions_in_the_least_time_keep_them(tmp_path, kind, is_turned):
 SHORT = "[axes]\nx = [0.0]\ny = [0.1]\nz = [1.4]\n"
 
 
+@pytest.mark.quick("speed_max-workspace", "acceleration_max-swing-range")
 @pytest.mark.parametrize("kind", ["transition-envelopes", "feasible-acceleration", "swing-range", "workspace"])
 @pytest.mark.parametrize("name", FLAGS)
 def test_maps_without_motions_refuse_them_in_one_line(tmp_path, kind, name):

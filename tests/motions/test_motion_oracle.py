@@ -200,6 +200,7 @@ def test_intervals_of_failure_between_samples():
     assert any_motion.smallest(slack, times, slack(times)) == pytest.approx(-0.0877)
 
 
+@pytest.mark.soak
 def test_judgements_do_not_hang_on_samples():
     rng = np.random.default_rng(8)
     feasible = 0

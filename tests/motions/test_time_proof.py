@@ -117,6 +117,7 @@ def sampler(robot, limits: Limits):
 QUICK = ("prototype", "boralugoda-rectangle")
 
 
+@pytest.mark.ci("laval-mssm-0.05")
 @pytest.mark.quick("prototype-0.0", "prototype-0.05")
 @pytest.mark.parametrize(
     ("name", "wheels"),

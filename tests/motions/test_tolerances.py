@@ -36,6 +36,7 @@ def run(tmp_path, uncertainty, name="sweep"):
     return code, tmp_path / name / f"{name}.h5"
 
 
+@pytest.mark.thorough
 def test_a_map_of_tolerated_multiples(tmp_path):
     _, small = run(tmp_path, "{ spool_positions = 1e-5 }", "small")
     _, large = run(tmp_path, "{ spool_positions = 0.02 }", "large")

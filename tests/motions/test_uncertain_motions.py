@@ -116,6 +116,7 @@ def worst_rooms(problem, state, multiple):
             yield room(limits, *balances(robot, one, base + spools, centre, ratio))[0]
 
 
+@pytest.mark.ci("prototype", "laval-mssm")
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", CASES)
 def test_no_robot_within_a_proved_multiple_fails_and_one_within_a_refuted_one_does(name):
@@ -195,6 +196,7 @@ def test_limits_of_cables_hold_for_all_robots(row):
     assert 0.99 < max(reached) < 1.0
 
 
+@pytest.mark.thorough
 def test_hypocycloids_tolerate_what_their_own_proof_says():
     off = {"spool_positions": 0.004, "mass_factor": 1.05}
     keys = {
@@ -217,6 +219,7 @@ TIMES = np.linspace(0.0, 6.0, 7)
 PLACES = np.array([0.0, 0.0, 1.0]) + 0.06 * np.random.default_rng(1).uniform(-1.0, 1.0, (7, 3))
 
 
+@pytest.mark.thorough
 def test_checks_are_of_all_robots():
     small = cspr_jax.check("prototype", TIMES, PLACES, limits={"uncertainty": {"spool_positions": 0.01}})
     shown = small.to_dict()

@@ -49,6 +49,8 @@ SOAK = pytest.mark.soak
 MANY = [(robot, kind) for robot in ROBOTS for kind in (FROM_REST, BETWEEN)]
 
 
+@pytest.mark.ci("mssm-kind0-20-2")
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("name", "kind", "count", "robots"),
     [
@@ -84,6 +86,7 @@ def test_no_robot_within_a_proved_multiple_of_the_uncertainty_fails(name, kind, 
             assert distance_of_cables(other, motion) > 0.0
 
 
+@pytest.mark.thorough
 def test_a_robot_that_refutes_a_multiple_fails_in_the_oracle_too():
     robot, limits = ROBOTS["mssm"], Limits(uncertainty=BALLS)
     drawn, segments, arcs = feasible_motions("mssm", FROM_REST, 20, limits)

@@ -117,6 +117,7 @@ def heads(plan):
     return [str(column.header) for column in plan.to_table().columns]
 
 
+@pytest.mark.thorough
 def test_margins_have_units(own):
     """Of segments in the table and JSON, in motion files, and so in pictures and pages."""
     keys = {"schema": 1, "robot": str(own / "robot.toml"), "samples": 30}

@@ -81,6 +81,7 @@ def test_an_object_flies_where_free_fall_takes_it(plan):
         assert place[0] == pytest.approx(wanted, abs=0.02)
 
 
+@pytest.mark.thorough
 def test_pictures_are_those_of_the_whole_figure(plan):
     """Pixel for pixel, though only what moves is drawn again: spools and clock lie over the cables and the mark."""
     columns = plan.rows(200.0) | {"flight_t": np.array([1.0, 1.5]), "flight_position": np.array([[0.3, 0.1, 1.2]] * 2)}
@@ -123,6 +124,7 @@ def test_other_kinds_of_films(plan, tmp_path):
     assert plan.animate(tmp_path / "again.html", speed=32.0).read_text("utf-8") == page
 
 
+@pytest.mark.thorough
 def test_long_films_have_fewer_pictures(plan, monkeypatch):
     monkeypatch.setattr(films, "MOST", 7)
     columns = plan.rows(200.0)
@@ -148,6 +150,7 @@ def test_no_film_is_written(tmp_path, monkeypatch, capsys, words, said):
     assert [path.name for path in tmp_path.iterdir()] == ["plan.toml"]
 
 
+@pytest.mark.thorough
 def test_what_is_not_feasible_is_shown_anyway_only(tmp_path):
     infeasible = cspr_jax.plan(
         {"schema": 1, "robot": "prototype", "family": "transition", "z0": 1.2}

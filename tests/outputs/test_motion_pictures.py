@@ -35,6 +35,7 @@ def drawn(figures, *words: str):
     return figures.pop()
 
 
+@pytest.mark.thorough
 def test_the_trajectory_in_space(motions, figures, capsys):
     figure = drawn(figures, str(motions / "first.h5"), "--quantity", "trajectory")
     result = cspr_jax.open_result(motions / "first.h5")
@@ -132,6 +133,7 @@ def test_a_wrong_picture_names_those_there_are(motions, capsys):
     assert "absent for a motion but with --quantity acceleration" in capsys.readouterr().err
 
 
+@pytest.mark.ci("svg-summary", "png-tensions", "pdf-tensions")
 @pytest.mark.quick("svg-tensions")
 @pytest.mark.parametrize("quantity", ["summary", "tensions"])
 @pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
@@ -165,6 +167,7 @@ def test_several_motions_of_a_planar_robot_have_no_view_from_above(tmp_path, fig
     assert len(figure.legends[0].get_texts()) == 2
 
 
+@pytest.mark.ci("summary-size4", "trajectory-size2")
 @pytest.mark.quick("trajectory-size0")
 @pytest.mark.parametrize(
     ("quantity", "size"),
@@ -218,6 +221,7 @@ def test_presets_and_titles(motions, figures, capsys):
     assert "cannot be combined with --column" in capsys.readouterr().err
 
 
+@pytest.mark.thorough
 def test_speeds_have_their_limits(motions, figures, capsys):
     figure = drawn(figures, str(motions / "first.h5"), "--quantity", "summary")
     rates = next(panel for panel in figure.axes if panel.get_ylabel() == "cable speed (m/s)")

@@ -141,6 +141,7 @@ def panels(figure) -> list:
     return [panel for panel in figure.axes if panel.get_visible() and panel.get_label() != "<colorbar>"]
 
 
+@pytest.mark.thorough
 def test_a_map_is_drawn_as_six_sections(capsys, tmp_path, figures):
     cspr(capsys, "plot", made(tmp_path / "map.h5"))
     figure = figures[0]
@@ -188,6 +189,7 @@ def test_a_map_over_one_axis_is_a_line(capsys, tmp_path, figures):
     assert "more than one point" in line and not figures[1:]
 
 
+@pytest.mark.thorough
 def test_lines(capsys, tmp_path, figures):
     """One line for each point of an axis, a panel for each of the next; several results in one picture."""
     path = made(tmp_path / "map.h5")

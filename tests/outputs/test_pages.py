@@ -66,6 +66,7 @@ def content_of(path):
     return json.loads(re.search(r'<script type="application/json" id="content">(.*?)</script>', text, re.DOTALL)[1])
 
 
+@pytest.mark.thorough
 @settings(max_examples=40, deadline=None)
 @given(
     arrays.arrays(st.sampled_from([np.int16, np.uint32, np.float64]), st.integers(0, 30), elements=None)

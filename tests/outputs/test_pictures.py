@@ -104,6 +104,7 @@ def test_spools_p0_and_start_stand_where_they_are(capsys, tmp_path, figures):
     assert side.get_ylim() == (2.25, 0.75)
 
 
+@pytest.mark.thorough
 def test_what_lies_elsewhere_is_not_marked(capsys, tmp_path, figures):
     """The start half a metre below the only section; beyond the lowest one; P0 upward of z = up."""
     for k, (z, height) in enumerate((([1.5], 2.0), ([1.0, 1.2, 1.4], 2.0), ([0.1, 1.2, 1.4], 1.6))):
@@ -317,6 +318,7 @@ def test_names_are_drawn_letter_by_letter(capsys, tmp_path):
     assert max(map(len, re.findall(r">([^<>]*long[^<>]*)<", (tmp_path / "b.svg").read_text("utf-8")))) < 80
 
 
+@pytest.mark.thorough
 def test_letters_stay_letters_and_bytes_stay_the_same(capsys, tmp_path, monkeypatch):
     """TrueType in PDF, text in SVG, nothing of the day, and nothing of the user's own settings of matplotlib."""
     path = made(tmp_path / "map.h5", GRID | {"z": [1.5, 2.5]})
@@ -367,6 +369,7 @@ def test_sizes_that_cannot_be(capsys, tmp_path, arguments, told):
     assert [file.name for file in tmp_path.iterdir()] == ["map.h5"]
 
 
+@pytest.mark.thorough
 def test_titles_stand_clear_of_panels(capsys, tmp_path, figures):
     """Of sections, whose upper row has ticks below, and of polar ones, which have angles around."""
     tilts = {"tilt_azimuth": (np.arange(8) - 4) * np.pi / 4.0, "tilt": np.arange(1, 4) * 0.3}
@@ -398,6 +401,7 @@ def test_a_narrow_title_has_one_line(capsys, tmp_path, figures):
     assert figures[-1].get_suptitle() == "" and figures[-1].get_figwidth() * 2.54 == pytest.approx(17.5)
 
 
+@pytest.mark.thorough
 def test_panels_side_by_side_follow_from_the_width(capsys, tmp_path, figures):
     path = made(tmp_path / "map.h5", GRID | {"z": [1.0, 1.2, 1.4, 1.6, 1.8, 2.0]})
     for words, side_by_side in (([], 3), (["--page"], 3), (["--column"], 2), (["--size", "6x30"], 1)):

@@ -108,6 +108,7 @@ def test_another_robot_is_seen(folder):
         assert np.linalg.norm(way.position[-1] - moved.position[-1]) > 1e-4
 
 
+@pytest.mark.thorough
 def test_the_command(folder, capsys):
     told = strict_json(cspr(capsys, "replay", "plan.toml", "--json", "--step", 0.002, "-o", "picture.svg"))
     found = cspr_jax.replay("plan.toml", step=0.002)

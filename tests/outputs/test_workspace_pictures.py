@@ -320,6 +320,7 @@ def test_workspaces_are_compared_by_their_outlines():
     assert lines.get_ylabel() == "margin of the tensions (N)"
 
 
+@pytest.mark.thorough
 def test_what_is_asked_is_said():
     """Numbers of conditions, limits over those of the robot, and sets of orientations."""
     axes = {"x": [0.0, 1.0], "y": [0.0, 1.0], "z": [1.0, 2.0]}
@@ -335,6 +336,7 @@ def test_what_is_asked_is_said():
         assert text in cspr_jax.plot(given, solid=True).get_suptitle()
 
 
+@pytest.mark.ci("svg")
 @pytest.mark.thorough
 @pytest.mark.parametrize("ending", ["png", "pdf", "svg"])
 def test_the_same_data_give_the_same_bytes(tmp_path, ending):
@@ -380,6 +382,7 @@ def test_a_picture_that_is_asked_wrongly(given, choices, told):
     assert told in str(caught.value) and len(str(caught.value).splitlines()) == 1
 
 
+@pytest.mark.thorough
 def test_the_command_line_draws_them(capsys, tmp_path, monkeypatch, figures):
     """A solid, several results, a map without a solid; a margin that nobody asks for is no picture."""
     read_here(monkeypatch)
@@ -398,6 +401,7 @@ def test_the_command_line_draws_them(capsys, tmp_path, monkeypatch, figures):
     assert "--solid" in cspr(capsys, "plot", made(tmp_path / "b.h5", axes | {"z0": [1.0]}), "--solid", code=2)
 
 
+@pytest.mark.thorough
 def test_a_legend_that_is_too_wide_is_broken(tmp_path):
     """Nothing is cut off, also in a narrow picture."""
     for size in ((30.0, 12.0), (9.0, 12.0)):

@@ -222,6 +222,7 @@ def test_more_orientations_are_a_smooth_curve_through_them():
     )
 
 
+@pytest.mark.thorough
 def test_turning_on_the_spot_is_a_path_of_a_platform():
     units = np.array([unit(0.0, 0.0, 0.0), unit(0.0, 0.0, 0.5)])
     places = np.zeros((2, 3))

@@ -96,6 +96,7 @@ def test_lifted_paths_go_over_what_straight_ones_meet():
     assert ways["lines"]["clearance"] < 0.0 < ways["lifts"]["clearance"]
 
 
+@pytest.mark.ci("path1")
 @pytest.mark.thorough
 @pytest.mark.parametrize("path", [{"grid": 60}, {"grid": 60, "lift": 0.5, "blend_tolerance": 0.1}, {"lift": 0.3}])
 def test_platforms_keep_their_orientation(path):

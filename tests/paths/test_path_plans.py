@@ -111,6 +111,7 @@ def test_arcs_and_circles():
     assert passes(walked(onward), [0.0, -0.06, 1.4]) < 1e-12
 
 
+@pytest.mark.thorough
 def test_files(tmp_path):
     """A table of points in millimetres, and the same as G-code; z of the file is that of the robot."""
     rows = "\n".join(",".join(f"{1000.0 * x:g}" for x in place) for place in PLACES)

@@ -38,6 +38,7 @@ def tensions_for(place: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
     return np.linalg.solve(pulls, MASS * (acceleration - np.array([0.0, 0.0, GRAVITY])))
 
 
+@pytest.mark.thorough
 def test_names_of_half_planes():
     robot = cspr_jax.load_robot("prototype")
     limits = Limits(tension_min=LEAST, tension_max=LARGEST, cable_acceleration_max=5.0)
@@ -67,6 +68,7 @@ def stopping():
     return planned(points=CORNER)
 
 
+@pytest.mark.thorough
 def test_bounds_of_sections_with_a_stop_between_them(stopping):
     (segment,) = stopping.to_dict()["segments"]
     first, last = segment["sections"]

@@ -58,6 +58,7 @@ def swing():
     return planned, cspr_jax.retime(planned)
 
 
+@pytest.mark.thorough
 def test_hypocycloid_that_almost_turns_back(swing):
     planned, retimed = swing
     (segment,) = retimed.to_dict()["segments"]

@@ -81,6 +81,7 @@ def test_a_segment_that_is_only_too_fast_is_not_called_slack(tmp_path):
     assert page.read_text().count(" m/s at t = ") == 2
 
 
+@pytest.mark.thorough
 def test_searches_from_python_say_the_same():
     base = [[0.05, 0.10, 2.85], [3.40, 0.22, 3.10], [1.60, 2.95, 2.60]]
     robot, limits = cspr_jax.point_mass(base, mass=1.2, z_axis="up"), cspr_jax.Limits(cable_speed_max=np.full(3, 2.5))
@@ -146,11 +147,13 @@ def check_causes(seed, count):
     return kinds
 
 
+@pytest.mark.thorough
 def test_what_is_named_alone_stands_alone_in_the_way():
     kinds = check_causes(4, 40)
     assert kinds["alone"] >= 5 and kinds["several"] >= 5
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize(
     "seed", [pytest.param(seed, marks=pytest.mark.thorough if seed == 5 else pytest.mark.soak) for seed in range(5, 13)]
 )
@@ -172,6 +175,7 @@ MSSM = {"schema": 1, "robot": "laval-mssm", "family": "hypocycloid", "z0": 1.4, 
 MSSM |= {"amplitude": {"name": "effective-c3", "epsilon": 0.1}}
 
 
+@pytest.mark.ci("limits1-tension_min-slack_cable")
 @pytest.mark.thorough
 @pytest.mark.parametrize(
     ("limits", "key", "flag"),

@@ -33,6 +33,7 @@ def clearances(plan, place, radius):
     return np.linalg.norm(np.array(SPOOLS) + along[..., None] * way - place, axis=2) - radius
 
 
+@pytest.mark.thorough
 def test_swings_take_the_smallest_number_of_arcs_beside_an_obstacle():
     free, beside = planned(SWING), planned(SWING, 0.01)
     assert (free.answers.arcs[0], beside.answers.arcs[0]) == (1, 2) and beside.feasible
@@ -76,7 +77,7 @@ def test_transitions_and_lines_among_obstacles():
         assert met.causes[0][0].needed == pytest.approx(clearances(met, [0.0, 0.05, 1.515], 0.02).min(), rel=0.01)
 
 
-@pytest.mark.quick("keys0")
+@pytest.mark.thorough
 @pytest.mark.parametrize("keys", [SWING, LINE, BEZIER])
 def test_motions_over_pulleys(keys):
     """The margin is the smallest tension of the cables over their pulleys, whatever it is without them."""

@@ -118,6 +118,7 @@ def test_a_plan_that_is_not_feasible(tmp_path):
     assert code == 1 and "no_arcs" in out and "none found" in out
 
 
+@pytest.mark.thorough
 def test_a_fixed_number_of_arcs(tmp_path, free):
     """Section 2.9: the segment from the third to the fourth target with 7 arcs instead of 5 has more tension."""
     place = "position = [0.8, 0.5, 1.5]\n"
@@ -130,6 +131,7 @@ def test_a_fixed_number_of_arcs(tmp_path, free):
     assert (code, segment["arcs"], segment["tried_arcs"]) == (1, None, 1)
 
 
+@pytest.mark.thorough
 def test_z0_that_is_chosen(tmp_path, free):
     """Section 2.9: the mean height is 1.7 m; the conservative z0 goes down to 4.757 m (errata: printed 4.74)."""
     found = {}

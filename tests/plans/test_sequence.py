@@ -124,6 +124,7 @@ def test_an_outcome_of_a_family(lines, monkeypatch, tmp_path):
     assert "one photo" in cspr("plan", lines / "plan.toml")[1]
 
 
+@pytest.mark.thorough
 def test_mujoco_plays_a_family(lines):
     """Open loop: the same path, and the same tensions."""
     planned(lines)
@@ -256,6 +257,7 @@ def test_mistakes_of_mixed_sequences(tmp_path, change, words):
     assert (code, out) == (2, "") and err.count("\n") == 1 and words in err
 
 
+@pytest.mark.thorough
 def test_robots_on_pulleys_are_moved_by_any_family(lines):
     """Files and MuJoCo hold the cables over the pulleys; without bounds of its states a motion is not proved."""
     (lines / "wheels.toml").write_text(

@@ -120,6 +120,10 @@ def values(robot, limits, ball, motion):
     return at
 
 
+@pytest.mark.ci(
+    "ball", "bezier", "eight cables", "ellipse", "path", "pulleys", "quintic", "s-curve", "swing", "transition of four"
+)
+@pytest.mark.quick("four cables")
 @pytest.mark.parametrize(
     "case", [name if name in QUICK else pytest.param(name, marks=pytest.mark.thorough) for name in CASES]
 )

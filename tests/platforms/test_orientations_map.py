@@ -124,6 +124,7 @@ def swept(folder, *change):
     return cspr("run", folder / "places.toml", "-o", folder / "run")
 
 
+@pytest.mark.thorough
 def test_maps_of_places(tmp_path):
     """Cells are what the functions give; the mirrored place has the same numbers."""
     code, out, err = swept(tmp_path)

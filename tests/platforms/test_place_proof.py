@@ -93,6 +93,7 @@ def block_breaks(count, seed, kind, robot):
     return broken, float((found.clear > 0.0).mean())
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "kind", [USUAL, pytest.param(FROM_REST, marks=pytest.mark.thorough)], ids=["between", "from rest"]
 )
@@ -145,6 +146,7 @@ def verdict_breaks(count, seed, kind, robot, instants):
     return contradicted, int(undecided.sum()), int((proof.met | proof.hit).sum()), int(proof.is_proved.sum())
 
 
+@pytest.mark.quick("from rest")
 @pytest.mark.parametrize(
     "kind", [pytest.param(USUAL, marks=pytest.mark.thorough), FROM_REST], ids=["between", "from rest"]
 )

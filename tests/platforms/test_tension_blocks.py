@@ -151,6 +151,7 @@ def block_breaks(count, seed, kind, robot, limits):
     return broken, np.array(gaps)
 
 
+@pytest.mark.quick("from rest")
 @pytest.mark.parametrize(
     "kind", [pytest.param(USUAL, marks=pytest.mark.thorough), FROM_REST], ids=["between", "from rest"]
 )
@@ -205,6 +206,7 @@ def verdict_breaks(count, seed, kind, robot, instants):
     return contradicted, int(undecided.sum()), int(proof.is_proved.sum())
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "kind", [USUAL, pytest.param(FROM_REST, marks=pytest.mark.thorough)], ids=["between", "from rest"]
 )
@@ -352,6 +354,7 @@ def flat_instants(robot, segment, p, beta):
     return 0.5 * (low + high)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("limits", "least"), [(None, True), pytest.param(TIGHT, False, marks=pytest.mark.thorough)], ids=["verdicts", "all"]
 )

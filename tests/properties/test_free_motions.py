@@ -26,6 +26,7 @@ def marks(name):
     return [pytest.mark.soak if any(part in name for part in SLOW) else pytest.mark.thorough]
 
 
+@pytest.mark.ci("segment 0", "2T-4 0 inside", "3T-3 0 outside", "segment 5")
 @pytest.mark.parametrize("name", [pytest.param(name, marks=marks(name)) for name in free_motion_times.NAMES])
 def test_times_are_those_of_collocation(name):
     reference = free_motion_times.reference(name)

@@ -88,6 +88,7 @@ def check_exact(robot, limits, path, exact, samples=SAMPLES["quick"]):
     return answer
 
 
+@pytest.mark.quick("ends0")
 @pytest.mark.parametrize("ends", [(0.6, 1.5), (1.5, 0.6)])
 def test_vertical_lines(ends):
     exact, _ = least_time_forms.vertical(RING, LOW, HIGH, *ends)
@@ -115,6 +116,7 @@ def test_limits_of_speed_and_acceleration():
     check_exact(RING, {**loose, "acceleration_max": 1.5}, path_rows.circle([0.0, 0.0, 0.8], 0.2), exact)
 
 
+@pytest.mark.thorough
 def test_a_circle_under_many_spools_does_not_chatter():
     """At 48 places the acceleration along the path drops out of a row."""
     limits = {"tension_min": np.zeros(24), "tension_max": np.full(24, 1e3)}
@@ -153,11 +155,13 @@ def check_case(case, samples, count):
         check_motion(case.robot, case.limits, case.path, answer, samples)
 
 
+@pytest.mark.quick("2T-2-0-False")
 @pytest.mark.parametrize("kind, seed, outside", QUICK)
 def test_random_paths(kind, seed, outside):
     check_case(least_time_cases.case(kind, seed, outside), SAMPLES["quick"], 60)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("kind, seed", [("2T-4", 152), ("3T-4", 148)])
 def test_bounds_where_multipliers_change_fast(kind, seed):
     """In one cell y . a' - y' . a is negative at first."""
@@ -166,6 +170,7 @@ def test_bounds_where_multipliers_change_fast(kind, seed):
     assert (1.0 - SHORTER) * answer.time <= answer.lower <= answer.time
 
 
+@pytest.mark.ci("3R3T-7-1-True", "2T-4-1-True", "1R2T-4-1-True", "3T-4-1-True")
 @pytest.mark.thorough
 @pytest.mark.parametrize("kind, seed, outside", THOROUGH)
 def test_more_random_paths(kind, seed, outside):
@@ -215,6 +220,7 @@ def test_verdicts_are_those_of_linear_programs(kind):
     assert differ == {}
 
 
+@pytest.mark.thorough
 def test_no_largest_tension_is_a_very_large_one():
     """Faces without a bound bound no motion, and the lower bound holds beside them."""
     path = path_rows.through(np.array([[-0.15, 0.0, 0.8], [0.0, 0.12, 1.1], [0.15, -0.05, 0.9]]))
@@ -245,6 +251,7 @@ def test_lengths_and_masses_scale(kind):
     assert large.lower == pytest.approx(scale.time * small.lower, rel=1e-5)
 
 
+@pytest.mark.thorough
 def test_ramps_cost_little_and_leave_no_jumps():
     path, ramp = path_rows.line([-0.2, 0.1, 0.8], [0.25, -0.05, 1.4]), 0.05
     sharp, smooth = (solve(RING, path, BETWEEN, ramp_time=t) for t in (0.0, ramp))

@@ -29,6 +29,7 @@ def cells_of(count):
     return shipped, bound
 
 
+@pytest.mark.thorough
 def test_the_proved_time_is_shorter_than_the_printed_ones():
     """19.865 s with 100 cells a segment in a prototype, and a bound of 19.840 s."""
     time, bound = cells_of(1900)

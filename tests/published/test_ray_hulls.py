@@ -38,7 +38,7 @@ def test_the_closed_form_gives_the_printed_hull():
     assert whole == pytest.approx(ray_hulls.hull(by_programs, 1), rel=1e-9)
 
 
-@pytest.mark.thorough
+@pytest.mark.soak
 def test_all_tensions_hold_a_larger_hull():
     """As linear programs (HiGHS) gave it, and larger along finer rays."""
     with double_precision():

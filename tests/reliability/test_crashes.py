@@ -128,6 +128,7 @@ def refusals(job, tmp_path, faults_at):
             shutil.rmtree(directory)
 
 
+@pytest.mark.thorough
 def test_a_disk_that_refuses(short_job, tmp_path):
     """Every call, for one reason after the other; every third for good."""
     refusals(short_job, tmp_path, lambda k: [([*FAULTS][k % 5], k % 3 == 0)])

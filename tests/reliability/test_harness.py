@@ -84,7 +84,7 @@ class Anything(str):
         return False
 
 
-@pytest.mark.thorough
+@pytest.mark.soak
 def test_without_the_record_s_checksum(tmp_path, monkeypatch):
     sweep = sweep_of(tmp_path, tiles=4)
     go(sweep, tmp_path / "run")

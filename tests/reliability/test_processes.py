@@ -128,6 +128,7 @@ def second_writers(job, tmp_path, count):
         complete(sweep, directory, reference)
 
 
+@pytest.mark.thorough
 def test_two_writers(job, tmp_path):
     second_writers(job, tmp_path, 2)
 

@@ -102,7 +102,7 @@ def test_a_command_that_is_killed_goes_on(job, tmp_path):
     assert (tmp_path / "killed" / "map.h5").read_bytes() == result
 
 
-@pytest.mark.thorough
+@pytest.mark.soak
 @pytest.mark.skipif(shutil.which("unshare") is None, reason="needs unshare")
 def test_a_disk_that_fills_between_tiles(job, tmp_path):
     """A disk of four megabytes, which another program fills: one line; with room again the run goes on."""
@@ -135,7 +135,7 @@ NAMES = [
 ]
 
 
-@pytest.mark.thorough
+@pytest.mark.soak
 @MAPS
 def test_maps_of_hostile_names(tmp_path, text):
     """What is written lies in its folder; pages show the names; lines for people have no escapes."""

@@ -216,6 +216,7 @@ def test_the_pace_of_a_sweep():
     assert pace.left() == "0:00:03 left"
 
 
+@pytest.mark.thorough
 def test_a_picture_is_there_whole_or_not_at_all(tmp_path, monkeypatch):
     sweep = sweep_of(tmp_path, tiles=4)
     result, picture = go(sweep, tmp_path / "run").result, tmp_path / "map.png"

@@ -275,6 +275,7 @@ def test_float32_gives_the_same_verdicts():
     assert quick.is_open.sum() == 1 and (quick.clearance == exact.clearance).any()
 
 
+@pytest.mark.thorough
 def test_few_poses_and_many_are_computed_alike(monkeypatch):
     """Short batches on one thread, or several long ones on two."""
     place, turns = random_poses(50, 9)

@@ -145,6 +145,8 @@ def instants(robot, around, seed: int, middle, size: float, count: int):
     return [x.reshape(count, -1) for x in exact[:5]], in_batches(kernel, blocks, size=40)
 
 
+@pytest.mark.ci("prototype", "laval-mssm")
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "name", ["prototype", *(pytest.param(name, marks=pytest.mark.thorough) for name in ("cogiro", "laval-mssm"))]
 )

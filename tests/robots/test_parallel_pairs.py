@@ -266,6 +266,7 @@ def test_a_motion_file_has_the_tensions_of_all_six(tmp_path):
     assert read.tension_each.dims == ("t", "each") and "each" not in read.tension.dims
 
 
+@pytest.mark.thorough
 def test_its_pictures(tmp_path, figures):
     """The robot that the file keeps is moved as it was when it was planned."""
     assert plan(tmp_path, PLAN.format(robot='"launch-robot"', family="transition", limits=""), "-o", tmp_path / "m.h5")

@@ -307,6 +307,7 @@ def test_cables_that_are_none(given, line):
         cspr_jax.with_cables(made("3R3T"), **given)
 
 
+@pytest.mark.thorough
 def test_a_rigid_platform_is_as_before():
     """Its wrench has forces first, then moments about the mass centre, whatever the origin of its axes."""
     robot, at = made("3R3T"), state_of("3R3T", np.random.default_rng(2))

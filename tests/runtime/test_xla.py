@@ -507,6 +507,7 @@ print(lines)
 """
 
 
+@pytest.mark.ci("4-10")
 @pytest.mark.parametrize(("count", "turns"), [(4, 10), pytest.param(20, 100, marks=pytest.mark.thorough)])
 def test_many_processes_share_one_folder(tmp_path, monkeypatch, count, turns):
     """While others take, hand over, trim and remove entries, each sees whole ones alone."""
@@ -520,6 +521,7 @@ def test_many_processes_share_one_folder(tmp_path, monkeypatch, count, turns):
     assert not list(tmp_path.glob("run-*"))
 
 
+@pytest.mark.soak
 @pytest.mark.parametrize(
     "count", [pytest.param(3, marks=pytest.mark.thorough), pytest.param(20, marks=pytest.mark.soak)]
 )

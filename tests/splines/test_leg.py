@@ -154,6 +154,7 @@ def test_infeasible_segments_name_the_cable(tmp_path):
     assert start <= cause["t"] <= end
 
 
+@pytest.mark.thorough
 def test_a_joint_stays(tmp_path):
     """Poses and tables that move the joint of a robot are refused; elsewhere its place is what positions are."""
     ends = np.array([[0.3, 0.0, 0.2], [0.0, 0.3, 0.2], [-0.3, -0.3, 0.2], [0.2, -0.3, 0.2]])

@@ -82,6 +82,7 @@ def test_what_was_given_comes_back(checked):
         np.testing.assert_array_equal(data["mass_centre"], table.data["mass_centre"])
 
 
+@pytest.mark.thorough
 def test_the_round_trip(checked):
     """With the same options, and without them, for the files say whose positions they hold."""
     folder, _, _, _, words, found = checked
@@ -92,6 +93,8 @@ def test_the_round_trip(checked):
     assert set(codes) == {0}
 
 
+@pytest.mark.ci("six, down")
+@pytest.mark.thorough
 def test_pictures_are_of_that_point(checked):
     folder, robot, _, _, words, _ = checked
     result = cspr_jax.open_result(folder / "out.h5")

@@ -94,6 +94,7 @@ def test_a_file_of_ours_without_its_seal_stays_refused(whole, tmp_path):
         cspr_jax.open_result(tmp_path / "joined.nc")
 
 
+@pytest.mark.thorough
 def test_the_command_line_draws_and_reports_joins(whole, tmp_path, capsys):
     JOINS["concat"](parts_of(whole)).to_netcdf(tmp_path / "joined.nc", engine="h5netcdf")
     path = str(tmp_path / "joined.nc")

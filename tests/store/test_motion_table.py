@@ -103,6 +103,7 @@ def is_inverted(path, **given):
     return panel.yaxis_inverted(), figure.get_suptitle()
 
 
+@pytest.mark.thorough
 def test_where_z_points(folder, upward):
     """The work of the cables tells it; robot, plan or an option do; so does a comment of an earlier version."""
     down, up = folder / "motion.csv", upward / "motion.csv"
@@ -213,6 +214,7 @@ def test_damage_is_one_line(folder, capsys, change, said):
     assert not path.with_suffix(".png").exists() and not path.with_suffix(".html").exists()
 
 
+@pytest.mark.thorough
 def test_pictures_of_a_table(folder, capsys):
     """What the columns hold alone; robot and limits with the plan."""
     table, words = str(folder / "motion.csv"), ["--plan", str(folder / "plan.toml")]

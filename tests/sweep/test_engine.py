@@ -219,6 +219,7 @@ def test_xarray_sees_names_units_and_flags(tiny):
         assert float(here["duration"]) == tiny[2]["duration"][1, 0, 0, 0]
 
 
+@pytest.mark.quick("failure0-4")
 @pytest.mark.parametrize(
     ("failure", "code"), [(MemoryError(), 4), (SelfCheckError("tile 1"), 5), (ValueError("a mistake of ours"), 70)]
 )
@@ -296,6 +297,7 @@ def test_the_reference_data_set_is_what_the_program_computes():
         np.testing.assert_allclose(stored[index], answers[name], rtol=rtol, atol=rtol, err_msg=name)
 
 
+@pytest.mark.thorough
 def test_runs_of_versions_with_narrower_verdicts_go_on(tiny, tmp_path, monkeypatch):
     """Earlier versions stored flags as uint16: their shards and results are read, finished, and give the same."""
     narrow = dataclasses.replace(EVERY["verdict"], kind="uint16")

@@ -96,6 +96,7 @@ def test_missing_tiles_are_named_and_nothing_is_written(tmp_path, kind):
         cspr_jax.open_result(parts[0])
 
 
+@pytest.mark.thorough
 def test_maps_that_differ_in_one_axis(tmp_path, kind):
     """Overlapping, interleaved, of other tiles, as a range: each cell is what one map has there."""
     files = [
@@ -127,6 +128,7 @@ class DoubtfulMap(toy.ToyMap):
         return {"verdict": np.where(cells["x"] > 0.25, Verdict.UNDECIDED, Verdict(0)).astype(np.uint32)}
 
 
+@pytest.mark.thorough
 def test_a_joined_map_says_how_much_is_proved_if_all_its_parts_do(tmp_path):
     columns = dict.fromkeys(("quantities", "stored", "pictured", "motionless"), ("verdict",))
     with registered(dataclasses.replace(toy.KIND, implementation=f"{__name__}:DoubtfulMap", **columns)):
@@ -143,6 +145,7 @@ def test_a_joined_map_says_how_much_is_proved_if_all_its_parts_do(tmp_path):
             assert [shard.undecided for shard in shards if shard.values["verdict"].any()] == undecided
 
 
+@pytest.mark.thorough
 def test_joined_directories_are_drawn_and_reported(tmp_path, kind, capsys):
     parts = [
         cspr_jax.run(written(tmp_path, name, x=x), tmp_path / name) for name, x in (("a", "[0.0]"), ("b", "[0.1, 0.3]"))
@@ -193,6 +196,7 @@ def test_what_is_no_map_is_refused(tmp_path, kind):
         cspr_jax.merge([file.parent, file], tmp_path / "joined")
 
 
+@pytest.mark.ci("half-20", "ENOSPC-20")
 @pytest.mark.quick("half-20", "power-45")
 @pytest.mark.parametrize("at", [3, 20, 45, 70, pytest.param(None, marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("mode", ["before", "half", "power", "ENOSPC"])

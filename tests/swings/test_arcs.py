@@ -85,6 +85,7 @@ def test_against_an_independent_search(base, deep):
     assert len(set(found.arcs[:16][found.arcs[:16] > 0] % 2)) == 2  # odd numbers too, from rest and to rest
 
 
+@pytest.mark.thorough
 def test_without_arcs_the_best_candidate_is_reported():
     """The margin of an infeasible cell tells how far it is from feasible: the largest over all numbers of arcs."""
     starts, ends = random_points(32, 30, far=1.4, deep=4.0, high=-0.2)
@@ -124,6 +125,7 @@ def test_cables_choose_what_is_shown_without_limits(monkeypatch):
     assert sum(refined) < 5 * len(starts)  # of 30 numbers of arcs
 
 
+@pytest.mark.thorough
 def test_fixed_and_largest_numbers_of_arcs():
     """A number that is asked for is the only one tried; 0 leaves the choice; nothing beyond max_arcs."""
     found = answer([TABLE[2]] * 4, [TABLE[3]] * 4, arcs=np.array([0, 7, 5, 3]))
@@ -149,6 +151,7 @@ def test_rest_and_coincident_points():
     assert found.verdict[2] & Verdict.NO_ARCS
 
 
+@pytest.mark.thorough
 def test_what_stays_undecided_is_flagged():
     """A margin within the tolerance of zero is said to be so, also where more arcs then do."""
     low, high = 0.4, 0.5  # z of the start of Table 2.1's second segment: at 0.45 two arcs have no margin left
@@ -228,6 +231,7 @@ def single_precision(count):
     assert (one.arcs == 0).any()
 
 
+@pytest.mark.thorough
 def test_single_precision_sieve_changes_nothing():
     single_precision(150)
 
@@ -237,6 +241,7 @@ def test_single_precision_sieve_changes_nothing_all():
     single_precision(20_000)
 
 
+@pytest.mark.thorough
 def test_parts_are_put_together_in_order(monkeypatch):
     """More than a batch, in several rounds of two threads, with numbers of arcs and depths of their own."""
     starts, ends = random_points(34, 500, far=1.2, deep=3.2)

@@ -56,6 +56,7 @@ def cells_of(result):
         yield place, {name: result[name].values[index].item() for name in result.data_vars}
 
 
+@pytest.mark.thorough
 def test_cells_are_what_plans_say(result):
     settings = json.loads(result.attrs["settings"])
     for place, cell in cells_of(result):

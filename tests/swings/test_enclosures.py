@@ -154,6 +154,7 @@ def test_a_factor_of_the_mass_is_that_of_the_tensions():
     assert (found.refuted >= expected * (1.0 - 1e-4)).all()
 
 
+@pytest.mark.thorough
 def test_a_limit_of_lengths_gives_way_by_as_much_as_spools_move():
     without = point_masses(Limits())
     longest = []

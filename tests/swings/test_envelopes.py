@@ -85,6 +85,7 @@ def test_the_envelope_is_the_worst_phase():
         assert float(found) == pytest.approx(worst.min(), abs=1e-7)
 
 
+@pytest.mark.thorough
 def test_a_sweep_of_envelopes(tmp_path):
     """N_1(v) = N_2(-v), (1.49); the largest N is the number squared; without names the worst cable."""
     result = run(tmp_path, SWEEP)
@@ -149,6 +150,7 @@ def test_closed_forms_of_the_zero_tension_function(r, xi, sigma, v):
     assert float(BEST(A_IS_TAU, w)[1]) == pytest.approx(least, rel=3e-8)  # a kink
 
 
+@pytest.mark.thorough
 def test_polar_axes(tmp_path):
     """The same targets by x and y and by radius and azimuth; the map of A = tau has the closed forms' numbers."""
     head = """schema = 1

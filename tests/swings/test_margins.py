@@ -125,7 +125,7 @@ def test_margins_of_limits():
         assert all((found[i, column] > 0.0) == (value > 0.0) for column, value in left.items())
 
 
-@pytest.mark.quick("limits are nearest")
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "wide",
     [

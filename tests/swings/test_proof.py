@@ -134,6 +134,7 @@ def limits_of(values, k=None):
     return Limits(**{key: np.asarray(v[0] if key == "floor" else v) for key, v in (far | own).items()})
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", BASES)
 def test_curvature_bounds_of_limits_hold(name):
     """Cable by cable: a bound that is too small lets a cable snap between samples. Only f'' <= M is needed."""
@@ -235,6 +236,7 @@ def within(key, attained, limit):
     return attained > limit if key == "tension_min" else attained < limit
 
 
+@pytest.mark.thorough
 def test_verdicts_with_limits_agree_with_dense_samples():
     """Each limit alone at a value that parts the feasible segments, then all of them together."""
     rng, name, n = np.random.default_rng(25), "prototype", 60

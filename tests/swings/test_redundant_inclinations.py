@@ -67,6 +67,7 @@ def test_searches_from_python_have_the_numbers_of_plans():
     assert answers.margin[0] == planned.answers.margin[0] and answers.duration[0] == planned.answers.duration[0]
 
 
+@pytest.mark.thorough
 def test_envelopes_are_refused(tmp_path):
     sweep = tmp_path / "map.toml"
     sweep.write_text(

@@ -58,6 +58,7 @@ def test_the_printed_root(name):
     np.testing.assert_allclose(found, np.maximum(envelope_root(name, weight, v, tau), least), rtol=1e-7, atol=1e-9)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", PRINTED)
 def test_the_largest_root_is_found_between_samples(name):
     """Against 400,000 instants, steep inclinations among them, whose maximum hides next to tau = 1."""

@@ -193,7 +193,7 @@ CASES = [
 FEW_CASES = [CASES[k] for k in (0, 1, 3, 5, 6)]
 
 
-@pytest.mark.quick("2T-3-static-uncertainty0-None")
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("pattern", "n", "condition", "uncertainty", "acceleration"),
     [case if case in FEW_CASES else pytest.param(*case, marks=pytest.mark.soak) for case in CASES],

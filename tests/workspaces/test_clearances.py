@@ -230,7 +230,7 @@ FINE = [np.linspace(0.2, 0.55, 8) + 5.0, np.array([-3.1, -3.05]), np.linspace(0.
 FREE = np.r_[BASE[:4], [np.add(ORIGIN, [-0.8, -2.2, 2.2])], BASE[5:]]
 
 
-@pytest.mark.quick("none")
+@pytest.mark.thorough
 @pytest.mark.parametrize("shape", ["none", "box", pytest.param("hull", marks=pytest.mark.soak)])
 def test_whole_cells_among_obstacles(tmp_path, shape):
     """A cell is on one side only where all positions that were tried are; so are some near the platform."""

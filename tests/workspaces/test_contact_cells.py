@@ -122,6 +122,7 @@ def check(rng, body, cells, samples, pulley_radius=0.0):
     return (low > 0.0).sum(), (far > 0.0).all(1).sum(), (high < 0.0).sum(), (far <= 0.0).all(1).sum()
 
 
+@pytest.mark.ci("hull-0.0-2-6", "none-0.05-2-6")
 @pytest.mark.thorough
 @pytest.mark.parametrize(
     ("body", "pulley_radius", "robots", "samples"),
