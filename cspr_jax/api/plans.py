@@ -13,7 +13,7 @@ from cspr_jax.config.mappings import plain, text_of
 from cspr_jax.config.plan import plan_keys
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.launch.landings import LaunchErrors, Scatter
-from cspr_jax.launch.launch_result import LaunchOutcome
+from cspr_jax.launch.launch_result import LaunchResult
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.outputs import motion_files, plan_report
 from cspr_jax.outputs.mujoco.motion import STEP
@@ -206,9 +206,9 @@ class Plan(Displayed, planning.PlannedMotions):
         return self.to_result()
 
     @property
-    def launch(self) -> LaunchOutcome | None:
+    def launch(self) -> LaunchResult | None:
         """Release and flight of the object that the plan launches; None: it launches nothing."""
-        return next((outcome for outcome in self.outcomes if isinstance(outcome, LaunchOutcome)), None)
+        return next((outcome for outcome in self.outcomes if isinstance(outcome, LaunchResult)), None)
 
     @checked
     def scatter(self, errors: LaunchErrors) -> Scatter:

@@ -124,7 +124,7 @@ def _poses(robot, frame: Frame, places: np.ndarray, orientations, point: str) ->
         unit_quaternions = quaternions("orientations", orientations, len(places))
         if row.is_planar and unit_quaternions[:, [1, 3]].any():
             raise InputError("orientations", "not about y", "turns about y: those of a planar robot")
-        turns = frame.turned_quaternions(unit_quaternions)
+        turns = frame.rotated_quaternions(unit_quaternions)
     return (mass_centres(robot, inner, turns) if point == "origin" else inner), turns
 
 
@@ -193,7 +193,7 @@ def sensitivity(
         centred_robot, frame = centred(robot)
         turns = None
         if orientations is not None:
-            turns = frame.turned_quaternions(quaternions("orientations", orientations, len(places)))
+            turns = frame.rotated_quaternions(quaternions("orientations", orientations, len(places)))
         search, inner = SensitivitySearch(centred_robot), np.asarray(frame.inward(places))
         if point == "origin":
             inner = mass_centres(search.robot, inner, turns)

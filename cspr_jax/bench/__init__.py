@@ -8,7 +8,7 @@ from typing import Any
 import jax
 
 from cspr_jax.bench import ellipses, hand_written, motions, paths, six_cables, three_cables, timing, workspaces
-from cspr_jax.numerics.batches import room
+from cspr_jax.numerics.batches import device_batch_size
 
 SCHEMA = 1
 
@@ -16,7 +16,7 @@ SCHEMA = 1
 def bench(kernels: Path | None = None) -> dict[str, Any]:
     """Measure the rates."""
     by_hand = None if kernels is None else hand_written.compiled(kernels)
-    six, three = six_cables.work(room(six_cables.TRAJECTORIES)), three_cables.work()
+    six, three = six_cables.work(device_batch_size(six_cables.TRAJECTORIES)), three_cables.work()
     batches = six_cables.batches(six)
     single, exact = (six_cables.rate(six.robot, batches, single_precision=is_single) for is_single in (True, False))
     rates = {

@@ -81,9 +81,9 @@ def _compiled(source: Path) -> Callable:
 def _lined(values) -> np.ndarray:
     # Whole vectors of float32, at the start of a cache line.
     array = np.ascontiguousarray(values, np.float32)
-    room = np.zeros(array.size + ALIGNED // 4, np.float32)
-    first = -room.ctypes.data % ALIGNED // 4
-    lined = room[first : first + array.size].reshape(array.shape)
+    device_batch_size = np.zeros(array.size + ALIGNED // 4, np.float32)
+    first = -device_batch_size.ctypes.data % ALIGNED // 4
+    lined = device_batch_size[first : first + array.size].reshape(array.shape)
     lined[...] = array
     return lined
 

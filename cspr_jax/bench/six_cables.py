@@ -21,7 +21,7 @@ from cspr_jax.families.platforms.platform_segment import PlatformSegment, pose_s
 from cspr_jax.families.platforms.six_cable_proof.screen import smallest_tensions
 from cspr_jax.motion import amplitudes
 from cspr_jax.motion.platform_kind import PlatformMotionKind
-from cspr_jax.numerics.batches import in_batches, in_threads, padded, room
+from cspr_jax.numerics.batches import device_batch_size, in_batches, in_threads, padded
 from cspr_jax.numerics.linear.frames import IDENTITY
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import rest_point
@@ -83,11 +83,11 @@ def batches(work: SixCableWork) -> list[Batch]:
     """The work by numbers of arcs."""
     half = work.angle[:, None] / 2.0
     quaternions = np.concatenate([np.cos(half), np.sin(half) * work.axis], axis=1)
-    portions, lanes = [], room(LANES)
+    portions, lanes = [], device_batch_size(LANES)
     for arcs in np.unique(work.arcs):
         cases = np.flatnonzero(work.arcs == arcs)
         kernel = partial(_segments, work.robot, np.asarray(arcs % 2 == 1))
-        segments = in_batches(kernel, (quaternions[cases], work.beta_hat[cases]), size=LANES)
+        segments = in_batches(kernel, (quaternions[cases], work.beta_hat[cases]), batch_size=LANES)
         for start in range(0, len(cases), lanes):
             portion = jax.tree.map(lambda x, s=start: x[s : s + lanes], segments)
             portions.append(Batch(int(arcs), len(portion.rate), jax.device_put(padded(portion, lanes))))

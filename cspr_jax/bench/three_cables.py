@@ -16,7 +16,7 @@ from cspr_jax.families.swings.hypocycloid import Segment
 from cspr_jax.families.swings.proof import screen
 from cspr_jax.motion import amplitudes
 from cspr_jax.motion.problem import Problem
-from cspr_jax.numerics.batches import in_threads, room
+from cspr_jax.numerics.batches import device_batch_size, in_threads
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.point_mass import point_mass_robot, rest_point
 
@@ -47,7 +47,9 @@ def work() -> ThreeCableWork:
     half = math.sqrt(3.0) / 2.0
     base = RADIUS * np.array([[half, -0.5, 0.0], [-half, -0.5, 0.0], [0.0, 1.0, 0.0]])
     problem = Problem(point_mass_robot(base, mass=0.198), Limits(), amplitudes.named("quintic"))
-    ends = np.random.default_rng(0).uniform([-1.5, -1.5, 0.3], [1.5, 1.5, 3.2], (BATCHES * room(screen.BATCH), 3))
+    ends = np.random.default_rng(0).uniform(
+        [-1.5, -1.5, 0.3], [1.5, 1.5, 3.2], (BATCHES * device_batch_size(screen.BATCH), 3)
+    )
     starts = np.broadcast_to(START, ends.shape).copy()
     parities, _ = segments_between(problem, starts, ends, np.full(len(ends), Z0))
     return ThreeCableWork(problem, ends, (parities[0], parities[1]))

@@ -9,7 +9,7 @@ import numpy as np
 
 from cspr_jax.bench.timing import best
 from cspr_jax.build.robots import load_robot
-from cspr_jax.numerics.batches import in_threads, room
+from cspr_jax.numerics.batches import device_batch_size, in_threads
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.frames import IDENTITY
 from cspr_jax.robots.contacts import clearance_kernels
@@ -80,7 +80,7 @@ def margin_rate(
     start = time.perf_counter()
     search = WorkspaceSearch(centred_robot, requirement(centred_robot, condition, robot.limits))
     numbers = np.dtype(dtype).type
-    kernel, size = search.kernel(numbers, by_null_space=by_null_space), room(search.batch(numbers))
+    kernel, size = search.kernel(numbers, by_null_space=by_null_space), device_batch_size(search.batch(numbers))
     all_poses = _poses(centred_robot, batches * size, dtype)
     parts = [jax.device_put(jax.tree.map(lambda x, i=i: x[i::batches], all_poses)) for i in range(batches)]
 
@@ -100,7 +100,7 @@ def clearance_rate(dtype: str) -> float:
     among = scene(robot, diameter=0.01)
     of_robot = clearance_kernels.Points(*map(as_float64, (among.base_points, among.platform_points, among.diameters)))
     points = jax.tree.map(lambda x: np.asarray(x, dtype), of_robot)
-    size, pairs = room(PAIRS_BATCH), np.array(among.pairs, np.int32)
+    size, pairs = device_batch_size(PAIRS_BATCH), np.array(among.pairs, np.int32)
     all_poses = _poses(robot, 4 * size, dtype)
     parts = [jax.device_put(jax.tree.map(lambda x, i=i: x[i::4], all_poses)) for i in range(4)]
 

@@ -20,7 +20,7 @@ def orientations(
     frame: Frame, points: Float[np.ndarray, "n 3"], angles: Float[np.ndarray, "n 3"]
 ) -> Float[np.ndarray, "n 4"]:
     """Orientations of tilt and torsion in the cylindrical frame of their places, (3.98), in the kernels' axes."""
-    return frame.turned_quaternions(from_tilt_torsion(angles + cylindrical_frames(frame.rotated(points))))
+    return frame.rotated_quaternions(from_tilt_torsion(angles + cylindrical_frames(frame.rotated(points))))
 
 
 def given_quaternion(quaternion: list[float] | None, key: str, file: object) -> Float[np.ndarray, "4"]:
@@ -41,4 +41,4 @@ def pose_quaternions(waypoints: Waypoints, points: Float[np.ndarray, "n_poses 3"
     ]
     angles = np.array([pose.tilt_torsion or [0.0] * 3 for pose in poses])
     is_tilted = np.array([pose.tilt_torsion is not None for pose in poses])
-    return np.where(is_tilted[:, None], orientations(frame, points, angles), frame.turned_quaternions(np.array(units)))
+    return np.where(is_tilted[:, None], orientations(frame, points, angles), frame.rotated_quaternions(np.array(units)))

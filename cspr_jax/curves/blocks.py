@@ -38,7 +38,7 @@ def spline_bounds(
     if quaternion is None:
         return StateBounds(*translation)
     turning = piecewise_bounds(quaternion, parts, parabolas=parabolas)
-    return StateBounds(*translation, *in_batches(_rotations, turning, size=BATCH))
+    return StateBounds(*translation, *in_batches(_rotations, turning, batch_size=BATCH))
 
 
 @persistent_jit(compiler_options=compile_options.least())

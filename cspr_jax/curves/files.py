@@ -127,7 +127,7 @@ def placed_inward(
     """A spline in the axes of a robot file, in those of the kernels."""
     turning = spline.quaternion
     if turning is not None:
-        rows = frame.turned_quaternions(np.asarray(turning)).reshape(-1, 4)
+        rows = frame.rotated_quaternions(np.asarray(turning)).reshape(-1, 4)
         # A product is linear in the quaternion, and so in its coefficients.
         turning = as_float64(products(rows, (reference * BACK)[None]).reshape(turning.shape))
     moved = dataclasses.replace(spline, position=as_float64(frame.inward(spline.position)), quaternion=turning)

@@ -177,7 +177,7 @@ def scatter(robot: PointMassRobot, throw: Throw, errors: LaunchErrors) -> Scatte
     rates = random.normal(size=(errors.throws, count)) * errors.cable_speed
     lengths = lengths + random.uniform(-1.0, 1.0, size=(errors.throws, count)) * errors.encoder
     sample = np.concatenate([release, lengths, rates], axis=1)
-    landings = in_batches(partial(_landings, robot, throw), sample, size=BATCH)
+    landings = in_batches(partial(_landings, robot, throw), sample, batch_size=BATCH)
     known = landings[np.isfinite(landings).all(1)]
     sizes = [errors.release**2]
     sizes += [errors.cable_length**2 + errors.encoder**2 / 3.0] * count + [errors.cable_speed**2] * count

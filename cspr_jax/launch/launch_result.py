@@ -12,7 +12,7 @@ import numpy as np
 from cspr_jax.config.keys.launch import LaunchTable
 from cspr_jax.launch.flight import flown
 from cspr_jax.launch.landings import LaunchErrors, Scatter, Throw, scatter, state_at
-from cspr_jax.motion.leg_result import LegOutcome
+from cspr_jax.motion.leg_result import LegResult
 from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.robots.model.point_mass import PointMassRobot
 
@@ -23,7 +23,7 @@ FLIGHT_ROWS = 101
 
 
 @dataclasses.dataclass(frozen=True)
-class LaunchOutcome(LegOutcome):
+class LaunchResult(LegResult):
     """Release of an object and its flight, in the axes of the robot file.
 
     Fields:
@@ -60,7 +60,7 @@ class LaunchOutcome(LegOutcome):
     key: ClassVar[str] = "launch"
 
     def to_dict(self) -> dict[str, Any]:
-        """The launch as a plan's JSON has it; see `LegOutcome.to_dict`."""
+        """The launch as a plan's JSON has it; see `LegResult.to_dict`."""
         table = {
             "segment": self.segment,
             "release": {"position": self.position.tolist(), "velocity": self.velocity.tolist(), "time": self.time},
@@ -73,7 +73,7 @@ class LaunchOutcome(LegOutcome):
         return table if self.scatter is None else table | {"scatter": self.scatter.to_dict()}
 
     def lines(self) -> list[str]:
-        """A line of the release and the flight, and one of throws with errors; see `LegOutcome.lines`."""
+        """A line of the release and the flight, and one of throws with errors; see `LegResult.lines`."""
         if not math.isfinite(self.time + self.flight_time):
             return ["no launch"]
         release, landing = (
@@ -89,7 +89,7 @@ class LaunchOutcome(LegOutcome):
         return lines
 
     def columns(self) -> dict[str, np.ndarray]:
-        """Flight of the object and landings of a sample of throws, none without a launch; see `LegOutcome.columns`."""
+        """Flight of the object and landings of a sample of throws, none without a launch; see `LegResult.columns`."""
         if not math.isfinite(self.flight_time):
             return {}
         t = np.linspace(0.0, self.flight_time, FLIGHT_ROWS)
@@ -111,7 +111,7 @@ class LaunchOutcome(LegOutcome):
         return Scatter(landings * signs, covariance * both, first_order * both)
 
 
-def launch_outcome(
+def launch_result(
     table: LaunchTable,
     frame: Frame,
     robot: PointMassRobot,
@@ -122,11 +122,11 @@ def launch_outcome(
     tension_min: float,
     control_points: Float[np.ndarray, "3 3"] | None = None,
     half_axes: Float[np.ndarray, "2 3"] | None = None,
-) -> LaunchOutcome:
+) -> LaunchResult:
     """Outcome of a planned release, with the scatter that its table asks for."""
     state = state_at(throw, jnp.asarray(0.0))
     landing, _ = flown(state.position, state.velocity, robot.gravity, flight_time)
-    launch = LaunchOutcome(
+    launch = LaunchResult(
         segment=table.segment,
         position=np.asarray(frame.outward(np.asarray(state.position))),
         velocity=np.asarray(frame.rotated(np.asarray(state.velocity))),

@@ -1,6 +1,6 @@
 """Motion: what every trajectory family provides, and what a plan asks of it.
 
-A motion is a pytree that gives its duration and the state at each instant (`motion`). Slacks and demands take any
+A motion is a pytree that gives its duration and the state at each instant (`motion`). Slacks and peaks take any
 motion of any robot; answers, legs and way-points are what families have in common. No file here knows a family.
 
 Files, each importing only from those above it:
@@ -13,7 +13,7 @@ Files, each importing only from those above it:
     given_limits        limits of a file or a caller, checked
     problem             robot, limits and amplitude function
     slacks              slacks of any motion at one instant
-    demands             extremes of tensions, heights, lengths and speeds along a motion
+    peaks               extremes of tensions, heights, lengths and speeds along a motion
     acceleration_sets   feasible accelerations of a point mass
     cause               a criterion that stands between a motion and feasible
     answers             the record that every family returns

@@ -12,7 +12,7 @@ import numpy as np
 
 from cspr_jax.errors import ConfigError
 from cspr_jax.motion.answers import Answers, joined
-from cspr_jax.motion.leg_result import LegOutcome
+from cspr_jax.motion.leg_result import LegResult
 from cspr_jax.motion.motion import Motion
 from cspr_jax.motion.problem import Problem
 from cspr_jax.motion.waypoints import Waypoints
@@ -85,9 +85,9 @@ class Leg(abc.ABC):
         """Answers for several depths of P0."""
         return joined([self.join(problem, float(z0))[0] for z0 in depths])
 
-    def outcome(
+    def result(
         self, problem: Problem, joined: JoinedLeg, tension_min: Float[np.ndarray, "n"], start: float
-    ) -> LegOutcome | None:
+    ) -> LegResult | None:
         """Outcome of the joined leg beyond its motion; a plan calls this once."""
         return None
 

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 
-class LegOutcome(abc.ABC):
+class LegResult(abc.ABC):
     """Outcome of a leg beyond its motion, in the axes of the robot file; computed once, with the plan.
 
     Fields:

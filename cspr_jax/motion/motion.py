@@ -1,4 +1,4 @@
-"""Motion of an effector: what every trajectory family provides, and what plans, margins, demands and files take.
+"""Motion of an effector: what every trajectory family provides, and what plans, margins, peaks and files take.
 
 A motion is a pytree that holds its own amplitude function, number of arcs and depth of P0, so that it can be jitted,
 vmapped and differentiated. Normalised time tau runs from 0 to 1.
@@ -181,7 +181,7 @@ def _is_in_pieces(part: Any) -> bool:
 
 def states_at(motion: Motion, tau: Float[np.ndarray, "k"], size: int = STATES) -> State:
     """States of a motion at many instants."""
-    state: Any = in_batches(partial(_states, common_shape(motion)), tau, size=size)
+    state: Any = in_batches(partial(_states, common_shape(motion)), tau, batch_size=size)
     return state
 
 
@@ -199,7 +199,7 @@ def inward(frame: Frame, state: State) -> State:
 
 def outward(frame: Frame, state: State) -> State:
     """State in the axes of a robot file."""
-    vector, tensor, quaternion = frame.rotated, frame.turned_tensor, frame.turned_quaternions
+    vector, tensor, quaternion = frame.rotated, frame.rotated_tensor, frame.rotated_quaternions
     # In the order of the fields of a state; a point mass has no orientation.
     changes: tuple[Callable[..., Any], ...] = (frame.outward, vector, vector, tensor, vector, vector, quaternion)
     return State(*(value if value is None else change(value) for change, value in zip(changes, state, strict=True)))

@@ -25,7 +25,7 @@ class Waypoints:
 
     Fields:
         robot_file: the robot.
-        keys: the plan.
+        plan_file: the plan.
         path: path of the plan, named in errors.
         frame: frame of the robot.
         family: name of the family that joins them.
@@ -36,7 +36,7 @@ class Waypoints:
     """
 
     robot_file: RobotFile
-    keys: PlanFile
+    plan_file: PlanFile
     path: Path
     frame: Frame
     family: str
@@ -51,7 +51,7 @@ class Waypoints:
     @property
     def poses(self) -> list[Pose]:
         """The poses, one more than segments."""
-        return self.keys.pose[self.first : self.last + 1]
+        return self.plan_file.pose[self.first : self.last + 1]
 
     @property
     def arcs(self) -> np.ndarray:
@@ -61,7 +61,7 @@ class Waypoints:
     @property
     def max_arcs(self) -> int:
         """Largest number of arcs tried."""
-        return max(self.keys.max_arcs, int(self.arcs.max()))
+        return max(self.plan_file.max_arcs, int(self.arcs.max()))
 
     def name(self, i: int) -> str:
         """Name of a pose in messages."""

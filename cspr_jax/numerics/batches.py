@@ -44,20 +44,20 @@ def in_threads(function: Callable, items: Sequence) -> list:
         return list(pool.map(one, items))
 
 
-def in_parts(function: Callable[[slice], Found], count: int, size: int) -> list[Found]:
+def in_parts(function: Callable[[slice], Found], count: int, length: int) -> list[Found]:
     """Results of many cases, range by range.
 
     Two threads work: what one does outside of XLA, and what XLA does on one core, runs beside the work of the other.
     """
     # All parts have one length, and each thread gets as many.
-    rounds = -(-count // (THREADS * size))
+    rounds = -(-count // (THREADS * length))
     bounds = np.linspace(0, count, min(rounds * THREADS, count) + 1).round().astype(int).tolist()
     return in_threads(function, [slice(*pair) for pair in pairwise(bounds)])
 
 
-def room(size: int) -> int:
+def device_batch_size(batch_size: int) -> int:
     """Length of a batch on the device in use."""
-    return min(size * LARGER.get(jax.default_backend(), 1), LARGEST)
+    return min(batch_size * LARGER.get(jax.default_backend(), 1), LARGEST)
 
 
 def row_by_row(function: Callable, rows):
@@ -68,31 +68,31 @@ def row_by_row(function: Callable, rows):
     return lax.map(function, rows, batch_size=max(count // 2, 1))
 
 
-def in_batches(function: Callable, arguments, *, size: int, axis: int = 0):
+def in_batches(function: Callable, arguments, *, batch_size: int, axis: int = 0):
     """Apply a compiled function to arrays of any length, in batches of one length."""
-    size = room(size)
+    batch_size = device_batch_size(batch_size)
     arguments = jax.tree.map(np.asarray, arguments)  # to slice an array of jax takes a hundred times as long
     count = len(jax.tree.leaves(arguments)[0])
     if count == 0:
         return None
     pending = [
-        function(padded(jax.tree.map(lambda a, s=start: a[s : s + size], arguments), size))
-        for start in range(0, count, size)
+        function(padded(jax.tree.map(lambda a, s=start: a[s : s + batch_size], arguments), batch_size))
+        for start in range(0, count, batch_size)
     ]
     parts = [jax.tree.map(np.asarray, part) for part in pending]
 
-    def whole(*pieces):
+    def joined(*pieces):
         return np.concatenate(pieces, axis=axis)[(*[slice(None)] * (axis % pieces[0].ndim), slice(count))]
 
-    return jax.tree.map(whole, *parts)
+    return jax.tree.map(joined, *parts)
 
 
-def padded(arguments, size: int):
+def padded(arguments, length: int):
     """Arrays padded to the length of a batch."""
 
     def one(array):
-        if len(array) == size:
+        if len(array) == length:
             return array
-        return np.concatenate([array, np.repeat(array[-1:], size - len(array), axis=0)])
+        return np.concatenate([array, np.repeat(array[-1:], length - len(array), axis=0)])
 
     return jax.tree.map(one, arguments)

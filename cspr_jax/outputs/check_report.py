@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.curves.spline import Spline
-from cspr_jax.motion.demands import EXTREMES
+from cspr_jax.motion.peaks import EXTREMES
 from cspr_jax.outputs.plan_report import axes_text, finite, retimed_words, verdict_text
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.robots.statics.wrench_sets import tension_range

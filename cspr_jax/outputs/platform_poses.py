@@ -40,5 +40,5 @@ def at_origin(plan: "PlannedMotions", columns: dict[str, np.ndarray]) -> dict[st
 def of_own_axes(robot_file: RobotFile, quaternions: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n 4"]:
     """Orientations of a platform's axes in its file, of those from its reference orientation."""
     reference = reference_of(build_robot(robot_file, TrajectoryKeys(), robot_file.name))
-    rotated = frame_of(robot_file.base_points, robot_file.z_axis).turned_quaternions(reference)
+    rotated = frame_of(robot_file.base_points, robot_file.z_axis).rotated_quaternions(reference)
     return products(quaternions, rotated[None])

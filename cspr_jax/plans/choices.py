@@ -31,7 +31,7 @@ DEPTHS = 200
 def chosen_depth(problem: Any, sequence: PlanLegs) -> float:
     """The plan's z0, given or chosen."""
     waypoints = sequence.waypoints
-    keys, path, targets = waypoints.keys, waypoints.path, waypoints.targets
+    keys, path, targets = waypoints.plan_file, waypoints.path, waypoints.targets
     if keys.z0 is None and not _needs_depth(waypoints):
         return float("nan")
     _check_depth_keys(waypoints)
@@ -63,7 +63,7 @@ def chosen_depth(problem: Any, sequence: PlanLegs) -> float:
 
 def _needs_depth(waypoints: Waypoints) -> bool:
     # Rests elsewhere than in P0 need no depth of P0.
-    keys = waypoints.keys
+    keys = waypoints.plan_file
     anywhere = all(FAMILIES[name].rests_anywhere for name in keys.families)
     return (
         not anywhere or keys.inclination is not None or any(pose.position is None and pose.rest for pose in keys.pose)
@@ -71,7 +71,7 @@ def _needs_depth(waypoints: Waypoints) -> bool:
 
 
 def _check_depth_keys(waypoints: Waypoints) -> None:
-    keys, path = waypoints.keys, waypoints.path
+    keys, path = waypoints.plan_file, waypoints.path
     if keys.z0 is None and keys.inclination is None:
         other = ", or inclination" if set(keys.families) == {"transition"} else ""
         raise ConfigError(
@@ -105,11 +105,11 @@ def nearly_resting(waypoints: Waypoints, z0: float) -> list[str]:
 
 def _rests_anywhere(waypoints: Waypoints, i: int) -> bool:
     segments = range(max(i - 1, 0), min(i + 1, len(waypoints)))
-    return all(FAMILIES[waypoints.keys.family_of(segment)].rests_anywhere for segment in segments)
+    return all(FAMILIES[waypoints.plan_file.family_of(segment)].rests_anywhere for segment in segments)
 
 
 def _depth_of_inclination(problem: Problem, waypoints: Waypoints) -> float:
-    targets, path, inclination = waypoints.targets, waypoints.path, waypoints.keys.inclination
+    targets, path, inclination = waypoints.targets, waypoints.path, waypoints.plan_file.inclination
     if inclination == "best":
         if (targets != targets[0]).any():
             raise ConfigError(path, 'inclination = "best": must be a number in a plan with more than one target')
@@ -122,7 +122,7 @@ def _depth_of_inclination(problem: Problem, waypoints: Waypoints) -> float:
             path, f"inclination = {v:g}: must be replaced by z0, since the targets lie at different depths"
         )
     if not levels[0] > 0.0:
-        hint = "".join(f" ({line})" for line in plan_hints(waypoints.keys, waypoints.robot_file))
+        hint = "".join(f" ({line})" for line in plan_hints(waypoints.plan_file, waypoints.robot_file))
         why = f"since the targets are not below the spool plane{hint}"
         raise ConfigError(path, f"inclination: must be replaced by z0, {why}")
     return levels[0]
@@ -160,9 +160,9 @@ def best_amplitude(problem: Any, sequence: PlanLegs, z0: float) -> tuple[Amplitu
     """The amplitude function whose epsilon gives the shortest plan; among equals, the largest margin."""
     ranked: list[tuple[float, float, int, Amplitude, float]] = []
     for epsilon in EPSILONS:
-        amplitude = build_amplitude(sequence.waypoints.keys, sequence.waypoints.path, epsilon=float(epsilon))
+        amplitude = build_amplitude(sequence.waypoints.plan_file, sequence.waypoints.path, epsilon=float(epsilon))
         trial = problem._replace(amplitude=amplitude)
-        depth = chosen_depth(trial, sequence) if sequence.waypoints.keys.inclination == "best" else z0
+        depth = chosen_depth(trial, sequence) if sequence.waypoints.plan_file.inclination == "best" else z0
         with within(f"epsilon {epsilon:.2f} of {EPSILONS[-1]:.2f}"):
             table = sequence.table(trial, np.array([depth]))
         cost = np.where(table["feasible"], table["duration"], np.inf).sum()

@@ -41,7 +41,7 @@ def with_mass_centres(robot_file: RobotFile, keys: PlanFile, path: Path) -> Plan
         changes = {"position": np.asarray(frame.outward(places[i] + shifts[i])).tolist()}
         if poses[i].tilt_torsion is not None and units is not None:
             # The direction from which the azimuth counts is that of the given place.
-            changes |= {"tilt_torsion": None, "quaternion": frame.turned_quaternions(units[i]).tolist()}
+            changes |= {"tilt_torsion": None, "quaternion": frame.rotated_quaternions(units[i]).tolist()}
         poses[i] = poses[i].model_copy(update=changes)
     return keys.model_copy(update={"pose": poses})
 

@@ -15,7 +15,7 @@ from cspr_jax.build.scenes import scene_of
 from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.cause import Cause
 from cspr_jax.motion.leg import JoinedLeg, Leg
-from cspr_jax.motion.leg_result import LegOutcome
+from cspr_jax.motion.leg_result import LegResult
 from cspr_jax.motion.motion import Motion
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.linear.frames import Frame
@@ -93,10 +93,10 @@ class JudgedLeg(Leg):
         """Warnings of the family; see `Leg.warnings`."""
         return self._leg.warnings(_from_points(problem))
 
-    def outcome(self, problem: Problem, joined: JoinedLeg, tension_min: np.ndarray, start: float) -> LegOutcome | None:
-        """Outcome by the family's answers; see `Leg.outcome`."""
+    def result(self, problem: Problem, joined: JoinedLeg, tension_min: np.ndarray, start: float) -> LegResult | None:
+        """Outcome by the family's answers; see `Leg.result`."""
         plain = joined.answers.plain if isinstance(joined.answers, JudgedAnswers) else joined.answers
-        return self._leg.outcome(problem, dataclasses.replace(joined, answers=plain), tension_min, start)
+        return self._leg.result(problem, dataclasses.replace(joined, answers=plain), tension_min, start)
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the poses by motions that are proved, if there are such; see `Leg.join`."""
@@ -107,9 +107,9 @@ class JudgedLeg(Leg):
                 problem.robot,
                 waypoints.robot_file,
                 waypoints.frame,
-                waypoints.keys,
+                waypoints.plan_file,
                 waypoints.path,
-                trajectory=waypoints.keys,
+                trajectory=waypoints.plan_file,
             ),
         )
         robot, joined = problem.robot, dict[bytes, tuple[Answers, list[Motion]]]()

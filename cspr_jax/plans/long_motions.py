@@ -17,8 +17,8 @@ from cspr_jax.curves.files import centre_from, kept_to, placed_inward, reference
 from cspr_jax.curves.reading import window_splines
 from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import ConfigError, InputError
-from cspr_jax.motion.demands import EXTREMES, SAMPLES, Demands, demands
 from cspr_jax.motion.leg import JoinedLeg
+from cspr_jax.motion.peaks import EXTREMES, SAMPLES, Peaks, peaks
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.bounds.intervals import united
 from cspr_jax.numerics.linear.frames import IDENTITY, Frame, frame_of
@@ -39,7 +39,7 @@ class _Window(NamedTuple):
     start: float
     duration: float
     proof: MotionProof
-    demands: Demands
+    demands: Peaks
     interpolation: str
     ends: str
 
@@ -98,7 +98,7 @@ def _judged(
         centre = centre_from(robot_file, keys.point or says["point"])
         curve = kept_to(robot_file.own_pattern, curve, is_planar=bool(says["is_planar"]))
         motion: Spline = placed_inward(curve, frame, reference, centre)
-        extremes = demands(problem.robot, [motion], [SAMPLES + 1], limits, keys.tension_rule, corners)
+        extremes = peaks(problem.robot, [motion], [SAMPLES + 1], limits, keys.tension_rule, corners)
         proof = attained(problem, motion, proof_of(problem, motion, scene), scene)
         yield _Window(start, float(motion.duration()), proof, extremes, curve.interpolation, curve.ends)
 
@@ -124,7 +124,7 @@ def _merged(windows: list[_Window]) -> MotionProof:
     return windows[0].proof._replace(proof=proof)
 
 
-def _reduced(each: list[Demands], starts: list[float]) -> Demands:
+def _reduced(each: list[Peaks], starts: list[float]) -> Peaks:
     # Extremes of windows that begin at these times, s.
     columns, worst = {}, []
     for name in EXTREMES:
@@ -134,4 +134,4 @@ def _reduced(each: list[Demands], starts: list[float]) -> Demands:
     when = np.array([starts[k] + each[k].when[0, i] for i, k in enumerate(worst)])
     cables = np.array([each[k].cables[0, i] for i, k in enumerate(worst)])
     samples = np.array([sum(int(one.samples[0]) for one in each)])
-    return Demands(**columns, samples=samples, when=when[None], cables=cables[None])
+    return Peaks(**columns, samples=samples, when=when[None], cables=cables[None])

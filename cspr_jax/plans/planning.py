@@ -16,10 +16,10 @@ from cspr_jax.config.reading import read_text
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.errors import ConfigError
 from cspr_jax.motion.answers import Answers, joined
-from cspr_jax.motion.demands import SAMPLES, Demands, demands
 from cspr_jax.motion.leg import JoinedLeg
-from cspr_jax.motion.leg_result import LegOutcome
+from cspr_jax.motion.leg_result import LegResult
 from cspr_jax.motion.motion import Motion, Placed, states_at
+from cspr_jax.motion.peaks import SAMPLES, Peaks, peaks
 from cspr_jax.motion.problem import Problem
 from cspr_jax.motion.waypoints import Waypoints
 from cspr_jax.numerics.linear.frames import Frame
@@ -66,8 +66,8 @@ class PlannedMotions:
     frame: Frame
     points: np.ndarray
     legs: tuple[JoinedLeg, ...]
-    demands: Demands
-    outcomes: tuple[LegOutcome, ...] = ()
+    demands: Peaks
+    outcomes: tuple[LegResult, ...] = ()
     causes: tuple[tuple[Cause, ...], ...] = ()
     warnings: tuple[str, ...] = ()
     text: str = ""
@@ -189,7 +189,7 @@ def _attained(problem: Problem, leg: JoinedLeg, waypoints: Waypoints) -> JoinedL
     from cspr_jax.verification.attained import with_attained
 
     answers: Any = leg.answers
-    keys = waypoints.keys
+    keys = waypoints.plan_file
     scene = scene_of(problem.robot, waypoints.robot_file, waypoints.frame, keys, waypoints.path, trajectory=keys)
     return dataclasses.replace(leg, answers=with_attained(problem, answers, leg.motions, scene))
 
@@ -205,7 +205,7 @@ def with_motions(plan: PlannedMotions, answers: Answers, motions: list[Motion], 
 
 def _judged(
     problem: Problem, robot_file: RobotFile, frame: Frame, legs: tuple[JoinedLeg, ...], keys: PlanFile
-) -> tuple[tuple[tuple[Cause, ...], ...], Demands]:
+) -> tuple[tuple[tuple[Cause, ...], ...], Peaks]:
     # Causes of the segments, and demands with heights in the axes of the robot file.
     why = [causes(problem, frame, leg.answers, leg.motions, _counts(leg, keys)) for leg in legs]
     extremes = _demands(problem, legs, keys, _shape(problem, robot_file, frame, keys))
@@ -229,7 +229,7 @@ def _points(sequence: PlanLegs, legs: tuple[JoinedLeg, ...], z0: float) -> np.nd
     waypoints = sequence.waypoints
     points = np.array(waypoints.frame.outward(waypoints.points(z0)))
     motions = [motion for leg in legs for motion in leg.motions]
-    for i in waypoints.keys.resulting_poses:
+    for i in waypoints.plan_file.resulting_poses:
         # The place of the first pose is where the motion begins.
         segment, end = (i - 1, 1.0) if i else (0, 0.0)
         points[i] = waypoints.frame.outward(states_at(motions[segment], np.array([end])).position[0])
@@ -237,12 +237,12 @@ def _points(sequence: PlanLegs, legs: tuple[JoinedLeg, ...], z0: float) -> np.nd
 
 
 def _outcomes(
-    problem: Problem, sequence: PlanLegs, legs: tuple[JoinedLeg, ...], extremes: Demands
-) -> tuple[LegOutcome, ...]:
+    problem: Problem, sequence: PlanLegs, legs: tuple[JoinedLeg, ...], extremes: Peaks
+) -> tuple[LegResult, ...]:
     outcomes, first, start = [], 0, 0.0
     for leg, joined_leg in zip(sequence.legs, legs, strict=True):
         tension_min = extremes.tension_min[first : first + len(leg)]
-        outcomes.append(leg.outcome(problem, joined_leg, tension_min, start))
+        outcomes.append(leg.result(problem, joined_leg, tension_min, start))
         first, start = first + len(leg), start + float(joined_leg.answers.duration.sum())
     return tuple(outcome for outcome in outcomes if outcome is not None)
 
@@ -262,7 +262,7 @@ def _check_rule(problem: Problem, keys: PlanFile, path: Path) -> None:
         raise ConfigError(path, f'tensions = "{rule}": must be {others} without tension_max of every cable')
 
 
-def _missed(keys: PlanFile, is_feasible: np.ndarray, extremes: Demands) -> list[str]:
+def _missed(keys: PlanFile, is_feasible: np.ndarray, extremes: Peaks) -> list[str]:
     # A rule that is not exact can find no tensions within the limits where there are some.
     if TENSION_RULES[keys.tension_rule].is_exact:
         return []
@@ -276,13 +276,13 @@ def _missed(keys: PlanFile, is_feasible: np.ndarray, extremes: Demands) -> list[
     ]
 
 
-def _demands(problem: Problem, legs: tuple[JoinedLeg, ...], keys: PlanFile, corners: np.ndarray | None) -> Demands:
+def _demands(problem: Problem, legs: tuple[JoinedLeg, ...], keys: PlanFile, corners: np.ndarray | None) -> Peaks:
     motions = [motion for leg in legs for motion in leg.motions]
     counts = np.concatenate([_counts(leg, keys) for leg in legs]).tolist()
     # The tensions of redundant cables alone depend on limits, and the compiled function on which of them are given.
     is_redundant = problem.robot.n_cables > problem.robot.dof
     limits = problem.limits if is_redundant else NO_LIMITS
-    return demands(problem.robot, motions, counts, limits, keys.tension_rule, corners)
+    return peaks(problem.robot, motions, counts, limits, keys.tension_rule, corners)
 
 
 def _counts(leg: JoinedLeg, keys: PlanFile) -> np.ndarray:

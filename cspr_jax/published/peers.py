@@ -91,7 +91,7 @@ def _row(grid: PoseGrid) -> dict[str, float]:
     robot = load_robot(grid.robot)
     centred_robot, frame = centred(robot)
     demand = requirement(centred_robot, grid.condition, robot.limits if grid.condition == FEASIBLE else Limits())
-    quaternions = frame.turned_quaternions(grid.quaternions)
+    quaternions = frame.rotated_quaternions(grid.quaternions)
     places = mass_centres(centred_robot, np.asarray(frame.inward(grid.positions)), quaternions)
     start = time.perf_counter()
     search = WorkspaceSearch(centred_robot, demand)

@@ -84,7 +84,7 @@ def _conditions() -> tuple[Inside, Inside]:
     robot, frame = centred(platform_robot(BASE, PLATFORM, mass=1.0, inertia=np.eye(3), z_axis="up"))
     wrenches = required_wrenches(robot, frame, points=np.zeros((1, 6)))
     demand = requirement(robot, FEASIBLE, Limits(tension_min=as_float64(LOW), tension_max=as_float64(HIGH)), wrenches)
-    search, upright = WorkspaceSearch(robot, demand), frame.turned_quaternions(np.array([[1.0, 0.0, 0.0, 0.0]]))
+    search, upright = WorkspaceSearch(robot, demand), frame.rotated_quaternions(np.array([[1.0, 0.0, 0.0, 0.0]]))
     rule = jax.vmap(lambda matrix: closed_form(matrix, np.zeros(6), LOW, HIGH).is_within)
 
     def poses(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -92,6 +92,6 @@ def _conditions() -> tuple[Inside, Inside]:
 
     def by_form(positions: np.ndarray) -> np.ndarray:
         matrices = np.asarray(geometry.wrench_matrices(robot, *poses(positions))) / search.unit[:, None]
-        return in_batches(rule, matrices, size=BATCH)
+        return in_batches(rule, matrices, batch_size=BATCH)
 
     return by_form, lambda positions: search(*poses(positions)).verdict == 0

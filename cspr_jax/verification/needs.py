@@ -14,7 +14,7 @@ from cspr_jax.motion.motion import Motion, common_shape, sample_times
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.elementary import as_float64
-from cspr_jax.numerics.search.minima import narrowed_places
+from cspr_jax.numerics.search.minima import narrowed_times
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.contacts.interference import gaps
 from cspr_jax.robots.model.limits import Limits
@@ -64,11 +64,11 @@ def needs(problem: Problem, motion: Motion, samples: int) -> list[Need]:
     kernel = partial(_values, structure, moves, _pairs(robot), leaves, robot, limits)
 
     def at(tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        reached, slacks = in_batches(kernel, tau.ravel(), size=BATCH)
+        reached, slacks = in_batches(kernel, tau.ravel(), batch_size=BATCH)
         return reached.reshape(*tau.shape, -1), slacks.reshape(*tau.shape, -1)
 
     tau = sample_times(motion, samples)
-    minimum, when = (x[0] for x in narrowed_places(lambda points: at(points)[1], tau, at(tau[None])[1]))
+    minimum, when = (x[0] for x in narrowed_times(lambda points: at(points)[1], tau, at(tau[None])[1]))
     column = np.arange(len(when))
     reached, first, worst = at(when[None])[0][0][column, column], 0, []
     for criterion in _criteria(robot, limits):

@@ -63,7 +63,7 @@ def piece_slacks(
 def all_robots_slacks(problem: Problem, states: StateBounds, multiple: float = 1.0) -> Float[np.ndarray, "k n"]:
     """Lower bounds of the slacks of tensions and limits of all robots within an uncertainty."""
     fraction = share_of(problem.limits, np.full(len(states.position.middle), multiple))
-    return in_batches(partial(lower_slacks, problem.robot, problem.limits), (states, fraction), size=BATCH)
+    return in_batches(partial(lower_slacks, problem.robot, problem.limits), (states, fraction), batch_size=BATCH)
 
 
 def short_blocks(instants: Float[np.ndarray, "k"], sizes: Float[np.ndarray, "k"]) -> Sides:

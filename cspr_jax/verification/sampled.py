@@ -30,7 +30,7 @@ def sampled_answers(problem: Problem, motions: list[Motion], samples: int = 400)
         kernel = partial(_slacks, common_shape(motion), problem)
 
         def at(points: np.ndarray, kernel=kernel) -> np.ndarray:
-            return in_batches(kernel, points.ravel(), size=BATCH).reshape(*points.shape, -1)
+            return in_batches(kernel, points.ravel(), batch_size=BATCH).reshape(*points.shape, -1)
 
         minimum.append(narrowed(at, tau, at(tau[None]))[0])
         duration.append(float(motion.duration()))

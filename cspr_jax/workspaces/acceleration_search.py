@@ -30,7 +30,7 @@ def _size(robot: PointMassRobot, power: int) -> int:
 def reach_of(robot: PointMassRobot, limits: Limits, positions: Float[np.ndarray, "n 3"]) -> AccelerationReach:
     """Sizes of the sets of feasible accelerations at many places."""
     kernel = partial(reaches, robot, limits, touchable_limits(robot, limits))
-    return in_batches(kernel, positions, size=_size(robot, 6))
+    return in_batches(kernel, positions, batch_size=_size(robot, 6))
 
 
 @jax.jit
@@ -40,7 +40,7 @@ def _faces(robot: PointMassRobot, limits: Limits, positions) -> Faces:
 
 def faces_of(robot: PointMassRobot, limits: Limits, positions: Float[np.ndarray, "n 3"]) -> Faces:
     """Faces of the sets of feasible accelerations at many places."""
-    return in_batches(partial(_faces, robot, limits), positions, size=_size(robot, 3))
+    return in_batches(partial(_faces, robot, limits), positions, batch_size=_size(robot, 3))
 
 
 @jax.jit
@@ -59,4 +59,4 @@ def judged(
     accelerations: Float[np.ndarray, "n 3"],
 ) -> tuple[Float[np.ndarray, "n"], Int[np.ndarray, "n"]]:
     """Margins and verdicts of accelerations, one at each place, from faces as `verdict` takes them."""
-    return in_batches(partial(_judged, robot), (faces, wider, positions, accelerations), size=_size(robot, 3))
+    return in_batches(partial(_judged, robot), (faces, wider, positions, accelerations), batch_size=_size(robot, 3))

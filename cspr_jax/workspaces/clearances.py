@@ -35,7 +35,9 @@ def at_rest(
     """Clearances of poses."""
     body_quaternions, pulleys = quaternions if PATTERNS[robot.pattern].is_body else None, robot.pulleys
     if exits is None and pulleys is not None:
-        exits = in_batches(lambda x: geometry.exit_points(robot, pulleys, *x), (positions, quaternions), size=BATCH)
+        exits = in_batches(
+            lambda x: geometry.exit_points(robot, pulleys, *x), (positions, quaternions), batch_size=BATCH
+        )
     return clearances(around, positions, body_quaternions, ends=exits)
 
 

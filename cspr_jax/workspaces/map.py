@@ -109,7 +109,7 @@ class WorkspaceMap(GridMap):
         units = np.stack([given_quaternion(one, key, self._file) for one in quaternions])
         if self._row.is_planar and units[:, [1, 3]].any():
             raise ConfigError(self._file, f"{key}: must turn about y: that of a planar robot")
-        return self._frame.turned_quaternions(units)
+        return self._frame.rotated_quaternions(units)
 
     def _orientation_set(self) -> tuple[np.ndarray | None, np.ndarray]:
         # Return orientations (k, 4), None where there is no set, and the part of the set that each stands for.
@@ -130,7 +130,7 @@ class WorkspaceMap(GridMap):
             angles, volume = grid.angles, grid.volume
         else:
             angles, volume = cone_grid(divisions, tilt, workspace.torsion_max or 0.0)
-        return products(self._frame.turned_quaternions(from_tilt_torsion(angles)), self._quaternion), volume
+        return products(self._frame.rotated_quaternions(from_tilt_torsion(angles)), self._quaternion), volume
 
     def _all_robots(self, robot_file: RobotFile, conditions: Sequence[str]) -> AllRobots | None:
         # All robots within the uncertainty, without which there are none.
@@ -184,7 +184,7 @@ class WorkspaceMap(GridMap):
             angles = np.stack([cells.get(name, np.zeros(len(places))) for name in TILT_TORSION], axis=1)
             if self._row.is_planar:
                 angles[:, 0] = 0.5 * math.pi
-            quaternions = products(self._frame.turned_quaternions(from_tilt_torsion(angles)), quaternions)
+            quaternions = products(self._frame.rotated_quaternions(from_tilt_torsion(angles)), quaternions)
         answers = self._poses(places, quaternions)
         sides, reasons = np.zeros((2, len(places)), np.int16)
         if self._cells is not None:

@@ -169,7 +169,7 @@ class WorkspaceSearch:
     def _matrices(self, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
         # Return wrench matrices, moments over the length.
         poses = positions, quaternions
-        matrices = in_batches(lambda x: geometry.wrench_matrices(self.robot, *x), poses, size=TRIALS)
+        matrices = in_batches(lambda x: geometry.wrench_matrices(self.robot, *x), poses, batch_size=TRIALS)
         return matrices / self.unit[:, None]
 
     def _part(self, poses: Poses) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -252,7 +252,7 @@ class WorkspaceSearch:
             batch = lanes(poses.positions), quaternions, loads
             # Use two lengths only, since each is compiled.
             size = BATCH if len(poses.positions) <= MOST_SHORT * BATCH else self.batch(dtype)
-            return in_batches(lambda x: compiled(*x), batch, size=size)
+            return in_batches(lambda x: compiled(*x), batch, batch_size=size)
 
         return stage
 
@@ -275,7 +275,7 @@ class WorkspaceSearch:
         if self._wrenches.points is not None:
             return None
         poses = positions, quaternions
-        return in_batches(lambda x: geometry.weights(self.robot, *x), poses, size=BATCH) / self.unit
+        return in_batches(lambda x: geometry.weights(self.robot, *x), poses, batch_size=BATCH) / self.unit
 
     @property
     def _fixed(self) -> Wrenches:

@@ -69,7 +69,7 @@ class SensitivitySearch:
         """Sensitivities at places."""
         robot, pairs = self.robot, self._pairs
         if isinstance(robot, PointMassRobot):
-            return in_batches(partial(_of_point_mass, robot), positions, size=BATCH)
+            return in_batches(partial(_of_point_mass, robot), positions, batch_size=BATCH)
         if quaternions is None and pairs is not None:
             points = np.asarray(robot.platform_points)
             first, second = points[pairs.cables[:, 0]], points[pairs.cables[:, 1]]
@@ -78,9 +78,9 @@ class SensitivitySearch:
                 as_float64(second - first),
                 as_float64(np.sqrt((points**2).sum(1).mean())),
             )
-            return in_batches(partial(_of_pairs, geometry), positions, size=BATCH)
+            return in_batches(partial(_of_pairs, geometry), positions, batch_size=BATCH)
         quaternions = np.tile(IDENTITY, (len(positions), 1)) if quaternions is None else quaternions
-        return in_batches(partial(_of_platform, robot), (positions, quaternions), size=BATCH)
+        return in_batches(partial(_of_platform, robot), (positions, quaternions), batch_size=BATCH)
 
 
 def _pairs(robot: PlatformRobot) -> ParallelPairs | None:

@@ -97,7 +97,7 @@ class RestPoses:
 
     def _lengths(self, places: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
         poses = places, quaternions
-        return in_batches(lambda x: geometry.cable_lengths(self.robot, *x), poses, size=BATCH)
+        return in_batches(lambda x: geometry.cable_lengths(self.robot, *x), poses, batch_size=BATCH)
 
     def _depths(self, places: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
         # Depths (n, k) of the mass centre, or joint, of the attachment points and of the corners of the shape.

@@ -26,7 +26,7 @@ def excess(seed: int, degree: int, count: int) -> dict[str, tuple[float, float]]
     for name in NAMES:
         values, band = getattr(states, name), jax.tree.map(np.asarray, getattr(bounds, name))
         s = S.reshape(1, -1, *(1,) * (values.ndim - 2))
-        over = np.abs(values - band.middle[:, None] - band.slope[:, None] * s) - band.radius[:, None]
+        over = np.abs(values - band.middle[:, None] - band.linear[:, None] * s) - band.radius[:, None]
         # Blocks in which the quaternion may vanish have no bounds.
         result[name] = np.nanmax(over) / np.abs(values).max(), np.nanmax(band.radius)
     return result

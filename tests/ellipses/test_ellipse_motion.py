@@ -66,7 +66,7 @@ def test_bounds_contain_samples():
     fraction = np.linspace(0.0, 1.0, 41)
     state = states_along(motion, start[:, None] + (end - start)[:, None] * fraction)
     for band, found in zip(bounds[:3], state[:3], strict=True):
-        line = band.middle[:, None] + (2.0 * fraction[:, None] - 1.0) * np.asarray(band.slope)[:, None]
+        line = band.middle[:, None] + (2.0 * fraction[:, None] - 1.0) * np.asarray(band.linear)[:, None]
         assert (np.abs(found - line) <= np.asarray(band.radius)[:, None]).all()
         # Short blocks have narrow bands: the height of an arc.
         assert (np.asarray(band.radius)[1:] < 60.0 * ((end - start)[1:, None] * 3.0 * np.pi) ** 2 + 1e-12).all()

@@ -78,7 +78,7 @@ def test_bounds_hold_all_states(motion):
     for fraction in np.linspace(0.0, 1.0, 7):
         state = states((start + 0.1 * fraction) / TIME)
         for name, band in bounds._asdict().items():
-            line = band.middle + (2.0 * fraction - 1.0) * band.slope
+            line = band.middle + (2.0 * fraction - 1.0) * band.linear
             assert (np.abs(np.asarray(getattr(state, name)) - line) <= band.radius).all(), name
     assert np.asarray(bounds.rotation.radius).max() < 0.01
 

@@ -7,7 +7,7 @@ import pytest
 from support.motions import MANY, states_along
 
 import cspr_jax
-from cspr_jax.motion.demands import EXTREMES
+from cspr_jax.motion.peaks import EXTREMES
 
 SIGNS = {"tension_min": 1.0, "mu_min": 1.0, "depth_min": 1.0}  # of the others the largest value counts
 STARTS, POINTS, ROUNDS = 9, 11, 8

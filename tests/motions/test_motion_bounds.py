@@ -96,7 +96,7 @@ def excess(motion, rng, width, count=64):
         assert np.isfinite(band.radius).all()
         value = np.asarray(value).reshape(count, len(S), *value.shape[1:])
         s = S.reshape(1, -1, *(1,) * (value.ndim - 2))
-        beside = np.abs(value - band.middle[:, None] - band.slope[:, None] * s) - band.radius[:, None]
+        beside = np.abs(value - band.middle[:, None] - band.linear[:, None] * s) - band.radius[:, None]
         worst = max(worst, (beside / np.abs(value).max()).max())
         radii.append(band.radius.max() / np.abs(value).max())
     return worst, max(radii)

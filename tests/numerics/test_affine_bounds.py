@@ -107,7 +107,7 @@ def excess(name: str, seed: int, width: float, fraction: float = 1.0, *, parabol
     s = S.reshape(-1, *(1,) * (exact.ndim - 1))
     square = 0.0 if band.square is None else band.square * s**2
     assert (exact >= np.asarray(band.low()) - 1e-15).all() and (exact <= np.asarray(band.high()) + 1e-15).all()
-    return (np.abs(exact - band.middle - band.slope * s - square) - fraction * band.radius).max(), band.radius.max()
+    return (np.abs(exact - band.middle - band.linear * s - square) - fraction * band.radius).max(), band.radius.max()
 
 
 @pytest.mark.parametrize("parabolas", [False, True])
@@ -138,7 +138,7 @@ def test_a_narrower_band_around_a_parabola_is_left(name):
 def test_ends_and_tops_of_parabolas():
     """Bounds of the values are those of the parabola, not of its three parts."""
     f, band = functions(3, 1.0, 200, parabolas=True)
-    curve = band.middle + band.slope * S[:, None] + band.square * S[:, None] ** 2
+    curve = band.middle + band.linear * S[:, None] + band.square * S[:, None] ** 2
     for side, values in ((band.low() + band.radius, curve.min(0)), (band.high() - band.radius, curve.max(0))):
         np.testing.assert_allclose(
             np.asarray(side), values.astype(float), atol=1e-4 * np.abs(values).max().astype(float)
@@ -158,7 +158,7 @@ def test_lengths_of_vectors_that_vanish():
         f, f_bounds = functions(seed, 0.3)
         f, f_bounds = f - f[at], f_bounds - f[at].astype(float)
         band = jax.tree.map(np.asarray, affine_bounds.norm(f_bounds))
-        assert (np.abs(Exact.norm(f) - band.middle - band.slope * S) <= band.radius).all()
+        assert (np.abs(Exact.norm(f) - band.middle - band.linear * S) <= band.radius).all()
         assert np.asarray(band.high()) <= 3.0 * Exact.norm(f).max() + 0.1
 
 

@@ -46,7 +46,7 @@ def asymmetrical(_):
         angles = rng.uniform([-np.pi, 0.2, -0.5], [np.pi, 0.8, 0.5])
         poses.append((position, oracle.pose_quaternion(position, angles)))
     segment, world = made(robot, *poses, Z0, (-3.0, -2.0), arcs), upward("down")
-    points, inertia = world.rotated(np.asarray(robot.platform_points)), world.turned_tensor(np.asarray(robot.inertia))
+    points, inertia = world.rotated(np.asarray(robot.platform_points)), world.rotated_tensor(np.asarray(robot.inertia))
     body = Suspended(
         *("mine", "down", (), float(robot.mass), inertia, float(robot.gravity)),
         *(world.inward(np.asarray(robot.base_points)), points, np.full(6, np.inf)),

@@ -18,7 +18,7 @@ from support.commands import cspr
 from support.platforms import state_of
 
 import cspr_jax
-from cspr_jax.motion.leg_result import LegOutcome
+from cspr_jax.motion.leg_result import LegResult
 from cspr_jax.schema import map_kinds
 from cspr_jax.schema.families import FAMILIES, moving, registered
 from cspr_jax.schema.verdicts import Verdict
@@ -102,7 +102,7 @@ def test_a_family_from_file_to_picture(lines):
     assert "prototype" in (lines / "motion.html").read_text()
 
 
-class Photo(LegOutcome):
+class Photo(LegResult):
     """What a family may have beyond its motion."""
 
     key = "photo"
@@ -119,7 +119,7 @@ class Photo(LegOutcome):
 
 def test_an_outcome_of_a_family(lines, monkeypatch, tmp_path):
     """Reports show what a leg adds to its motion without knowing it."""
-    monkeypatch.setattr("straight_lines.leg.Lines.outcome", lambda *_: Photo())
+    monkeypatch.setattr("straight_lines.leg.Lines.result", lambda *_: Photo())
     assert planned(lines)[1]["photo"] == {"focus": None}
     assert "one photo" in cspr("plan", lines / "plan.toml")[1]
 

@@ -79,7 +79,7 @@ def block_breaks(count, seed, kind, robot):
     kernel = partial(
         place_blocks, problem, (near.sides, near.normal), np.ones(()), pairs=pairs, kind=kind, margins=True
     )
-    found = in_batches(kernel, (segments, arcs.astype(float), start, stop), size=BATCH, axis=-1)
+    found = in_batches(kernel, (segments, arcs.astype(float), start, stop), batch_size=BATCH, axis=-1)
     broken = 0
     for i, (segment, p, beta) in enumerate(zip(theirs, arcs, betas, strict=True)):
         tau = np.linspace(start[i], stop[i], STEPS * (FINE - 1) + 1)

@@ -85,7 +85,7 @@ class Samples:
         def kernel(items):
             return np.min(slacks_at(self._problem, items, pairs=pairs, kind=self._kind), axis=0)
 
-        return in_batches(kernel, (*motions.items(row), tau), size=BATCH)
+        return in_batches(kernel, (*motions.items(row), tau), batch_size=BATCH)
 
     def tension(self, motions, row, tau):
         """Smallest slack of taut cables, (k,), in other orders of these, of which one has digits everywhere."""
@@ -95,7 +95,7 @@ class Samples:
             return slacks_at(problem, items, pairs=(), kind=self._kind)[0]
 
         items = (*motions.items(row), tau)
-        return np.min([in_batches(partial(kernel, problem), items, size=BATCH) for problem in orders], axis=0)
+        return np.min([in_batches(partial(kernel, problem), items, batch_size=BATCH) for problem in orders], axis=0)
 
     def touches(self, motions, row, ends):
         """Motions in whose steps something meets, (n,)."""
@@ -104,7 +104,7 @@ class Samples:
             def kernel(items):
                 return redundant_kernels.cable_vectors(self._problem, self._pairs, items, kind=self._kind)
 
-            return in_batches(kernel, (*motions.items(which), tau), size=BATCH)
+            return in_batches(kernel, (*motions.items(which), tau), batch_size=BATCH)
 
         return np.logical_or(*passed_over(vectors, self._platform, row, ends, len(motions.arcs)))
 

@@ -36,7 +36,7 @@ def test_times_are_those_of_collocation(name):
         positions = np.asarray(frame.inward(np.array([pose.position for pose in ends])))
         quaternions, size = None, 3
         if isinstance(problem.robot, PlatformRobot):
-            quaternions, size = np.asarray(frame.turned_quaternions(np.array([pose.quaternion for pose in ends]))), 6
+            quaternions, size = np.asarray(frame.rotated_quaternions(np.array([pose.quaternion for pose in ends]))), 6
         still, free = np.zeros((2, 3)), np.full((2, size), np.nan)
         poses = FreePoses(positions, quaternions, still, free, float(positions[:, 2].mean()))
         free = free_motion(problem, None, poses)

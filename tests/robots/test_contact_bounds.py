@@ -13,7 +13,7 @@ from support.splines import random_spline, states_of
 import cspr_jax
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, constant
-from cspr_jax.numerics.bounds.determinant_bounds import changes_sign, determinant, size_range
+from cspr_jax.numerics.bounds.determinant_bounds import changes_sign, determinant, magnitude_range
 from cspr_jax.robots.bounds.contact_bounds import contact_bounds, corner_depths, passings
 from cspr_jax.robots.bounds.state_bounds import StateBounds, cable_bounds
 from cspr_jax.robots.contacts import clearance, convex_gaps
@@ -142,7 +142,7 @@ def instants(robot, around, seed: int, middle, size: float, count: int):
     state = states_of(spline, times.ravel())
     exact = clearances(around, state.position, None if around.body is None else state.quaternion)
     blocks, kernel = spline.bounds(edges[:-1], edges[1:]), partial(BOUNDS, robot, bodies_of(robot, around))
-    return [x.reshape(count, -1) for x in exact[:5]], in_batches(kernel, blocks, size=40)
+    return [x.reshape(count, -1) for x in exact[:5]], in_batches(kernel, blocks, batch_size=40)
 
 
 @pytest.mark.ci("prototype", "laval-mssm")
@@ -218,9 +218,9 @@ def test_determinants_over_blocks():
         value = jax.tree.map(np.asarray, jax.jit(jax.vmap(determinant))(bands))
         noise = 1e-5 * rng.uniform(-1.0, 1.0, (len(S), *middle.shape))
         exact = np.linalg.det(middle + 0.01 * S[:, None, None, None] * slope + noise)
-        over = np.abs(exact - value.middle - value.slope * S[:, None]) - value.radius
+        over = np.abs(exact - value.middle - value.linear * S[:, None]) - value.radius
         assert not (over > 1e-12 * np.abs(exact).max()).any()
-        low, high = size_range(value)
+        low, high = magnitude_range(value)
         assert (low <= np.abs(exact).min(0)).all() and (high >= np.abs(exact).max(0)).all()
         closed = np.nanmedian(value.radius / np.abs(value.middle))
         assert closed < 0.05
@@ -233,5 +233,5 @@ def test_corners_of_a_platform():
     robot, around = surrounded("cogiro", shapes.box([0.0, 0.0, 0.2], [0.4, 0.4, 0.4]), 0.0)
     body = bodies_of(robot, around).body
     depths = corner_depths(body.corners, lifted(0.05, height=2.0))
-    np.testing.assert_allclose(depths.slope, 0.05 * body.corners[:, 1], atol=1e-15)
+    np.testing.assert_allclose(depths.linear, 0.05 * body.corners[:, 1], atol=1e-15)
     assert float(depths.middle.max()) == pytest.approx(2.4) and float(depths.high().max()) > 2.4 + 0.05 * 0.2

@@ -176,7 +176,7 @@ def excess(values, bands):
     over = []
     for value, band in zip(values, bands, strict=True):
         s = S.reshape(1, -1, *(1,) * (value.ndim - 2))
-        beyond = np.abs(value - band.middle[:, None] - band.slope[:, None] * s) - band.radius[:, None]
+        beyond = np.abs(value - band.middle[:, None] - band.linear[:, None] * s) - band.radius[:, None]
         over.append(np.nanmax(beyond) / np.nanmax(np.abs(value)))
     return np.array(over)
 
@@ -237,7 +237,7 @@ def test_nothing_is_known_within_a_pulley_or_on_its_axis():
         assert unknown[31:33].all() and not unknown[[0, 1, 62, 63]].any()
         assert np.isnan(values[0][unknown][:, :, 0]).any() == (ends[0][2] < 0.1)
         for value, band in zip(values[:3], bands[:3], strict=True):
-            beyond = np.abs(value[..., 0] - band.middle[:, None, 0] - band.slope[:, None, 0] * S) - band.radius[:, :1]
+            beyond = np.abs(value[..., 0] - band.middle[:, None, 0] - band.linear[:, None, 0] * S) - band.radius[:, :1]
             assert np.nanmax(beyond) < 1e-12 * np.nanmax(np.abs(value))
             assert np.isfinite(value[~unknown]).all()
 

@@ -70,10 +70,10 @@ def judged(name: str, seed: int, count: int, low: float, high: float, *, parabol
         edges = np.append(parts.T.ravel(), table.x[-1])
     times = 0.5 * (edges[:-1] + edges[1:])[:, None] + 0.5 * np.diff(edges)[:, None] * S
     limits = np.full(robot.n_cables, low), np.full(robot.n_cables, high)
-    instants = in_batches(partial(EXACT, robot, spline), times / table.x[-1], size=10)
+    instants = in_batches(partial(EXACT, robot, spline), times / table.x[-1], batch_size=10)
     several = SeveralSplines([spline])
     states = several.bounds(np.zeros(count, int), edges[:-1], edges[1:], parabolas=parabolas)
-    return instants, in_batches(partial(BOUNDS, robot, limits), states, size=10)
+    return instants, in_batches(partial(BOUNDS, robot, limits), states, batch_size=10)
 
 
 def largest_distance(matrix, wrench, low: float, high: float) -> float:
@@ -111,7 +111,7 @@ def test_bounds_of_cables_and_balances(name, parabolas):
             for values, band in zip(instants, found[:5], strict=True):
                 s = S.reshape(1, -1, *(1,) * (values.ndim - 2))
                 curve = band.square[:, None] * s**2 if parabolas else 0.0
-                over = np.abs(values - band.middle[:, None] - band.slope[:, None] * s - curve) - band.radius[:, None]
+                over = np.abs(values - band.middle[:, None] - band.linear[:, None] * s - curve) - band.radius[:, None]
                 assert np.nanmax(over) < 1e-11 * np.abs(values).max()
 
 
@@ -142,7 +142,7 @@ def test_the_only_tensions(name, parabolas):
     instants, found = judged(name, 4, 78, 0.0, np.inf, parabolas=parabolas)
     matrices, wrenches, tensions = *instants[3:], found[5]
     exact = np.linalg.solve(matrices, wrenches[..., None])[..., 0]
-    over = exact - tensions.tension.middle[:, None] - tensions.tension.slope[:, None] * S[:, None]
+    over = exact - tensions.tension.middle[:, None] - tensions.tension.linear[:, None] * S[:, None]
     over = np.abs(over - (tensions.tension.square[:, None] * S[:, None] ** 2 if parabolas else 0.0))
     known = tensions.is_regular
     assert known.mean() > 0.9

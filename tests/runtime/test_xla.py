@@ -640,7 +640,7 @@ def test_batches_are_larger_on_a_gpu(monkeypatch, backend, length):
         shapes.append(len(x))
         return 2.0 * x
 
-    found = in_batches(doubled, np.arange(700.0), size=32)
+    found = in_batches(doubled, np.arange(700.0), batch_size=32)
     np.testing.assert_array_equal(found, 2.0 * np.arange(700.0))
     assert set(shapes) == {length} and len(shapes) == -(-700 // length)
 

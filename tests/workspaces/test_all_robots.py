@@ -41,7 +41,7 @@ class Uncertain:
         self.own, self.quaternion = own, np.array([1.0, 0.0, 0.0, 0.0])
         if drawn.pattern not in cable_robots.POINT_MASSES:
             given = Rotation.from_matrix(turn).as_quat(scalar_first=True)
-            self.quaternion = self.frame.turned_quaternions(given[None])[0]
+            self.quaternion = self.frame.rotated_quaternions(given[None])[0]
         tensions = Limits(tension_min=drawn.low, tension_max=drawn.high)
 
         def ask(robot):

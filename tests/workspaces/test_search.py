@@ -314,7 +314,7 @@ def test_every_margin_lies_between_its_bounds(pattern, n, precision):
     own, frame = centred(made(drawn))
     inner, quaternions = np.asarray(frame.inward(places)), np.tile([1.0, 0.0, 0.0, 0.0], (200, 1))
     if pattern == "3R3T":
-        quaternions = frame.turned_quaternions(Rotation.from_matrix(turns).as_quat(scalar_first=True))
+        quaternions = frame.rotated_quaternions(Rotation.from_matrix(turns).as_quat(scalar_first=True))
     limits = Limits(tension_min=drawn.low, tension_max=drawn.high)
     search = WorkspaceSearch(own, requirement(own, "wrench-feasible", limits), precision=precision)
     every = Poses(inner, quaternions, None)

@@ -54,7 +54,7 @@ class Asked:
         self.quaternion = NONE
         if drawn.pattern not in cable_robots.POINT_MASSES:
             given = Rotation.from_matrix(turn).as_quat(scalar_first=True)
-            self.quaternion = self.frame.turned_quaternions(given[None])[0]
+            self.quaternion = self.frame.rotated_quaternions(given[None])[0]
         with double_precision():
             self.search = WorkspaceSearch(self.own, self.question)
         self.cells = WorkspaceCells(self.own, self.search)
@@ -300,7 +300,7 @@ def whole_cells(name, condition, size, count, turn=NONE):
     search, cells, own, frame = given(cspr_jax.load_robot(name), condition)
     rng = np.random.default_rng(0)
     low, high = ([-6.0, -4.0, 0.0], [6.0, 4.0, 4.0]) if name == "cogiro" else ([-4.0, -3.0, 2.0], [4.0, 3.0, 4.0])
-    turn = frame.turned_quaternions(np.asarray(turn)[None])[0]
+    turn = frame.rotated_quaternions(np.asarray(turn)[None])[0]
     places = mass_centres(own, np.asarray(frame.inward(rng.uniform(low, high, (count, 3)))), turn[None])
     answers = answered(search, places, turn)
     inside, outside = cells(places, np.full(3, 0.5 * size), turn)

@@ -84,13 +84,13 @@ def minimum_pose_arcs(  # noqa: PLR0913
         for each in np.unique(depth if robot.n_cables == robot.dof else depth[:0]):
             reference_pose(problem.robot, float(each))
         checker = pose_checker(problem, PlatformMotionKind(variable=variable, from_rest=start is None), batch=MANY)
-        ends = (frame.inward(places), frame.turned_quaternions(turns))
+        ends = (frame.inward(places), frame.rotated_quaternions(turns))
         if start is None:
             first, beta_hats = rest_poses(depth), np.full(len(depth), AT_REST)
         else:
             place, turn = points_of("start", [start[0]]), quaternions("start", [start[1]], 1)
             rows = np.zeros(len(depth), int)
-            first = (frame.inward(place)[rows], frame.turned_quaternions(turn)[rows])
+            first = (frame.inward(place)[rows], frame.rotated_quaternions(turn)[rows])
             beta_hats = start_beta_hat(checker, first, depth)
         trial = Candidates(first, ends, depth, np.arange(len(depth)), (beta_hats, beta_hats))
         value = float(beta_hat) if isinstance(beta_hat, int) else beta_hat

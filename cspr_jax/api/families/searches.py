@@ -23,9 +23,9 @@ from cspr_jax.families.swings.transitions.oscillations import OscillationAnswers
 from cspr_jax.families.swings.transitions.oscillations import minimum_oscillations as search_oscillations
 from cspr_jax.motion.amplitudes import Amplitude
 from cspr_jax.motion.answers import Answers
-from cspr_jax.motion.demands import SAMPLES
 from cspr_jax.motion.leg import each
 from cspr_jax.motion.motion import Placed
+from cspr_jax.motion.peaks import SAMPLES
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.numerics.linear.frames import Frame

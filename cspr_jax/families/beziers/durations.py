@@ -50,7 +50,7 @@ def proved_margins(
 ) -> Float[np.ndarray, "n"]:
     """Smallest slacks less their rounding errors: a segment is proved feasible where they are positive."""
     motions = Bezier(ends.start, ends.middles(durations), ends.end, durations, z0)
-    margins = in_batches(partial(_proved_margins, robot), motions, size=BATCH)
+    margins = in_batches(partial(_proved_margins, robot), motions, batch_size=BATCH)
     return np.where(np.isfinite(margins), margins, -np.inf)
 
 

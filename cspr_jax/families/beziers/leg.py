@@ -15,7 +15,7 @@ from cspr_jax.families.beziers.motion import Bezier, end_acceleration
 from cspr_jax.families.beziers.segments import BezierAnswers, answers_of, joined_segments
 from cspr_jax.families.beziers.sequences import Anchored, duration_bounds, least_total, segments_of
 from cspr_jax.launch.landings import Throw
-from cspr_jax.launch.launch_result import LaunchOutcome, launch_outcome
+from cspr_jax.launch.launch_result import LaunchResult, launch_result
 from cspr_jax.launch.parabola import parabola_of
 from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.leg import JoinedLeg, Leg, each
@@ -46,9 +46,9 @@ class Beziers(Leg):
         """Refuse numbers of arcs, of which a segment has none."""
         super().__init__(waypoints)
         self._refuse("arcs")
-        if waypoints.keys.least == "total" and None not in self._durations:
+        if waypoints.plan_file.least == "total" and None not in self._durations:
             raise ConfigError(waypoints.path, 'least = "total": must be absent where every duration is given')
-        launch = waypoints.keys.launch
+        launch = waypoints.plan_file.launch
         # Number of the segment of the launch, if it is one of these.
         self._at = None if launch is None or not 0 <= launch.segment - waypoints.first < len(self) else launch.segment
 
@@ -68,16 +68,18 @@ class Beziers(Leg):
         shown_points = np.asarray(frame.outward(answers.control_points))
         return dataclasses.replace(answers, control_points=shown_points), each(motions, len(self))
 
-    def outcome(
-        self, problem: Problem, joined: JoinedLeg, tension_min: np.ndarray, start: float
-    ) -> LaunchOutcome | None:
-        """Release and flight of the object that the leg launches; see `Leg.outcome`."""
-        table, frame, answers = self.waypoints.keys.launch, self.waypoints.frame, cast(BezierAnswers, joined.answers)
+    def result(self, problem: Problem, joined: JoinedLeg, tension_min: np.ndarray, start: float) -> LaunchResult | None:
+        """Release and flight of the object that the leg launches; see `Leg.result`."""
+        table, frame, answers = (
+            self.waypoints.plan_file.launch,
+            self.waypoints.frame,
+            cast(BezierAnswers, joined.answers),
+        )
         if table is None or self._at is None:
             return None
         at = self._at - self.waypoints.first
         motion, release = cast(Bezier, joined.motions[at]), float(answers.release[at])
-        return launch_outcome(
+        return launch_result(
             table,
             frame,
             problem.robot,
@@ -89,16 +91,16 @@ class Beziers(Leg):
         )
 
     def _chosen(self, problem: Problem, points: np.ndarray, depth: float) -> _Chosen:
-        waypoints, durations, launch = self.waypoints, self._durations, self.waypoints.keys.launch
+        waypoints, durations, launch = self.waypoints, self._durations, self.waypoints.plan_file.launch
         if launch is not None and self._at is not None:
             question = _question(waypoints, launch, points, depth, float(problem.robot.gravity))
             best = launched(problem, question, durations, launch.choose)
             first = segments_of(best.sequence, jnp.asarray(best.durations)).middle[0]
             places, times, first = jax.tree.map(np.asarray, (best.sequence.points, best.durations, first))
             return _Chosen(places, times.tolist(), first, float(best.release), float(best.time))
-        control_point = waypoints.keys.first_control_point if waypoints.first == 0 else None
+        control_point = waypoints.plan_file.first_control_point if waypoints.first == 0 else None
         first = points[0] if control_point is None else np.asarray(waypoints.frame.inward(control_point))
-        if waypoints.keys.least == "total":
+        if waypoints.plan_file.least == "total":
             sequence = Anchored(points, np.asarray(0), first, np.asarray(depth))
             durations = least_total(problem, sequence, durations).tolist()
         return _Chosen(points, durations, first)
@@ -114,7 +116,7 @@ class Beziers(Leg):
             points[self._at - waypoints.first + 1] = np.nan
         near = np.linalg.norm(np.diff(points, axis=0), axis=1) <= AT_P0 * float(spool_radius(problem.robot))
         for i in (np.flatnonzero(near) + 1).tolist():
-            control_point = waypoints.keys.first_control_point if waypoints.first == 0 else None
+            control_point = waypoints.plan_file.first_control_point if waypoints.first == 0 else None
             if control_point is None or control_point == waypoints.poses[0].position:
                 raise ConfigError(
                     waypoints.path,
@@ -128,7 +130,7 @@ class Beziers(Leg):
         # Redundant cables without largest tensions may give any acceleration, so that no duration is the least.
         if problem.robot.n_cables == problem.robot.dof:
             return
-        is_searched = self.waypoints.keys.least == "total" or self._at is not None
+        is_searched = self.waypoints.plan_file.least == "total" or self._at is not None
         shortest = np.exp(duration_bounds(problem, points)[0]) if is_searched else 0.0
         is_free = np.array([time is None for time in self._durations])[: len(times)]
         for i in np.flatnonzero(is_free & ~(times > shortest * ABOVE_SHORTEST)).tolist():

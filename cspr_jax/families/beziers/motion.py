@@ -77,7 +77,7 @@ def many_bounds(
 ) -> StateBounds:
     """Bounds of the states of several segments over blocks of time."""
     each = jax.tree.map(lambda x: x[motion], curves)
-    return in_batches(_bounds, (each, normalised(each.time, start, end)), size=BATCH)
+    return in_batches(_bounds, (each, normalised(each.time, start, end)), batch_size=BATCH)
 
 
 @persistent_jit

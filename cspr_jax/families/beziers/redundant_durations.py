@@ -57,7 +57,7 @@ class _Segment:
         return Bezier(start, Ends(start, end, *rest).middles(times), end, times, np.full(len(times), self._z0))
 
     def sampled(self, times: np.ndarray) -> np.ndarray:
-        return in_batches(partial(_sampled, touchable(self._problem)), self._motions(times), size=BATCH)
+        return in_batches(partial(_sampled, touchable(self._problem)), self._motions(times), batch_size=BATCH)
 
     def is_proved(self, time: float) -> bool:
         return bool(verdicts_and_proofs(self._problem, self._motions(np.array([time])))[0].verdict[0] == 0)

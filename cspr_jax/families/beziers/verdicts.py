@@ -57,7 +57,7 @@ def verdicts(problem: Problem, motions: Bezier) -> Verdicts:
 def verdicts_within(problem: Problem, motions: Bezier) -> Verdicts:
     """Verdicts, on as many cables as degrees of freedom, of which none that touches a limit is feasible."""
     size = BATCH if len(motions.time) <= BATCH else MANY
-    margins = in_batches(partial(_margins, problem.robot), motions, size=size)
+    margins = in_batches(partial(_margins, problem.robot), motions, batch_size=size)
     slack = np.concatenate([margins.taut, margins.below[:, None]], axis=1)
     doubt = np.concatenate([margins.taut_rounding, margins.below_rounding[:, None]], axis=1)
     flags = [Verdict.SLACK_CABLE.value] * margins.taut.shape[1] + [Verdict.ABOVE_SPOOLS.value]
@@ -67,7 +67,7 @@ def verdicts_within(problem: Problem, motions: Bezier) -> Verdicts:
     rows = limits_set(problem.limits)
     finite = np.isfinite(slack).all(1)
     if rows:
-        kappa = in_batches(partial(_pseudotensions, problem.robot), motions, size=size)
+        kappa = in_batches(partial(_pseudotensions, problem.robot), motions, batch_size=size)
         proved = limit_slacks(problem, motions, kappa, bound[:, -1] > 0.0)
         known = np.isfinite(proved.attained)
         broken |= np.bitwise_or.reduce(

@@ -187,7 +187,9 @@ def of_many(function, hull: SpoolHull, *items):
     """One of the functions above for many ellipses."""
 
     def part(rows: slice):
-        return in_batches(partial(_each, function, hull), jax.tree.map(lambda leaf: leaf[rows], items), size=BATCH)
+        return in_batches(
+            partial(_each, function, hull), jax.tree.map(lambda leaf: leaf[rows], items), batch_size=BATCH
+        )
 
     count = len(jax.tree.leaves(items)[0])
     if count <= BATCH:

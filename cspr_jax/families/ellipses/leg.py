@@ -22,7 +22,7 @@ from cspr_jax.families.ellipses.releases import Release, ReleaseRequirement, cho
 from cspr_jax.families.ellipses.rotation_frequencies import rotation_frequencies
 from cspr_jax.families.ellipses.transfers import Turning, Way, between, least_way, rotation_between, step_of
 from cspr_jax.launch.landings import Throw
-from cspr_jax.launch.launch_result import LaunchOutcome, launch_outcome
+from cspr_jax.launch.launch_result import LaunchResult, launch_result
 from cspr_jax.launch.parabola import parabola_of
 from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.leg import JoinedLeg, Leg
@@ -70,7 +70,7 @@ class Ellipses(Leg):
         super().__init__(waypoints)
         for i, pose in enumerate(waypoints.poses):
             self._check_pose(i, pose)
-        launch, count = waypoints.keys.launch, len(waypoints)
+        launch, count = waypoints.plan_file.launch, len(waypoints)
         # Number of the pose of the release, if it is one of these.
         of_launch = 0 if launch is None else launch.segment - waypoints.first + 1
         self._of_launch = of_launch if 0 < of_launch <= count else None
@@ -84,9 +84,9 @@ class Ellipses(Leg):
             problem.robot,
             waypoints.robot_file,
             waypoints.frame,
-            waypoints.keys,
+            waypoints.plan_file,
             waypoints.path,
-            trajectory=waypoints.keys,
+            trajectory=waypoints.plan_file,
         )
         turnings = self._turnings(problem, z0, scene)
         ways: list[Way] = []
@@ -97,11 +97,9 @@ class Ellipses(Leg):
             place = dataclasses.replace(last, phase=last.phase + 2.0 * math.pi * turns)
         return self._answers(problem, turnings, ways, scene), [way.motion for way in ways]
 
-    def outcome(
-        self, problem: Problem, joined: JoinedLeg, tension_min: np.ndarray, start: float
-    ) -> LaunchOutcome | None:
-        """Release at the end of a segment, and flight of the object; see `Leg.outcome`."""
-        table, frame = self.waypoints.keys.launch, self.waypoints.frame
+    def result(self, problem: Problem, joined: JoinedLeg, tension_min: np.ndarray, start: float) -> LaunchResult | None:
+        """Release at the end of a segment, and flight of the object; see `Leg.result`."""
+        table, frame = self.waypoints.plan_file.launch, self.waypoints.frame
         if table is None or self._of_launch is None:
             return None
         at, answers = self._of_launch - 1, cast(EllipseAnswers, joined.answers)
@@ -112,7 +110,7 @@ class Ellipses(Leg):
             if at + 1 < len(self)
             else turning(way.last, way.frequencies[1], as_float64(0.0), 1.0)
         )
-        return launch_outcome(
+        return launch_result(
             table,
             frame,
             problem.robot,
@@ -124,7 +122,7 @@ class Ellipses(Leg):
         )
 
     def _release(self, problem: Problem, before: Turning, scene: Scene) -> Release:
-        waypoints, table, i = self.waypoints, self.waypoints.keys.launch, self._of_launch or 0
+        waypoints, table, i = self.waypoints, self.waypoints.plan_file.launch, self._of_launch or 0
         ellipse = waypoints.poses[i].ellipse
         if table is None or ellipse is None:
             raise ValueError("no launch")
@@ -156,7 +154,7 @@ class Ellipses(Leg):
             raise ConfigError(waypoints.path, f"{name}.turns = {pose.turns:g}: must be absent at rest")
         # Families before and behind need the place of the pose that they share.
         is_shared = (i == 0 and waypoints.first > 0) or (
-            i == len(waypoints) and waypoints.last < len(waypoints.keys.pose) - 1
+            i == len(waypoints) and waypoints.last < len(waypoints.plan_file.pose) - 1
         )
         if pose.position is not None and not pose.rest and not is_shared:
             raise ConfigError(waypoints.path, f"{name}.position = {shown(pose.position)}: must be absent on an ellipse")
@@ -169,7 +167,9 @@ class Ellipses(Leg):
     def _key(self, i: int, name: str) -> str:
         # Name of a key of an ellipse in messages.
         return (
-            f"ellipse.{name}" if self.waypoints.keys.ellipse is not None else f"{self.waypoints.name(i)}.ellipse.{name}"
+            f"ellipse.{name}"
+            if self.waypoints.plan_file.ellipse is not None
+            else f"{self.waypoints.name(i)}.ellipse.{name}"
         )
 
     def _check_plane(self, i: int, table: EllipseTable) -> None:
@@ -264,7 +264,7 @@ class Ellipses(Leg):
                 waypoints.path, f"max_arcs = {waypoints.max_arcs}: must be at least {step} between two ellipses"
             )
         if not step and not turns and not between(first, last):
-            key = "turns" if waypoints.keys.ellipse is not None else f"{waypoints.name(i)}.turns"
+            key = "turns" if waypoints.plan_file.ellipse is not None else f"{waypoints.name(i)}.turns"
             raise ConfigError(waypoints.path, f"{key} = 0: must be above 0 on one and the same ellipse")
         return least_way(problem, first, last, turns, scene, arcs=arcs, max_arcs=waypoints.max_arcs)
 

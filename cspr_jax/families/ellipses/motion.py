@@ -98,7 +98,7 @@ class EllipseMotion:
             time_bounds(self.law, self.time, start, end),
             time_bounds(self.progress, self.time, start, end, orders=1).values[0],
         )
-        return in_batches(partial(_bounds, self), blocks, size=BATCH)
+        return in_batches(partial(_bounds, self), blocks, batch_size=BATCH)
 
 
 def _kinematics(first: Ellipse, last: Ellipse, s: tuple, turns: tuple, rates: tuple) -> tuple[Any, Any, Any]:

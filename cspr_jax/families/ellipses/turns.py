@@ -47,7 +47,7 @@ class Turns:
     ) -> StateBounds:
         """Bounds of the states over blocks."""
         chosen = Ellipse(*(np.asarray(leaf)[motion] for leaf in self.ellipses))
-        return in_batches(_bounds, (chosen, self.frequencies[motion], start, end), size=BATCH)
+        return in_batches(_bounds, (chosen, self.frequencies[motion], start, end), batch_size=BATCH)
 
 
 @persistent_jit

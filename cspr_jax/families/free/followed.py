@@ -73,7 +73,7 @@ def _turning(tasks: Tasks, segment: int, motion: Motion, duration: float) -> np.
 def energy_along(tasks: Tasks, motion: Motion) -> float:
     """Integral of the sum of the squares of the tensions."""
     kernel = partial(_tensions, tasks.robot, tasks.limits, common_shape(motion))
-    force = in_batches(kernel, tasks.basis.tau.ravel(), size=BATCH)
+    force = in_batches(kernel, tasks.basis.tau.ravel(), batch_size=BATCH)
     return float(motion.duration()) * float(np.sum(tasks.basis.shares.ravel() * np.sum(force**2, axis=1)))
 
 

@@ -82,19 +82,19 @@ class FreeMotions(Leg):
         self._others: Sequence[Leg] = ()
         self._lines: Sequence[Leg] = ()
         self._refuse("arcs", "beta_hat")
-        accelerations = waypoints.keys.end_accelerations
-        if isinstance(accelerations, list) and len(accelerations) != len(waypoints.keys.pose):
+        accelerations = waypoints.plan_file.end_accelerations
+        if isinstance(accelerations, list) and len(accelerations) != len(waypoints.plan_file.pose):
             raise ConfigError(
                 waypoints.path,
                 f"end_accelerations = {shown(accelerations)}: must be one [x, y, z] for each of the "
-                f"{len(waypoints.keys.pose)} poses",
+                f"{len(waypoints.plan_file.pose)} poses",
             )
-        if accelerations == "swing" and waypoints.keys.z0 is None:
+        if accelerations == "swing" and waypoints.plan_file.z0 is None:
             raise ConfigError(
                 waypoints.path, 'z0 is missing: depth of P0, m, about which end_accelerations = "swing" are'
             )
-        if waypoints.keys.objective in LEVELS and waypoints.keys.duration_max is None:
-            why = f'which objective = "{waypoints.keys.objective}" needs: the slower a motion, the better it is'
+        if waypoints.plan_file.objective in LEVELS and waypoints.plan_file.duration_max is None:
+            why = f'which objective = "{waypoints.plan_file.objective}" needs: the slower a motion, the better it is'
             raise ConfigError(waypoints.path, f"duration_max is missing: longest duration of a segment, s, {why}")
 
     def begin_with(self, others: Sequence[Leg]) -> None:
@@ -111,15 +111,15 @@ class FreeMotions(Leg):
             problem.robot,
             waypoints.robot_file,
             waypoints.frame,
-            waypoints.keys,
+            waypoints.plan_file,
             waypoints.path,
-            trajectory=waypoints.keys,
+            trajectory=waypoints.plan_file,
         )
         poses = self._poses(problem, z0)
         if not len(divided(problem, poses)):
             self._refuse_poses(problem, scene, poses)
         # Segments have nothing in common if all accelerations are known.
-        is_separate = waypoints.keys.together is False or not np.isnan(poses.accelerations[1:-1]).any()
+        is_separate = waypoints.plan_file.together is False or not np.isnan(poses.accelerations[1:-1]).any()
         try:
             parts = (self._separate if is_separate else self._together)(problem, scene, poses)
         except InputError as error:
@@ -175,7 +175,7 @@ class FreeMotions(Leg):
     @property
     def _settings(self) -> FreeSettings:
         # With the end of a search that begins now.
-        keys = self.waypoints.keys
+        keys = self.waypoints.plan_file
         until = np.inf if keys.search_time is None else time.monotonic() + keys.search_time
         return FreeSettings(keys.objective or "time", keys.duration_max, keys.starts, until)
 
@@ -261,7 +261,7 @@ class FreeMotions(Leg):
         if isinstance(problem.robot, PlatformRobot):
             quaternions = pose_quaternions(waypoints, positions)
         accelerations = np.full((len(positions), 3 if quaternions is None else 6), np.nan)
-        known = waypoints.keys.end_accelerations
+        known = waypoints.plan_file.end_accelerations
         if known == "swing":
             accelerations[:] = 0.0
             accelerations[:, :3] = -float(problem.robot.gravity) / z0 * (positions - rest_point(z0))

@@ -65,7 +65,7 @@ class FreeMap(ProvedMap):
     ) -> None:
         # Fill in what is found of some cells.
         pairs = np.stack([starts[rows], ends[rows]], axis=1)
-        units = None if self._unit is None else self._frame.turned_quaternions(np.tile(self._unit, (2, 1)))
+        units = None if self._unit is None else self._frame.rotated_quaternions(np.tile(self._unit, (2, 1)))
         accelerations = np.full((2, 3 if units is None else 6), np.nan)
         accelerations[:1] = 0.0 if self._rests else np.nan
         depths = pairs[..., 2].mean(1) if z0 is None else z0[rows]
@@ -96,4 +96,4 @@ class FreeMap(ProvedMap):
     def _turning(self) -> Array | None:
         if self._unit is None:
             return None
-        return as_float64(self._frame.turned_quaternions(self._unit[None])[None])
+        return as_float64(self._frame.rotated_quaternions(self._unit[None])[None])

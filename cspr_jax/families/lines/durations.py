@@ -92,7 +92,7 @@ def by_formula(
     """Least durations along straight lines under taut cables and the largest acceleration alone."""
     in_plane, largest = in_one_plane(robot), np.full(len(starts), float(max_acceleration))
     kernel = partial(_by_formula, robot, law=law, rule=rule, in_plane=in_plane)
-    minimum, bound, rest, depth, is_bounded = in_batches(kernel, (starts, ends, largest), size=BATCH)
+    minimum, bound, rest, depth, is_bounded = in_batches(kernel, (starts, ends, largest), batch_size=BATCH)
     duration = minimum.duration * (1.0 + fastest.LONGER) if in_plane else np.full(len(starts), np.nan)
     fields = (duration, minimum.ratio, bound, rest, depth, is_bounded, minimum.up, minimum.down)
     return Durations(*(np.array(x) for x in fields))
@@ -105,7 +105,7 @@ def _lines(problem: Problem, arguments) -> LineSlacks:
 
 def lines_of(problem: Problem, starts: Float[np.ndarray, "n 3"], ends: Float[np.ndarray, "n 3"]) -> LineSlacks:
     """Return the coefficients that slacks along lines depend on."""
-    return in_batches(partial(_lines, problem), (starts, ends), size=BATCH)
+    return in_batches(partial(_lines, problem), (starts, ends), batch_size=BATCH)
 
 
 def by_cells(
@@ -130,7 +130,9 @@ def by_search(
         limits=Limits(**{name: getattr(problem.limits, name) for name in moving(problem.limits)})
     )
     largest = np.full(len(starts), float(max_acceleration))
-    minimum = in_batches(partial(_by_search, moving_problem, law=law), (starts, ends, largest), size=BATCH_OF_SEARCH)
+    minimum = in_batches(
+        partial(_by_search, moving_problem, law=law), (starts, ends, largest), batch_size=BATCH_OF_SEARCH
+    )
     rows = _bounds_of_rows(moving_problem)
     return dataclasses.replace(
         timings, duration=minimum.duration, ratio=minimum.ratio, up=rows[minimum.up], down=rows[minimum.down]

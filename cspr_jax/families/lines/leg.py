@@ -23,7 +23,7 @@ class TimedLines(Leg):
 
     def check(self, problem: Problem) -> None:
         """Refuse the rule of the text where spools are not in one plane; see `Leg.check`."""
-        if self.waypoints.keys.rule == "thesis" and not in_one_plane(problem.robot):
+        if self.waypoints.plan_file.rule == "thesis" and not in_one_plane(problem.robot):
             place, key = self.waypoints.robot_file.placed("base_points", self.waypoints.path)
             raise ConfigError(place, f'{key}: must lie in one plane with rule = "thesis"')
 
@@ -52,7 +52,7 @@ class TimedLines(Leg):
         return points[:, :-1].reshape(-1, 3), points[:, 1:].reshape(-1, 3)
 
     def _solved(self, problem: Problem, starts: np.ndarray, ends: np.ndarray) -> LineAnswers:
-        keys, law = self.waypoints.keys, self.waypoints.family
+        keys, law = self.waypoints.plan_file, self.waypoints.family
         largest = np.inf if keys.max_acceleration is None else keys.max_acceleration
         rule = keys.rule or "optimum"
         answers = timed_lines(problem, starts, ends, law=law, rule=rule, max_acceleration=largest)

@@ -107,7 +107,7 @@ class TimedLine:
     def bounds(self, start: np.ndarray, end: np.ndarray) -> StateBounds:
         """Bounds of the states; see `BoundedMotion.bounds`."""
         blocks = time_bounds(self.law, self.time, start, end)
-        return in_batches(partial(_bounds, self), blocks, size=BATCH)
+        return in_batches(partial(_bounds, self), blocks, batch_size=BATCH)
 
 
 @persistent_jit

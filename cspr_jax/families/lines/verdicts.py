@@ -37,7 +37,7 @@ def _s_curves(ratios) -> Amplitude:
 def laws_of(law: str, ratios: Float[np.ndarray, "n"]) -> Amplitude:
     """Laws of time."""
     if law == "s-curve":
-        return in_batches(_s_curves, ratios, size=BATCH)
+        return in_batches(_s_curves, ratios, batch_size=BATCH)
     one = jax.tree.map(np.asarray, fixed_law(law))
     return jax.tree.map(lambda x: np.broadcast_to(x, (len(ratios), *x.shape)), one)
 
@@ -145,7 +145,7 @@ def limits_at_rest(
 def _fails_at_rest(problem: Problem, starts: np.ndarray, ends: np.ndarray, limits: dict[str, Any]) -> np.ndarray:
     # Tell whether rest at either end breaks limits of the tensions, or taut cables, (n,).
     limited = problem._replace(limits=Limits(**limits))
-    margins = [in_batches(partial(_at_rest, limited), places, size=BATCH) for places in (starts, ends)]
+    margins = [in_batches(partial(_at_rest, limited), places, batch_size=BATCH) for places in (starts, ends)]
     return np.min(margins, axis=0) < -FORMULAS_UNDECIDED * float(np.asarray(problem.robot.gravity))
 
 

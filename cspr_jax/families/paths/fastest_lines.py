@@ -33,11 +33,11 @@ class FastestLines(Leg):
 
     def join(self, problem: Problem, z0: float) -> tuple[Answers, list[Motion]]:
         """Join the poses; see `Leg.join`."""
-        frame, keys = self.waypoints.frame, self.waypoints.keys
+        frame, keys = self.waypoints.frame, self.waypoints.plan_file
         scene = scene_of(problem.robot, self.waypoints.robot_file, frame, keys, self.waypoints.path, trajectory=keys)
         positions, units = np.array(frame.outward(self.waypoints.points(z0))), None
         if isinstance(problem.robot, PlatformRobot):
-            units = continuous(frame.turned_quaternions(pose_quaternions(self.waypoints, self.waypoints.points(z0))))
+            units = continuous(frame.rotated_quaternions(pose_quaternions(self.waypoints, self.waypoints.points(z0))))
         lines = [
             self._lines(positions[i : i + 2], None if units is None else units[i : i + 2]) for i in range(len(self))
         ]

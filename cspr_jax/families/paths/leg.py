@@ -75,7 +75,7 @@ class Paths(Leg):
         self._notes: list[str] = []
         self._refuse("arcs", "beta_hat")
         for i, pose in enumerate(waypoints.poses):
-            if i and pose.path is not None and not waypoints.keys.is_one_path:
+            if i and pose.path is not None and not waypoints.plan_file.is_one_path:
                 self._check_path(i, pose.path)
 
     @classmethod
@@ -90,9 +90,9 @@ class Paths(Leg):
             problem.robot,
             waypoints.robot_file,
             waypoints.frame,
-            waypoints.keys,
+            waypoints.plan_file,
             waypoints.path,
-            trajectory=waypoints.keys,
+            trajectory=waypoints.plan_file,
         )
         parts: list[list[Spline]] = [[] for _ in range(len(self))]
         through = np.empty(len(self), object)
@@ -126,7 +126,7 @@ class Paths(Leg):
         places = np.array(waypoints.frame.outward(waypoints.points(z0)))
         units = None
         if isinstance(problem.robot, PlatformRobot):
-            units = waypoints.frame.turned_quaternions(pose_quaternions(waypoints, waypoints.points(z0)))
+            units = waypoints.frame.rotated_quaternions(pose_quaternions(waypoints, waypoints.points(z0)))
         for run in self._runs:
             try:
                 course = self._course(run, places, units)
@@ -149,7 +149,7 @@ class Paths(Leg):
     @property
     def _runs(self) -> list[CourseRun]:
         # A course ends where a pose has a path of its own, before one, and at rest.
-        poses, keys, first, runs = self.waypoints.poses, self.waypoints.keys, 0, list[CourseRun]()
+        poses, keys, first, runs = self.waypoints.poses, self.waypoints.plan_file, 0, list[CourseRun]()
         usual = PathTable() if keys.path is None or keys.is_one_path else keys.path
         for i, pose in enumerate(poses[1:], start=1):
             following = poses[i + 1] if i < len(self) else None
@@ -167,7 +167,7 @@ class Paths(Leg):
     def _key(self, run: CourseRun) -> str:
         return (
             "path"
-            if self.waypoints.poses[run.last].path is None or self.waypoints.keys.is_one_path
+            if self.waypoints.poses[run.last].path is None or self.waypoints.plan_file.is_one_path
             else (f"{self.waypoints.name(run.last)}.path")
         )
 
@@ -180,20 +180,20 @@ class Paths(Leg):
         robot_file = waypoints.robot_file
         if table.orientations is not None and units is None:
             raise InputError("orientations", None, "must be absent for a point mass", fault="given")
-        has_start = not waypoints.keys.is_one_path and not (
+        has_start = not waypoints.plan_file.is_one_path and not (
             run.first == 0 and table.has_start and waypoints.poses[0].position is None and not waypoints.poses[0].rest
         )
         ends = CourseEnds(
             places[run.first] if has_start else None,
-            None if waypoints.keys.is_one_path or table.has_end else places[run.last],
+            None if waypoints.plan_file.is_one_path or table.has_end else places[run.last],
             *(() if units is None else (units[run.first], units[run.last])),
         )
         if has_start and table.start is not None:
             raise InputError("start", table.start, f"absent: the path begins at {waypoints.name(run.first)}")
         turning = np.array(IDENTITY)
         if table.kind == "csv" and units is not None:
-            reference = reference_of(build_robot(robot_file, waypoints.keys, waypoints.path))
-            turning = waypoints.frame.turned_quaternions(reference * BACK)
+            reference = reference_of(build_robot(robot_file, waypoints.plan_file, waypoints.path))
+            turning = waypoints.frame.rotated_quaternions(reference * BACK)
         axes = FileAxes(robot_file.z_axis, np.eye(3)[1 if robot_file.is_planar else 2], turning)
         return course_of(table, ends, waypoints.path.parent, axes)
 

@@ -95,7 +95,8 @@ class _Segments:
     def __init__(self, robot: PlatformRobot, candidates: Candidates) -> None:
         self._candidates = candidates
         self._of_motions = [
-            in_batches(partial(_motions, robot, np.asarray(odd)), candidates[:3], size=BATCH) for odd in (False, True)
+            in_batches(partial(_motions, robot, np.asarray(odd)), candidates[:3], batch_size=BATCH)
+            for odd in (False, True)
         ]
 
     def __call__(self, arcs: int, indices: np.ndarray) -> PlatformSegment:

@@ -69,7 +69,7 @@ def end_options(
 ) -> tuple[Float[np.ndarray, "n count"], Bool[np.ndarray, "n"]]:
     """Values of beta-hat to try at poses."""
     preferred, lowest, highest, fraction, depth = in_batches(
-        partial(_ends, robot), (positions, quaternions, z0), size=BATCH
+        partial(_ends, robot), (positions, quaternions, z0), batch_size=BATCH
     )
     return options(preferred, lowest, highest, count), (depth > 0.0) & is_regular(fraction)
 

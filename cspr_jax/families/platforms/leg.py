@@ -55,7 +55,7 @@ class _Poses(Leg):
 
     def __init__(self, waypoints: Waypoints) -> None:
         """Refuse keys of other families and quaternions that are no orientations."""
-        keys, path = waypoints.keys, waypoints.path
+        keys, path = waypoints.plan_file, waypoints.path
         if keys.inclination is not None:
             raise ConfigError(path, 'inclination: must be absent unless family = "transition"')
         if keys.beat in WITHOUT_BETA_HAT:
@@ -72,13 +72,13 @@ class _Poses(Leg):
         poses, frame = self.waypoints.poses, self.waypoints.frame
         angles = np.array([[0.0] * 3 if p.rest else p.tilt_torsion or [0.0] * 3 for p in poses])
         is_given = np.array([pose.rest or pose.tilt_torsion is None for pose in poses])
-        return np.where(is_given[:, None], frame.turned_quaternions(self._given), orientations(frame, points, angles))
+        return np.where(is_given[:, None], frame.rotated_quaternions(self._given), orientations(frame, points, angles))
 
     def check(self, problem: Problem) -> None:
         """Refuse poses at which no motion can begin or end; see `Leg.check`."""
         waypoints = self.waypoints
         points = waypoints.points(1.0)
-        hint = "".join(f" ({line})" for line in plan_hints(waypoints.keys, waypoints.robot_file))
+        hint = "".join(f" ({line})" for line in plan_hints(waypoints.plan_file, waypoints.robot_file))
         for i, (position, quaternion) in enumerate(zip(points, self._quaternions(points), strict=True)):
             # On more than six cables poses are judged by the margin of their tensions alone.
             if not waypoints.poses[i].rest and _is_determined(problem):
@@ -146,7 +146,7 @@ class _Poses(Leg):
     def _pairs(self, i: int, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         # Return the values at both ends of segment i, (n_first, n_last) each.
         starts, ends = np.meshgrid(first, last, indexing="ij")
-        if self.waypoints.keys.beat == "beta_f":
+        if self.waypoints.plan_file.beat == "beta_f":
             return (starts, starts) if self.waypoints.poses[i + 1].rest else (ends, ends)
         return starts, ends
 
@@ -165,7 +165,7 @@ class _Poses(Leg):
         tries: list[np.ndarray] = []
         waypoints, changes = self.waypoints, self._changes()
         for i, (pose, position, quaternion) in enumerate(zip(waypoints.poses, points, quaternions, strict=True)):
-            if waypoints.keys.beat in WITHOUT_BETA_HAT:
+            if waypoints.plan_file.beat in WITHOUT_BETA_HAT:
                 tries.append(np.zeros(1))
                 continue
             if pose.beta_hat is not None or pose.rest:
@@ -183,7 +183,7 @@ class _Poses(Leg):
     def _changes(self) -> set[int]:
         # Return the poses where the family changes: both families take the value that is tried first there, so that
         # accelerations are continuous.
-        ends = {0: self.waypoints.first > 0, len(self): self.waypoints.last < len(self.waypoints.keys.pose) - 1}
+        ends = {0: self.waypoints.first > 0, len(self): self.waypoints.last < len(self.waypoints.plan_file.pose) - 1}
         return {i for i, changes in ends.items() if changes}
 
     def _refuse_slack(self, beta_hats: list[np.ndarray]) -> None:

@@ -120,7 +120,7 @@ class MotionChecker(abc.ABC):
 
     def durations(self, segments: PlatformSegment, arcs: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
         """Durations of segments."""
-        return in_batches(_durations, (segments, arcs.astype(float)), size=self.batch)
+        return in_batches(_durations, (segments, arcs.astype(float)), batch_size=self.batch)
 
     def nothing(self, count: int) -> PlatformChecks:
         """Checks to be filled in."""

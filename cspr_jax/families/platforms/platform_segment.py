@@ -228,7 +228,7 @@ class PlatformMotion:
     def bounds(self, start: np.ndarray, end: np.ndarray) -> StateBounds:
         """Bounds of the states; see `BoundedMotion.bounds`."""
         blocks = time_bounds(self.amplitude, self.duration(), start, end, orders=4)
-        return in_batches(partial(_bounds, self.segment, self.arcs, kind=self.kind), blocks, size=BATCH)
+        return in_batches(partial(_bounds, self.segment, self.arcs, kind=self.kind), blocks, batch_size=BATCH)
 
 
 @persistent_jit(static_argnames="kind", compiler_options=compile_options.least())

@@ -19,7 +19,16 @@ from cspr_jax.families.platforms.platform_segment import PlatformSegment
 from cspr_jax.motion.amplitudes import Amplitude, derivatives
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.numerics.elementary import polynomial, sincospi
-from cspr_jax.numerics.linear.lanes import Matrix, Vector, about_axis, combined, cross, dot, rotation_matrix, stored
+from cspr_jax.numerics.linear.lanes import (
+    Matrix,
+    Vector,
+    about_axis,
+    combined,
+    cross,
+    dot,
+    materialized,
+    rotation_matrix,
+)
 
 if TYPE_CHECKING:
     from jaxtyping import Float, Num
@@ -177,7 +186,7 @@ def _about_one_axis(
     axis = tuple(segment.slerp.across[:, i] for i in range(1, 4))
     beta, beta1, beta2 = beats
     full = 2.0 * segment.slerp.angle
-    sine, cosine = stored(sincospi(full * beta * instant.a / math.pi), one)
+    sine, cosine = materialized(sincospi(full * beta * instant.a / math.pi), one)
     rate = full * (beta1 * instant.a + beta * instant.a1)
     second_derivative = full * (beta2 * instant.a + 2.0 * beta1 * instant.a1 + beta * instant.a2)
     return about_axis(axis, sine, cosine), tuple(rate * e for e in axis), tuple(second_derivative * e for e in axis)

@@ -88,10 +88,11 @@ def _sinc(y: AffineBounds) -> tuple[AffineBounds, ...]:
     # Their second derivatives may change sign.
     cosine, *derivatives = sinc(y.middle)
     slopes = (-0.5 * derivatives[0], *derivatives[1:])
-    half = 0.5 * y.reach() ** 2
+    half = 0.5 * y.half_range() ** 2
     return tuple(
         _widened(
-            AffineBounds(value, slope * y.slope, jnp.abs(slope) * y.radius + second_derivative * half), 1.0 + y.reach()
+            AffineBounds(value, slope * y.linear, jnp.abs(slope) * y.radius + second_derivative * half),
+            1.0 + y.half_range(),
         )
         for value, slope, second_derivative in zip((cosine, *derivatives[:3]), slopes, _BENDS, strict=True)
     )

@@ -85,7 +85,7 @@ def function_motion(
         place = jnp.asarray(frame.inward(value[:3]))
         if not is_platform:
             return place
-        turning = jnp.asarray(frame.turned_quaternions(value[3:])) if size == (7,) else jnp.eye(4)[0]
+        turning = jnp.asarray(frame.rotated_quaternions(value[3:])) if size == (7,) else jnp.eye(4)[0]
         return jnp.concatenate([place, rotations.product(turning, back)])
 
     return FunctionMotion(as_float64(duration), as_float64(1.0), as_float64(1.0), inward)

@@ -56,16 +56,16 @@ class Splines(Leg):
             else:
                 curve = self._curve(problem, z0, first, last)
                 motions += [part(curve, i, i + 1) for i in range(last - first)]
-        if self.waypoints.keys.stretch is not None:
-            motions = [motion.stretched(self.waypoints.keys.stretch) for motion in motions]
+        if self.waypoints.plan_file.stretch is not None:
+            motions = [motion.stretched(self.waypoints.plan_file.stretch) for motion in motions]
         waypoints = self.waypoints
         scene = scene_of(
             problem.robot,
             waypoints.robot_file,
             waypoints.frame,
-            waypoints.keys,
+            waypoints.plan_file,
             waypoints.path,
-            trajectory=waypoints.keys,
+            trajectory=waypoints.plan_file,
         )
         return proved_answers(problem, motions, scene), list(motions)
 
@@ -85,7 +85,7 @@ class Splines(Leg):
 
     @property
     def _is_hermite(self) -> bool:
-        return self.waypoints.keys.interpolation == "hermite"
+        return self.waypoints.plan_file.interpolation == "hermite"
 
     def _is_file(self, segment: int) -> bool:
         return self.waypoints.poses[segment + 1].motion is not None
@@ -93,7 +93,7 @@ class Splines(Leg):
     def _of_file(self, i: int) -> Any:
         waypoints = self.waypoints
         name = waypoints.poses[i].motion or ""
-        source = waypoints.keys.source(name)
+        source = waypoints.plan_file.source(name)
         if source is None:
             source = read_motion(waypoints.path.parent / name, waypoints.poses[i].trajectory)
         try:
@@ -107,8 +107,8 @@ class Splines(Leg):
                 source,
                 z_axis=waypoints.robot_file.z_axis,
                 is_platform=waypoints.robot_file.is_platform,
-                interpolation=waypoints.keys.interpolation,
-                ends=waypoints.keys.ends,
+                interpolation=waypoints.plan_file.interpolation,
+                ends=waypoints.plan_file.ends,
             )
             is_planar = getattr(source, "is_planar", False)
             curve = kept_to(waypoints.robot_file.own_pattern, curve, is_planar=is_planar)
@@ -116,13 +116,13 @@ class Splines(Leg):
             raise ConfigError(name, str(error)) from error
         reference = np.array(IDENTITY)
         if not getattr(source, "from_reference", False):
-            reference = reference_of(build_robot(waypoints.robot_file, waypoints.keys, waypoints.path))
+            reference = reference_of(build_robot(waypoints.robot_file, waypoints.plan_file, waypoints.path))
         return placed_inward(
             curve, waypoints.frame, reference, centre_from(waypoints.robot_file, self._point(name, source))
         )
 
     def _point(self, name: str, source: Any) -> str:
-        point, centre = self.waypoints.keys.point or getattr(source, "point", None), None
+        point, centre = self.waypoints.plan_file.point or getattr(source, "point", None), None
         if point is None:
             centre = centre_from(self.waypoints.robot_file, "origin")
         if centre is not None and centre.any():
@@ -136,9 +136,9 @@ class Splines(Leg):
 
     def _refuse_keys_of_samples(self, source: Any) -> None:
         for key in ("interpolation", "ends", "smooth") if not isinstance(source, MotionTable) else ():
-            if getattr(self.waypoints.keys, key) is not None:
-                raise InputError(key, getattr(self.waypoints.keys, key), "absent for a motion without samples")
-        if isinstance(source, Placed) and self.waypoints.keys.point == "origin":
+            if getattr(self.waypoints.plan_file, key) is not None:
+                raise InputError(key, getattr(self.waypoints.plan_file, key), "absent for a motion without samples")
+        if isinstance(source, Placed) and self.waypoints.plan_file.point == "origin":
             raise InputError("point", "origin", '"mass-centre", whose positions functions and motions give')
 
     def _cleaned(self, name: str, source: Any) -> Any:
@@ -146,7 +146,7 @@ class Splines(Leg):
         lines: list[str] = []
         if isinstance(source, MotionTable):
             lines += [f"hint: {line}" for line in unit_hints(source, np.asarray(self.waypoints.robot_file.base_points))]
-            noise, settings = list[str](), self.waypoints.keys
+            noise, settings = list[str](), self.waypoints.plan_file
             if settings.smooth is not None:
                 from cspr_jax.curves.smoothing import smoothed  # takes time, and few records are noisy
 
@@ -193,7 +193,7 @@ class Splines(Leg):
                     )
 
     def _curve(self, problem: Problem, z0: float, first: int, last: int) -> Spline:
-        waypoints, keys = self.waypoints, self.waypoints.keys
+        waypoints, keys = self.waypoints, self.waypoints.plan_file
         chosen, frame = slice(first, last + 1), waypoints.frame
         poses, points = waypoints.poses[chosen], waypoints.points(z0)
         interpolation = keys.interpolation or "cubic"

@@ -20,7 +20,7 @@ from cspr_jax.families.swings.proof import screen
 from cspr_jax.motion.amplitudes import boundary_errors
 from cspr_jax.motion.answers import Answers, joined
 from cspr_jax.motion.problem import Problem, touchable
-from cspr_jax.numerics.batches import in_batches, in_parts, room
+from cspr_jax.numerics.batches import device_batch_size, in_batches, in_parts
 from cspr_jax.robots.model.point_mass import AT_P0, LARGEST_LENGTH, PointMassRobot, spool_radius
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.runtime.stages import stage
@@ -45,7 +45,7 @@ def segments_between(
     problem: Problem, starts: Float[np.ndarray, "n 3"], ends: Float[np.ndarray, "n 3"], z0: Float[np.ndarray, "n"]
 ) -> tuple[dict[int, Segment], np.ndarray]:
     """Segments of many pairs of points."""
-    even, odd, infinity = in_batches(partial(_segments, problem), (starts, ends, z0), size=screen.BATCH)
+    even, odd, infinity = in_batches(partial(_segments, problem), (starts, ends, z0), batch_size=screen.BATCH)
     return {0: even, 1: odd}, infinity
 
 
@@ -71,7 +71,11 @@ def minimum_arcs(
         return arcs_and_segments(problem, *points, max_arcs=max_arcs, arcs=fixed, dtype=dtype)[0]
 
     # Segments that fit into one batch are not divided.
-    return joined(in_parts(part, len(z0), room(PART))) if len(z0) > room(screen.BATCH) else part(slice(None))
+    return (
+        joined(in_parts(part, len(z0), device_batch_size(PART)))
+        if len(z0) > device_batch_size(screen.BATCH)
+        else part(slice(None))
+    )
 
 
 def arcs_and_segments(
@@ -123,6 +127,6 @@ def _sieved(problem: Problem, even: Segment, odd: Segment, max_arcs: int, dtype:
     # same for all numbers of arcs.
     cast = jax.tree.map(lambda x: np.asarray(x, dtype), (even, odd))
     kernel = partial(screen.upper_bounds, max_arcs=max_arcs)
-    upper = in_batches(lambda pair: kernel(problem.amplitude, *pair), cast, size=screen.BATCH).astype(float)
-    at_ends = in_batches(partial(end_slacks, touchable(problem), 3.0), odd, size=screen.BATCH)
+    upper = in_batches(lambda pair: kernel(problem.amplitude, *pair), cast, batch_size=screen.BATCH).astype(float)
+    at_ends = in_batches(partial(end_slacks, touchable(problem), 3.0), odd, batch_size=screen.BATCH)
     return np.where(np.isnan(upper), -np.inf, upper), at_ends

@@ -84,7 +84,7 @@ def decided(
     smallest, bound = search.smallest, search.bound
     tried, slack, broken = _shown(problem, parities, search, with_limits, basic, measure)
     chosen = pick(parities, np.arange(len(smallest)), tried)
-    duration = in_batches(_durations, (chosen, tried.astype(float)), size=BATCH)
+    duration = in_batches(_durations, (chosen, tried.astype(float)), batch_size=BATCH)
     none = np.flatnonzero(smallest == 0)
     is_feasible = smallest > 0
     if len(none):
@@ -269,7 +269,7 @@ def _denser_upper_bounds(problem: Problem, parities: dict[int, Segment], max_arc
     # The first sieve has a sample an arc or two, which bounds the margins of many arcs loosely.
     samples = min(SAMPLES_PER_ARC * max_arcs, MOST_SAMPLES)
     kernel = partial(upper_bounds, max_arcs=max_arcs, samples=samples)
-    return in_batches(lambda pair: kernel(problem.amplitude, *pair), (parities[0], parities[1]), size=DENSE_BATCH)
+    return in_batches(lambda pair: kernel(problem.amplitude, *pair), (parities[0], parities[1]), batch_size=DENSE_BATCH)
 
 
 def _tolerated(problem: Problem, segments: Segment, arcs: np.ndarray, rows: np.ndarray) -> Tolerated:

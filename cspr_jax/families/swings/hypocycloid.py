@@ -242,7 +242,7 @@ class Hypocycloid:
     def bounds(self, start: np.ndarray, end: np.ndarray) -> StateBounds:
         """Bounds of the states; see `BoundedMotion.bounds`."""
         blocks = time_bounds(self.amplitude, self.duration(), start, end)
-        return in_batches(partial(_bounds, self.segment, self.arcs), blocks, size=BATCH)
+        return in_batches(partial(_bounds, self.segment, self.arcs), blocks, batch_size=BATCH)
 
 
 @persistent_jit(compiler_options=compile_options.least())

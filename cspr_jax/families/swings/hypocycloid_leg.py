@@ -20,7 +20,7 @@ class Hypocycloids(Leg):
 
     def __init__(self, waypoints: Waypoints) -> None:
         """Refuse a key that belongs to transitions."""
-        if waypoints.keys.inclination is not None:
+        if waypoints.plan_file.inclination is not None:
             raise ConfigError(waypoints.path, 'inclination: must be absent unless family = "transition"')
         super().__init__(waypoints)
 

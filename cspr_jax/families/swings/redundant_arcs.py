@@ -158,7 +158,7 @@ def least_slacks(
     def at(tau: np.ndarray) -> np.ndarray:
         row = np.repeat(np.arange(len(rows)), tau.shape[1])
         items = (jax.tree.map(lambda x: x[row], chosen), np.full(len(row), float(number)), tau.ravel())
-        return in_batches(kernel, items, size=BATCH).reshape(*tau.shape, -1)
+        return in_batches(kernel, items, batch_size=BATCH).reshape(*tau.shape, -1)
 
     tau = np.linspace(0.0, 1.0, samples * number + 1)
     slacks = at(np.tile(tau, (len(rows), 1)))

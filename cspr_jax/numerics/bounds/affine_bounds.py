@@ -28,37 +28,37 @@ class AffineBounds(NamedTuple):
 
     Fields:
         middle: (...) of the line, at the middle of the block.
-        slope: (...) half of what the line rises from the start to the end.
-        radius: (...) half of the height of the band; NaN where nothing is known.
-        square: (...) share of s^2; None: the band is around a line.
+        linear: (...) coefficient of s: half of what the line rises from the start to the end.
+        radius: (...) bound of the remainder; NaN where there is none.
+        square: (...) coefficient of s^2; None: the remainder is that of a line.
     """
 
     middle: Any
-    slope: Any
+    linear: Any
     radius: Any
     square: Any = None
 
-    def reach(self) -> Float[Array, "..."]:
+    def half_range(self) -> Float[Array, "..."]:
         """How far the function may be from `middle`."""
-        reach = jnp.abs(self.slope) + self.radius
+        reach = jnp.abs(self.linear) + self.radius
         return reach if self.square is None else reach + jnp.abs(self.square)
 
     def low(self) -> Float[Array, "..."]:
         """Lower bound."""
-        return self.middle - self.reach() if self.square is None else -(-self).high()
+        return self.middle - self.half_range() if self.square is None else -(-self).high()
 
     def high(self) -> Float[Array, "..."]:
         """Upper bound."""
         if self.square is None:
-            return self.middle + self.reach()
+            return self.middle + self.half_range()
         # The top of a parabola may lie within the block.
-        rise, is_within = jnp.abs(self.slope), -2.0 * self.square > jnp.abs(self.slope)
+        rise, is_within = jnp.abs(self.linear), -2.0 * self.square > jnp.abs(self.linear)
         top = jnp.where(is_within, -0.25 * rise**2 / jnp.where(is_within, self.square, 1.0), rise + self.square)
         return self.middle + top + self.radius
 
-    def size(self) -> Float[Array, "..."]:
+    def magnitude(self) -> Float[Array, "..."]:
         """Bound of the absolute value."""
-        return jnp.abs(self.middle) + self.reach()
+        return jnp.abs(self.middle) + self.half_range()
 
     def each(self, change) -> "AffineBounds":
         """The same bounds in another order, such as transposed or with another dimension."""
@@ -86,7 +86,7 @@ class AffineBounds(NamedTuple):
 
     def __neg__(self) -> "AffineBounds":
         """Bounds of -f."""
-        return AffineBounds(-self.middle, -self.slope, self.radius, None if self.square is None else -self.square)
+        return AffineBounds(-self.middle, -self.linear, self.radius, None if self.square is None else -self.square)
 
     def __sub__(self, other: Any) -> "AffineBounds":
         """Bounds of f - g, or of f less constants."""
@@ -99,19 +99,19 @@ class AffineBounds(NamedTuple):
 
 def rounded(bounds: AffineBounds, size: Any = 0.0) -> AffineBounds:
     """Bounds with a band that is wider by the rounding of numbers as large as they are, or more."""
-    return bounds._replace(radius=bounds.radius + ROUNDING * (bounds.size() + size))
+    return bounds._replace(radius=bounds.radius + ROUNDING * (bounds.magnitude() + size))
 
 
 @partial(jax.jit, static_argnames="axis")
 def _total(f: AffineBounds, axis: int) -> AffineBounds:
     # Up to some thirty terms.
     total = f.each(lambda x: jnp.sum(x, axis=axis))
-    return total._replace(radius=total.radius + 2.0 * ROUNDING * jnp.sum(f.size(), axis=axis))
+    return total._replace(radius=total.radius + 2.0 * ROUNDING * jnp.sum(f.magnitude(), axis=axis))
 
 
 @jax.jit
 def _sum(f: AffineBounds, g: AffineBounds) -> AffineBounds:
-    line = AffineBounds(f.middle + g.middle, f.slope + g.slope, f.radius + g.radius)
+    line = AffineBounds(f.middle + g.middle, f.linear + g.linear, f.radius + g.radius)
     is_line = f.square is None and g.square is None
     return rounded(line if is_line else line._replace(square=squares(f) + squares(g)))
 
@@ -133,24 +133,24 @@ def _products(f: AffineBounds, g: AffineBounds) -> tuple[AffineBounds, Array]:
     # Bounds of f g but for rounding, and the size of the numbers in its line; s^2 is between 0 and 1.
     if f.square is not None or g.square is not None:
         return _parabola_products(f, g)
-    half = 0.5 * f.slope * g.slope
-    sizes = jnp.abs(f.middle) + jnp.abs(f.slope), jnp.abs(g.middle) + jnp.abs(g.slope)
+    half = 0.5 * f.linear * g.linear
+    sizes = jnp.abs(f.middle) + jnp.abs(f.linear), jnp.abs(g.middle) + jnp.abs(g.linear)
     radius = jnp.abs(half) + sizes[0] * g.radius + (sizes[1] + g.radius) * f.radius
-    slope = f.middle * g.slope + f.slope * g.middle
+    slope = f.middle * g.linear + f.linear * g.middle
     return AffineBounds(f.middle * g.middle + half, slope, radius), sizes[0] * sizes[1]
 
 
 def _parabola_products(f: AffineBounds, g: AffineBounds) -> tuple[AffineBounds, Array]:
     # s^3 is within 1/4 of 3 s / 4, s^4 between 0 and 1.
     f, g = (x._replace(square=squares(x)) for x in (f, g))
-    cubic, quartic = f.slope * g.square + f.square * g.slope, f.square * g.square
-    sizes = [jnp.abs(x.middle) + jnp.abs(x.slope) + jnp.abs(x.square) for x in (f, g)]
+    cubic, quartic = f.linear * g.square + f.square * g.linear, f.square * g.square
+    sizes = [jnp.abs(x.middle) + jnp.abs(x.linear) + jnp.abs(x.square) for x in (f, g)]
     radius = 0.25 * jnp.abs(cubic) + 0.5 * jnp.abs(quartic) + sizes[0] * g.radius + (sizes[1] + g.radius) * f.radius
     product = AffineBounds(
         f.middle * g.middle + 0.5 * quartic,
-        f.middle * g.slope + f.slope * g.middle + 0.75 * cubic,
+        f.middle * g.linear + f.linear * g.middle + 0.75 * cubic,
         radius,
-        f.middle * g.square + f.slope * g.slope + f.square * g.middle,
+        f.middle * g.square + f.linear * g.linear + f.square * g.middle,
     )
     return product, sizes[0] * sizes[1]
 
@@ -171,7 +171,7 @@ def flat(f: AffineBounds) -> AffineBounds:
     if f.square is None:
         return f
     half = 0.5 * f.square
-    return rounded(AffineBounds(f.middle + half, f.slope, f.radius + jnp.abs(half)))
+    return rounded(AffineBounds(f.middle + half, f.linear, f.radius + jnp.abs(half)))
 
 
 def constant(values: Float[Array, "..."]) -> AffineBounds:
@@ -184,9 +184,9 @@ def squared(f: AffineBounds) -> AffineBounds:
     """Bounds of f^2."""
     if f.square is not None:
         return f * f
-    half, line = 0.5 * f.slope**2, jnp.abs(f.middle) + jnp.abs(f.slope)
+    half, line = 0.5 * f.linear**2, jnp.abs(f.middle) + jnp.abs(f.linear)
     radius = half + (2.0 * line + f.radius) * f.radius
-    return rounded(AffineBounds(f.middle**2 + half, 2.0 * f.middle * f.slope, radius), line**2)
+    return rounded(AffineBounds(f.middle**2 + half, 2.0 * f.middle * f.linear, radius), line**2)
 
 
 def selected(choices: Bool[Array, "..."], f: AffineBounds, g: AffineBounds) -> AffineBounds:
@@ -215,9 +215,9 @@ def norm(f: AffineBounds) -> AffineBounds:
     """Bounds of the lengths of vectors, also of those that vanish."""
     f = flat(f)
     # A length is convex: it lies below the chord between the ends of the line, and above its part along any direction.
-    start, end = (jnp.sqrt(jnp.sum((f.middle + side) ** 2, axis=-1)) for side in (-f.slope, f.slope))
+    start, end = (jnp.sqrt(jnp.sum((f.middle + side) ** 2, axis=-1)) for side in (-f.linear, f.linear))
     apart, size = jnp.sqrt(jnp.sum(f.radius**2, axis=-1)), jnp.sqrt(jnp.sum(f.middle**2, axis=-1))
-    along = jnp.sum(f.middle * f.slope, axis=-1) / jnp.where(size > 0.0, size, 1.0)
+    along = jnp.sum(f.middle * f.linear, axis=-1) / jnp.where(size > 0.0, size, 1.0)
     slope, above = 0.5 * (end - start), 0.5 * (start + end) + apart
     below = size - apart - jnp.abs(along - slope)
     return rounded(AffineBounds(0.5 * (above + below), slope, 0.5 * (above - below)), start + end)

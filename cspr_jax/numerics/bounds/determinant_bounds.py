@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def determinant(matrix: AffineBounds) -> AffineBounds:
     """Bounds of the determinant of a small matrix."""
     rest, product = matrix, matrix.each(lambda x: jnp.ones((), x.dtype))
-    product = product._replace(slope=jnp.zeros_like(product.slope), radius=jnp.zeros_like(product.radius))
+    product = product._replace(linear=jnp.zeros_like(product.linear), radius=jnp.zeros_like(product.radius))
     while len(rest.middle) > 1:
         count = len(rest.middle)
         place = jnp.argmax(jnp.abs(rest.middle))
@@ -40,14 +40,14 @@ def _swapped(count: int, place: Array) -> Array:
     return jnp.where(index == place, 0, jnp.where(index == 0, place, index))
 
 
-def size_range(number: AffineBounds) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
+def magnitude_range(number: AffineBounds) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
     """Bounds of the absolute value."""
     low, high = number.low(), number.high()
     minimum = jnp.where(low > 0.0, low, jnp.where(high < 0.0, -high, 0.0))
-    maximum = number.size()
+    maximum = number.magnitude()
     return minimum, jnp.where(jnp.isnan(maximum), jnp.inf, maximum)
 
 
 def changes_sign(number: AffineBounds) -> Float[Array, "..."]:
     """Tell whether a number is proved to have opposite signs at both ends of the block."""
-    return jnp.abs(number.middle) < jnp.abs(number.slope) - number.radius
+    return jnp.abs(number.middle) < jnp.abs(number.linear) - number.radius

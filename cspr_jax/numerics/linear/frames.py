@@ -70,15 +70,15 @@ class Frame:
         array = _numbers(vectors)
         return array * _beside(self.signs, array)
 
-    def turned_tensor(self, tensor):
+    def rotated_tensor(self, tensor):
         """A tensor in the other axes, either way."""
         return self.signs[:, None] * tensor * self.signs[None]
 
-    def turned_angles(self, angles) -> Float[np.ndarray, "... 3"]:
+    def rotated_angles(self, angles) -> Float[np.ndarray, "... 3"]:
         """Angles of tilt and torsion in the other axes, either way."""
         return np.asarray(angles, float) * np.array([self.signs[1], 1.0, self.signs[2]])
 
-    def turned_quaternions(self, quaternions) -> Float[np.ndarray, "... 4"]:
+    def rotated_quaternions(self, quaternions) -> Float[np.ndarray, "... 4"]:
         """Orientations in the other axes, either way."""
         # The scalar part keeps its sign, like the component along x.
         array = _numbers(quaternions)

@@ -36,7 +36,7 @@ def rotated(matrix: Matrix, vector: Vector) -> Vector:
     return tuple(dot(row, vector) for row in matrix)
 
 
-def turned_back(matrix: Matrix, vector: Vector) -> Vector:
+def rotated_back(matrix: Matrix, vector: Vector) -> Vector:
     """Transposed matrix times vector."""
     return combined([(vector[i], matrix[i]) for i in range(3)])
 
@@ -85,6 +85,6 @@ def smallest_of_each(arrays: Sequence[Array]) -> tuple[Float[Array, "..."], ...]
     return tuple(lax.reduce(tuple(arrays), tuple(nothing), lambda a, b: tuple(map(jnp.minimum, a, b)), (0,)))
 
 
-def stored(values: Any, one: Float[Array, ""] | None) -> Any:
+def materialized(values: Any, one: Float[Array, ""] | None) -> Any:
     """The same values, which XLA then computes only once."""
     return values if one is None else jax.tree.map(lambda x: x / one, values)

@@ -67,7 +67,7 @@ def least(
 
     fraction = qmc.Halton(len(low), seed=0).random(LOOKED_AT)
     places = low + (high - low) * fraction
-    value, margin = in_batches(partial(_screened, parts, arguments), places, size=BATCH)
+    value, margin = in_batches(partial(_screened, parts, arguments), places, batch_size=BATCH)
     usable = np.isfinite(value) & np.isfinite(margin)
     margin = np.where(usable, margin, -np.inf)
     # Feasible places come first, the smallest objective ahead; then the places that are nearest to being feasible.

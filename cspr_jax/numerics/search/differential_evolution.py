@@ -124,6 +124,6 @@ def evolved(
     kernel = partial(_evolved, parts, arguments, np.asarray(margins), places, moves)
 
     def part(rows: slice) -> np.ndarray:
-        return in_batches(kernel, jax.tree.map(lambda x: x[rows], questions), size=BATCH)
+        return in_batches(kernel, jax.tree.map(lambda x: x[rows], questions), batch_size=BATCH)
 
     return np.concatenate(in_parts(part, len(jax.tree.leaves(questions)[0]), PART))

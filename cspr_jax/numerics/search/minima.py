@@ -95,10 +95,10 @@ def narrowed(
     function: Callable[[np.ndarray], np.ndarray], tau: np.ndarray, values: Float[np.ndarray, "n_motions n n_functions"]
 ) -> Float[np.ndarray, "n_motions n_functions"]:
     """Smallest value of each function along each of several motions."""
-    return narrowed_places(function, tau, values)[0]
+    return narrowed_times(function, tau, values)[0]
 
 
-def narrowed_places(
+def narrowed_times(
     function: Callable[[np.ndarray], np.ndarray], tau: np.ndarray, values: Float[np.ndarray, "n_motions n n_functions"]
 ) -> tuple[Float[np.ndarray, "n_motions n_functions"], Float[np.ndarray, "n_motions n_functions"]]:
     """Smallest value of each function along each of several motions, and the instant at which it is attained."""

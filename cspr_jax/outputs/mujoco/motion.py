@@ -128,10 +128,10 @@ def suspended(plan: PlannedMotions) -> Suspended:
     points = np.zeros((len(written.base_points), 3))
     if plan.robot_file.pairs is not None:
         points = world.rotated(np.asarray(written.platform_points) - np.asarray(written.centre_of_mass or [0.0] * 3))
-        inertia = world.turned_tensor(np.asarray(written.inertia))
+        inertia = world.rotated_tensor(np.asarray(written.inertia))
     elif row.is_body:
         points = world.rotated(plan.frame.rotated(np.asarray(robot.platform_points)))
-        inertia = world.turned_tensor(plan.frame.turned_tensor(np.asarray(robot.inertia)))
+        inertia = world.rotated_tensor(plan.frame.rotated_tensor(np.asarray(robot.inertia)))
     pulleys = robot.pulleys
     if pulleys is not None:
         pulleys = Pulleys(pulleys.radius, as_float64(world.rotated(plan.frame.rotated(np.asarray(pulleys.axes)))))
@@ -219,7 +219,7 @@ def in_world(columns: Mapping[str, np.ndarray], segment: Int[np.ndarray, "n"], z
         from scipy.spatial.transform import Rotation  # takes time, likewise
 
         # SciPy has the scalar last.
-        rotation = Rotation.from_quat(np.roll(world.turned_quaternions(columns["quaternion"]), -1, axis=1))
+        rotation = Rotation.from_quat(np.roll(world.rotated_quaternions(columns["quaternion"]), -1, axis=1))
         back = rotation.inv()
         # Nothing is added to the derivative in axes that turn: omega x omega is nil.
         moved |= {name: back.apply(world.rotated(columns[name])) for name in ("omega", "omega_dot")}

@@ -52,7 +52,7 @@ def backwards(state: StateBounds) -> StateBounds:
     """Bounds of the states of the same motion with time reversed."""
     rates = ("velocity", "angular_velocity")
     changed = {name: -bounds if name in rates else bounds for name, bounds in state._asdict().items() if bounds}
-    return StateBounds(**{name: bounds._replace(slope=-bounds.slope) for name, bounds in changed.items()})
+    return StateBounds(**{name: bounds._replace(linear=-bounds.linear) for name, bounds in changed.items()})
 
 
 class CableBounds(NamedTuple):

@@ -75,9 +75,9 @@ def uncertain_tensions(
     sine = sizes[0] / cables.length.low()
     tilt = jnp.where((sine >= 0.0) & (sine < 1.0), sine, jnp.nan) / jnp.sqrt(1.0 - sine**2)
     block = _UnitBlock(inverse, matrix, _across(robot, state, cables, unit), tilt, tensions)
-    centre = _centre_change(robot, state, inverse * unit[None], sizes[1]) + SURPLUS * jnp.max(tensions.size())
+    centre = _centre_change(robot, state, inverse * unit[None], sizes[1]) + SURPLUS * jnp.max(tensions.magnitude())
     within, displaced = block.changes(inverse)
-    maximum = _solution(within + displaced, displaced @ tensions.size() + centre)
+    maximum = _solution(within + displaced, displaced @ tensions.magnitude() + centre)
     down, up = maximum, maximum
     if robot.n_cables == robot.dof:
         down, up = _closer(block, displaced, within @ maximum + centre, limits[0], centre)
@@ -105,7 +105,7 @@ class _UnitBlock(NamedTuple):
         left = jnp.abs(self.matrix.middle @ self.inverse - jnp.eye(dof))
         rounding = jnp.where(jnp.sum(left, axis=1).max() < 0.5 * SURPLUS, SURPLUS, jnp.nan)
         radius = self.matrix.radius + rounding * jnp.sum(jnp.abs(self.matrix.middle), axis=0, keepdims=True)
-        within = jnp.abs(rows @ self.matrix.slope) + jnp.abs(rows) @ radius
+        within = jnp.abs(rows @ self.matrix.linear) + jnp.abs(rows) @ radius
         ways = rotated(self.across.each(lambda x: x.reshape(dof, -1).T[None]), rows)
         return within, norm(ways.each(lambda x: x.reshape(len(rows), count, 3))).high() * self.tilt[None]
 
@@ -196,7 +196,7 @@ def _centre_change(robot: AnyRobot, state: StateBounds, inverse: Array, size: Ar
     influence = _centre_influence(robot, state).each(lambda x: x.T[None])
     moments = balanced_part(robot, state.rotation, constant(jnp.zeros((3, 3))), constant(jnp.eye(3)))
     turning = rotated(moments.each(lambda x: x.T[None]), inverse)
-    acceleration_matrix = jnp.linalg.norm(_whirl(state).size()) * robot.mass
+    acceleration_matrix = jnp.linalg.norm(_whirl(state).magnitude()) * robot.mass
     return size * (norm(rotated(influence, inverse)).high() + size * acceleration_matrix * norm(turning).high())
 
 

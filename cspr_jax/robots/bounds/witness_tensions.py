@@ -71,7 +71,7 @@ def witness_tensions(
         above = jnp.broadcast_to(jnp.where(is_regular, smallest, jnp.inf), (2,))
     else:
         matrices, wrenches = (
-            jnp.stack([x.middle + squares(x) - x.slope, x.middle + squares(x) + x.slope]) for x in (matrix, wrench)
+            jnp.stack([x.middle + squares(x) - x.linear, x.middle + squares(x) + x.linear]) for x in (matrix, wrench)
         )
         faces = jax.vmap(nearest_face, (0, 0, None, None))(matrices, wrenches, low, high)
         before, after = faces.tensions
@@ -85,7 +85,7 @@ def witness_tensions(
         below = jnp.broadcast_to(jnp.where(is_regular, minimum, -jnp.inf), (2,))
         return WitnessTensions(tension, below, above, is_regular, inverse)
     # The smallest of functions above lines is above the line between the smallest values at both ends.
-    lines = tension.middle - tension.slope, tension.middle + tension.slope
+    lines = tension.middle - tension.linear, tension.middle + tension.linear
     slacks = [jnp.minimum(line - low, high - line) - tension.radius for line in lines]
     below = jnp.stack([jnp.min(slack) for slack in slacks])
     return WitnessTensions(tension, jnp.where(is_regular, below, -jnp.inf), above, is_regular, inverse)
@@ -117,14 +117,14 @@ def _solution(
     # (n,); say whether M, with this right inverse in the middle, is proved to have rank m throughout.
     m, n = matrix.middle.shape
     middle = start + inverse @ (right.middle - matrix.middle @ start)
-    slope = rise + inverse @ (right.slope - matrix.slope @ middle - matrix.middle @ rise)
+    slope = rise + inverse @ (right.linear - matrix.linear @ middle - matrix.middle @ rise)
     line = AffineBounds(middle, slope, jnp.zeros(n))
     # Sums of rows of |M B - 1|; that of the middle is rounding.
-    rows = jnp.abs(matrix.middle @ inverse - jnp.eye(m)) + jnp.abs(matrix.slope @ inverse)
+    rows = jnp.abs(matrix.middle @ inverse - jnp.eye(m)) + jnp.abs(matrix.linear @ inverse)
     if matrix.square is not None:
-        line = line._replace(square=inverse @ (squares(right) - matrix.square @ middle - matrix.slope @ slope))
+        line = line._replace(square=inverse @ (squares(right) - matrix.square @ middle - matrix.linear @ slope))
         rows += jnp.abs(matrix.square @ inverse)
-    residual = (right - rotated(matrix, line)).size()
+    residual = (right - rotated(matrix, line)).magnitude()
     rows = jnp.sum(rows + matrix.radius @ jnp.abs(inverse), axis=1)
     fraction = jnp.max(rows, initial=0.0)
     radius = jnp.abs(inverse) @ (residual + rows * jnp.max(residual, initial=0.0) / (1.0 - fraction))
@@ -146,15 +146,15 @@ def _face_margin(
     # Each cable at the limit that gives the least; the other one counts as far as its product may change sign.
     is_inward = along.middle > 0.0
     limit = jnp.where(is_spanning, 0.0, jnp.where(is_inward, low, high))
-    is_bounded = jnp.isfinite(limit) | (along.size() == 0.0)
+    is_bounded = jnp.isfinite(limit) | (along.magnitude() == 0.0)
     over = jnp.where(is_inward, -along.low(), along.high())
     other = jnp.where(over > FLAT * jnp.abs(along.middle), over * (high - low), 0.0)
     slack = dot(normal, wrench) - dot(along, jnp.where(is_bounded, limit, 0.0))
     top = slack.middle + slack.radius + jnp.maximum(squares(slack), 0.0) + jnp.sum(other)
-    ends = jnp.stack([top - slack.slope, top + slack.slope])
+    ends = jnp.stack([top - slack.linear, top + slack.linear])
     # The quotient is a convex function of the slack: it is below the line between its values at both ends.
-    smallest = jnp.maximum(along.size() - 2.0 * along.reach(), 0.0)
-    size = jnp.where(ends < 0.0, jnp.sum(along.size()), jnp.sum(smallest))
+    smallest = jnp.maximum(along.magnitude() - 2.0 * along.half_range(), 0.0)
+    size = jnp.where(ends < 0.0, jnp.sum(along.magnitude()), jnp.sum(smallest))
     is_known = is_normal & is_bounded.all() & (size > 0.0).all() & jnp.isfinite(ends).all()
     above, half = jnp.where(is_known, ends / jnp.where(is_known, size, 1.0), jnp.inf), 0.5 * jnp.min(high - low)
     return jnp.where(jnp.max(above) < half, above, half)

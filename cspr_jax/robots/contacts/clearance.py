@@ -13,7 +13,7 @@ import jax
 import numpy as np
 
 from cspr_jax.errors import InputError
-from cspr_jax.numerics.batches import in_batches, in_parts, in_threads, room
+from cspr_jax.numerics.batches import device_batch_size, in_batches, in_parts, in_threads
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.contacts import clearance_kernels as kernels
 from cspr_jax.robots.model.platform import PlatformRobot, pairs_apart
@@ -199,7 +199,7 @@ def _all(scene: Scene, all_poses: _CheckedPoses, threshold: float, dtype: np.dty
 
     def one(part: slice) -> Clearances:
         poses = all_poses.rows(part).lanes(origin, dtype)
-        answers = in_batches(lambda batch: tuple(term(batch) for _, _, term in terms), poses, size=size)
+        answers = in_batches(lambda batch: tuple(term(batch) for _, _, term in terms), poses, batch_size=size)
         answer = _least([(kind, first, x) for (kind, first, _), x in zip(terms, answers, strict=True)])
         far = [np.abs(x) for x in poses.position]
         extents = np.maximum(np.maximum(np.maximum(far[0], far[1]), far[2]), reach)
@@ -208,7 +208,7 @@ def _all(scene: Scene, all_poses: _CheckedPoses, threshold: float, dtype: np.dty
 
     if not terms:
         return _nothing(count)
-    parts = in_threads(one, [slice(count)]) if count <= FEW else in_parts(one, count, room(BATCH))
+    parts = in_threads(one, [slice(count)]) if count <= FEW else in_parts(one, count, device_batch_size(BATCH))
     return Clearances(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 

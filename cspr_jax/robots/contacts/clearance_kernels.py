@@ -200,7 +200,7 @@ def of_obstacle(points: Points, poses: PoseLanes, solid: Solid) -> Complex[Array
 def _in_brick(brick: Brick, start: Vector, ray: Vector) -> tuple[Vector, Vector]:
     # Return a segment in the axes of a box, from the centre of the box.
     axes = [_three(row) for row in brick.rotation]
-    return lanes.turned_back(axes, _less(start, _three(brick.centre))), lanes.turned_back(axes, ray)
+    return lanes.rotated_back(axes, _less(start, _three(brick.centre))), lanes.rotated_back(axes, ray)
 
 
 @jax.jit
@@ -240,7 +240,7 @@ def of_boxes(poses: PoseLanes, body: Brick, solid: Brick) -> Complex[Array, "n"]
     """The platform, a box, and another box: the largest gap between their shadows on a line."""
     zero, rotation = jnp.zeros_like(poses.position[0]), _rotation(poses)
     axes = [_three(row) for row in body.rotation]
-    edges = [lanes.turned_back(axes, _inward(rotation, _three(column))) for column in solid.rotation.T]
+    edges = [lanes.rotated_back(axes, _inward(rotation, _three(column))) for column in solid.rotation.T]
     away = _inward(rotation, _less(_three(solid.centre), poses.position))
     centre, _ = _in_brick(body, away, [zero, zero, zero])
     return nearest([boxes(_three(body.half), centre, [tuple(zero + x for x in e) for e in edges], _three(solid.half))])
@@ -256,4 +256,4 @@ def of_hull_box(poses: PoseLanes, body: Polyhedron, solid: Brick) -> Complex[Arr
 
 
 def _inward(rotation: Matrix | None, vector: Vector) -> Vector:
-    return vector if rotation is None else lanes.turned_back(rotation, vector)
+    return vector if rotation is None else lanes.rotated_back(rotation, vector)

@@ -117,7 +117,7 @@ def turning(direction: Callable[..., Array], *points: AffineBounds) -> AffineBou
 
 def along(line: AffineBounds, vectors: AffineBounds) -> Float[Array, ""]:
     """Least component of vectors along a direction that turns."""
-    middle, turn = line.middle, line.slope
+    middle, turn = line.middle, line.linear
     low = jnp.min(dot(line.each(lambda x: x[None]), vectors).low())
     size = jnp.sqrt(jnp.dot(middle, middle) + jnp.dot(turn, turn) + 2.0 * jnp.abs(jnp.dot(middle, turn)))
     return jnp.where(low > 0.0, low * (1.0 - DISTANCE_ERROR) / size, -jnp.inf)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.numerics.linear.lanes import Matrix, Vector, cross, dot, turned_back
+from cspr_jax.numerics.linear.lanes import Matrix, Vector, cross, dot, rotated_back
 from cspr_jax.robots.contacts.interference import PARALLEL
 from cspr_jax.robots.statics.wrench_lanes import CableLanes
 
@@ -62,7 +62,7 @@ def residual(sides: tuple[Vector, Vector], normal: Vector, seen: Vector) -> Vect
 
 def cable_directions(cables: CableLanes, rotation: Matrix) -> list[Vector]:
     """The cables from the platform to the spools, in the platform's axes; not of unit length."""
-    return [turned_back(rotation, tuple(-x for x in ray)) for ray in cables.rays]
+    return [rotated_back(rotation, tuple(-x for x in ray)) for ray in cables.rays]
 
 
 def as_arrays(

@@ -21,7 +21,7 @@ def centred(robot: RobotKind) -> tuple[RobotKind, Frame]:
     changes: dict[str, Any] = {"base_points": as_float64(frame.inward(robot.base_points)), "z_axis": "down"}
     if isinstance(robot, PlatformRobot):
         changes["platform_points"] = as_float64(frame.rotated(robot.platform_points))
-        changes["inertia"] = frame.turned_tensor(as_float64(robot.inertia))
+        changes["inertia"] = frame.rotated_tensor(as_float64(robot.inertia))
         if robot.centre_of_mass is not None:
             changes["centre_of_mass"] = as_float64(frame.rotated(robot.centre_of_mass))
     if robot.pulleys is not None:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import jax.numpy as jnp
 from jax import Array
 
-from cspr_jax.numerics.linear.lanes import Matrix, Vector, combined, cross, dot, rotated, turned_back
+from cspr_jax.numerics.linear.lanes import Matrix, Vector, combined, cross, dot, rotated, rotated_back
 from cspr_jax.robots.model.platform import PlatformRobot
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def inertial_wrench(
     inertia = robot.inertia / robot.mass
 
     def weighted(vector):
-        own_axes = turned_back(rotation, vector)
+        own_axes = rotated_back(rotation, vector)
         return rotated(rotation, [dot([inertia[i, j] for j in range(3)], own_axes) for i in range(3)])
 
     x, y = weighted(angular_acceleration), cross(omega, weighted(omega))

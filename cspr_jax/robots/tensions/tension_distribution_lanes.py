@@ -15,9 +15,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
-from cspr_jax.numerics.batches import in_batches, in_parts, room
+from cspr_jax.numerics.batches import device_batch_size, in_batches, in_parts
 from cspr_jax.numerics.elementary import nan_ignoring_min
-from cspr_jax.numerics.linear.lanes import stored
+from cspr_jax.numerics.linear.lanes import materialized
 from cspr_jax.robots.statics.wrench_sets import FLAT
 from cspr_jax.robots.tensions.tension_distribution import TENSION_ERROR, WITHIN, Distribution
 
@@ -46,10 +46,10 @@ def _apart(vector: Lanes, units: Sequence[Lanes], one: Array) -> tuple[Lanes, La
     """Component of a vector normal to unit vectors, and its products with them; computed twice, against rounding."""
     total: Lanes = [jnp.zeros_like(vector[0])] * len(units)
     for _ in range(2):
-        products = stored([_dot(vector, unit) for unit in units], one)
+        products = materialized([_dot(vector, unit) for unit in units], one)
         total = [x + y for x, y in zip(total, products, strict=True)]
         left = [x - _dot(products, [unit[k] for unit in units]) if units else x for k, x in enumerate(vector)]
-        vector = stored(left, one)
+        vector = materialized(left, one)
     return vector, total
 
 
@@ -65,7 +65,7 @@ def _all_tensions(matrix: Array, wrench: Array, one: Array) -> tuple[list[Array]
         left, products = _apart([matrix[i, k] for k in range(count)], units, one)
         length = jnp.sqrt(_dot(left, left))
         inverse = 1.0 / length
-        along.append(stored((wrench[i] - (_dot(products, along) if units else 0.0)) * inverse, one))
+        along.append(materialized((wrench[i] - (_dot(products, along) if units else 0.0)) * inverse, one))
         units.append([x * inverse for x in left])
         lengths.append(length)
     minimum = [_dot(along, [unit[k] for unit in units]) for k in range(count)]
@@ -76,10 +76,10 @@ def _all_tensions(matrix: Array, wrench: Array, one: Array) -> tuple[list[Array]
         place, maximum = jnp.zeros_like(rest[0]), rest[0]
         for k, value in enumerate(rest[1:], 1):
             place, maximum = jnp.where(value > maximum, float(k), place), jnp.where(value > maximum, value, maximum)
-        place = stored(place, one)
+        place = materialized(place, one)
         left, _ = _apart([jnp.where(place == k, 1.0, 0.0) for k in range(count)], units, one)
         inverse = 1.0 / jnp.sqrt(_dot(left, left))
-        kernel.append([stored(x * inverse, one) for x in left])
+        kernel.append([materialized(x * inverse, one) for x in left])
         units.append(kernel[-1])
     shortest, longest = lengths[0], lengths[0]
     for length in lengths[1:]:
@@ -214,9 +214,9 @@ def least_norms(
 
     def one(part: slice):
         arrays = tuple(x[part] for x in (matrices, wrenches, low, high))
-        tensions, *others = in_batches(_of_batch, arrays, size=BATCH)
+        tensions, *others = in_batches(_of_batch, arrays, batch_size=BATCH)
         return np.stack(tensions, 1), *others
 
-    parts = in_parts(one, len(matrices), 4 * room(BATCH))
+    parts = in_parts(one, len(matrices), 4 * device_batch_size(BATCH))
     tensions, residual, is_within, fraction = (np.concatenate(column) for column in zip(*parts, strict=True))
     return Distribution(*(cast(Array, x) for x in (tensions, residual, is_within))), ~(fraction > UNCERTAIN)

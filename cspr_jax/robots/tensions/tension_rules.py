@@ -264,7 +264,7 @@ def distributions(
             return Distribution(*map(jnp.asarray, (np.zeros((0, cables)), np.zeros(0), np.zeros(0, bool))))
         if rule == "least-norm" and cables - matrix.shape[1] in FREE:
             return _least_norms(*arguments)
-        return in_batches(lambda batch: _COMPILED[rule](*batch), tuple(arguments), size=BATCH)
+        return in_batches(lambda batch: _COMPILED[rule](*batch), tuple(arguments), batch_size=BATCH)
 
 
 _COMPILED = {name: jax.jit(jax.vmap(rule.function)) for name, rule in RULES.items()}
@@ -276,7 +276,7 @@ def _least_norms(matrix: np.ndarray, wrench: np.ndarray, low: np.ndarray, high: 
     again = np.flatnonzero(is_open)
     if len(again):
         open_cases = tuple(x[again] for x in (matrix, wrench, low, high))
-        slow = in_batches(lambda batch: _COMPILED["least-norm"](*batch), open_cases, size=BATCH)
+        slow = in_batches(lambda batch: _COMPILED["least-norm"](*batch), open_cases, batch_size=BATCH)
         for old, new in zip(answer, slow, strict=True):
             old[again] = new
     return answer

@@ -42,11 +42,11 @@ def time_bounds(
     knots = np.concatenate([[0.0], np.asarray(amplitude.knots, float), [1.0]])
     pieces, errors = _pieces(amplitude, knots, orders)
     # A band holds for the block that is as much longer as the normalised time is uncertain.
-    first, last = tau.middle - tau.slope, tau.middle + tau.slope
+    first, last = tau.middle - tau.linear, tau.middle + tau.linear
     bands = piecewise_bounds(pieces, overlaps(knots, first, last), orders)
     slack = [error + np.asarray(amplitude.largest)[order + 1] * ROUNDING for order, error in enumerate(errors)]
     values = tuple(
-        AffineBounds(band.middle[:, 0], band.slope[:, 0], band.radius[:, 0] + more)
+        AffineBounds(band.middle[:, 0], band.linear[:, 0], band.radius[:, 0] + more)
         for band, more in zip(bands, slack, strict=True)
     )
     return TimeBounds(tau, values)

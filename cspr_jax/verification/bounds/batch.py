@@ -44,7 +44,7 @@ class SeveralMotions:
     ) -> StateBounds:
         """Bounds of the states over blocks; see `motion.motion.BoundedMotion.bounds`."""
         blocks = time_bounds(self._motions.amplitude, self.durations[motion], start, end, orders=self._orders)
-        return in_batches(self._kernel, (*self._rows(motion), blocks), size=BATCH)
+        return in_batches(self._kernel, (*self._rows(motion), blocks), batch_size=BATCH)
 
     def _rows(self, chosen: Any) -> Any:
         return jax.tree.map(lambda leaves: np.asarray(leaves)[chosen], (self._motions.segment, self._motions.arcs))

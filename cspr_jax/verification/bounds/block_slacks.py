@@ -18,7 +18,7 @@ from jax import Array
 from cspr_jax.motion.limits import limits_set
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, dot, norm
-from cspr_jax.numerics.bounds.determinant_bounds import changes_sign, determinant, size_range
+from cspr_jax.numerics.bounds.determinant_bounds import changes_sign, determinant, magnitude_range
 from cspr_jax.robots.bounds.contact_bounds import contact_bounds, corner_depths, passings
 from cspr_jax.robots.bounds.state_bounds import CableBounds, StateBounds, balance_bounds, cable_bounds
 from cspr_jax.robots.bounds.witness_tensions import witness_tensions
@@ -82,7 +82,7 @@ def _part(slack: AffineBounds) -> Part:
 
 def _edges(slack: AffineBounds) -> tuple[Pair, Pair]:
     sides = slack.middle - slack.radius, slack.middle + slack.radius
-    below, above = ((side - slack.slope, side + slack.slope) for side in sides)
+    below, above = ((side - slack.linear, side + slack.linear) for side in sides)
     return below, above
 
 
@@ -161,7 +161,7 @@ def _of_pose(robot: AnyRobot, matrix: AffineBounds, state: StateBounds) -> list[
     parts: list[Part] = []
     is_regular, is_below = judged_poses(robot)
     if is_regular:
-        low, high = size_range(determinant(matrix))
+        low, high = magnitude_range(determinant(matrix))
         parts.append((low[None] - SINGULAR, high[None] - SINGULAR))
     if is_below:
         parts.append(_lines(*_edges(dot(state.position, plane_normal(robot)).each(lambda x: x[None]))))
@@ -217,7 +217,7 @@ def block_slacks(
     """Bounds of the slacks of a motion over blocks of time."""
     bodies = bodies_of(robot, scene or default_scene(robot))
     slacks = partial(_kernel, robot, limits, bodies, contacts_alone=contacts_alone)
-    low, high, *rises = in_batches(slacks, bounds(start, end), size=BATCH)
+    low, high, *rises = in_batches(slacks, bounds(start, end), batch_size=BATCH)
     rows = (contact_criteria if contacts_alone else criteria)(robot, limits, scene)
     at_instants = np.array([row.flag in AT_INSTANTS for row in rows])
     is_open = ~((low > 0.0) | (high < 0.0))[:, at_instants]
@@ -228,7 +228,7 @@ def block_slacks(
         kernel = partial(_kernel, robot, limits, bodies, passes=True)
         # Bounds are of all blocks together, which may be those of several motions.
         states = jax.tree.map(lambda leaf: np.asarray(leaf)[short], bounds(before, end))
-        passes = in_batches(kernel, states, size=BATCH)
+        passes = in_batches(kernel, states, batch_size=BATCH)
         passes = passes if rows[np.argmax(at_instants)].flag == Verdict.SINGULAR else passes[:, 1:]
         vanishing = np.zeros((len(short), len(rows)), bool)
         vanishing[:, at_instants] = passes & is_open[short]
@@ -241,9 +241,9 @@ def rate_slacks(
     robot: AnyRobot, limits: Limits, states: StateBounds
 ) -> tuple[Float[np.ndarray, "k n"], Float[np.ndarray, "k n"]]:
     """Bounds of the smallest slacks of tensions and limits over blocks: of the first criteria alone."""
-    return in_batches(partial(_rates_kernel, robot, limits), states, size=RATES_BATCH)
+    return in_batches(partial(_rates_kernel, robot, limits), states, batch_size=RATES_BATCH)
 
 
 def speed_slacks(states: StateBounds) -> BlockSlacks:
     """Bounds of the negative speed of the mass centre over k blocks: of its slack, less what is allowed."""
-    return BlockSlacks(*in_batches(_speeds_kernel, states.velocity, size=RATES_BATCH))
+    return BlockSlacks(*in_batches(_speeds_kernel, states.velocity, batch_size=RATES_BATCH))

@@ -63,7 +63,7 @@ class _StatePool:
             return np.zeros(0, bool)
         of_robot = self.problem.robot, self.problem.limits, self.bodies
         kernel = partial(blocks_hold, *of_robot, contacts_alone=self.contacts_alone)
-        return in_batches(kernel, (self.states, share_of(self.problem.limits, multiple)), size=BATCH)
+        return in_batches(kernel, (self.states, share_of(self.problem.limits, multiple)), batch_size=BATCH)
 
     def fail(self, multiple: np.ndarray) -> np.ndarray:
         if not len(self.blocks.row):
@@ -93,7 +93,7 @@ def _instants(motion: Motion, tau) -> StateBounds:
 
 def instant_states(motion: Motion, tau: Float[np.ndarray, "k"]) -> StateBounds:
     """States of a motion, as bounds of blocks without a length."""
-    return in_batches(partial(_instants, common_shape(motion)), tau, size=INSTANTS)
+    return in_batches(partial(_instants, common_shape(motion)), tau, batch_size=INSTANTS)
 
 
 def motion_tolerances(

@@ -135,7 +135,7 @@ def _largest(
     if limits.cable_speed_max is None and limits.cable_acceleration_max is None:
         return lengths
     _, _, velocity, pull = attachments(robot, state)
-    near, speed = cables.length.low(), cables.rate.size()
+    near, speed = cables.length.low(), cables.rate.magnitude()
     sine = spools / near
     slowest = jnp.maximum(0.0, jnp.maximum(cables.rate.low(), -cables.rate.high()))
     square = jnp.maximum(norm(velocity).high() ** 2 - slowest**2, 0.0)
@@ -144,7 +144,7 @@ def _largest(
     short = jnp.where(near > spools, near - spools, jnp.nan)
     more = faster * (2.0 * speed + faster) / short + square * spools / (near * short)
     more += jnp.arcsin(sine) * norm(pull).high()
-    return lengths | {"speed": speed + faster, "acceleration": cables.acceleration.size() + more}
+    return lengths | {"speed": speed + faster, "acceleration": cables.acceleration.magnitude() + more}
 
 
 @persistent_jit(static_argnames="contacts_alone", compiler_options=compile_options.least())
@@ -188,7 +188,7 @@ def _of_robots(
     repeated = jax.tree.map(lambda x: np.repeat(x, shape[1], axis=0), states)
     cases = repeated, moved.reshape(-1, *moved.shape[2:]), ratio.reshape(-1)
     kernel = partial(_upper_slacks, robot, limits, bodies, contacts_alone=contacts_alone)
-    return in_batches(kernel, cases, size=BATCH).reshape(*shape, -1)
+    return in_batches(kernel, cases, batch_size=BATCH).reshape(*shape, -1)
 
 
 def worst_ways(

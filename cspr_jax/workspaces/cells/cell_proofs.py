@@ -107,7 +107,7 @@ class CellProofs:
 
         exits, moves = self._exits(positions), self._moves(positions, half)
         for left in range(ROUNDS if self._spools else 0, -1, -1):
-            worst = in_batches(kernel, self._matrices(positions, exits), size=BATCH)
+            worst = in_batches(kernel, self._matrices(positions, exits), batch_size=BATCH)
             held, along = self._subsets[worst.subset], np.asarray(worst.normal)[:, None] * self._spreads
             loads = self._wrenches[worst.load] + (self._spreads * unit_vectors(along)).sum(1)
             if left:

@@ -96,7 +96,7 @@ def clearance_bounds(
     bodies, rotation = bodies_of(robot, scene), np.asarray(matrix(jnp.asarray(quaternion)))
     body = None if bodies.body is None else _rotated(bodies.body, rotation)
     rotated = bodies._replace(points=bodies.points @ rotation.T, body=body)
-    low, high = in_batches(partial(_kernel, rotated), _CellLanes(positions, half, exits, shifts), size=BATCH)
+    low, high = in_batches(partial(_kernel, rotated), _CellLanes(positions, half, exits, shifts), batch_size=BATCH)
     return np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high)
 
 

@@ -49,7 +49,7 @@ def shifts(
     reach: Float[np.ndarray, "n"],
 ) -> Shifts:
     """Bounds of movements while robots move within their cells."""
-    targets = in_batches(lambda x: geometry.attachments(robot, *x), (positions, quaternions), size=BATCH)
+    targets = in_batches(lambda x: geometry.attachments(robot, *x), (positions, quaternions), batch_size=BATCH)
     rays, maximum = targets - np.asarray(robot.base_points), reach[:, None]
     if robot.pulleys is None:
         free = np.linalg.norm(rays, axis=2) - maximum
@@ -75,7 +75,7 @@ def leaving_points(
     if pulleys is None:
         return np.broadcast_to(np.asarray(robot.base_points), (len(positions), robot.n_cables, 3))
     poses = positions, np.tile(quaternion, (len(positions), 1))
-    return in_batches(lambda x: geometry.exit_points(robot, pulleys, *x), poses, size=BATCH)
+    return in_batches(lambda x: geometry.exit_points(robot, pulleys, *x), poses, batch_size=BATCH)
 
 
 def unit_changes(reach: Float[np.ndarray, "n k"], length: np.ndarray) -> np.ndarray:

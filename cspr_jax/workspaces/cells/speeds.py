@@ -49,7 +49,7 @@ class CableSpeeds:
     ) -> Float[np.ndarray, "n n_cables"]:
         """Slack up to the largest speeds of the cables."""
         poses = origins, quaternions
-        columns = in_batches(lambda x: geometry.wrench_matrices(self.robot, *x), poses, size=BATCH)
+        columns = in_batches(lambda x: geometry.wrench_matrices(self.robot, *x), poses, batch_size=BATCH)
         forces = len(PATTERNS[self.robot.pattern].forces)
         along, about = (np.linalg.norm(part, axis=1) for part in (columns[:, :forces], columns[:, forces:]))
         return self.most - (along * self.speed + about * self.angular_speed)

@@ -131,7 +131,9 @@ def _answers(known: tuple[Problem, ReleaseBounds], cases: tuple[LaunchRequiremen
     # Put one candidate for every place and margin asked for into one row: the margins change fastest.
     count, tracks, _ = cases[1].shape
     question = jax.tree.map(lambda x: np.repeat(x, tracks, axis=0), cases[0])
-    shots = in_batches(lambda batch: _shots(known, batch), (question, cases[1].reshape(count * tracks, -1)), size=BATCH)
+    shots = in_batches(
+        lambda batch: _shots(known, batch), (question, cases[1].reshape(count * tracks, -1)), batch_size=BATCH
+    )
     verdict, margin = _judged(known[0], shots.motion, (count, tracks))
     speed = np.linalg.norm(shots.velocity, axis=1).reshape(count, tracks)
     slowest = np.where(verdict == 0, speed, np.inf).argmin(1)

@@ -157,4 +157,4 @@ def _at_all(
     # Results of a kernel, leaves (..., ...).
     shape = instants[2].shape
     flat = tuple(np.ascontiguousarray(part.reshape(-1, *part.shape[len(shape) :])) for part in instants)
-    return [leaf.reshape(*shape, *leaf.shape[1:]) for leaf in in_batches(kernel, flat, size=BATCH)]
+    return [leaf.reshape(*shape, *leaf.shape[1:]) for leaf in in_batches(kernel, flat, batch_size=BATCH)]

@@ -36,9 +36,9 @@ def path_bound(problem: Problem, path: Discrete, x: Float[np.ndarray, "n_nodes"]
     middles = np.maximum(0.5 * (x[1:] + x[:-1]), LEAST * x.max())
     of_nodes, of_cells = dual_multipliers(path.dual_rows(), path.ends, middles)
     nodes = places_on(curve, grid.nodes, ahead=True)
-    values = in_batches(partial(_of_nodes, robot, limits), (nodes, of_nodes.T), size=BATCH)
+    values = in_batches(partial(_of_nodes, robot, limits), (nodes, of_nodes.T), batch_size=BATCH)
     centres = places_on(curve, 0.5 * (grid.nodes[1:] + grid.nodes[:-1]), ahead=True)
-    rates = in_batches(partial(_of_cells, robot, limits), (centres, grid.speed, of_cells), size=BATCH)
+    rates = in_batches(partial(_of_cells, robot, limits), (centres, grid.speed, of_cells), batch_size=BATCH)
     return lower_bound(robot, limits, path, Multipliers(*values), SpeedMultipliers(*rates))
 
 

@@ -94,7 +94,7 @@ def lower_bound(
     for _ in range(REPAIRS):
         start, end = (Multipliers(*(leaf[side] for leaf in multipliers)) for side in (slice(None, -1), slice(1, None)))
         cells = _Cell(start, end, rates, width, speed)
-        gains, losses, lacks, short = in_batches(partial(_kernel, robot, limits), (states, cells), size=BATCH)
+        gains, losses, lacks, short = in_batches(partial(_kernel, robot, limits), (states, cells), batch_size=BATCH)
         if (lacks > 0.0).any():
             multipliers = _pulled_down(robot, multipliers, lacks)
             continue
@@ -141,7 +141,7 @@ def _evened(robot: AnyRobot, path: Discrete, multipliers: Multipliers, short: np
         fall = np.clip(1.0 - (nodes - cell - 1) / REACH, 0.0, 1.0) * (nodes > cell)
         fraction += 0.5 * SPARE * short[cell] * (rise - fall)
     momentum = in_batches(
-        partial(_momentum, robot), (places_on(path.section.curve, path.grid.nodes, ahead=True),), size=BATCH
+        partial(_momentum, robot), (places_on(path.section.curve, path.grid.nodes, ahead=True),), batch_size=BATCH
     )
     square = np.sum(momentum**2, axis=1)
     change = np.where(square > 0.0, fraction / np.where(square > 0.0, square, 1.0), 0.0)[:, None] * momentum
@@ -166,7 +166,7 @@ def _steep(start: Array, end: Array, width: Array) -> AffineBounds:
 def _ends(bounds: AffineBounds, sign: float) -> tuple[Array, Array]:
     # Values at both ends of the line below (-1), or above (1), a function.
     side = bounds.middle + sign * bounds.radius
-    return side - bounds.slope, side + bounds.slope
+    return side - bounds.linear, side + bounds.linear
 
 
 def _along(

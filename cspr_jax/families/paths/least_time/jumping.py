@@ -12,7 +12,7 @@ import numpy as np
 from cspr_jax.families.paths.least_time.controllable import GridSolution, fastest, smallest_of_slopes
 from cspr_jax.families.paths.least_time.discrete import Discrete
 from cspr_jax.families.paths.least_time.timed import PathSpeeds, moving
-from cspr_jax.numerics.batches import padded, room
+from cspr_jax.numerics.batches import device_batch_size, padded
 
 if TYPE_CHECKING:
     from jaxtyping import Float
@@ -60,7 +60,7 @@ def solved_together(paths: Sequence[Discrete], bends: Sequence[np.ndarray]) -> l
     for k, path in enumerate(paths):
         groups[path.start.u.shape].append(k)
     for members in groups.values():
-        size = room(TOGETHER)
+        size = device_batch_size(TOGETHER)
         for first in range(0, len(members), size):
             chosen = members[first : first + size]
             columns = [

@@ -160,7 +160,7 @@ def side_rows(
         apart.append(jumps)
     together = jax.tree.map(lambda *leaves: np.concatenate(leaves), *places)
     size = BATCH if len(curves) == 1 else MANY
-    rows = in_batches(partial(_rows, robot, limits), (together, np.concatenate(speeds)), size=size)
+    rows = in_batches(partial(_rows, robot, limits), (together, np.concatenate(speeds)), batch_size=size)
     sides, first = [], 0
     for grid, jumps in zip(grids, apart, strict=True):
         count = len(grid.speed)
@@ -193,4 +193,4 @@ def _derivatives(places: Places) -> Any:
 
 def derivatives(places: Places) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Values and first two derivatives along the path."""
-    return in_batches(_derivatives, places, size=BATCH)
+    return in_batches(_derivatives, places, batch_size=BATCH)

@@ -18,7 +18,7 @@ from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.elementary import solved
 from cspr_jax.numerics.linear import rotations
 from cspr_jax.numerics.linear.frames import IDENTITY
-from cspr_jax.numerics.linear.lanes import rotation_matrix, stored
+from cspr_jax.numerics.linear.lanes import materialized, rotation_matrix
 from cspr_jax.robots.cables import wrench_units
 from cspr_jax.robots.contacts import interference_lanes
 from cspr_jax.robots.contacts.contact_bodies import default_scene, has_sectors
@@ -60,9 +60,9 @@ class OrientationSamples(NamedTuple):
 def _sampled(robot: PlatformRobot, poses: tuple[Array, Array], *, pairs: tuple) -> tuple[Array, Array, Array]:
     places, quaternions = poses
     one = jnp.where(robot.mass > 0.0, 1.0, 2.0)
-    rotation = stored(rotation_matrix([quaternions[:, i] for i in range(4)]), one)
+    rotation = materialized(rotation_matrix([quaternions[:, i] for i in range(4)]), one)
     cables = cable_lanes(robot, [places[:, i] for i in range(3)], rotation)
-    cables = cables._replace(rays=stored(cables.rays, one))
+    cables = cables._replace(rays=materialized(cables.rays, one))
     apart, directions = (
         interference_lanes.gaps(robot.base_points, pairs, cables),
         interference_lanes.cable_directions(cables, rotation),
@@ -118,7 +118,7 @@ class OrientationSteps:
         """Determinants and vectors of cables of orientations."""
         places = np.broadcast_to(self._place, (len(quaternions), 3))
         sampled = in_batches(
-            partial(_sampled, self._robot, pairs=self._pairs), (places, np.asarray(quaternions)), size=BATCH
+            partial(_sampled, self._robot, pairs=self._pairs), (places, np.asarray(quaternions)), batch_size=BATCH
         )
         fraction, gaps, directions = sampled
         # Cables that touch have a gap of rounding errors, whose direction means nothing.

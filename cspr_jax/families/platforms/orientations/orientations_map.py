@@ -25,7 +25,7 @@ class OrientationsMap(AttainabilityMap):
         """Answers of the cells of a tile; see `GridMap.__call__`."""
         places, z0 = self._targets(cells), self._depths(cells)
         # An axis of the file turned over turns phi and sigma around.
-        angles = self._frame.turned_angles(np.stack([cells[name] for name in TILT_TORSION], axis=1))
+        angles = self._frame.rotated_angles(np.stack([cells[name] for name in TILT_TORSION], axis=1))
         rows, count = np.flatnonzero(self._accessible(places, angles) & (z0 > 0.0)), len(z0)
         results = {name: np.full(count, np.nan) for name in FLOATS}
         results |= {"arcs": np.zeros(count, int), "tried_arcs": np.zeros(count, int)}

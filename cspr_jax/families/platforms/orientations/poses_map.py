@@ -81,7 +81,7 @@ class PosesMap(PlatformMap):
         if start is None or start.position is None:
             return rest_poses(z0), np.full(count, AT_REST)
         place = np.tile(self._frame.inward(start.position), (count, 1))
-        rotated = np.tile(self._frame.turned_quaternions(self._quaternion), (count, 1))
+        rotated = np.tile(self._frame.rotated_quaternions(self._quaternion), (count, 1))
         if start.tilt_torsion is not None:
             rotated = orientations(self._frame, place, np.tile(start.tilt_torsion, (count, 1)))
         beta_hat = start.beta_hat

@@ -28,7 +28,7 @@ from cspr_jax.motion.limits import other_limits
 from cspr_jax.motion.platform_kind import USUAL, PlatformMotionKind
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches
-from cspr_jax.numerics.search.minima import narrowed_places
+from cspr_jax.numerics.search.minima import narrowed_times
 from cspr_jax.numerics.tolerances import SAMPLES_UNDECIDED
 from cspr_jax.robots.model.platform import pairs_apart
 from cspr_jax.schema.verdicts import Verdict, conjunction
@@ -105,7 +105,7 @@ class RedundantChecker(MotionChecker):
         """Margins, other slacks and distances along motions."""
         row = np.repeat(np.arange(len(tau)), tau.shape[1])
         kernel = partial(instants, self.problem, self._pairs, kind=self.kind)
-        states = in_batches(kernel, (*motions.items(row), tau.ravel()), size=self.batch)
+        states = in_batches(kernel, (*motions.items(row), tau.ravel()), batch_size=self.batch)
         is_finite = (
             np.isfinite(states.position).all(1)
             & np.isfinite(states.quaternion).all(1)
@@ -229,7 +229,7 @@ class RedundantChecker(MotionChecker):
         is_near = np.logical_or(whole, ~(minimum > NEAR * np.abs(samples).max(1)).all(1))
         if is_near.any():
             rows_near = motions.rows(is_near)
-            minimum[is_near], when[is_near] = narrowed_places(partial(self.values, rows_near), tau, samples[is_near])
+            minimum[is_near], when[is_near] = narrowed_times(partial(self.values, rows_near), tau, samples[is_near])
         return minimum, when
 
     def _met(self, motions: Motions, tau: np.ndarray) -> np.ndarray:
@@ -240,7 +240,7 @@ class RedundantChecker(MotionChecker):
 
         def vectors(motion_row: np.ndarray, when: np.ndarray) -> CableVectors:
             kernel = partial(cable_vectors, self.problem, self._pairs, kind=self.kind)
-            return in_batches(kernel, (*motions.items(motion_row), when), size=self.batch)
+            return in_batches(kernel, (*motions.items(motion_row), when), batch_size=self.batch)
 
         if not len(self._pairs):
             return np.zeros(many, bool)

@@ -138,7 +138,7 @@ class PlatformChecker(MotionChecker):
         for start in range(0, len(motions.arcs), size):
             row = np.repeat(np.arange(start, min(start + size, len(motions.arcs))), len(tau))
             instants = np.tile(tau, len(row) // len(tau))
-            slacks = in_batches(kernel, (*motions.items(row), instants), size=self.batch)
+            slacks = in_batches(kernel, (*motions.items(row), instants), batch_size=self.batch)
             minimum.append(np.stack(slacks[:-1], axis=1).reshape(-1, len(tau), len(self.flags)).min(1))
         return np.concatenate(minimum)
 
@@ -247,7 +247,7 @@ class PlatformChecker(MotionChecker):
         # Lower the attained values, (n_criteria + 1, n), of the selected motions to their margins.
         def values_at(row: np.ndarray, tau: np.ndarray) -> np.ndarray:
             kernel = partial(slacks_at, self.problem, pairs=self._places.pairs, kind=self.kind)
-            return np.stack(in_batches(kernel, (*motions.items(row), tau), size=self.batch))
+            return np.stack(in_batches(kernel, (*motions.items(row), tau), batch_size=self.batch))
 
         rows = np.flatnonzero(selected)
         if not len(rows):

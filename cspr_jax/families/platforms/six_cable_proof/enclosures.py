@@ -22,7 +22,7 @@ from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.motion.problem import Problem, touchable
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.elementary import unit_vectors
-from cspr_jax.numerics.linear.lanes import stored
+from cspr_jax.numerics.linear.lanes import materialized
 from cspr_jax.robots.contacts.interference import between, contacts, nearest
 from cspr_jax.robots.contacts.interference_lanes import residual
 from cspr_jax.robots.model.limits import Limits
@@ -63,7 +63,7 @@ def _moving(problem: Problem, one: Array, items, *, kind: PlatformMotionKind) ->
         reach(segments, arcs, middle, (half + radius, radius), kind)
         for radius in (jnp.zeros_like(half), RADIUS / (math.pi * arcs))
     )
-    return stored(_Moving(current, squared_duration(segments, arcs), near, wide), one)
+    return materialized(_Moving(current, squared_duration(segments, arcs), near, wide), one)
 
 
 @partial(jax.jit, static_argnames="pairs")
@@ -264,13 +264,13 @@ class Robustness:
         problem, block_arcs = self._problem._replace(limits=Limits()), arcs[blocks.row].astype(float)
         items = rows(segments, blocks.row), block_arcs, blocks.start, blocks.stop
         kernel = partial(_moving, problem, np.ones(()), kind=self._kind)
-        moving = in_batches(kernel, items, size=self._batch)
+        moving = in_batches(kernel, items, batch_size=self._batch)
         half = 0.5 * (blocks.stop - blocks.start)
         middle = _middle(problem.robot, moving.here, moving.squared)
         within = _within(problem.robot, middle, moving, half, block_arcs)
         points = np.asarray(problem.robot.platform_points)
         touching = partial(_contacts, self._platform, points, pairs=self._pairs)
-        met = in_batches(lambda x: touching(*x), (middle.rays,), size=self._batch)
+        met = in_batches(lambda x: touching(*x), (middle.rays,), batch_size=self._batch)
         low, high = self._certifier.ranges(blocks, segments, arcs)
         scale = np.asarray(segments.rate)[blocks.row, None] / CABLES
         return Enclosure(

@@ -23,7 +23,7 @@ from cspr_jax.families.platforms.six_cable_proof.work_list import least_nodes
 from cspr_jax.motion.limits import limits_set, scales
 from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.motion.problem import Problem
-from cspr_jax.numerics.linear.lanes import Vector, dot, largest, smallest, stored, turned_back
+from cspr_jax.numerics.linear.lanes import Vector, dot, largest, materialized, rotated_back, smallest
 from cspr_jax.robots.contacts import interference_lanes
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import plane_normal
@@ -90,9 +90,9 @@ def place_blocks(
     bounds = reach(segments, arcs, middle, (half, jnp.zeros_like(half)), kind)
     fraction = (2.0 * half / STEPS) ** 2 / 8.0
     turning = bounds.angular_acceleration + bounds.omega**2
-    instant = stored(instant_beside(middle, segments.sense, arcs, jnp.zeros_like(half)), one)
+    instant = materialized(instant_beside(middle, segments.sense, arcs, jnp.zeros_like(half)), one)
     current = state(segments, arcs, instant, kind, one)
-    position, rotation = stored((current.position, current.rotation), one)
+    position, rotation = materialized((current.position, current.rotation), one)
     away = [
         dot(x, x) for x in ([position[i] - problem.robot.base_points[k, i] for i in range(3)] for k in range(CABLES))
     ]
@@ -101,7 +101,7 @@ def place_blocks(
         + bounds.second_derivative
         + 2.0 * bounds.omega * bounds.speed
     )
-    bends = stored(_Bends(bounds.second_derivative * fraction, turning * fraction, seen * fraction), one)
+    bends = materialized(_Bends(bounds.second_derivative * fraction, turning * fraction, seen * fraction), one)
     gaps, left = _separators(problem.robot, platform, pairs, (position, rotation), one)
 
     def on(place):
@@ -142,8 +142,8 @@ def _separators(robot: PlatformRobot, platform, pairs: tuple, middle, one: Array
     # code.
     position, rotation = ([x[None] for x in middle[0]], [[x[None] for x in row] for row in middle[1]])
     points, base = ([x[:, k, None] for k in range(3)] for x in (robot.platform_points, robot.base_points))
-    rays = stored([position[k] + dot(rotation[k], points) - base[k] for k in range(3)], one)
-    seen = turned_back(rotation, [-x for x in rays])
+    rays = materialized([position[k] + dot(rotation[k], points) - base[k] for k in range(3)], one)
+    seen = rotated_back(rotation, [-x for x in rays])
     sides, normal = platform
     first, last = ([sides[:, side, k, None] for k in range(3)] for side in range(2))
     left = _units(interference_lanes.residual((first, last), [normal[k] for k in range(3)], seen))

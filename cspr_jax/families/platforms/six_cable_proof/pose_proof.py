@@ -159,7 +159,7 @@ class PlaceCertifier:
             margins=margins,
         )
         items = (rows(segments, blocks.row), arcs[blocks.row].astype(float), blocks.start, blocks.stop)
-        return in_batches(kernel, items, size=self._batch, axis=-1)
+        return in_batches(kernel, items, batch_size=self._batch, axis=-1)
 
     def _cables(self, blocks: Blocks, bends: np.ndarray, motions) -> CablesOfStep:
         # Return the cables at the instants of blocks.
@@ -167,7 +167,7 @@ class PlaceCertifier:
         block = np.tile(np.arange(len(blocks.row)), len(PLACES))
         row, middle = blocks.row[block], 0.5 * (blocks.start + blocks.stop)[block]
         items = rows(segments, row), arcs[row].astype(float), middle, blocks.instants(PLACES[:, None]).ravel() - middle
-        vectors = in_batches(partial(cables_beside, self._problem, kind=self._kind), items, size=self._batch)
+        vectors = in_batches(partial(cables_beside, self._problem, kind=self._kind), items, batch_size=self._batch)
         rays, seen = (x.reshape(len(PLACES), len(blocks.row), *x.shape[1:]) for x in vectors)
         centre, arm, platform = bends
         return CablesOfStep(rays, seen, centre[:, None] + arm[:, None] * self._arms, platform)

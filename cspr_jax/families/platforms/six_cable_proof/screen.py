@@ -24,7 +24,7 @@ from cspr_jax.families.platforms.platform_segment_lanes import instant_lanes
 from cspr_jax.families.platforms.six_cable_proof.slack_lanes import certain_tension, lowest_tension
 from cspr_jax.motion.amplitudes import Amplitude
 from cspr_jax.motion.platform_kind import PlatformMotionKind
-from cspr_jax.numerics.batches import in_batches, room, row_by_row
+from cspr_jax.numerics.batches import device_batch_size, in_batches, row_by_row
 from cspr_jax.numerics.linear.lanes import cross, dot
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.statics.wrench_lanes import balance, cable_lanes
@@ -164,12 +164,12 @@ class TensionSieve(NamedTuple):
             if not len(alive):
                 break
             remaining = segments if len(alive) == len(is_refuted) else rows(segments, alive)
-            if len(alive) <= room(self.size // FEWER):  # not worth two looks
+            if len(alive) <= device_batch_size(self.size // FEWER):  # not worth two looks
                 is_refuted[alive] = ~(self._lowest(remaining, arcs, chunk) > self.least)
                 continue
             self.count_instants(len(alive) * (len(chunk) + 1))
             kernel = partial(_rough_and_certain, self.robot, self.amplitude, float(arcs), chunk, kind=self.kind)
-            lowest, certain = in_batches(kernel, remaining, size=self.size)
+            lowest, certain = in_batches(kernel, remaining, batch_size=self.size)
             is_refuted[alive] = (lowest < 0.0) & ~(certain > self.least)
         return is_refuted
 
@@ -177,7 +177,7 @@ class TensionSieve(NamedTuple):
         # Look at few motions, in float64.
         self.count_instants(len(segments.rate) * len(tau))
         kernel = partial(smallest_tensions, self.robot, self.amplitude, float(arcs), tau, kind=self.kind)
-        return in_batches(kernel, segments, size=self.size // FEWER)[0]
+        return in_batches(kernel, segments, batch_size=self.size // FEWER)[0]
 
 
 def _chunks(tau: np.ndarray) -> np.ndarray:

@@ -40,7 +40,7 @@ from cspr_jax.motion.platform_kind import PlatformMotionKind
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.bounds import chebyshev
 from cspr_jax.numerics.linear import packed_arrays
-from cspr_jax.numerics.linear.lanes import dot, stored
+from cspr_jax.numerics.linear.lanes import dot, materialized
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.statics.wrench_lanes import CABLES, balance, cable_lanes, inertial_wrench
 from cspr_jax.runtime.persistent_jit import persistent_jit
@@ -162,7 +162,7 @@ def _taken(
 
     def at(off):
         instant = instant_beside(middle, segments.sense, arcs, off * half)
-        return state(segments, arcs, stored(instant, one), kind, one)
+        return state(segments, arcs, materialized(instant, one), kind, one)
 
     def values_at(node):
         return [x for pair in _values(problem, block, at(node), margins=margins) for x in pair]
@@ -173,7 +173,7 @@ def _taken(
         else (packed_arrays.paired, packed_arrays.parts)
     )
     values = jnp.stack(apart(lax.map(lambda node: together(values_at(node)), chebyshev.nodes())), axis=1)
-    lengths = stored(_lengths(problem.robot, at(0.0)), one)
+    lengths = materialized(_lengths(problem.robot, at(0.0)), one)
     radii = np.array(chebyshev.RADII)
     axes = np.vstack([chebyshev.semi_axes(radii), [1.0, 0.0]])
 

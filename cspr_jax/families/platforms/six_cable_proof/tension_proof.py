@@ -168,7 +168,7 @@ class Certifier:
         """Bounds on blocks."""
         problem, items = self._items(order, blocks, motions)
         kernel = partial(tension_blocks, problem, np.ones(()), kind=self._kind, margins=margins, least=least)
-        return in_batches(kernel, items, size=self._batch, axis=-1)
+        return in_batches(kernel, items, batch_size=self._batch, axis=-1)
 
     def _items(self, order: int, blocks: Blocks, motions) -> tuple[Problem, tuple]:
         # Return the robot with its cables in an order, and its blocks as kernels take them.
@@ -189,7 +189,7 @@ class Certifier:
         for k, order in enumerate(self._orders):
             problem, items = self._items(k, blocks.part(remaining), motions)
             kernel = partial(tension_ranges, problem._replace(limits=Limits()), np.ones(()), kind=self._kind)
-            bounds = in_batches(kernel, items, size=self._batch, axis=-1)
+            bounds = in_batches(kernel, items, batch_size=self._batch, axis=-1)
             index = np.ix_(remaining, np.array(order.cables))
             low[index], high[index] = np.fmax(low[index], bounds.low.T), np.fmin(high[index], bounds.high.T)
             # Go on as in `_looked_at`, where the first three cables lie nearly in one plane.

@@ -84,11 +84,11 @@ def _durations(items) -> Array:
 def enclosure(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"], blocks: Blocks) -> Enclosure:
     """Enclosure of blocks of motions."""
     items = (*jax.tree.map(lambda x: np.asarray(x)[blocks.row], (segments, arcs.astype(float))), *blocks[1:])
-    known: Any = in_batches(partial(_enclosed, problem), items, size=BATCH)
+    known: Any = in_batches(partial(_enclosed, problem), items, batch_size=BATCH)
     count, n_cables = known.rays.shape[:2]
     nothing, each = np.zeros(count), (count, n_cables, 3)
     half = 0.5 * (blocks.stop - blocks.start)
-    way = (half * in_batches(_durations, items[:2], size=BATCH))[:, None] * known.velocity
+    way = (half * in_batches(_durations, items[:2], batch_size=BATCH))[:, None] * known.velocity
     moved = largest_moves(way, known.deviation)[:, None]
     lengths, longest = np.linalg.norm(known.rays, axis=2), touchable(problem).limits.cable_length_max
     room = np.zeros((count, 0)) if longest is None else np.asarray(longest) - lengths

@@ -72,7 +72,9 @@ def broken_at_samples(
     problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]
 ) -> Bool[np.ndarray, "n n_criteria"]:
     """Limits that some sample breaks by more than rounding; a quick refutation."""
-    lowest, near = in_batches(partial(_lowest, touchable(problem)), (segments, np.asarray(arcs, float)), size=BATCH)
+    lowest, near = in_batches(
+        partial(_lowest, touchable(problem)), (segments, np.asarray(arcs, float)), batch_size=BATCH
+    )
     return np.concatenate([np.zeros((len(lowest), BASIC), bool), lowest < -FAR * near[:, None]], axis=1)
 
 

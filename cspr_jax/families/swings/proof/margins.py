@@ -22,7 +22,7 @@ from cspr_jax.families.swings.proof.verdicts import OF_PLANS, SMALL, length
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.elementary import vertex
-from cspr_jax.numerics.linear.lanes import smallest_of_each, stored
+from cspr_jax.numerics.linear.lanes import materialized, smallest_of_each
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ def refined_minimum(
         smallest, at, width = state
         middle_point = jnp.clip(at, width, 1.0 - width)  # equidistant points, the ends of the motion among them
         points = jnp.stack([middle_point - width, middle_point, middle_point + width])
-        left, middle, right = stored(jax.vmap(function)(points), one)
+        left, middle, right = materialized(jax.vmap(function)(points), one)
         bracketed = (middle <= left) & (middle <= right)
         lower = jnp.where(left < right, points[0], points[2])
         at = jnp.where(bracketed, middle_point + width * vertex(left, middle, right)[0], lower)
@@ -175,7 +175,7 @@ def smallest_values(
     order = np.argsort(arcs, kind="stable")
     arguments = jax.tree.map(lambda x: x[order], (segments, arcs))
     kernel = partial(_minima, functions, problem, *table, 1.0)
-    minima = in_batches(kernel, arguments, size=length(problem, len(arcs), OF_PLANS))
+    minima = in_batches(kernel, arguments, batch_size=length(problem, len(arcs), OF_PLANS))
     return minima[np.argsort(order, kind="stable")]
 
 

@@ -162,7 +162,7 @@ def first_look(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"]) 
     back = np.argsort(order, kind="stable")
     arguments = jax.tree.map(lambda x: x[order], (segments, arcs))
     look = in_batches(
-        partial(_first_look, touchable(problem), *table), arguments, size=length(problem, len(arcs), OF_PLANS)
+        partial(_first_look, touchable(problem), *table), arguments, batch_size=length(problem, len(arcs), OF_PLANS)
     )
     return jax.tree.map(lambda x: x[back], look)
 
@@ -181,7 +181,7 @@ def _cut(
     start, stop = edges[row, place], edges[row, place + 1]
     for _ in range(FINEST_CUT):
         items = (*jax.tree.map(lambda x, o=owner: x[o], (segments, arcs)), start, stop)
-        sampled, proved = in_batches(partial(_closer_look, problem), items, size=length(problem, len(owner)))
+        sampled, proved = in_batches(partial(_closer_look, problem), items, batch_size=length(problem, len(owner)))
         limit = near[owner]
         fails: np.ndarray = ~(sampled >= -limit) & counted[owner]
         failing = np.flatnonzero(fails.any(1))

@@ -55,7 +55,7 @@ class TransitionEnvelopesMap(MinimumOscillationsMap):
         v, w = np.asarray(inclination(segments)), np.asarray(weights(segments))
         cable = np.asarray(cells.get("cable", np.zeros(len(v)))).astype(int)
         kernel = partial(_instants, self._problem.amplitude)
-        n, squared, envelope = in_batches(kernel, (w, v, cells["tau"], cable), size=BATCH)
+        n, squared, envelope = in_batches(kernel, (w, v, cells["tau"], cable), batch_size=BATCH)
         return {
             "least_oscillations": n,
             "squared_oscillations": squared,

@@ -79,7 +79,7 @@ def _transitions(problem: Problem, arguments) -> Segment:
 
 def transitions_to(problem: Problem, targets: Float[np.ndarray, "n 3"], z0: Float[np.ndarray, "n"]) -> Segment:
     """Transitions from rest to many targets."""
-    return in_batches(partial(_transitions, problem), (targets, z0), size=BATCH)
+    return in_batches(partial(_transitions, problem), (targets, z0), batch_size=BATCH)
 
 
 @jax.jit
@@ -99,7 +99,7 @@ def best_inclinations(
     weights = transition.weights(transitions_to(problem, targets, np.ones(len(targets))))
     if not np.any(problem.amplitude.largest[2]):  # A = tau
         return np.asarray(jax.vmap(lambda w: zero_tension.best_inclination(w)[0])(weights))
-    return in_batches(partial(_best_inclinations, problem.amplitude), np.asarray(weights), size=BATCH)
+    return in_batches(partial(_best_inclinations, problem.amplitude), np.asarray(weights), batch_size=BATCH)
 
 
 @jax.jit
@@ -156,7 +156,7 @@ def _known(
     # Return the whole numbers of oscillations that the envelopes prove.
     n = np.where(np.isfinite(allowed), allowed, 1.0)
     kernel = partial(_proofs, problem.amplitude)
-    bound, near = in_batches(kernel, (segments, *of_targets, n), size=BATCH)
+    bound, near = in_batches(kernel, (segments, *of_targets, n), batch_size=BATCH)
     return Known(np.where(np.isfinite(allowed) & (bound > near), 2 * n, 0).astype(int), bound)
 
 
@@ -174,14 +174,14 @@ def minimum_oscillations(
         return _on_more_cables(problem, segments, z0, 2 * largest, arcs)
     v, weights = np.asarray(transition.inclination(segments)), np.asarray(transition.weights(segments))
     envelopes = _level if (v == 0.0).all() else _envelopes
-    look = in_batches(partial(envelopes, problem.amplitude), (weights, v), size=BATCH)
+    look = in_batches(partial(envelopes, problem.amplitude), (weights, v), batch_size=BATCH)
     real, gain = (np.array(column) for column in look)
     loads = v[:, None] + weights
     extreme = (np.maximum(loads.max(1), 0.0), np.minimum(loads.min(1), 0.0), v)
     kernel = partial(_upper_bounds, problem.amplitude, largest=largest)
     upper = np.full((len(v), 2 * largest), -np.inf)
-    upper[:, 1::2] = in_batches(kernel, extreme, size=BATCH)
-    at_ends = in_batches(partial(end_slacks, touchable(problem), 4.0), segments, size=BATCH)
+    upper[:, 1::2] = in_batches(kernel, extreme, batch_size=BATCH)
+    at_ends = in_batches(partial(end_slacks, touchable(problem), 4.0), segments, batch_size=BATCH)
     if steady is not None:
         upper[steady, 1::2], real[steady], gain[steady] = np.inf, 0.0, 0.0
     infinity = _infinity(problem, v)

@@ -1,4 +1,4 @@
-"""Demands of motions on the robot: tensions, heights, cable lengths and speeds, at their extremes."""
+"""Peaks of motions: extremes of tensions, heights, cable lengths and speeds along them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from jax import Array
 from cspr_jax.motion.limits import lowest_depth
 from cspr_jax.motion.motion import Motion, common_shape, has_pieces, sample_times
 from cspr_jax.numerics.batches import in_batches
-from cspr_jax.numerics.search.minima import narrowed_places
+from cspr_jax.numerics.search.minima import narrowed_times
 from cspr_jax.robots import cables
 from cspr_jax.robots.model.limits import NO_LIMITS, Limits
 from cspr_jax.robots.model.point_mass import plane_normal
@@ -33,8 +33,8 @@ ROOM = 200_000
 
 
 @dataclasses.dataclass(frozen=True)
-class Demands:
-    """Demands of n motions on the robot, refined between samples; (n,) each.
+class Peaks:
+    """Extremes along n motions, refined between samples; (n,) each.
 
     Fields:
         tension_min: smallest tension of any cable, N.
@@ -71,7 +71,7 @@ class Demands:
 
 # A largest value is the smallest value of the negative.
 _SIGNS = np.array([1.0, -1.0, 1.0, 1.0, -1.0, -1.0, -1.0, -1.0, -1.0, -1.0, 1.0])
-EXTREMES = [field.name for field in dataclasses.fields(Demands)][: len(_SIGNS)]
+EXTREMES = [field.name for field in dataclasses.fields(Peaks)][: len(_SIGNS)]
 
 
 @persistent_jit(static_argnames="rule")
@@ -112,15 +112,15 @@ def _at_instant(robot, limits: Limits, corners, rule: str, motion: Motion, tau: 
     return jnp.stack([table[name] for table in (extremes, nearest) for name in EXTREMES])
 
 
-def demands(
+def peaks(
     robot: Any,
     motions: Sequence[Motion],
     samples: Sequence[int],
     limits: Limits = NO_LIMITS,
     rule: str = CENTRED,
     corners: Float[np.ndarray, "m 3"] | None = None,
-) -> Demands:
-    """Demands of motions on the robot, narrowed down where a value is extreme."""
+) -> Peaks:
+    """Extremes along motions, narrowed down between samples."""
     table = np.empty((len(motions), 3, len(EXTREMES)))
     times = [sample_times(motion, count) for motion, count in zip(motions, samples, strict=True)]
     alike: dict[Any, list[int]] = {}
@@ -139,7 +139,7 @@ def demands(
                 robot, limits, corners, rule, [motions[i] for i in batch], [times[i] for i in batch]
             )
     columns = (table[:, 0] * _SIGNS + 0.0).T  # no -0
-    return Demands(
+    return Peaks(
         **dict(zip(EXTREMES, columns, strict=True)),
         samples=np.array([len(tau) for tau in times]),
         when=table[:, 1] * np.array([[float(motion.duration())] for motion in motions]),
@@ -155,7 +155,7 @@ def _of_alike(
         of_one = partial(_values_of_one, robot, limits, corners, common_shape(motions[0]), rule=rule)
 
         def along(tau: np.ndarray) -> np.ndarray:
-            return in_batches(of_one, tau.ravel(), size=BATCH).reshape(*tau.shape, -1)
+            return in_batches(of_one, tau.ravel(), batch_size=BATCH).reshape(*tau.shape, -1)
 
         return _narrowed(along, times[0][None])
     kernel = partial(_values, robot, limits, corners, rule=rule)
@@ -164,7 +164,7 @@ def _of_alike(
     def at(tau: np.ndarray) -> np.ndarray:
         row = np.repeat(np.arange(len(tau)), tau.shape[1])
         items = jax.tree.map(lambda leaf: leaf[row], stacked)
-        values = in_batches(kernel, (items, tau.ravel()), size=BATCH)
+        values = in_batches(kernel, (items, tau.ravel()), batch_size=BATCH)
         return values.reshape(*tau.shape, -1)
 
     return _narrowed(at, np.stack(times))
@@ -172,6 +172,6 @@ def _of_alike(
 
 def _narrowed(at: Callable[[np.ndarray], np.ndarray], tau: np.ndarray) -> np.ndarray:
     count = len(EXTREMES)
-    minimum, when = narrowed_places(lambda points: at(points)[..., :count], tau, at(tau)[..., :count])
+    minimum, when = narrowed_times(lambda points: at(points)[..., :count], tau, at(tau)[..., :count])
     nearest = np.diagonal(at(when)[..., count:], axis1=1, axis2=2)
     return np.stack([minimum, when, nearest], axis=1)
