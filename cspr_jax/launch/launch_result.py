@@ -1,4 +1,4 @@
-"""LegOutcome of a launch: the release and the flight of an object, and where throws with errors land."""
+"""Result of a launch: the release and the flight of an object, and where throws with errors land."""
 
 from __future__ import annotations
 

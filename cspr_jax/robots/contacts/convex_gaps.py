@@ -110,7 +110,7 @@ def clearance_bounds(first: Solid, second: Solid) -> tuple[Float[Array, ""], Flo
 
 def turning(direction: Callable[..., Array], *points: AffineBounds) -> AffineBounds:
     """A direction that turns at a constant rate, which follows that of a function of points in the middle."""
-    middles, slopes = (tuple(getattr(x, name) for x in points) for name in ("middle", "slope"))
+    middles, slopes = (tuple(getattr(x, name) for x in points) for name in ("middle", "linear"))
     middle, turn = jax.jvp(direction, middles, slopes)
     return AffineBounds(middle, jnp.where(jnp.sum(turn**2) <= 1.0, turn, 0.0), jnp.zeros_like(middle))
 
