@@ -77,12 +77,7 @@ def values(robot, motion, tau):
 
 
 def refined(at, motion, columns=None):
-    """For each column of values at times the smallest ones around the lowest samples of pieces, their times, the scale.
-
-    Args:
-        at: gives the columns by their names, (n,) each, from normalised times.
-        columns: names of those that are asked for; None: all.
-    """
+    """Of each column of values the smallest ones around the lowest samples of pieces, their times, the scale."""
     knots = np.unique([0.0, *np.asarray(motion.breaks(), float).ravel(), 1.0])
     knots = knots[np.append(True, np.diff(knots) > 1e-9)]
     count = max(20 * MANY // (len(knots) - 1), 9)

@@ -181,12 +181,7 @@ class Transcription:
         self.solver = ca.nlpsol("solver", "ipopt", problem, {"print_time": False, "ipopt": OPTIONS})
 
     def solved(self, time, nodes, tensions=None, room=0.0, ease=1.0):
-        """T, infinite where the solver fails, nodes (3, N + 1, d), and tensions (places, n), from others.
-
-        Args:
-            room: (places,) by which tensions stay off their limits, over the weight, and values, over theirs.
-            ease: factor of the largest tensions and of the other limits.
-        """
+        """T, infinite where the solver fails, nodes (3, N + 1, d), and tensions (places, n), from others."""
         room, free = np.broadcast_to(room, len(self.places)), np.full(nodes.size, np.inf)
         low, high = (x + s * self.weight * room[:, None] for x, s in zip(self.tensions, (1.0, -1.0), strict=True))
         most = np.concatenate([self.zeros, *(np.repeat((ease - room) ** p, n) for p, n in self.most)])
@@ -278,14 +273,7 @@ def starts(robot, problem, count, rng):
 
 
 def least_time(robot, limits, start, end, steps=(30, 60), count=8, seed=0, accelerations=(None, None), rounds=8):
-    """Least time between two poses at zero velocity, from several starts: an `Answer`.
-
-    Args:
-        steps: numbers of steps, of which the later ones begin where the ones before ended.
-        count: of starts.
-        accelerations: (6,) given ones of the mass centre, and r'' at both ends, or None.
-        rounds: of room for what samples between places break; the last one is not looked at again.
-    """
+    """Least time between two poses at zero velocity, from several starts: an `Answer`."""
     size = max(np.linalg.norm(np.asarray(p.position) - np.mean(robot["base_points"], axis=0)) for p in (start, end))
     scale = least_time_forms.Scale(1.0 / size, 1.0 / robot["mass"])
     small, tight = scale.robot(robot), scale.limits(limits)

@@ -64,12 +64,7 @@ class Timed:
 
 
 def slacks(robot, limits, motion, times):
-    """Slacks of all limits at times, dict of (k,): by linear programs, or by solving where n = dof. SI units.
-
-    Args:
-        motion: `state(times)` gives a `sampled_motion.State` of the mass centre, in the axes of the robot.
-        times: (k,) s.
-    """
+    """Slacks of all limits at times, dict of (k,): by linear programs, or by solving where n = dof. SI units."""
     low, high = path_rows.tension_range(robot, limits)
     judge = any_motion.Judge(robot, limits, motion, any_motion.Centring(low, high))
     made, state = judge.slacks(times), motion.state(np.atleast_1d(times))

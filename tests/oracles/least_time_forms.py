@@ -39,11 +39,7 @@ def two_spools(half, mass=1.0, gravity=9.81):
 
 
 def bang_bang(reach, length):
-    """Least time over a length, and where u changes from its largest to its smallest.
-
-    Args:
-        reach: reach(s) gives x when starting at rest at 0, and x with which to come to rest at the end.
-    """
+    """Least time over a length, and where u changes from its largest to its smallest."""
     switch = brentq(lambda s: reach(s)[0] - reach(s)[1], 0.0, length, xtol=1e-15 * length)
     # s = w^2 from the end at rest: the integrand 2 w / sqrt(x) is smooth.
     first = quad(lambda w: 2.0 * w / math.sqrt(reach(w * w)[0]), 0.0, math.sqrt(switch), epsabs=0.0, epsrel=1e-12)

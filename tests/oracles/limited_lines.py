@@ -101,25 +101,6 @@ def cable_rates(
     return lengths, slopes * speed[..., None], slopes * second_derivative[..., None] + curves * speed[..., None] ** 2
 
 
-def rates_mismatch(
-    base: ArrayLike, start: ArrayLike, end: ArrayLike, motion: Motion, *, planar: bool = False
-) -> tuple[float, float]:
-    """The largest error of `cable_rates` l' and l'' against finite differences, over the largest |l'| and |l''|."""
-    worst, largest = np.zeros((2, 2))
-    spools, first, last = _points(planar, base, start, end)
-    for left, right in pairwise(corners_of(motion)):
-        h = 1e-3 * (right - left)
-        t = np.linspace(left + 2 * h, right - 2 * h, 201)
-        places = law_of(motion, t + h * np.arange(-2, 3)[:, None])[0]
-        far = np.linalg.norm(first + places[..., None, None] * (last - first) - spools, axis=-1)
-        first_rate = np.tensordot([1.0, -8.0, 0.0, 8.0, -1.0], far, 1) / (12 * h)
-        second_rate = np.tensordot([-1.0, 16.0, -30.0, 16.0, -1.0], far, 1) / (12 * h**2)
-        _, speed, second_derivative = cable_rates(base, start, end, law_of(motion, t), planar=planar)
-        worst = np.maximum(worst, [np.abs(speed - first_rate).max(), np.abs(second_derivative - second_rate).max()])
-        largest = np.maximum(largest, [np.abs(speed).max(), np.abs(second_derivative).max()])
-    return float(worst[0] / largest[0]), float(worst[1] / largest[1])
-
-
 def _share(limit: ArrayLike, used: Array) -> float:
     """The smallest (limit - used) / limit; infinite without a limit."""
     limits = np.broadcast_to(np.asarray(limit, dtype=np.float64), used.shape)
@@ -130,14 +111,7 @@ def _share(limit: ArrayLike, used: Array) -> float:
 def margins(
     base: ArrayLike, mass: float, start: ArrayLike, end: ArrayLike, law: Run, *, samples: int = 2001, **limits: object
 ) -> dict[str, float]:
-    """The smallest slacks along a motion: its corners and `samples` times, or all samples of a law given as arrays.
-
-    Returns:
-        "tension": N, the signed tension margin by HiGHS, `lines.tension_margin`: the largest m with
-        tension_min + m <= t <= tension_max - m; negative where infeasible.  "acceleration", "cable_speed",
-        "cable_acceleration": (limit - used)/limit, infinite without a limit.  "cable_length_min", "cable_length_max",
-        "floor": m.
-    """
+    """The smallest slacks along a motion: its corners and `samples` times, or all samples of a law given as arrays."""
     line = Line.of(base, start, end, **limits)
     given = line.given
     if isinstance(law[0], str):
@@ -221,21 +195,6 @@ def range_by_faces(
         ends[:, here[np.any((rise == 0.0) & (room < -1e3 * SLACK), axis=1)]] = [[UNBOUNDED], [-UNBOUNDED]]
     low, high = np.clip(ends, -UNBOUNDED, UNBOUNDED) * line.unit
     return low, high
-
-
-def range_mismatch(
-    base: ArrayLike, mass: float, start: ArrayLike, end: ArrayLike, s: ArrayLike, **limits: object
-) -> float:
-    """The largest difference of `range_by_faces` from the linear programs: in gravities, relative to 1 + the value.
-
-    Infinite where one of them has no feasible s'' and the other has, or one is unlimited and the other is not.
-    """
-    unit = Line.of(base, start, end, **limits).unit
-    found = np.array(range_by_faces(base, mass, start, end, s, **limits)) / unit
-    exact = np.clip(np.array(acceleration_range(base, mass, start, end, s, **limits)) / unit, -UNBOUNDED, UNBOUNDED)
-    none, nothing = np.isnan(exact), np.broadcast_to(found[0] > found[1], found.shape)
-    wrong = np.where(none & nothing, 0.0, np.abs(found - exact) / (1.0 + np.abs(exact)))
-    return float(np.max(np.where(none != nothing, np.inf, wrong)))
 
 
 def range_table(
@@ -329,10 +288,6 @@ def least_duration(
 
     A grid over r, its three best peaks zoomed in on.  The q of one r are an interval, which need not reach down to 0.
     `ratios` is the range of r (two equal ends: one r), `table` the `range_table` of the same arguments.
-
-    Returns:
-        T and r (NaN but for the S-curve; one of many where T does not depend on it).  Both NaN where there is none, or
-        no rest at an end; T = 0 without a limit.
     """
     line = Line.of(base, start, end, **limits)
     given, lowest = line.given, line.start[-1] + min(line.step[-1], 0.0)

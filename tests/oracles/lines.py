@@ -13,8 +13,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import cumulative_trapezoid
-from scipy.optimize import OptimizeResult, linprog, lsq_linear, nnls
-from scipy.spatial import ConvexHull
+from scipy.optimize import OptimizeResult, linprog
 
 Array = NDArray[np.float64]
 Law = tuple[Array, Array, Array]
@@ -31,11 +30,7 @@ GRAVITY, MAX_ACCELERATION = 9.81, 10.0
 
 
 def _points(planar: bool, *points: ArrayLike) -> list[Array]:
-    """The points in the axes that the robot moves in.
-
-    Raises:
-        ValueError: a planar robot's points do not share their y.
-    """
+    """The points in the axes that the robot moves in."""
     found = [np.asarray(point, dtype=np.float64) for point in points]
     if planar and any(point.shape[-1] == 3 for point in found):
         heights = np.concatenate([point[..., 1].ravel() for point in found])
@@ -82,12 +77,7 @@ def tension_margin(
     tension_max: ArrayLike = np.inf,
     planar: bool = False,
 ) -> float:
-    """Largest s, N, with tension_min + s <= t <= tension_max - s and sum of t_i u_i = m (a - g), by HiGHS.
-
-    Returns:
-        Negative: infeasible by that much.  Minus infinity: no tensions, of whatever sign, give this acceleration
-        (cables in one plane).  Never more than CAP weights: cables that pull against each other, and no maximum.
-    """
+    """Largest s, N, with tension_min + s <= t <= tension_max - s and sum of t_i u_i = m (a - g), by HiGHS."""
     pull = _pull(base_points, position, planar)
     cables = pull.shape[1]
     weight = mass * gravity
@@ -111,65 +101,6 @@ def tension_margin(
     return float(found.x[-1] * weight)
 
 
-def can_be_held(
-    base_points: ArrayLike,
-    position: ArrayLike,
-    acceleration: ArrayLike,
-    *,
-    gravity: float,
-    planar: bool = False,
-    tolerance: float = REST,
-) -> bool:
-    """Whether tensions >= 0 without a maximum give the acceleration: the residual of NNLS over |a - g| is zero."""
-    load = _free(acceleration, gravity, planar)
-    return bool(nnls(_pull(base_points, position, planar), load)[1] <= tolerance * max(np.linalg.norm(load), gravity))
-
-
-def distance_to_infeasible(
-    base_points: ArrayLike,
-    position: ArrayLike,
-    acceleration: ArrayLike,
-    *,
-    mass: float,
-    gravity: float,
-    tension_min: ArrayLike = 0.0,
-    tension_max: ArrayLike = np.inf,
-    planar: bool = False,
-) -> float:
-    """Distance, m/s^2, from the acceleration to the boundary of the feasible ones: > 0 inside, < 0 outside.
-
-    Inside, the least distance to the faces of a convex hull: that of the zonotope's corners, or with no maximum that of
-    the cone's apex and one point on each edge, of which only faces through the apex count (a cone has no others).
-    Outside, the distance to the nearest feasible acceleration.  A flat set has no inside: 0 or less.  Positive
-    infinity: no boundary at all.
-
-    Raises:
-        ValueError: maxima for some cables only, or a maximum that is not above its minimum.
-    """
-    pull = _pull(base_points, position, planar)
-    dimension, cables = pull.shape
-    load = _free(acceleration, gravity, planar)
-    least, most = (np.broadcast_to(limit, cables) / mass for limit in (tension_min, tension_max))
-    ended = bool(np.isfinite(most[0]))
-    if np.any(np.isfinite(most) != ended) or np.any(least >= most):
-        raise ValueError(f"tensions from {tension_min} to {tension_max}")
-    apex = pull @ least
-    if ended:
-        away = np.sqrt(2.0 * lsq_linear(pull, load, (least, most), method="bvls").cost)
-    else:
-        away = nnls(pull, load - apex)[1]
-    solid = np.linalg.matrix_rank(pull, tol=FLAT) == dimension
-    if away > REST * max(np.linalg.norm(load), gravity) or not solid:
-        return -float(away)
-    if ended:
-        corners = (np.arange(2**cables)[:, None] >> np.arange(cables)) & 1
-        faces = ConvexHull((least + corners * (most - least)) @ pull.T).equations
-        return float(np.min(-faces[:, :-1] @ load - faces[:, -1]))
-    faces = ConvexHull(np.vstack([np.zeros(dimension), pull.T])).equations
-    faces = faces[np.abs(faces[:, -1]) < FLAT]
-    return float(np.min(-faces[:, :-1] @ (load - apex), initial=np.inf))
-
-
 def path_limits(
     base_points: ArrayLike,
     start: ArrayLike,
@@ -183,23 +114,7 @@ def path_limits(
     planar: bool = False,
     max_acceleration: float | None = None,
 ) -> tuple[Array, Array]:
-    """The least and the largest feasible s'' at each s of the line: X'' = (X1 - X0) s'', three linear programs each.
-
-    Args:
-        base_points: rows.
-        start: X0, where s = 0.
-        end: X1, where s = 1.
-        s: any shape.
-        mass: kg.
-        gravity: m/s^2, positive.
-        tension_min: N.
-        tension_max: N, infinite for none.
-        planar: as the module says.
-        max_acceleration: of |X''|, m/s^2.
-
-    Returns:
-        Two arrays of the shape of s; infinite where there is no limit, (inf, -inf) where no s'' is feasible.
-    """
+    """The least and the largest feasible s'' at each s of the line: X'' = (X1 - X0) s'', three linear programs each."""
     base, first, last = _points(planar, base_points, start, end)
     step = last - first
     size = float(np.linalg.norm(step))
@@ -306,16 +221,6 @@ def least_duration_of_s_curve(
     With p = r T the curve s(t/T) does not depend on T and s'' goes as 1/T^2: for each r the least T is sampled.  The
     best r of the grid are zoomed in on, each round ten times.  T is good to 1e-9; p to 1e-7 or so where the best is
     smooth in p.
-
-    Args:
-        lower: of an array of s in [0, 1], 1/s^2.
-        upper: the same.
-        ratios: of the first grid of p/T.
-        samples: of each quarter of the curve.
-        rounds: of zooming in.
-
-    Returns:
-        T and p; (inf, nan) where no S-curve is feasible.
     """
 
     def rates(grid: Array) -> Array:
@@ -403,11 +308,7 @@ def couples_mismatch(couples: ArrayLike, position: ArrayLike, *, x_max: float, y
 
 
 def case_lines(decimals: int | None = None) -> tuple[np.poly1d, np.poly1d]:
-    """(25) and (24), the lower and the upper limit of s'' in the test case: lines in s through the limits at both ends.
-
-    Args:
-        decimals: the coefficients are rounded to them; None leaves them.
-    """
+    """(25) and (24), both limits of s'' in the test case: lines in s through the limits at both ends."""
     ends = path_limits(BASE, START, END, [0.0, 1.0], mass=10.0, gravity=GRAVITY)
     lines = [np.array([at_end - at_start, at_start]) for at_start, at_end in ends]
     lower, upper = (np.poly1d(line if decimals is None else np.round(line, decimals)) for line in lines)
@@ -433,17 +334,6 @@ def table_4_3(
     s'', beyond both lines everywhere: it changes nothing); whether Max_a is over all t or t <= p (one over the whole
     table, p from 1.8 to 2.75, T from 2.9 to 4.4); whether Max_b is over all t or t >= p.  The last two differ in 15
     cells of T >= 4.25: over all t Max_b is never below -0.03085, its value at t = 0.
-
-    Args:
-        p_values: columns, s.
-        durations: T of the rows, s, each greater than every p.
-        decimals: of the lines' coefficients; None leaves them exact.
-        after_p: Max_b over t >= p only.
-        max_acceleration: m/s^2 along the line, a limit beside the lines.
-        samples: of each quarter of the curve.
-
-    Returns:
-        Two arrays, one row a duration.
     """
     lower, upper = case_lines(decimals)
     most = np.inf if max_acceleration is None else max_acceleration / float(np.linalg.norm(END - START))

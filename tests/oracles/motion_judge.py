@@ -114,13 +114,7 @@ def smoothness(state, times):
 
 
 def judged(robot, limits, state, duration, start, end, samples=any_motion.SAMPLES, began=0.0):
-    """Judgement of a motion from a pose at zero velocity to another one.
-
-    Args:
-        state: state(times) gives a `sampled_motion.State` of the mass centre, in the axes of the robot.
-        start, end: `free_motions.Pose`.
-        began: time at the start, s.
-    """
+    """Judgement of a motion from a pose at zero velocity to another one."""
 
     class Motion:
         times = began, began + duration

@@ -198,11 +198,7 @@ def tension_range(robot, limits):
 
 
 def tension_rows(robot, limits, place, directions=None):
-    """Rows A, B, C, (k, rows), N, of the tensions alone.
-
-    Args:
-        directions: (k, subsets, dof) other normals than those of the places themselves, whose lengths are kept.
-    """
+    """Rows A, B, C, (k, rows), N, of the tensions alone."""
     low, high = tension_range(robot, limits)
     found = balance(robot, place)
     normal = normals(found.matrix) if directions is None else directions

@@ -378,21 +378,6 @@ def deviations(robot: Robot, position: Vec, q: Vec, z0: float, gravity: float = 
     return np.array([mu[0] - eta / 6, mu[1] - mu[0]])
 
 
-def printed_deviations(
-    robot: Robot, position: Vec, q: Vec, z0: float, gravity: float = 9.81, factor: float = 1
-) -> Array:
-    """u and v, (2, 6), by the blocks (3.87)-(3.90), for c_A = c_B = 0; factor 2 is (3.80) as printed, 1 is right."""
-    eta, unit = gravity / z0, np.asarray(q, dtype=float)
-    turn = matrix(unit)
-    left = -jacobian(robot, position, turn)[0].T
-    a, b, c, d = left[:3, :3], left[:3, 3:], left[3:, :3], left[3:, 3:]
-    e = d - c @ np.linalg.solve(a, b)
-    m = np.cross(robot.platform @ turn.T, robot.base).mean(axis=0)  # (3.15)
-    phi = factor * eta / robot.mass * turn @ robot.inertia @ rotation_vector(unit)  # (3.80)
-    last = np.array([-eta * np.linalg.solve(e, m), np.linalg.solve(e, phi)])
-    return np.concatenate([-np.linalg.solve(a, b @ last.T).T, last], axis=1)
-
-
 def preferred_beta_hat(u: Array, v: Array) -> float:
     """Best beta_hat (3.91); -1, which turns beta_f into beta_1, where the rotation is nil and any value does."""
     return -float(u @ v) / float(v @ v) if np.linalg.norm(v) > 0 else -1.0

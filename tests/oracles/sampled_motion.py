@@ -173,14 +173,7 @@ class Motion:
 
 
 def sampled(times, positions, quaternions=None, *, interpolation="cubic", ends="rest", rates=None):
-    """Motion through samples; where positions are Hermite pieces, quaternions are a spline of the same degree.
-
-    Args:
-        positions: (n, 3) of the mass centre.
-        quaternions: (n, 4), or None.
-        interpolation: "cubic", "quintic", or "hermite" with rates.
-        rates: (n, k, 3) velocities, and accelerations, of Hermite pieces.
-    """
+    """Motion through samples; where positions are Hermite pieces, quaternions are a spline of the same degree."""
     if interpolation == "hermite":
         interpolation = ["cubic", "quintic"][rates.shape[1] - 1]
         moved = hermite(times, np.concatenate([positions[:, None], rates], axis=1))

@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from oracles import (
-    any_motion,
     free_motion_bounds,
-    free_motion_cases,
     free_motion_times,
     free_motions,
     least_time_forms,
@@ -51,29 +49,10 @@ def least(robot, limits, start, end):
     return free_motion_bounds.least(robot, limits, start, end, near=0.005)
 
 
-def mirrored(robot, limits, start, end):
-    """The same, seen in a mirror and from another side."""
-    turn = np.diag([-1.0, 1.0, 1.0]) @ sampled_motion.rotations(np.array([[0.8, 0.0, 0.0, 0.6]]))[0]
-    poses = (Pose(turn @ p.position) for p in (start, end))
-    return {**robot, "base_points": np.asarray(robot["base_points"]) @ turn.T}, limits, *poses
-
-
 @pytest.mark.parametrize("name", ["vertical", "speeds", "lengths"])
 def test_bounds_are_below_and_near_exact_times(name):
     *case, exact = exact_cases()[name]
     assert 0.98 * exact < least(*case) <= exact * (1.0 + 1e-12)
-
-
-@pytest.mark.parametrize("number", [3, 5])
-def test_bounds_of_cases_backwards_turned_and_scaled(number):
-    case = free_motion_cases.segment(number)
-    case, scale = (case.robot, case.limits, case.start, case.end), least_time_forms.Scale(2.5, 7.0)
-    larger = scale.robot(case[0]), scale.limits(case[1]), *(Pose(2.5 * np.array(p.position)) for p in case[2:])
-    time = free_motion_times.reference(f"segment {number}").below
-    for sides, unit in ((case, 1.0), ((*case[:2], *case[:1:-1]), 1.0), (mirrored(*case), 1.0), (larger, scale.time)):
-        reach = free_motion_bounds.Reach(*sides)
-        assert reach.refutes(0.97 * unit * time)
-        assert not reach.refutes(1.1 * unit * time)
 
 
 @pytest.mark.parametrize("name", free_motion_times.NAMES)
@@ -157,69 +136,6 @@ def test_the_judge_sees_a_motion_above_the_spools():
 @pytest.fixture(scope="module")
 def casadi():
     return pytest.importorskip("casadi")
-
-
-@pytest.mark.parametrize("kind", ["2T-3", "3T-8", "1R2T-4", "3R3T-6", "3R3T-7"])
-def test_demands_are_those_of_any_motion(kind, casadi):
-    """Balance, cables' speeds and accelerations, and quaternions of nodes."""
-    case, rng = free_motion_cases.case(kind, 3), np.random.default_rng(1)
-    d = len(free_motions.coordinates(case.robot))
-    accelerations = rng.normal(size=(4, d))
-    nodes = free_motions.integrated(case.robot, case.start, case.end, 0.7, accelerations)
-    motion = free_motions.motion(case.robot, case.start, case.end, 0.7, nodes)
-    times = np.linspace(0.0, 0.7, 4)
-    state = motion.state(times)
-    cables = any_motion.cables(case.robot, state)
-    matrix, wrench = any_motion.balance(case.robot, state, cables)
-    tensions = rng.uniform(0.0, 1.0, (4, matrix.shape[2]))
-    demands = free_motions.demands(case.robot, free_motions.middle(case.start, case.end)[0])
-    for k in range(4):
-        left, rates, bends, speed, acceleration, _ = (np.asarray(x).ravel() for x in demands(*nodes[:, k], tensions[k]))
-        residual = (wrench[k] - matrix[k] @ tensions[k]) / (case.robot["mass"] * case.robot["gravity"])
-        ratio = left / residual
-        force = 3 if case.robot["pattern"] == "3R3T" else 2
-        np.testing.assert_allclose(ratio[:force], 1.0, rtol=1e-9)
-        np.testing.assert_allclose(ratio[force:], ratio[-1], rtol=1e-7)
-        np.testing.assert_allclose(rates, cables.rates[k], atol=1e-11)
-        np.testing.assert_allclose(bends, cables.accelerations[k], rtol=1e-9)
-        assert speed == pytest.approx(state.velocity[k] @ state.velocity[k])
-        assert acceleration == pytest.approx(state.acceleration[k] @ state.acceleration[k])
-
-
-@pytest.mark.parametrize("name", ["vertical", "speeds", "lengths"])
-def test_exact_times_are_approached_from_above(name, casadi):
-    *case, exact = exact_cases()[name]
-    answer = free_motions.least_time(*case, steps=(12, 24), count=1)
-    off = np.array(answer.meshes) / exact - 1.0
-    assert 0.0 < off[1] < 0.006
-    assert 2.5 < off[0] / off[1] < 8.0
-    assert abs(answer.infimum / exact - 1.0) < 1.5e-3
-    assert motion_judge.judged(*case[:2], answer.motion.state, answer.time, *case[2:]).faults() == []
-
-
-def test_times_turned_and_backwards(casadi):
-    case = free_motion_cases.segment(3)
-    case = case.robot, case.limits, case.start, case.end
-    times = [free_motions.least_time(*sides, steps=(20,), count=1, rounds=0).time for sides in (case, mirrored(*case))]
-    times.append(free_motions.least_time(*case[:2], case[3], case[2], steps=(20,), count=1, rounds=0).time)
-    np.testing.assert_allclose(times, times[0], rtol=1e-6)
-
-
-def test_larger_limits_take_less_time_and_ends_cost_little(casadi):
-    """Accelerations at the ends as those of a swing about rest: on ever finer meshes they cost nothing."""
-    case = free_motion_cases.segment(3)
-    sides = case.start, case.end
-    swing = [np.append((np.array(free_motion_cases.REST) - p.position) * 9.81 / 1.7, np.zeros(3)) for p in sides]
-    free = free_motions.least_time(case.robot, case.limits, *sides, steps=(20, 40), count=1)
-    judgement = motion_judge.judged(case.robot, case.limits, free.motion.state, free.time, *sides)
-    assert judgement.faults(near=1e-5) == []
-    tied = free_motions.least_time(
-        case.robot, case.limits, *sides, steps=(20, 40), count=1, rounds=0, accelerations=swing
-    )
-    easier = {**case.limits, "tension_max": 1.01 * case.limits["tension_max"]}
-    assert free_motions.least_time(case.robot, easier, *sides, steps=(20,), count=1, rounds=0).time < free.meshes[0]
-    costs = np.array(tied.meshes) / free.meshes - 1.0
-    assert 0.0 < costs[1] < 0.6 * costs[0] < 0.06
 
 
 @pytest.mark.thorough

@@ -86,17 +86,6 @@ def test_three_ways_agree(kind, scheme, cases):
         assert ours.time == pytest.approx(programs.time, rel=1e-7)
 
 
-@pytest.mark.parametrize("kind, seed", [("2T-2", 5), ("3R3T-7", 0)])
-def test_three_ways_agree_where_a_least_speed_is_needed(kind, seed):
-    case = least_time_cases.case(kind, seed, outside=True)
-    problem = least_time.problem(case.robot, case.limits, case.path, 14)
-    ours, corners = least_time.solved(problem), least_time.solved(problem, least_time.vertex_span)
-    programs = least_time.ByTensions(case.robot, case.limits, case.path, 14).solve()
-    assert ours.sets[:, 0].max() > 0.1
-    np.testing.assert_allclose(corners.sets, ours.sets, rtol=1e-10, atol=1e-9)
-    np.testing.assert_allclose(programs.sets, ours.sets, rtol=1e-6, atol=1e-7)
-
-
 @pytest.mark.parametrize("kind", ["2T-3", "3T-4", "3R3T-6"])
 @pytest.mark.parametrize("scheme", ["interpolation", "midpoint"])
 def test_greedy_solutions_take_little_longer_than_the_optimum(kind, scheme, cases):
@@ -112,25 +101,6 @@ def test_greedy_solutions_take_little_longer_than_the_optimum(kind, scheme, case
     for fraction, rows in zip(problem.shares, problem.rows, strict=True):
         slack = path_rows.slack(rows, u, x[:-1] + 2.0 * fraction * np.diff(problem.nodes) * u)
         assert (slack > -1e-5 * np.abs(rows.c)).all()
-
-
-@pytest.mark.parametrize("kind", ["2T-3", "3T-4", "1R2T-4", "3R3T-6"])
-def test_motions_meet_the_necessary_rows(kind, cases):
-    """Any motion whose limits hold does, on cells of which each has eight of the motion's."""
-    case = cases[kind]
-    nodes = case.path.nodes(16)
-    motion, _ = least_time_bounds.above(case.robot, case.limits, case.path, 128)
-    rows = least_time_bounds.necessary(
-        case.robot, case.limits, case.path, nodes, least_time_bounds.fastest(case.robot, case.limits, case.path, nodes)
-    )
-    x = np.interp(nodes, motion.nodes, motion.x)
-    u = np.diff(x) / (2.0 * np.diff(nodes))
-    assert (rows.a * u[:, None] + rows.b * 0.5 * (x[1:] + x[:-1])[:, None] <= rows.c).all()
-    inner = np.diff(motion.x) / (2.0 * np.diff(motion.nodes))
-    cell = np.searchsorted(nodes, 0.5 * (motion.nodes[1:] + motion.nodes[:-1])) - 1
-    assert (inner >= rows.low[cell] - 1e-9).all()
-    assert (inner <= rows.high[cell] + 1e-9).all()
-    assert (x <= rows.caps).all()
 
 
 @pytest.mark.parametrize("ends", [(0.6, 1.5), (1.5, 0.6)])
@@ -155,27 +125,6 @@ def test_level_line():
     assert 0.0 < time_of(SPOOLS, TAUT, path_rows.line(*ends), 200, "midpoint") / exact - 1.0 < 6e-5
 
 
-def test_limits_of_speed_and_acceleration():
-    limits = {"acceleration_max": 3.0, "speed_max": 0.9}
-    path = path_rows.line([0.0, 0.0, 0.5], [0.0, 0.6, 1.3])
-    assert time_of(RING, limits, path, 400, "midpoint") == pytest.approx(
-        least_time_forms.trapezoid(1.0, 0.9, 3.0), rel=2e-5
-    )
-    around = path_rows.circle([0.0, 0.0, 0.8], 0.3)
-    exact = least_time_forms.circle_by_acceleration(0.3, 3.0)
-    assert time_of(RING, {"acceleration_max": 3.0}, around, 400, "midpoint") == pytest.approx(exact, rel=1e-4)
-
-
-def test_level_circle_under_many_spools():
-    """Between the rings through the spools and through the middles of the sides between them."""
-    robot = least_time_forms.ring_robot(24)
-    bounds = [least_time_forms.level_circle(0.3, reach, 0.8) for reach in (1.0, math.cos(math.pi / 24.0))]
-    for scheme in ("midpoint", "interpolation"):
-        time = time_of(robot, {"tension_min": np.zeros(24)}, path_rows.circle([0.0, 0.0, 0.8], 0.3), 384, scheme)
-        assert bounds[0] < time < bounds[1]
-    assert bounds[1] / bounds[0] < 1.004
-
-
 @pytest.mark.parametrize("kind, fraction", [("2T-3", 0.945), ("3T-3", 0.985), ("1R2T-4", 0.965), ("3R3T-7", 0.988)])
 def test_bounds_enclose_the_estimate(kind, fraction, cases):
     case = cases[kind]
@@ -198,28 +147,3 @@ def test_the_judge_sees_a_motion_that_is_too_fast(cases):
     slacks = least_time_bounds.slacks(case.robot, case.limits, faster, np.linspace(*faster.times, 200))
     weight = case.robot["mass"] * case.robot["gravity"]
     assert min(slacks["tension"].min() / weight, *(v.min() for k, v in slacks.items() if k != "tension")) < -1e-3
-
-
-@pytest.mark.parametrize("kind", ["2T-4", "3T-8", "1R2T-4", "3R3T-6"])
-def test_reversed_and_scaled(kind, cases):
-    case, scale = cases[kind], least_time_forms.Scale(2.5, 7.0)
-    time = time_of(case.robot, case.limits, case.path, 60, "midpoint")
-    larger = scale.robot(case.robot), scale.limits(case.limits), case.path.scaled(scale.size)
-    assert time_of(*larger, 60, "midpoint") == pytest.approx(scale.time * time, rel=1e-9)
-    # Greedy from the other end is another motion: both are near the least time.
-    both = [time_of(case.robot, case.limits, path, 250, "interpolation") for path in (case.path, case.path.backwards())]
-    assert both[0] == pytest.approx(both[1], rel=0.005)
-
-
-def test_steps_of_motions_are_their_derivatives(cases):
-    case = cases["3R3T-8"]
-    solution = least_time.solved(least_time.problem(case.robot, case.limits, case.path, 20))
-    motion = least_time_bounds.Timed(case.path, solution.nodes, solution.x)
-    clock = motion.clock
-    middle = 0.5 * (clock[1:] + clock[:-1])
-    step = 1e-4 * np.diff(clock)
-    before, after, state = (motion.state(middle + k * step) for k in (-1.0, 1.0, 0.0))
-    for lower, upper in (("position", "velocity"), ("velocity", "acceleration"), ("omega", "alpha")):
-        slope = (getattr(after, lower) - getattr(before, lower)) / (2.0 * step[:, None])
-        exact = getattr(state, upper)
-        np.testing.assert_allclose(slope, exact, atol=1e-5 * np.abs(exact).max())

@@ -6,7 +6,6 @@ and everything a second time from the cocircuits, the vectors of minimal support
 A definition over orientations takes margin(position, rotation) of one pose, which belongs where it is not negative.
 """
 
-from collections.abc import Callable, Sequence
 from itertools import combinations, product
 
 import numpy as np
@@ -15,7 +14,6 @@ from scipy.optimize import brentq, linprog, nnls
 from scipy.spatial import ConvexHull
 
 Array = np.ndarray
-Test = Callable[[Array, Array], float]
 
 PATTERNS = ("1T", "2T", "3T", "1R2T", "2R3T", "3R3T", "3R")
 _ROWS = {"1T": [2], "2T": [0, 2], "3T": [0, 1, 2], "1R2T": [0, 2, 4], "3R3T": [*range(6)], "3R": [3, 4, 5]}
@@ -298,49 +296,3 @@ def segment_distance(start: Array, end: Array, other_start: Array, other_end: Ar
     found += [point_distance(p, start, end) for p in (other_start, other_end)]
     at = np.clip(np.linalg.lstsq(np.c_[one, -two], other_start - start, rcond=None)[0], 0.0, 1.0)
     return min(*found, float(np.linalg.norm(start + at[0] * one - other_start - at[1] * two)))
-
-
-def segment_box_distance(start: Array, end: Array, half: Array, centre=(0.0, 0.0, 0.0), rotation=None) -> float:
-    """Of a segment and a solid box of half sides (3,): 0 where they meet, else by ends and faces, and by edges."""
-    turn = np.eye(3) if rotation is None else np.asarray(rotation, float)
-    start, end = (start - np.asarray(centre)) @ turn, (end - np.asarray(centre)) @ turn
-    step = end - start
-    crossings = [(sign * h - p) / q for h, p, q in zip(half, start, step, strict=True) if q for sign in (-1.0, 1.0)]
-    at = np.unique([0.0, 1.0, *(c for c in crossings if 0.0 <= c <= 1.0)])
-    points = start + np.r_[at, (at[1:] + at[:-1]) / 2.0][:, None] * step
-    if (np.abs(points) <= half).all(1).any():  # an interval inside has its middle inside
-        return 0.0
-    found = [float(np.linalg.norm(p - np.clip(p, -half, half))) for p in (start, end)]
-    vertices = np.array(list(product(*[(-h, h) for h in half])))
-    edges = [(a, b) for a, b in combinations(vertices, 2) if (a != b).sum() == 1]
-    return min(*found, *(segment_distance(start, end, a, b) for a, b in edges))
-
-
-def segment_sphere(start: Array, end: Array, centre: Array, radius: float) -> float:
-    """Of a segment and a sphere; negative where they meet."""
-    return point_distance(centre, start, end) - radius
-
-
-def segment_capsule(start: Array, end: Array, axis_start: Array, axis_end: Array, radius: float) -> float:
-    """Of a segment and a cylinder with half spheres on its ends; negative where they meet."""
-    return segment_distance(start, end, axis_start, axis_end) - radius
-
-
-def translation(margin: Test, positions: ArrayLike, rotation: ArrayLike) -> Array:
-    """(k,) margins at positions (k, 3) with one rotation (3, 3)."""
-    return np.array([margin(p, np.asarray(rotation, float)) for p in np.asarray(positions, float)])
-
-
-def orientation(margin: Test, position: ArrayLike, rotations: Sequence[Array]) -> Array:
-    """(k,) margins of rotations (k, 3, 3) at one position."""
-    return np.array([margin(np.asarray(position, float), r) for r in rotations])
-
-
-def inclusion(margin: Test, positions: ArrayLike, rotations: Sequence[Array]) -> Array:
-    """(k,) margins of the best of the rotations: some orientation will do."""
-    return np.array([orientation(margin, p, rotations).max() for p in np.asarray(positions, float)])
-
-
-def total(margin: Test, positions: ArrayLike, rotations: Sequence[Array]) -> Array:
-    """(k,) margins of the worst of the rotations: every orientation has to do."""
-    return np.array([orientation(margin, p, rotations).min() for p in np.asarray(positions, float)])

@@ -23,11 +23,7 @@ def plan(folder: Path, text: str, *arguments: object) -> tuple[int, str, str]:
 
 
 def strict_json(text: str) -> dict:
-    """One JSON object on one line, without NaN and infinities.
-
-    Raises:
-        ValueError: one of them stands there.
-    """
+    """One JSON object on one line, without NaN and infinities."""
     assert text.count("\n") == 1
 
     def refuse(word):

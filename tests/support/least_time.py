@@ -39,17 +39,7 @@ class Answer:
 
 
 def solve(robot, path, limits, grid=500, ramp_time=0.0):
-    """Answer of the package.
-
-    Args:
-        robot: dict of `oracles.any_motion`.
-        path: `oracles.path_rows.Path` of the mass centre: `positions.knots` (n,), m, and `positions.coefficients`
-            (n - 1, degree + 1, 3), powers of s less its piece's knot; `quaternions` alike, (w, x, y, z), or None.
-        limits: dict of `oracles.path_rows`: tension_min, tension_max, cable_speed_max, cable_acceleration_max, each
-            (n,) or a number, speed_max and acceleration_max of the mass centre; a limit that is absent is none.
-        grid: number of cells.
-        ramp_time: s, 0 for accelerations that may jump.
-    """
+    """Answer of the package."""
     with double_precision():
         prepared, frame = centred(robot_of(robot))
         sizes = {name: np.ones(prepared.n_cables) for name in limits if name not in ("speed_max", "acceleration_max")}

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from oracles import workspaces as oracle
-from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
 from support import cable_robots as robots
 
@@ -183,36 +182,6 @@ def test_a_wrench_matrix_takes_lengths_off(pulleys):
         np.testing.assert_allclose(matrix.T @ twist, -rates, atol=1e-7)
 
 
-def test_small_pulleys_are_points():
-    rng = np.random.default_rng(3)
-    robot = robots.spatial(rng, 8)
-    pose = robot.pose(rng)
-    given = {"pulley_radii": np.full(8, 1e-9), "pulley_axes": np.tile(UP, (8, 1))}
-    small = oracle.wrench_matrix(robot.base, robot.platform, *pose, "3R3T", **given)
-    np.testing.assert_allclose(small, oracle.wrench_matrix(robot.base, robot.platform, *pose, "3R3T"), atol=1e-8)
-
-
-@pytest.mark.parametrize("pattern", ["1T", "2T", "3T", "1R2T", "2R3T", "3R3T"])
-def test_nothing_is_lost_with_the_rows_that_a_pattern_drops(pattern):
-    rng = np.random.default_rng(4)
-    for suspended in (False, True):
-        robot = robots.any_robot(rng, pattern, 6, suspended)
-        position, rotation = robot.pose(rng)
-        kept = oracle.rows(pattern, robot.platform, rotation)
-        np.testing.assert_allclose(kept @ kept.T, np.eye(robots.DEGREES[pattern]), atol=1e-12)
-        full = oracle.full_wrench_matrix(robot.base, robot.platform, position, rotation)
-        np.testing.assert_allclose(kept.T @ (kept @ full), full, atol=1e-12)
-
-
-def test_a_line_beside_the_mass_centre_loses_a_moment():
-    rng = np.random.default_rng(5)
-    robot = robots.rod(rng, 7)
-    platform = robot.platform + np.array([0.1, 0.2, -0.1])
-    kept = oracle.rows("2R3T", platform, EYE)
-    full = oracle.full_wrench_matrix(robot.base, platform, np.zeros(3), EYE)
-    assert np.abs(kept.T @ (kept @ full) - full).max() > 0.01
-
-
 # Ways against each other
 
 
@@ -224,15 +193,6 @@ def test_programs_and_facets_agree(pattern, n, bounds):
         agree(robots.any_robot(rng, pattern, n, suspended, bounds), rng)
 
 
-@pytest.mark.soak
-@pytest.mark.parametrize("bounds", BOUNDS)
-@pytest.mark.parametrize(("pattern", "n"), SIZES)
-def test_programs_and_facets_agree_on_many(pattern, n, bounds):
-    rng = np.random.default_rng([7, n, len(pattern), BOUNDS.index(bounds)])
-    signs = {agree(robots.any_robot(rng, pattern, n, k % 2 == 0, bounds), rng) >= 0.0 for k in range(60)}
-    assert pattern in ("1T", "2T", "3T") or signs == {True, False}
-
-
 @pytest.mark.parametrize("robot", robots.degenerate(), ids=lambda robot: robot.name)
 def test_programs_and_facets_agree_where_something_vanishes(robot):
     rng = np.random.default_rng(8)
@@ -240,16 +200,6 @@ def test_programs_and_facets_agree_where_something_vanishes(robot):
         agree(bounded, rng)
         at = dict(vars(bounded), space=np.zeros(3))
         agree(robots.CableRobot(**at), rng)
-
-
-@pytest.mark.parametrize(("pattern", "n"), [("1T", 3), ("2T", 4), ("3T", 4), ("3T", 8), ("1R2T", 5), ("3R", 6)])
-def test_capacity_by_hull_and_by_planes(pattern, n):
-    rng = np.random.default_rng(n)
-    for _ in range(3):
-        robot = robots.any_robot(rng, pattern, n)
-        matrix, _, held = posed(robot, rng)
-        given = (matrix, [held, 0.5 * held], robot.low, robot.high)
-        assert oracle.capacity_by_hull(*given) == pytest.approx(oracle.capacity_by_planes(*given), abs=1e-9)
 
 
 def test_capacity_is_the_ball_of_wrenches_that_fits():
@@ -264,13 +214,6 @@ def test_capacity_is_the_ball_of_wrenches_that_fits():
     margins = [oracle.tension_margin(matrix, middle + radius * e, low, high) for e in directions]
     assert min(margins) == pytest.approx(0.0, abs=1e-8)
     assert oracle.ellipsoid_margin(matrix, middle, radius * np.eye(6), low, high) == pytest.approx(0.0, abs=1e-8)
-
-
-def test_capacity_below_full_rank_is_at_most_zero():
-    matrix = np.array([[1.0, -1.0], [0.0, 0.0]])
-    assert oracle.capacity_margin(matrix, [0.0, 0.0], 0.0, 10.0) == 0.0
-    assert oracle.capacity_margin(matrix, [0.0, 3.0], 0.0, 10.0) == pytest.approx(-3.0)
-    assert oracle.capacity_margin(matrix, [14.0, 3.0], 0.0, 10.0) == pytest.approx(-4.0)
 
 
 @pytest.mark.parametrize("bounds", BOUNDS)
@@ -295,98 +238,6 @@ def test_sets_of_wrenches(pattern, n, bounds):
     assert box <= oracle.tension_margin(matrix, held, *given) + 1e-9 * scale
 
 
-def test_a_ball_of_accelerations():
-    rng = np.random.default_rng(11)
-    for robot in (robots.point_mass(rng, "3T", 4, suspended=False), robots.spherical(rng, 6)):
-        position, rotation = robot.pose(rng)
-        kept = oracle.rows(robot.pattern, robot.platform, rotation)
-        matrix = oracle.wrench_matrix(robot.base, robot.platform, position, rotation, robot.pattern)
-        arm = rotation @ np.array(robot.arm)
-        margin = oracle.acceleration_margin(matrix, kept, robot.mass, 3.0, robot.low, robot.high, arm)
-        ways = rng.normal(size=(60, 3))
-        ways *= 3.0 / np.linalg.norm(ways, axis=1, keepdims=True)
-        held = [oracle.weight(kept, robot.mass, arm, [0.0, 0.0, -G] - a) for a in ways]
-        sampled = oracle.tension_margin(matrix, held, robot.low, robot.high)
-        assert margin <= sampled + 1e-9 <= margin + 0.3 * robot.mass * 3.0
-
-
-# What a margin must do
-
-
-@pytest.mark.parametrize("bounds", BOUNDS)
-@pytest.mark.parametrize(("pattern", "n"), [("1R2T", 4), ("3R3T", 6), ("3R3T", 8), ("3R3T", 10)])
-def test_the_margin_knows_no_reference_point_and_no_unit(pattern, n, bounds):
-    rng = np.random.default_rng([12, n])
-    robot = robots.any_robot(rng, pattern, n, suspended=n == 8, bounds=bounds)
-    matrix, _, held = posed(robot, rng)
-    shape = rng.normal(size=(len(matrix), 3))
-    away = rng.normal(size=3)
-    lever = np.array([[0, -away[2], away[1]], [away[2], 0, -away[0]], [-away[1], away[0], 0]])
-    change = np.block([[EYE, np.zeros((3, 3))], [40.0 * lever, 40.0 * EYE]])
-    kept = oracle.rows(pattern, robot.platform, EYE)
-    change = kept @ change @ kept.T
-    given = robot.low, robot.high
-    before = oracle.ellipsoid_margin(matrix, held, shape, *given)
-    assert same(oracle.ellipsoid_margin(change @ matrix, change @ held, change @ shape, *given), before, robot.mass * G)
-    before = oracle.tension_margin(matrix, held, *given)
-    assert same(oracle.tension_margin(change @ matrix, change @ held, *given), before, robot.mass * G)
-    assert oracle.is_closed(change @ matrix) == oracle.is_closed(matrix)
-    if bounds == "equal":
-        capacities = [oracle.capacity_margin(m @ matrix, m @ held, *given) for m in (np.eye(len(matrix)), change)]
-        assert capacities[0] != pytest.approx(capacities[1])
-
-
-@pytest.mark.parametrize(("pattern", "n"), [("2T", 3), ("3T", 5), ("1R2T", 5), ("2R3T", 6), ("3R3T", 8)])
-def test_the_margin_follows_bounds_and_wrenches(pattern, n):
-    rng = np.random.default_rng([13, n])
-    robot = robots.any_robot(rng, pattern, n)
-    matrix, _, held = posed(robot, rng)
-    low, high = robot.low, robot.high
-    unit = robot.mass * G
-
-    def margin(wrench, low=low, high=high):
-        return oracle.tension_margin(matrix, wrench, low, high)
-
-    here = margin(held)
-    near = {"abs": 1e-9 * unit}
-    assert margin(held, low + 0.3 * unit, high - 0.3 * unit) == pytest.approx(here - 0.3 * unit, **near)
-    assert margin(7.0 * held, 7.0 * low, 7.0 * high) == pytest.approx(7.0 * here, **near)
-    assert margin(held, low - rng.random(n), high + rng.random(n)) >= here - 1e-9 * unit
-    assert margin(held, low, np.inf) >= here - 1e-9 * unit
-    other = held + 0.3 * unit * rng.normal(size=len(held))
-    assert margin((held + other) / 2.0) >= (here + margin(other)) / 2.0 - 1e-9 * unit
-    assert margin([held, other]) == min(here, margin(other))
-    # A cable may be slack at a low bound of zero: another one never ends feasibility, though it may cost margin.
-    more = np.c_[matrix, rng.normal(size=len(matrix))]
-    assert not oracle.is_static(matrix, held) or oracle.is_static(more, held)
-    assert not oracle.is_closed(matrix) or oracle.is_closed(more)
-
-
-def test_suspended_robots_and_few_cables_are_never_closed():
-    rng = np.random.default_rng(14)
-    for pattern, n in (("2T", 5), ("3T", 6), ("1R2T", 6), ("2R3T", 8), ("3R3T", 9)):
-        assert not oracle.is_closed(posed(robots.any_robot(rng, pattern, n, suspended=True), rng)[0])
-    for pattern, d in robots.DEGREES.items():
-        assert not oracle.is_closed(posed(robots.any_robot(rng, pattern, d), rng)[0])
-
-
-def test_a_wrench_outside_of_the_span():
-    matrix = np.array([[1.0, -1.0, 0.5], [0.0, 0.0, 0.0]])
-    assert oracle.tension_margin(matrix, [1.0, 1.0], 0.0, np.inf) == -np.inf
-    assert oracle.margin_by_facets(matrix, [1.0, 1.0], 0.0, 10.0) == -np.inf
-    assert oracle.ellipsoid_margin(matrix, [1.0, 0.0], np.eye(2), 0.0, 10.0) == -np.inf
-    assert oracle.tension_margin(matrix, [1.0, 0.0], 0.0, 10.0) == oracle.tension_margin(matrix[:1], [1.0], 0.0, 10.0)
-
-
-def test_cables_through_the_joint_hold_no_moment():
-    robot = next(robot for robot in robots.degenerate() if robot.name == "joint in the middle of a box")
-    matrix = posed(robot, np.random.default_rng(0))[0]
-    assert oracle.rank_of(matrix) == 0 and not oracle.is_closed(matrix)
-    for margin in (oracle.tension_margin, oracle.margin_by_facets):
-        assert margin(matrix, [0.0, 0.0, 1e-3], 0.0, np.inf) == -np.inf
-        assert margin(matrix, np.zeros(3), 1.0, 3.0) == pytest.approx(1.0)
-
-
 def test_a_mass_level_with_its_spools_jumps():
     """There the margin of unbounded cables, one of them below, is far below zero; a hair lower it is infinite."""
     base = np.array([[1, 0, 1], [0, 1, 1], [-1, 0, 1], [0, -1, 1], [0, 0, -1]], float)
@@ -396,95 +247,3 @@ def test_a_mass_level_with_its_spools_jumps():
         for margin in (oracle.tension_margin, oracle.margin_by_facets):
             found = margin(matrix, [0.0, 0.0, G], 0.0, np.inf)
             assert found == np.inf if lower else found < -0.99 * G
-
-
-# Interference
-
-
-def nearest(matrix, aim, low, high):
-    found = lsq_linear(matrix, aim, (low, high), tol=1e-14, lsmr_tol=None, method="bvls")
-    return np.linalg.norm(matrix @ found.x - aim)
-
-
-def check_distances(count, rng):
-    for k in range(count):
-        a, b, c, d = rng.normal(size=(4, 3)) * 2.0
-        if k % 4 == 0:  # nearly or quite parallel
-            d = c + (b - a) * rng.normal() + rng.normal(size=3) * 10.0 ** -rng.integers(3, 20)
-        expected = nearest(np.c_[b - a, c - d], c - a, np.zeros(2), np.ones(2))
-        assert oracle.segment_distance(a, b, c, d) == pytest.approx(expected, abs=2e-7)
-        assert oracle.segment_distance(a, b, c, d) <= expected + 1e-12
-        assert oracle.segment_distance(d, c, a, b) == pytest.approx(oracle.segment_distance(a, b, c, d), abs=1e-12)
-        half, centre, turn = rng.uniform(0.2, 1.5, 3), rng.normal(size=3), Rotation.random(rng=rng).as_matrix()
-        expected = nearest(np.c_[b - a, -turn], centre - a, np.r_[0.0, -half], np.r_[1.0, half])
-        assert oracle.segment_box_distance(a, b, half, centre, turn) == pytest.approx(expected, abs=2e-7)
-
-
-def test_distances_are_least():
-    check_distances(50, np.random.default_rng(15))
-
-
-@pytest.mark.soak
-def test_distances_are_least_for_many():
-    check_distances(5000, np.random.default_rng(16))
-
-
-@pytest.mark.parametrize("angle", 10.0 ** -np.arange(1, 12))
-def test_nearly_parallel_segments_that_cross(angle):
-    along, across = np.array([5.0, 0.0, 0.0]), np.array([0.0, 5.0 * angle, 0.0])
-    away = np.array([0.3, -0.2, 0.7])
-    ends = [away + 0.4 * along - way for way in (-along, along, -along - across, along + across)]
-    assert oracle.segment_distance(*ends) <= 2e-14
-    assert oracle.segment_distance(*ends[:2], ends[2] + EYE[2], ends[3] + EYE[2]) == pytest.approx(1.0, abs=1e-14)
-
-
-def test_distances_by_hand():
-    o, x, y, z = np.zeros(3), *EYE
-    assert oracle.segment_distance(o, x, z, x + z) == 1.0  # parallel
-    assert oracle.segment_distance(o, x, 3 * x, 5 * x) == 2.0  # on one line
-    assert oracle.segment_distance(o, 4 * x, x, 2 * x) == 0.0
-    assert oracle.segment_distance(o, 2 * x, x - y + z, x + y + z) == 1.0
-    assert oracle.segment_distance(o, o, 3 * x, 3 * x) == 3.0  # points
-    assert oracle.segment_sphere(o, x, 3 * x, 0.5) == 1.5
-    assert oracle.segment_capsule(o, x, z - y, z + y, 0.75) == 0.25
-    half = np.array([1.0, 2.0, 0.5])
-    assert oracle.segment_box_distance(-5 * x, 5 * x, half) == 0.0
-    assert oracle.segment_box_distance(0.1 * x, 0.2 * x, half) == 0.0  # inside
-    assert oracle.segment_box_distance(z - 5 * x, z + 5 * x, half) == 0.5  # over a face, both ends outside of it
-    assert oracle.segment_box_distance(4 * x, 4 * x + y, half) == 3.0
-    assert oracle.segment_box_distance(2 * x - y, 2 * x + y, half, centre=-z) == pytest.approx(np.hypot(1.0, 0.5))
-
-
-# Sets of orientations
-
-
-def test_definitions_over_orientations():
-    turns = [Rotation.from_euler("y", angle).as_matrix() for angle in (-0.4, 0.0, 0.6)]
-    robot = robots.planar(np.random.default_rng(17), 5)
-    held = [0.0, robot.mass * G, 0.0]
-    positions = [robot.pose(np.random.default_rng(k))[0] for k in range(4)]
-
-    def margin(position, rotation):
-        matrix = oracle.wrench_matrix(robot.base, robot.platform, position, rotation, "1R2T")
-        return oracle.tension_margin(matrix, held, robot.low, robot.high)
-
-    each = np.array([oracle.translation(margin, positions, turn) for turn in turns])
-    np.testing.assert_array_equal(oracle.inclusion(margin, positions, turns), each.max(0))
-    np.testing.assert_array_equal(oracle.total(margin, positions, turns), each.min(0))
-    np.testing.assert_array_equal(oracle.orientation(margin, positions[2], turns), each[:, 2])
-    assert len(np.unique(each)) == each.size
-
-
-# Robots
-
-
-def test_robots_come_again_and_are_sane():
-    for pattern, n in SIZES:
-        for suspended in (False, True):
-            one, two = (robots.any_robot(np.random.default_rng(n), pattern, n, suspended, "mixed") for _ in range(2))
-            np.testing.assert_array_equal(one.base, two.base)
-            np.testing.assert_array_equal(one.high, two.high)
-            position, rotation = one.pose(np.random.default_rng(0))
-            assert np.linalg.norm(one.base - position - one.platform @ rotation.T, axis=1).min() > 0.3
-            if suspended and pattern != "3R":
-                assert (one.base - position - one.platform @ rotation.T)[:, 2].min() > 0.0
