@@ -79,6 +79,7 @@ def test_forms_keep_limits_of_the_mass_centre(asked):
         assert any(free.families) == stands_in
 
 
+@pytest.mark.thorough
 def test_splines_follow_a_motion(asked):
     problem, scene, poses, settings = asked["question"][:4]
     (form,) = asked["forms"]

@@ -57,6 +57,7 @@ def test_it_follows_and_ends_at_the_poses(turning):
     assert energy == pytest.approx(np.trapezoid(squares, rows["t"]), rel=1e-3)
 
 
+@pytest.mark.thorough
 def test_quaternions_may_jump_to_their_negatives(turning, monkeypatch):
     """Both stand for one orientation."""
     motion, question, duration, _ = turning

@@ -117,6 +117,7 @@ def test_searches_begin_from_lines_that_are_no_slower_than_straight_ones(begun):
     np.testing.assert_allclose(planned.frame.outward(ends.position), PLACES[:2], atol=1e-12)
 
 
+@pytest.mark.quick("rows1")
 @pytest.mark.parametrize("rows", [[0, 1], [1]])
 def test_lines_stand_in_where_nothing_is_proved(monkeypatch, begun, rows):
     """On single segments, too; the plan says so, and not that nothing was found."""

@@ -48,6 +48,7 @@ def check_cell(cell, keys):
     assert -15.0 * TOUCHED <= cell["tension_margin_bound"] <= cell["tension_margin"]
 
 
+@pytest.mark.thorough
 def test_targets():
     """Above the spools nothing is searched; the start is reached at once; mirror images take as long."""
     cells = {(place["x"], place["z"]): (cell, keys) for place, cell, keys in cells_of(PLANAR)}

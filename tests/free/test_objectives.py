@@ -79,7 +79,7 @@ def test_each_objective_is_the_best_in_what_it_is_for():
     assert best("time").duration < LONGEST
 
 
-@pytest.mark.quick("time")
+@pytest.mark.thorough
 @pytest.mark.parametrize("objective", ["time", "tension", "margin"])
 def test_no_segment_is_shorter_than_limits_allow(objective):
     """The least time is 0.68 s; in less the best tensions break their limits."""

@@ -54,6 +54,7 @@ def test_a_motion_is_proved_for_all_robots_and_samples_agree(nominal):
     assert nominal[0].duration < free.duration < 1.1 * nominal[0].duration
 
 
+@pytest.mark.thorough
 def test_more_room_takes_more_time(nominal):
     durations = [nominal[0].duration]
     for fraction in (0.5, 1.0):
@@ -66,6 +67,7 @@ def test_more_room_takes_more_time(nominal):
     assert 0.8 * first < second < 1.25 * first
 
 
+@pytest.mark.thorough
 def test_too_large_an_uncertainty_is_told():
     free, _ = solve(RING, LIMITS | {"uncertainty": uncertain(spool_positions=0.5)}, ASIDE)
     assert free.is_optimal

@@ -95,7 +95,8 @@ def test_depths_of_bodies_that_meet():
     solid = bodies_of(cspr_jax.load_robot("prototype"), scene(cspr_jax.load_robot("prototype"), obstacles=[box])).boxes
     planes = jax.tree.map(lambda x: x[0], solid.planes)
     bands, lines = moving(rng, rng.uniform(-1.5, 1.5, (300, 2, 3)), 0.05)
-    depth = jax.vmap(lambda x: convex_gaps.depth_bound(convex_gaps.Solid(x, *convex_gaps.SEGMENT), planes))(bands)
+    bound = jax.vmap(lambda x: convex_gaps.depth_bound(convex_gaps.Solid(x, *convex_gaps.SEGMENT), planes))
+    depth = jax.jit(bound)(bands)
     inner = (lines - box.centre) @ box.rotation
     part = [oracle.chord(x[:, 0], x[:, 1] - x[:, 0], np.broadcast_to(box.half, (300, 3))) for x in inner]
     meets, is_deep = np.min(part, axis=0) > 0.0, np.asarray(depth) < 0.0

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import h5py
+import jax
 import numpy as np
 import pytest
 from oracles import clearance as oracle
@@ -308,7 +309,7 @@ def test_exits_move_no_more_than_is_said():
 
     def exit_of(points):
         up = np.broadcast_to([0.0, 0.0, -1.0], points.shape)
-        return exits(np.zeros_like(points), up, np.full(points.shape[:-1], radius), points)
+        return jax.jit(exits)(np.zeros_like(points), up, np.full(points.shape[:-1], radius), points)
 
     before, after = exit_of(middles[:, None] + 0.0 * steps), exit_of(middles[:, None] + steps)
     for name, bound in (("point", found.exits), ("direction", found.units[:, 0])):

@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import jax
 import numpy as np
 import pytest
 from oracles import workspaces as oracle
@@ -148,7 +149,7 @@ def test_cables_that_leave_pulleys_are_kept_apart_from_there():
 
     found = apart(centred(wound)[0], places - base.mean(0), turns)
     for place, value in zip(places, found, strict=True):
-        ends = np.asarray(exits(base, wound.pulleys.axes, wound.pulleys.radius, place + platform).point)
+        ends = np.asarray(jax.jit(exits)(base, wound.pulleys.axes, wound.pulleys.radius, place + platform).point)
         moved = dataclasses.replace(plain, base_points=ends)
         assert value == pytest.approx(apart(moved, place[None], turns[:1])[0], abs=1e-9)
         assert value != pytest.approx(apart(plain, place[None], turns[:1])[0], abs=1e-3)
