@@ -244,7 +244,7 @@ def test_the_least_energy_above_a_floor():
     assert edge * (1.0 - 2e-3) < launch["flight_time"] < edge
 
 
-@pytest.mark.thorough
+@pytest.mark.soak
 def test_the_earliest_landing():
     """No other number of arcs, and no shorter flight with the same number, lands earlier."""
     found = cspr_jax.plan(content({"time": None, "choose": "time"}, last=None)).to_dict()

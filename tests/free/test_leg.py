@@ -103,7 +103,7 @@ def test_platforms_leave_rest(robot, tension_max, z0, place, longest):
     assert tensions.max() < tension_max + 1e-9
 
 
-@pytest.mark.thorough
+@pytest.mark.soak
 def test_nothing_is_found():
     """Below 3 m/s no motion stays taut between these poses."""
     planned = cspr_jax.plan(KEYS | {"limits": LIMITS | {"speed_max": 3.0}, "pose": poses(*PLACES[:2])})

@@ -222,8 +222,7 @@ def test_poses_that_no_motion_can_have_are_refused_at_once(tmp_path, monkeypatch
     assert err.count("\n") == 1 and line in err
 
 
-@pytest.mark.ci("eight")
-@pytest.mark.thorough
+@pytest.mark.soak
 @pytest.mark.parametrize("kind", ["six pulleys", "eight"])
 def test_platforms(kind):
     free, line, _ = compared(kind, 1)

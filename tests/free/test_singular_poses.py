@@ -92,7 +92,7 @@ def test_second_derivatives_at_a_singular_pose_are_numbers():
     np.testing.assert_allclose(regular.cofactors, 0.0, atol=1e-12)
 
 
-@pytest.mark.ci("3R3T-None", "1R2T-longest2")
+@pytest.mark.ci("3R3T-None")
 @pytest.mark.thorough
 @pytest.mark.parametrize(("pattern", "longest"), [("3R3T", None), ("3R3T", np.array(3.0)), ("1R2T", np.array(3.0))])
 def test_derivatives_are_finite_differences(pattern, longest):

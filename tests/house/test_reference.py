@@ -45,6 +45,7 @@ def fields_of(text: str, head: str) -> set[str]:
     return {re.match(r"\| `(\w+)` \|", row)[1] for row in rows}
 
 
+@pytest.mark.ci("table_3_2", "launch", "straight_line", "transition", "translating")
 @pytest.mark.parametrize("name", [PLANS[0], *(pytest.param(name, marks=pytest.mark.thorough) for name in PLANS[1:])])
 def test_everything_that_a_plan_writes_is_in_the_reference(tmp_path, reference, name):
     path = ROOT / "sweeps" / f"{name}.toml"

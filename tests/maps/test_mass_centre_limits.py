@@ -136,7 +136,7 @@ def between(peaks):
     return float(0.5 * (middle[gap] + middle[gap + 1]))
 
 
-@pytest.mark.ci("minimum-arcs-False", "minimum-oscillations-False", "poses-False", "redundant arcs-False")
+@pytest.mark.ci("minimum-arcs-False", "minimum-oscillations-False")
 @pytest.mark.parametrize(("kind", "is_turned"), cases())
 def test_motions_of_their_own_time_are_judged(tmp_path, kind, is_turned):
     keys = {"map": kind} | FIXED[kind]
@@ -168,7 +168,7 @@ def test_motions_of_their_own_time_are_judged(tmp_path, kind, is_turned):
         assert 0 < changed < len(motions)
 
 
-@pytest.mark.ci("least-time-False", "paths-False")
+@pytest.mark.ci("least-time-False")
 @pytest.mark.thorough
 @pytest.mark.parametrize("is_turned", [False, pytest.param(True, marks=pytest.mark.soak)])
 @pytest.mark.parametrize("kind", FASTEST)

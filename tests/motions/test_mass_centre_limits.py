@@ -106,7 +106,7 @@ def largest(planned):
     return {name: segment[name] for name in RATES}
 
 
-@pytest.mark.ci("hypocycloid-standard", "ellipse")
+@pytest.mark.ci("ellipse")
 @pytest.mark.thorough
 @pytest.mark.parametrize("family", families(FIXED))
 def test_motions_of_their_own_time_are_judged(family):

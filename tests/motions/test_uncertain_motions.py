@@ -116,7 +116,7 @@ def worst_rooms(problem, state, multiple):
             yield room(limits, *balances(robot, one, base + spools, centre, ratio))[0]
 
 
-@pytest.mark.ci("prototype", "laval-mssm")
+@pytest.mark.ci("prototype")
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", CASES)
 def test_no_robot_within_a_proved_multiple_fails_and_one_within_a_refuted_one_does(name):

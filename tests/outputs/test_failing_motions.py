@@ -147,7 +147,7 @@ def shaded(panel):
     return np.stack([bands[..., 0].min(1), bands[..., 0].max(1)], axis=1)
 
 
-@pytest.mark.quick("None", "tensions")
+@pytest.mark.quick("tensions")
 @pytest.mark.parametrize("quantity", [None, "tensions", "summary"])
 def test_pictures_over_time_shade_them(plan, file, quantity):
     figure = cspr_jax.plot(file, quantity=quantity)

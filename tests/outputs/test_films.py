@@ -16,9 +16,11 @@ from cspr_jax.outputs.plots.style.style import Style, in_style
 PLAN = """
 schema = 1
 robot = "prototype"
-family = "transition"
+family = "hypocycloid-standard"
 z0 = 1.2
+tension_min = 0.02
 tension_max = 3.0
+cable_speed_max = 9.0
 [[pose]]
 rest = true
 [[pose]]
@@ -38,15 +40,15 @@ def test_a_film_is_as_long_as_its_motion(plan, tmp_path, capsys):
     """By the delays of its pictures, which a GIF has in hundredths of a second."""
     file = tmp_path / "plan.toml"
     file.write_text(PLAN, "utf-8")
-    assert main(["plan", str(file), "--animate", str(tmp_path / "film.gif"), "--speed", "16"]) == 0
-    length = plan.to_dict()["segments"][0]["duration"] / 16.0
+    assert main(["plan", str(file), "--animate", str(tmp_path / "film.gif"), "--speed", "64"]) == 0
+    length = plan.to_dict()["segments"][0]["duration"] / 64.0
     with Image.open(tmp_path / "film.gif") as picture:
         delays = []
         for number in range(picture.n_frames):
             picture.seek(number)
             delays.append(picture.info["duration"] / 1000.0)
     assert 0.0 <= sum(delays[:-1]) - length <= 0.05 + 1e-9
-    assert (tmp_path / "film.gif").read_bytes() == plan.animate(tmp_path / "again.gif", speed=16.0).read_bytes()
+    assert (tmp_path / "film.gif").read_bytes() == plan.animate(tmp_path / "again.gif", speed=64.0).read_bytes()
 
 
 def test_cables_are_where_the_plan_has_them(plan):
@@ -153,7 +155,7 @@ def test_no_film_is_written(tmp_path, monkeypatch, capsys, words, said):
 @pytest.mark.thorough
 def test_what_is_not_feasible_is_shown_anyway_only(tmp_path):
     infeasible = cspr_jax.plan(
-        {"schema": 1, "robot": "prototype", "family": "transition", "z0": 1.2}
+        {"schema": 1, "robot": "prototype", "family": "hypocycloid-standard", "z0": 1.2}
         | {"pose": [{"rest": True}, {"position": [0.9, 0.1, 1.2], "arcs": 2}]}
     )
     with pytest.raises(ConfigError, match="not proved feasible"):

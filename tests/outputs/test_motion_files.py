@@ -105,6 +105,7 @@ def test_a_row_at_a_border_is_of_both_segments():
     assert flags.tolist() == [True, True, False, False, False, True, True]
 
 
+@pytest.mark.thorough
 def test_motions_of_the_version_before(motions, tmp_path, figures, capsys):
     """They have neither version nor plan, spools nor segments."""
     path = tmp_path / "old.h5"

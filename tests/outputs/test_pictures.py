@@ -237,6 +237,7 @@ def test_from_rest_is_said_of_motions_alone(capsys, tmp_path, figures, kind, qua
     assert ("from rest" in figures[0].get_suptitle()) == rest
 
 
+@pytest.mark.thorough
 def test_none_only_where_there_is_some(capsys, tmp_path, figures):
     arcs = np.full((5, 5, 3, 1), 3)
     arcs[0, 0] = 7

@@ -289,6 +289,7 @@ HIGH = AXES | {"z": np.linspace(0.5, 2.75, 7)}
 SHAPES = {"static": ball(HIGH, size=1.0, table={"conditions": ["static"]}), "own": ball(HIGH, size=0.6)}
 
 
+@pytest.mark.thorough
 def test_workspaces_are_compared_by_their_outlines():
     """Of each result in its colour, at heights where something is inside; words say what each has to meet."""
     figure = cspr_jax.plot(list(SHAPES.values()))

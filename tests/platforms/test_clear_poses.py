@@ -90,7 +90,7 @@ def kind_of(cell, first):
     return {0: "free", 1: "next", 2: "third"}[cell["arcs"] - first]
 
 
-@pytest.mark.ci("cables", "eight cables")
+@pytest.mark.ci("eight cables")
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", SWEEPS)
 def test_cells_are_what_plans_and_samples_say(name):

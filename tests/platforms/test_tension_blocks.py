@@ -151,6 +151,7 @@ def block_breaks(count, seed, kind, robot, limits):
     return broken, np.array(gaps)
 
 
+@pytest.mark.ci("from rest")
 @pytest.mark.quick("from rest")
 @pytest.mark.parametrize(
     "kind", [pytest.param(USUAL, marks=pytest.mark.thorough), FROM_REST], ids=["between", "from rest"]

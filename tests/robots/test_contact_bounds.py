@@ -146,7 +146,7 @@ def instants(robot, around, seed: int, middle, size: float, count: int):
     return [x.reshape(count, -1) for x in exact[:5]], in_batches(kernel, blocks, batch_size=40)
 
 
-@pytest.mark.ci("prototype", "laval-mssm")
+@pytest.mark.ci("prototype")
 @pytest.mark.thorough
 @pytest.mark.parametrize(
     "name", ["prototype", *(pytest.param(name, marks=pytest.mark.thorough) for name in ("cogiro", "laval-mssm"))]

@@ -200,6 +200,7 @@ def limits_of(key, value):
     return Limits(**{other: v if other in OF_CABLES else v[0] for other, v in far.items()})
 
 
+@pytest.mark.quick("tension_min")
 @pytest.mark.parametrize("key", LIMITS)
 def test_each_limit_raises_its_own_flag(key):
     """Just inside the extreme that the motion attains the limit refuses it, just outside it does not."""

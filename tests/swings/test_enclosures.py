@@ -170,6 +170,7 @@ def test_a_limit_of_lengths_gives_way_by_as_much_as_spools_move():
     assert found.refuted[i] == pytest.approx(2.0, rel=0.01)
 
 
+@pytest.mark.thorough
 def test_speeds_and_accelerations_of_other_robots_keep_their_limits():
     without = point_masses(Limits())
     base, rng = np.asarray(without[0].robot.base_points), np.random.default_rng(3)

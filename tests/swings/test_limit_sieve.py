@@ -90,7 +90,7 @@ def compare(seed, count):
     return int((wanted > 0).sum()), refused
 
 
-@pytest.mark.quick("0")
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", [0, 3])
 def test_limits_are_met_by_the_arcs_of_a_full_search(seed):
     """Segments of a robot, some with an answer, some refused by limits; the soak has 100,000 segments."""

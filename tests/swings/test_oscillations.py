@@ -105,6 +105,7 @@ def test_symmetries():
             np.testing.assert_allclose(v, second, atol=1e-6)
 
 
+@pytest.mark.thorough
 def test_symmetries_at_a_fixed_inclination():
     """Six-fold, and the opposite target at the opposite inclination."""
     z0, radius, angle = 2.0, np.linspace(0.4, 3.0, 12), 0.23

@@ -134,6 +134,7 @@ def test_motion_starts_at_rest_and_ends_like_a_pendulum(tilted, name):
             np.testing.assert_allclose((after[k] - before[k]) / (2.0 * h * time), now[k + 1], rtol=2e-6, atol=1e-6)
 
 
+@pytest.mark.thorough
 @given(
     st.tuples(*[st.floats(-6.0, 6.0)] * 2),
     st.floats(-0.95, 0.95),
@@ -293,6 +294,7 @@ def test_table_1_2(capsys):
             )
 
 
+@pytest.mark.thorough
 def test_table_1_3(capsys):
     """The printed cells belong to w_max = 5 sqrt(3), and the printed epsilon to a slip: 0.0599 gives the printed n."""
     cells = cells_of(capsys, "1.3")
