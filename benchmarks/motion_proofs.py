@@ -8,7 +8,7 @@ import numpy as np
 
 from cspr_jax.build.robots import load_robot
 from cspr_jax.curves.interpolation import interpolated
-from cspr_jax.curves.several import SeveralSplines
+from cspr_jax.curves.spline import SplineBatch
 from cspr_jax.motion.amplitudes import named
 from cspr_jax.motion.problem import Problem
 from cspr_jax.robots.cables import wrench_units
@@ -76,7 +76,7 @@ def measure(name: str, count: int) -> None:
     print(f"  {ROWS} rows of 10 s: {seconds:.3f} s with interpolation, {case.proof.blocks} blocks")
 
     def many():
-        several = SeveralSplines(splines)
+        several = SplineBatch(splines)
         return proofs_of(problem, several.bounds, several.durations, jumps=several.jumps)
 
     seconds, cases = cpu(many)

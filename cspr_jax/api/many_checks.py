@@ -16,7 +16,7 @@ from cspr_jax.config.equivalents import as_moved
 from cspr_jax.config.plan import plan_keys
 from cspr_jax.config.robot import resolve_robot
 from cspr_jax.curves.files import kept_to, placed_inward, reference_of, samples_of, source_spline
-from cspr_jax.curves.several import SeveralSplines
+from cspr_jax.curves.spline import SplineBatch
 from cspr_jax.errors import InputError
 from cspr_jax.motion.cause import Cause
 from cspr_jax.numerics.elementary import double_precision
@@ -110,7 +110,7 @@ def check_many(
                 motions.append(placed_inward(curve, axes, reference))
             except InputError as error:
                 raise InputError(f"motion {i}, {error.key}", error.value, error.allowed, fault=error.fault) from error
-        several, scene = SeveralSplines(motions), scene_of(problem.robot, file, axes, keys, NAME, trajectory=keys)
+        several, scene = SplineBatch(motions), scene_of(problem.robot, file, axes, keys, NAME, trajectory=keys)
         proofs = proofs_of(problem, several.bounds, several.durations, scene, several.jumps)
         answers = with_attained(problem, answers_of(proofs, several.durations), motions, scene)
         judge_all_robots(problem, answers, motions, scene)

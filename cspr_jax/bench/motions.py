@@ -9,8 +9,7 @@ import numpy as np
 from cspr_jax.bench.timing import best
 from cspr_jax.build.robots import load_robot
 from cspr_jax.curves.interpolation import interpolated
-from cspr_jax.curves.several import SeveralSplines
-from cspr_jax.curves.spline import Spline
+from cspr_jax.curves.spline import Spline, SplineBatch
 from cspr_jax.errors import SelfCheckError
 from cspr_jax.motion.amplitudes import named
 from cspr_jax.motion.problem import Problem
@@ -81,7 +80,7 @@ def record_rate() -> float:
 def together_rate() -> float:
     """Motions of eight cables that are judged a second, `TOGETHER` at once."""
     judged, rng = problem(EIGHT), np.random.default_rng(0)
-    several = SeveralSplines([_motion(EIGHT, rng) for _ in range(TOGETHER)])
+    several = SplineBatch([_motion(EIGHT, rng) for _ in range(TOGETHER)])
     prove = partial(proofs_of, judged, several.bounds, several.durations, jumps=several.jumps)
     return TOGETHER / best(lambda: _decided(prove()))
 

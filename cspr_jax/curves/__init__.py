@@ -1,9 +1,9 @@
-"""Curves: piecewise polynomials through places and orientations, and what is read as such.
+"""Curves: piecewise polynomials through positions and orientations, and what is read as such.
 
-What controllers play is a table of samples or way-points and an interpolation between them: polynomials, piece by
-piece. Over a block of time each lies within a narrow band around a straight line, found from its Bernstein
-coefficients, whether the block holds a part of a piece or hundreds of pieces. From such bands follow bounds of cables,
-of the balance and of tensions (`robots.bounds.state_bounds`, `robots.bounds.witness_tensions`), and so verdicts between
+What controllers play is a table of samples or waypoints and an interpolation between them: polynomials, piece by
+piece. Over a block of time each lies close to a straight line, with a remainder that its Bernstein coefficients bound,
+whether the block holds a part of a piece or hundreds of pieces. From such bounds follow those of cables, of the balance
+and of tensions (`robots.bounds.state_bounds`, `robots.bounds.witness_tensions`), and so verdicts between
 the samples. The parameter of a curve is the time of a motion, or the coordinate along a path that no motion runs along
 yet.
 
@@ -11,11 +11,8 @@ Orientations are quaternions that are interpolated as they are and normalised af
 
 Files, each importing only from those above it:
 
-    blocks          bounds of states over blocks of time
-    spline          positions and rotations over time
-    several         blocks of several motions together
-    interpolation   cubic, quintic and Hermite curves through samples
-    thinned         curves through every second sample
+    spline          positions and rotations over time, and bounds of them over blocks, of one motion or a batch
+    interpolation   cubic, quintic and Hermite curves through samples, or through every second one
     reading         tables and pieces that were read, curves of SciPy, tables window by window
     noise           noise of recorded samples
     smoothing       the smoothest curve near them

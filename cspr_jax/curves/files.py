@@ -27,10 +27,10 @@ from cspr_jax.robots.statics.reference_pose import aligned
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Samples of a motion, not way-points, are at least so many; the part of the largest speed that counts as moving.
-MANY, MOVING = 30, 0.2
-STILL = 1e-6  # m/s; slower samples are at rest but for rounding
-BESIDE = 1e-9  # share of the size of a motion by which rounding takes it off the plane or the guide of a robot
+MANY = 30  # samples, at least, of a motion that is no sequence of waypoints
+MOVING = 0.2  # part of the largest speed that counts as moving
+AT_REST = 1e-6  # m/s; slower samples are at rest but for rounding
+BESIDE = 1e-9  # part of the largest coordinate by which rounding takes a motion off the plane or the guide of a robot
 JOINT_STAYS = 1e-6  # m; by which the joint of a robot moves in a table of six decimals
 BACK = np.array([1.0, -1.0, -1.0, -1.0])
 
@@ -39,19 +39,21 @@ def samples_of(times, positions, quaternions=None, velocities=None, acceleration
     """Samples of a motion from arrays."""
     times, positions = np.asarray(times, float), np.asarray(positions, float)
     others = {"quaternions": quaternions, "velocities": velocities, "accelerations": accelerations}
-    arrays: dict[str, Any] = {name: np.asarray(rows, float) for name, rows in others.items() if rows is not None}
+    arrays: dict[str, Any] = {name: np.asarray(values, float) for name, values in others.items() if values is not None}
     if accelerations is not None and velocities is None:
         raise InputError("accelerations", None, "absent without velocities")
-    for name, rows in ({"positions": positions} | arrays).items():
-        if len(rows) != len(times):
-            raise InputError(name, None, f"must have {len(times)} rows, one for each time", fault=f"shape {rows.shape}")
+    for name, values in ({"positions": positions} | arrays).items():
+        if len(values) != len(times):
+            raise InputError(
+                name, None, f"must have {len(times)} rows, one for each time", fault=f"shape {values.shape}"
+            )
     if "quaternions" in arrays:
         with np.errstate(over="ignore"):
-            sizes = np.linalg.norm(arrays["quaternions"], axis=1)
-        odd = np.flatnonzero(~((sizes >= SHORTEST) & (sizes <= LONGEST)))
+            norms = np.linalg.norm(arrays["quaternions"], axis=1)
+        odd = np.flatnonzero(~((norms >= SHORTEST) & (norms <= LONGEST)))
         if len(odd):
-            row = arrays["quaternions"][odd[0]].tolist()
-            raise InputError(f"quaternions[{odd[0]}]", row, "a unit quaternion, scalar first")
+            quaternion = arrays["quaternions"][odd[0]].tolist()
+            raise InputError(f"quaternions[{odd[0]}]", quaternion, "a unit quaternion, scalar first")
     return MotionTable(times, positions, **arrays)
 
 
@@ -78,17 +80,17 @@ def kept_to(pattern: str, spline: Spline, *, is_planar: bool) -> Spline:
     turning = None if spline.quaternion is None else np.array(spline.quaternion)
     if is_planar and not row.is_planar:
         raise InputError("positions", None, "must have y too, but for planar robots", fault="x and z alone")
-    size = BESIDE * np.abs(position).max()
+    tolerance = BESIDE * np.abs(position).max()
     if row.is_planar:
         beside = float(np.abs(position[:, :, 1]).max())
-        if beside > size:
+        if beside > tolerance:
             raise InputError("positions", None, "must be 0 on a planar robot", fault=f"y reaches {beside:.3g} m")
         position[:, :, 1] = 0.0
         if turning is not None:
             if np.abs(turning[:, :, [1, 3]]).max() > BESIDE * np.abs(turning).max():
                 raise InputError("orientations", None, "must turn about y alone", fault="those of a planar robot")
             turning[:, :, [1, 3]] = 0.0
-    if row.name == "1T" and np.ptp(position[:, :, :2], axis=(0, 1)).max() > size:
+    if row.name == "1T" and np.ptp(position[:, :, :2], axis=(0, 1)).max() > tolerance:
         raise InputError("positions", None, "must be the same everywhere on a vertical guide", fault="x and y")
     if row.is_jointed:
         moved = float(np.ptp(position, axis=(0, 1)).max())
@@ -109,11 +111,11 @@ def moving_ends(source: Any, ends: str | None) -> list[str]:
     if len(times) < MANY:
         return []
     largest = float(np.max(np.linalg.norm(np.diff(positions, axis=0), axis=1) / np.diff(times)))
-    for word, rows in (("begin", slice(None, 4)), ("end", slice(-4, None))):
-        place = times[rows][0 if word == "begin" else -1]
-        curve = BarycentricInterpolator(times[rows] - place, positions[rows])
+    for word, part in (("begin", slice(None, 4)), ("end", slice(-4, None))):
+        end = times[part][0 if word == "begin" else -1]
+        curve = BarycentricInterpolator(times[part] - end, positions[part])
         speed = float(np.linalg.norm(curve.derivative(0.0)))
-        if speed > max(MOVING * largest, STILL):
+        if speed > max(MOVING * largest, AT_REST):
             lines.append(
                 f"hint: its samples {word} at {speed:.3g} m/s, where the curve is taken to be at rest: ends natural or "
                 "periodic, or velocities in the file, would keep that"
@@ -127,9 +129,9 @@ def placed_inward(
     """A spline in the axes of a robot file, in those of the kernels."""
     turning = spline.quaternion
     if turning is not None:
-        rows = frame.rotated_quaternions(np.asarray(turning)).reshape(-1, 4)
+        units = frame.rotated_quaternions(np.asarray(turning)).reshape(-1, 4)
         # A product is linear in the quaternion, and so in its coefficients.
-        turning = as_float64(products(rows, (reference * BACK)[None]).reshape(turning.shape))
+        turning = as_float64(products(units, (reference * BACK)[None]).reshape(turning.shape))
     moved = dataclasses.replace(spline, position=as_float64(frame.inward(spline.position)), quaternion=turning)
     if centre is None or not np.any(centre) or turning is None:
         return moved

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.interpolate import BSpline, CubicSpline, PPoly, make_interp_spline
@@ -27,7 +27,8 @@ ENDS = ("rest", "natural", "periodic")
 # The ends of a periodic motion differ by no more than this part of its largest number.
 PERIODIC = 1e-9
 # Samples closer in time than this have accelerations beyond all numbers.
-LEAST_STEP = 1e-12  # s
+MIN_STEP = 1e-12  # s
+JUMP = 1e-6  # part of the largest acceleration by which one jumps, but for rounding, where legs meet
 
 
 def interpolated(
@@ -91,12 +92,12 @@ def check_order(times: Float[np.ndarray, "n"], *, repeated: bool) -> None:
 
 
 def check_steps(times: Float[np.ndarray, "n"]) -> None:
-    """Refuse instants that are too close for numbers."""
+    """Refuse times that are too close for numbers."""
     steps = np.diff(times)
-    close = np.flatnonzero((steps > 0.0) & (steps < LEAST_STEP))
+    close = np.flatnonzero((steps > 0.0) & (steps < MIN_STEP))
     if len(close):
         i = int(close[0]) + 1
-        raise InputError(f"times[{i}]", float(times[i]), f"{LEAST_STEP:g} s or more behind the time before it")
+        raise InputError(f"times[{i}]", float(times[i]), f"{MIN_STEP:g} s or more behind the time before it")
 
 
 def _check(times: np.ndarray, positions, quaternions, interpolation: str, ends: str) -> None:
@@ -144,23 +145,19 @@ def _spline(
         return _periodic(times, values, degree)
     if derivatives is None:
         derivatives = np.full((2, 2, values.shape[1]), np.nan)
-    still = np.zeros(values.shape[1])
-    free = [(2, still)] if degree == 3 else [(3, still), (4, still)]
+    zero = np.zeros(values.shape[1])
+    free = [(2, zero)] if degree == 3 else [(3, zero), (4, zero)]
     conditions = []
     for end in derivatives:
-        known = [(order, value) for order, value in zip((1, 2), end, strict=True) if not np.isnan(value).any()]
-        rest = [(order, still) for order in (1, 2)]
+        prescribed = [(order, value) for order, value in zip((1, 2), end, strict=True) if not np.isnan(value).any()]
+        rest = [(order, zero) for order in (1, 2)]
         usual = rest if ends == "rest" else free
-        # The highest orders that are free fill what is not known.
-        conditions.append((known + [row for row in usual if row[0] not in dict(known)])[: degree // 2])
+        # Conditions of `ends` take the place of those that are not prescribed.
+        conditions.append((prescribed + [pair for pair in usual if pair[0] not in dict(prescribed)])[: degree // 2])
     if degree == 3:
         return _pieces(CubicSpline(times, values, bc_type=(conditions[0][0], conditions[1][0])))
-    return _quintic(
-        times,
-        make_interp_spline(
-            times, values, degree, bc_type=tuple(sorted(rows, key=lambda row: row[0]) for rows in conditions)
-        ),
-    )
+    ordered = tuple(sorted(condition, key=lambda pair: pair[0]) for condition in conditions)
+    return _quintic(times, make_interp_spline(times, values, degree, bc_type=ordered))
 
 
 def _periodic(times: np.ndarray, values: np.ndarray, degree: int) -> np.ndarray:
@@ -183,10 +180,10 @@ def hermite(times: Float[np.ndarray, "n"], derivatives: list) -> np.ndarray:
     """Pieces with the values and derivatives of samples."""
     width = np.diff(times)[:, None]
     degree = 2 * len(derivatives) - 1
-    falls = [math.factorial(degree - i) / math.factorial(degree) for i in range(len(derivatives))]
+    factors = [math.factorial(degree - i) / math.factorial(degree) for i in range(len(derivatives))]
 
     def ends(values: list[np.ndarray], step: np.ndarray) -> list[np.ndarray]:
-        taylor = [fall * step**i * value for i, (fall, value) in enumerate(zip(falls, values, strict=True))]
+        taylor = [factor * step**i * value for i, (factor, value) in enumerate(zip(factors, values, strict=True))]
         return [sum(math.comb(j, i) * taylor[i] for i in range(j + 1)) for j in range(len(taylor))]
 
     first = ends([np.asarray(values, float)[:-1] for values in derivatives], width)
@@ -197,3 +194,35 @@ def hermite(times: Float[np.ndarray, "n"], derivatives: list) -> np.ndarray:
 def _pieces(spline: PPoly) -> np.ndarray:
     powers = np.moveaxis(spline.c[::-1], 0, 1)
     return bernstein_of_powers(powers * np.diff(spline.x)[:, None, None] ** np.arange(powers.shape[1])[:, None])
+
+
+def thinned(spline: Spline, first: int) -> Spline:
+    """Hermite pieces through every second sample of a motion, its ends, and where the accelerations of legs jump."""
+    knots = np.asarray(spline.knots)
+    tables = {name: np.asarray(getattr(spline, name)) for name in ("position", "quaternion")}
+    sides = {name: _sides(table, np.diff(knots)[:, None]) for name, table in tables.items() if table.ndim}
+    is_kept = np.zeros(len(knots), bool)
+    is_kept[[0, -1]] = is_kept[first::2] = True
+    for starts, ends in (pair for pairs in sides.values() for pair in pairs[2:]):
+        is_kept[1:-1] |= (np.abs(starts[1:] - ends[:-1]) > JUMP * np.abs(ends).max()).any(axis=1)
+    at = np.flatnonzero(is_kept)
+    times = np.repeat(knots[at], 2)[1:-1]
+    fewer: dict[str, Any] = {
+        name: as_float64(hermite(times, [_between(starts[at[:-1]], ends[at[1:] - 1]) for starts, ends in pairs]))
+        for name, pairs in sides.items()
+    }
+    return dataclasses.replace(spline, knots=as_float64(knots[at]), **fewer)
+
+
+def _sides(table: np.ndarray, width: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    # Values and derivatives that samples of pieces of this degree have, at the starts and at the ends of the pieces.
+    degree, factor, pairs = table.shape[1] - 1, np.ones_like(width), []
+    for order in range(degree // 2 + 1):
+        differences = np.diff(table, order, axis=1)
+        pairs.append((factor * differences[:, 0], factor * differences[:, -1]))
+        factor = factor * (degree - order) / width
+    return pairs
+
+
+def _between(starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    return np.stack([starts, ends], axis=1).reshape(-1, starts.shape[1])

@@ -15,21 +15,21 @@ from cspr_jax.curves.interpolation import continuous
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Rows of the stretches in which noise is estimated, and the most of them.
-STRETCH, STRETCHES = 96, 16
+WINDOW = 96  # samples in which noise is estimated at a time
+MAX_WINDOWS = 16
 ORDERS = range(2, 13)  # of differences
 # Median of the absolute value of a normal variable, over its standard deviation.
 MEDIAN = 0.6745
 # Standard deviation of the second derivative of a cubic spline through white noise of 1 at times 1 apart.
 BENDING = 6.0
 GRAVITY = 9.81
-ACCELERATION = 0.02  # share of gravity, and of the motion's own acceleration, that noise may have
-SHARE = 0.01  # of rows at which the acceleration jumps by so much
-SCATTER = 0.05  # noise is smaller than this share of the way, else the samples are way-points
+ACCELERATION = 0.02  # part of gravity, and of the motion's own acceleration, that noise may have
+JUMP_FRACTION = 0.01  # of samples at which the acceleration jumps by so much
+SCATTER = 0.05  # noise is smaller than this part of the range of positions, else the samples are waypoints
 CLOSE = 0.02  # s; or they follow each other so closely
 DECIMALS = range(9)  # at which files round
-ONE_STEP = 0.1  # share of the third differences that are not 0
-LEAST_ROWS = 32
+ONE_STEP = 0.1  # fraction of the third differences that are not 0
+MIN_SAMPLES = 32
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,11 +49,11 @@ class Noise:
     step: float
 
 
-def noise_notes(table: MotionTable, *, size: float = 1.0) -> list[str]:
+def noise_notes(table: MotionTable, *, radius: float = 1.0) -> list[str]:
     """Noise that makes the accelerations of a table useless."""
     parts = [("accelerations jump", "m/s^2", "m", table.positions, 1.0)]
     if table.quaternions is not None:
-        parts.append(("angular accelerations jump", "rad/s^2", "rad", 2.0 * continuous(table.quaternions), size))
+        parts.append(("angular accelerations jump", "rad/s^2", "rad", 2.0 * continuous(table.quaternions), radius))
     lines = []
     for words, unit, short, values, arm in parts:
         noise = noise_of(table.times, values, arm=arm)
@@ -72,25 +72,25 @@ def noise_of(times: Float[np.ndarray, "n"], values: Float[np.ndarray, "n width"]
     Differences of a high order vanish along smooth motions, but not in noise; so of several orders, the one with the
     least median says most.
     """
-    rows = np.append(True, np.diff(times) > 0.0)
-    times, values = times[rows], values[rows]
-    if len(times) < LEAST_ROWS:
+    is_later = np.append(True, np.diff(times) > 0.0)
+    times, values = times[is_later], values[is_later]
+    if len(times) < MIN_SAMPLES:
         return None
     step = float(np.median(np.diff(times)))
-    starts = np.unique(np.linspace(0, len(times) - STRETCH, STRETCHES).astype(int).clip(min=0))
-    spread = max(_deviation(times[i : i + STRETCH], values[i : i + STRETCH]) for i in starts)
+    starts = np.unique(np.linspace(0, len(times) - WINDOW, MAX_WINDOWS).astype(int).clip(min=0))
+    spread = max(_deviation(times[i : i + WINDOW], values[i : i + WINDOW]) for i in starts)
     rounding = _rounding(values)
     is_rounded = _is_of_rounding(rounding, spread, values)
     deviation = max(spread, rounding / math.sqrt(12.0) if is_rounded else 0.0)
-    way = float(np.ptp(values, axis=0).max())
-    if deviation > SCATTER * way and step > CLOSE:
+    extent = float(np.ptp(values, axis=0).max())
+    if deviation > SCATTER * extent and step > CLOSE:
         return None
     bending = BENDING * deviation / step**2
     if bending * arm <= ACCELERATION * GRAVITY:
         return None
     jumps = np.linalg.norm(np.diff(CubicSpline(times, values)(times, 2), axis=0), axis=1)
     minimum = ACCELERATION * max(GRAVITY / arm, _calm(times, values, step, deviation))
-    if bending <= minimum or np.mean(jumps > minimum) < SHARE:
+    if bending <= minimum or np.mean(jumps > minimum) < JUMP_FRACTION:
         return None
     return Noise(deviation, bending, float(np.median(jumps[jumps > minimum])), rounding if is_rounded else 0.0)
 
@@ -107,18 +107,18 @@ def _calm(times: np.ndarray, values: np.ndarray, step: float, deviation: float) 
 
 
 def _deviation(times: np.ndarray, values: np.ndarray) -> float:
-    # Standard deviation of noise in a short stretch, by divided differences of the order that says most.
+    # Standard deviation of noise in a short window, by divided differences of the order that says most.
     estimates = []
     for order in ORDERS:
         if len(times) < 3 * order:
             break
-        places = np.arange(order + 1) + np.arange(len(times) - order)[:, None]
-        apart = times[places][:, :, None] - times[places][:, None]
-        apart /= float(np.median(np.diff(times)))
-        apart[:, np.arange(order + 1), np.arange(order + 1)] = 1.0
-        weights = 1.0 / apart.prod(axis=2)
+        indices = np.arange(order + 1) + np.arange(len(times) - order)[:, None]
+        gaps = times[indices][:, :, None] - times[indices][:, None]
+        gaps /= float(np.median(np.diff(times)))
+        gaps[:, np.arange(order + 1), np.arange(order + 1)] = 1.0
+        weights = 1.0 / gaps.prod(axis=2)
         weights /= np.linalg.norm(weights, axis=1, keepdims=True)
-        differences = np.einsum("ij,ijk->ik", weights, values[places])
+        differences = np.einsum("ij,ijk->ik", weights, values[indices])
         estimates.append(np.median(np.abs(differences), axis=0) / MEDIAN)
     return float(np.max(np.min(estimates, axis=0)))
 
@@ -143,7 +143,7 @@ def _is_rounded(values: np.ndarray, step: float) -> bool:
 
 def deviation_of(times: Float[np.ndarray, "n"], values: Float[np.ndarray, "n width"]) -> float:
     """Standard deviation of the noise of the first samples; what rounding leaves is noise too."""
-    spread, step = _deviation(times[:STRETCH], values[:STRETCH]), _rounding(values)
+    spread, step = _deviation(times[:WINDOW], values[:WINDOW]), _rounding(values)
     return step / math.sqrt(12.0) if _is_of_rounding(step, spread, values) else spread
 
 

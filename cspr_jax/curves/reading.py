@@ -22,9 +22,10 @@ from cspr_jax.numerics.bounds.piecewise_bounds import bernstein_of_powers
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear import rotations
 
-# Shares of the largest coefficient by which pieces may miss each other, and by which windows may.
-MEETING, WINDOWS_MEETING = 1e-6, 1e-9
-COEFFICIENT_ERROR = 1e-12  # of coefficients, in their largest
+# Parts of the largest coefficient:
+PIECES_ERROR = 1e-6  # by which pieces may miss each other
+WINDOWS_ERROR = 1e-9  # by which windows may
+COEFFICIENT_ERROR = 1e-12  # of coefficients
 # Columns of curves, as indices of x, y, z and the quaternion.
 _WIDTHS = {2: (0, 2), 3: (0, 1, 2), 7: (0, 1, 2, 3, 4, 5, 6)}
 
@@ -98,7 +99,7 @@ def window_splines(
         full = spline_of(table, interpolation=interpolation, ends=ends)
         begin = float(table.times[0]) if begin is None else begin
         since, knots = table.times - table.times[0], np.asarray(full.knots)
-        first, last = (int(np.searchsorted(knots, since[row])) for row in (window.first, window.last))
+        first, last = (int(np.searchsorted(knots, since[index])) for index in (window.first, window.last))
         if first == last:
             continue
         quaternion = None if full.quaternion is None else as_float64(np.asarray(full.quaternion)[first:last])
@@ -130,13 +131,13 @@ def _check_joins(name: str, table: np.ndarray, width: np.ndarray, knots: np.ndar
     # A mass follows no jump, whatever pulls it.
     degree = table.shape[1] - 1
     starts, ends = degree * (table[:, 1:2] - table[:, :1]), degree * (table[:, -1:] - table[:, -2:-1])
-    for words, first, last, size in (
+    for words, first, last, scale in (
         ("value", table[:, 0], table[:, -1], np.abs(table).max()),
         ("rate", starts[:, 0] / width, ends[:, 0] / width, np.abs(np.diff(table, axis=1) / width[:, None]).max()),
     ):
         jumps = np.linalg.norm(first[1:] - last[:-1], axis=1)
         rounding = COEFFICIENT_ERROR * np.abs(table).max() / (1.0 if words == "value" else width.min())
-        far = np.flatnonzero(jumps > MEETING * size * max(degree, 1) + rounding)
+        far = np.flatnonzero(jumps > PIECES_ERROR * scale * max(degree, 1) + rounding)
         if len(far):
             error = f"its {words} jumps by {jumps[far[0]]:.3g} at t = {knots[far[0] + 1]:.6g} s"
             raise InputError(
@@ -172,15 +173,15 @@ def _pure(vectors: np.ndarray) -> np.ndarray:
 
 
 def _without_joins(table: MotionTable) -> MotionTable:
-    rows = np.append(True, np.diff(table.times) > 0.0)
+    is_later = np.append(True, np.diff(table.times) > 0.0)
     parts = {field.name: getattr(table, field.name) for field in dataclasses.fields(table)}
-    arrays = {name: value[rows] for name, value in parts.items() if isinstance(value, np.ndarray)}
+    arrays = {name: value[is_later] for name, value in parts.items() if isinstance(value, np.ndarray)}
     return dataclasses.replace(table, **arrays)
 
 
 def _check_window(before: Spline, after: Spline) -> None:
-    # Taylor coefficients of both at the instant at which they meet, by the smaller of the two pieces there.
-    steps = [float(np.diff(np.asarray(spline.knots))[place]) for spline, place in ((before, -1), (after, 0))]
+    # Taylor coefficients of both at the time at which they meet, by the smaller of the two pieces there.
+    steps = [float(np.diff(np.asarray(spline.knots))[index]) for spline, index in ((before, -1), (after, 0))]
     step = min(steps)
     for name in ("position", "quaternion"):
         ends, starts = getattr(before, name), getattr(after, name)
@@ -188,11 +189,11 @@ def _check_window(before: Spline, after: Spline) -> None:
             continue
         tables = [np.asarray(ends)[-1], np.asarray(starts)[0]]
         sign = -1.0 if name == "quaternion" and float(tables[0][-1] @ tables[1][0]) < 0.0 else 1.0
-        size, degree = max(float(np.abs(table).max()) for table in tables), len(tables[0]) - 1
+        scale, degree = max(float(np.abs(table).max()) for table in tables), len(tables[0]) - 1
         for order in range(3):
             last, first = np.diff(tables[0], order, axis=0)[-1], sign * np.diff(tables[1], order, axis=0)[0]
             away = np.abs(last * (step / steps[0]) ** order - first * (step / steps[1]) ** order).max()
-            if order <= degree and away > WINDOWS_MEETING * size:
+            if order <= degree and away > WINDOWS_ERROR * scale:
                 raise InputError(
                     "interpolation",
                     None,

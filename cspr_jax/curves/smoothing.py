@@ -16,16 +16,19 @@ from cspr_jax.curves.interpolation import continuous
 from cspr_jax.curves.noise import deviation_of
 from cspr_jax.errors import InputError
 
-LEAST_ROWS = 5
+MIN_SAMPLES = 5
 LOWEST = -8.0  # power of ten of the weight of the second derivative, in steps, with which curves pass through samples
 HIGHEST = 24.0
 STEPS = 4.0  # of the power, in which an upper bound is sought
 POWER_ERROR = 1e-4  # of the power
 REFINEMENTS = 3  # of solutions, whose matrices are badly conditioned where weights are large
-# An end moves if a polynomial at rest there misses samples so many times more, squared, than one that is not, of which
-# so many standard deviations are noise, and if rest takes so many times the second derivatives, squared.
-FACTOR, SURE, COSTS = 2.0, 4.0, 1.03
-FITS, SAMPLE_ERROR = 1.2, 1e-9  # part of their noise by which polynomials miss samples; of the samples
+# An end moves if a polynomial at rest there misses samples so many times more, squared, than one that is not, and if
+# rest takes so many times the second derivatives, squared.
+FACTOR = 2.0
+COSTS = 1.03
+SURE = 4.0  # standard deviations of the noise that the first factor needs
+FITS = 1.2  # part of their noise by which polynomials miss samples
+SAMPLE_ERROR = 1e-9  # of the samples
 _COUNTS = np.unique(np.geomspace(6.0, 256.0, 20).astype(int))  # of samples that tell the speed at an end
 REST, MOVING = (1, 2), ()  # derivatives that are 0 at an end
 
@@ -48,17 +51,17 @@ def smoothed(
     for key, value in (("smooth", deviation), ("smooth (angle)", angle)):
         if not 0.0 < value < math.inf:
             raise InputError(key, value, "a number > 0, the standard deviation of the noise")
-    rows = np.append(True, np.diff(table.times) > 0.0)
-    times, ends = table.times[rows], ends or table.ends
+    is_later = np.append(True, np.diff(table.times) > 0.0)
+    times, ends = table.times[is_later], ends or table.ends
     kind = interpolation or table.interpolation
     kind = "quintic" if kind == "quintic" else "cubic"
-    minimum = LEAST_ROWS + (kind == "quintic")
+    minimum = MIN_SAMPLES + (kind == "quintic")
     knots = _knots(times)
     if len(knots) < minimum:
         raise InputError("smooth", deviation, f"absent for {len(knots)} samples: must have {minimum} or more")
-    groups = [("positions", "m", 1.0, deviation, table.positions[rows])]
+    groups = [("positions", "m", 1.0, deviation, table.positions[is_later])]
     if table.quaternions is not None:
-        groups.append(("orientations", "rad", 2.0, angle, continuous(table.quaternions[rows])))
+        groups.append(("orientations", "rad", 2.0, angle, continuous(table.quaternions[is_later])))
     degree = 3 if kind == "cubic" else 5
     fits = [_Fit(times, knots, values, degree, ends == "periodic") for *_, values in groups]
     moving = [
@@ -100,11 +103,11 @@ class _Fit:
     ) -> None:
         self.values, self.degree, self.is_periodic = values, degree, is_periodic
         self.moved = np.ptp(values, axis=0) > 0.0
-        places = (times - times[0]) / float(np.median(np.diff(times)))
-        self.places, self.knots = places, places[knots]
+        steps = (times - times[0]) / float(np.median(np.diff(times)))
+        self.steps, self.knots = steps, steps[knots]
         self.sign = 1.0 if values.shape[1] == 3 or float(values[0] @ values[-1]) >= 0.0 else -1.0
         table = _knot_table(self.knots, degree, is_periodic)
-        self.design = csr_array(BSpline.design_matrix(places, table, degree, extrapolate=False))
+        self.design = csr_array(BSpline.design_matrix(steps, table, degree, extrapolate=False))
         self.at_knots = csr_array(BSpline.design_matrix(self.knots, table, degree, extrapolate=False))
         self.derivatives = _derivatives(table, degree, 4 if degree == 5 else 2)
         # Gauss points, at which the squares of second derivatives are summed exactly.
@@ -123,7 +126,7 @@ class _Fit:
         if not self.moved.any():
             return self.values[: len(self.knots)].copy(), np.zeros(len(self.values))
         is_free = conditions == [MOVING, MOVING] and not self.is_periodic
-        straight = np.stack([np.ones(len(self.places)), self.places], axis=1)[:, : 1 + is_free]
+        straight = np.stack([np.ones(len(self.steps)), self.steps], axis=1)[:, : 1 + is_free]
         if not (self.is_periodic and self.sign < 0.0):
             line = straight @ np.linalg.lstsq(straight, values, rcond=None)[0]
             maximum = _rms(line - values)
@@ -131,8 +134,8 @@ class _Fit:
                 words = "a straight line" if is_free else "rest at one place"
                 allowed = f"less than {factor * maximum:.2g} {unit}, by which {words} misses the {name}"
                 raise InputError("smooth", factor * deviation, allowed)
-        coefficients = self._least(deviation, conditions, values)
-        result, fitted = (np.tile(self.values[:1], (rows.shape[0], 1)) for rows in (self.at_knots, self.design))
+        coefficients = self._smoothest(deviation, conditions, values)
+        result, fitted = (np.tile(self.values[:1], (basis.shape[0], 1)) for basis in (self.at_knots, self.design))
         result[:, self.moved], fitted[:, self.moved] = self.at_knots @ coefficients, self.design @ coefficients
         if self.is_periodic:
             result[-1] = self.sign * result[0]
@@ -152,7 +155,7 @@ class _Fit:
                 may_move[k] = maximum > COSTS * minimum
         return may_move
 
-    def _least(self, deviation: float, conditions: list, values: np.ndarray) -> np.ndarray:
+    def _smoothest(self, deviation: float, conditions: list, values: np.ndarray) -> np.ndarray:
         # A curve that must come to rest in its last step may miss the samples, or bend more than the one through them:
         # then its velocity alone is 0 there.
         smoothest = self._weighed(deviation, self._space(conditions), values)
@@ -213,8 +216,8 @@ class _Fit:
             if k in free:
                 block[k, free.index(k)] = 1.0
                 continue
-            rows = self.derivatives[k]
-            weights = rows[[rows.shape[0] - 1 if is_last else 0]].toarray()[0]
+            derivative = self.derivatives[k]
+            weights = derivative[[derivative.shape[0] - 1 if is_last else 0]].toarray()[0]
             weights = weights[::-1][: k + 1] if is_last else weights[: k + 1]
             block[k] = -weights[:k] @ block[:k] / weights[k]
         return block[::-1, ::-1] if is_last else block

@@ -11,19 +11,23 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.curves.blocks import spline_bounds
+from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds.affine_bounds import cross, rotated
+from cspr_jax.numerics.bounds.piecewise_bounds import overlaps, piecewise_bounds
+from cspr_jax.numerics.bounds.rotation_bounds import rotation_bounds
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear import rotations
 from cspr_jax.robots.bounds.state_bounds import StateBounds
 from cspr_jax.robots.model.state import State
+from cspr_jax.runtime import compile_options
 from cspr_jax.runtime.persistent_jit import persistent_jit
 
 if TYPE_CHECKING:
-    from jaxtyping import Float
+    from jaxtyping import Float, Int
 
 # Second derivatives that differ by less than this part of the largest one do not jump.
 SAME = 1e-9
+BATCH = 256  # parts of blocks whose rotations are bounded at a time
 # Numbers of pieces that numbers are rounded up to; copies of longer tables would cost more than compiling.
 USUAL = (64, 256, 1024, 4096)
 
@@ -33,7 +37,7 @@ class Spline:
     """Piecewise polynomial motion; see `motion.motion.Motion`.
 
     Fields:
-        knots: (m + 1,) instants between the m pieces, the first 0, increasing; s.
+        knots: (m + 1,) times between the m pieces, the first 0, increasing; s.
         position: (m, degree + 1, 3) Bernstein coefficients of each piece, m.
         quaternion: (m, degree + 1, 4) likewise, scalar first, continuous; their length is of no account, but not zero;
             None for a point mass.
@@ -88,15 +92,15 @@ class Spline:
         return self.knots[1:-1] / self.knots[-1]
 
     def jumps(self, fraction: float = SAME) -> Float[np.ndarray, "n"]:
-        """Instants at which the acceleration jumps."""
+        """Times at which the acceleration jumps."""
         width = np.diff(np.asarray(self.knots))[:, None]
         is_jump = np.zeros(len(width) - 1, bool)
         for table in (self.position, self.quaternion):
             degree = 0 if table is None else table.shape[1] - 1
             if table is not None and degree >= 2:
-                bends = np.diff(np.asarray(table), 2, axis=1) * (degree * (degree - 1)) / width[:, None] ** 2
-                size = np.abs(bends).max(initial=0.0)
-                is_jump |= (np.abs(bends[1:, 0] - bends[:-1, -1]) > fraction * size).any(1)
+                second = np.diff(np.asarray(table), 2, axis=1) * (degree * (degree - 1)) / width[:, None] ** 2
+                largest = np.abs(second).max(initial=0.0)
+                is_jump |= (np.abs(second[1:, 0] - second[:-1, -1]) > fraction * largest).any(1)
         return np.asarray(self.knots)[1:-1][is_jump]
 
     def bounds(self, start: np.ndarray, end: np.ndarray) -> StateBounds:
@@ -118,9 +122,11 @@ def moved(bounds: StateBounds, offset: Float[Array, "3"]) -> StateBounds:
     def one(state: StateBounds) -> StateBounds:
         arm = rotated(state.rotation, offset)
         swing = cross(state.angular_velocity, arm)
-        pull = cross(state.angular_acceleration, arm) + cross(state.angular_velocity, swing)
+        relative = cross(state.angular_acceleration, arm) + cross(state.angular_velocity, swing)
         return state._replace(
-            position=state.position + arm, velocity=state.velocity + swing, acceleration=state.acceleration + pull
+            position=state.position + arm,
+            velocity=state.velocity + swing,
+            acceleration=state.acceleration + relative,
         )
 
     return jax.vmap(one)(bounds)
@@ -155,16 +161,16 @@ def piece_state(
     offset: Array | None = None,
 ) -> State:
     """State on one piece of a spline."""
-    place, velocity, acceleration = piece_values(position, fraction, width)
+    point, velocity, acceleration = piece_values(position, fraction, width)
     if quaternion is None:
-        return State(place, velocity, acceleration)
+        return State(point, velocity, acceleration)
     rotation, spin, spin_rate, unit = turning_of(*piece_values(quaternion, fraction, width))
     if offset is not None:
         arm = rotation @ offset
         swing = jnp.cross(spin, arm)
-        place, velocity = place + arm, velocity + swing
+        point, velocity = point + arm, velocity + swing
         acceleration = acceleration + jnp.cross(spin_rate, arm) + jnp.cross(spin, swing)
-    return State(place, velocity, acceleration, rotation, spin, spin_rate, unit)
+    return State(point, velocity, acceleration, rotation, spin, spin_rate, unit)
 
 
 def piece_values(
@@ -199,3 +205,69 @@ def turning_of(
     angular_velocity = across(first)
     angular_acceleration = across(second) - angular_velocity * (2.0 * jnp.dot(quaternion, first) / square)
     return rotation, angular_velocity, angular_acceleration, unit
+
+
+def spline_bounds(
+    knots: np.ndarray,
+    position: Float[np.ndarray, "m degree+1 3"],
+    quaternion: Float[np.ndarray, "m degree+1 4"] | None,
+    start: Float[np.ndarray, "k"],
+    end: Float[np.ndarray, "k"],
+    *,
+    of_knots: np.ndarray | None = None,
+    of_blocks: Int[np.ndarray, "k"] | None = None,
+    parabolas: bool = False,
+) -> StateBounds:
+    """Bounds of the states over blocks of time, of one motion or of a batch, whose tables follow each other."""
+    motions = (of_knots, of_blocks) if of_knots is not None and of_blocks is not None else None
+    parts = overlaps(knots, start, end, motions)
+    translation = piecewise_bounds(position, parts, parabolas=parabolas)
+    if quaternion is None:
+        return StateBounds(*translation)
+    turning = piecewise_bounds(quaternion, parts, parabolas=parabolas)
+    return StateBounds(*translation, *in_batches(_rotations, turning, batch_size=BATCH))
+
+
+@persistent_jit(compiler_options=compile_options.least())
+def _rotations(quaternions):
+    return jax.vmap(rotation_bounds)(*quaternions)
+
+
+class SplineBatch:
+    """Splines of one degree, all of positions alone or all of orientations too, of any numbers of pieces."""
+
+    def __init__(self, splines: Sequence[Spline]):
+        """Join the tables."""
+        self._offset = splines[0].offset
+        if any(not np.array_equal(np.asarray(spline.offset), np.asarray(self._offset)) for spline in splines):
+            raise ValueError("one offset of the mass centre")
+        self._knots = np.concatenate([np.asarray(spline.knots) for spline in splines])
+        self._of_knots = np.repeat(np.arange(len(splines)), [len(spline.knots) for spline in splines])
+        turning = [spline.quaternion for spline in splines if spline.quaternion is not None]
+        if len(turning) not in (0, len(splines)):
+            raise ValueError("either all splines have orientations, or none")
+        self._position = np.concatenate([np.asarray(spline.position) for spline in splines])
+        self._quaternion = np.concatenate([np.asarray(table) for table in turning]) if turning else None
+        self.durations = np.array([float(spline.knots[-1]) for spline in splines])
+        self.jumps = [spline.jumps() for spline in splines]
+
+    def bounds(
+        self,
+        motion: Int[np.ndarray, "k"],
+        start: Float[np.ndarray, "k"],
+        end: Float[np.ndarray, "k"],
+        *,
+        parabolas: bool = False,
+    ) -> StateBounds:
+        """Bounds of the states over blocks; see `motion.motion.BoundedMotion.bounds`."""
+        bounds = spline_bounds(
+            self._knots,
+            self._position,
+            self._quaternion,
+            start,
+            end,
+            of_knots=self._of_knots,
+            of_blocks=motion,
+            parabolas=parabolas,
+        )
+        return bounds if self._offset is None else moved(bounds, self._offset)

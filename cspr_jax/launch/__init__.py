@@ -2,8 +2,7 @@
 
 Files, each importing only from those above it:
 
-    flight          free flight of a released object
-    parabola        flight that a [launch] table asks for
+    flight          free flight of a released object, and that which a [launch] table asks for
     landings        scatter of the landings of launches
     launch_result   release and flight of a launch, in the axes of the robot file
 """

@@ -1,14 +1,22 @@
-"""Free flight of an object that is released from a moving effector."""
+"""Free flight of an object that is released from a moving effector, and the flight that a [launch] table asks for."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 
+from cspr_jax.config.keys.launch import LaunchTable
+from cspr_jax.errors import ConfigError, shown
+from cspr_jax.numerics.linear.frames import Frame
+
 if TYPE_CHECKING:
     from jaxtyping import Float
+
+# A point of release counts as on a parabola that it misses by less than this part of its distance from the target.
+ON_PARABOLA = 1e-6
 
 
 def flown(position: Any, velocity: Any, gravity: Any, time: Any) -> tuple[Any, Any]:
@@ -27,12 +35,51 @@ def nearest_time(
     position: Float[np.ndarray, "3"], target: Float[np.ndarray, "3"], velocity: Float[np.ndarray, "3"], gravity: float
 ) -> tuple[float, float] | None:
     """Time of flight at which the parabola that reaches a target with a velocity comes nearest to a release."""
-    down, way = 0.5 * gravity * np.array([0.0, 0.0, 1.0]), target - position
-    # |way - velocity t + down t^2|^2, by powers of t, the highest first.
-    square = [down @ down, -2.0 * down @ velocity, velocity @ velocity + 2.0 * way @ down, -2.0 * way @ velocity]
+    down, ray = 0.5 * gravity * np.array([0.0, 0.0, 1.0]), target - position
+    # |ray - velocity t + down t^2|^2, by powers of t, the highest first.
+    square = [
+        down @ down,
+        -2.0 * down @ velocity,
+        velocity @ velocity + 2.0 * ray @ down,
+        -2.0 * ray @ velocity,
+    ]
     roots = np.roots(np.array(square) * [4.0, 3.0, 2.0, 1.0])
     times = roots.real[(np.abs(roots.imag) < 1e-6 * np.abs(roots)) & (roots.real > 0.0)]
     if not len(times):
         return None
-    apart = np.array([float(np.linalg.norm(way - velocity * t + down * t**2)) for t in times])
-    return float(times[apart.argmin()]), float(apart.min())
+    distances = np.array([float(np.linalg.norm(ray - velocity * t + down * t**2)) for t in times])
+    return float(times[distances.argmin()]), float(distances.min())
+
+
+class Parabola(NamedTuple):
+    """Flight to a target, from a point of release or with a velocity at the target.
+
+    Fields:
+        target: (3,) from the centroid of the spools, z down, m.
+        point: (3,) point of the release, m; None: `velocity` determines it.
+        velocity: (3,) at the target, m/s; None: `point` and the time of flight determine it.
+        time: of the flight, s; None: to be chosen.
+    """
+
+    target: np.ndarray
+    point: np.ndarray | None
+    velocity: np.ndarray | None
+    time: float | None
+
+
+def parabola_of(table: LaunchTable, frame: Frame, gravity: float, path: Path) -> Parabola:
+    """Flight that a table asks for."""
+    target = np.asarray(frame.inward(table.target))
+    point = None if table.point is None else np.asarray(frame.inward(table.point))
+    velocity = None if table.velocity is None else np.asarray(frame.rotated(np.asarray(table.velocity)))
+    if point is None or velocity is None:
+        return Parabola(target, point, velocity, table.time)
+    nearest = nearest_time(point, target, velocity, gravity)
+    if nearest is None or not nearest[1] <= ON_PARABOLA * max(float(np.linalg.norm(target - point)), 1e-300):
+        missed = f"passes it by {nearest[1]:.3g} m" if nearest else "never comes near it before the target"
+        raise ConfigError(
+            path,
+            f"launch.point = {shown(table.point)}: must lie on the parabola that "
+            f"reaches the target with launch.velocity, which {missed}",
+        )
+    return Parabola(target, point, None, nearest[0])

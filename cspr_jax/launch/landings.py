@@ -1,8 +1,8 @@
-"""Scatter of landings: errors of the winches and of the instant of release, by a random sample and to first order.
+"""Scatter of landings: errors of the winches and of the time of release, by a random sample and to first order.
 
 At the release the cables have lengths and rates that miss the plan's; the effector is where the lengths are, and moves
-as the rates say; on redundant cables, whose errors contradict each other, where the sum of the squares of what is left
-is least. From there the object flies to the height of its target. A random sample of errors gives a sample of
+as the rates say; on redundant cables, whose errors contradict each other, where the sum of the squares of the residuals
+is smallest. From there the object flies to the height of its target. A random sample of errors gives a sample of
 landings, and the derivatives of the landing with respect to all errors the covariance for small errors.
 """
 
@@ -30,9 +30,12 @@ from cspr_jax.schema.given_numbers import Numbers, whole
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-BATCH, NEWTON = 1024, 12
+BATCH = 1024
+NEWTON_STEPS = 12
 # As in the keys of a plan file.
-LARGEST_ERROR, MOST_THROWS, LARGEST_SEED = 1e3, 1_000_000, 2**63 - 1
+LARGEST_ERROR = 1e3
+MAX_THROWS = 1_000_000
+LARGEST_SEED = 2**63 - 1
 
 
 class Throw(NamedTuple):
@@ -55,7 +58,7 @@ class LaunchErrors:
     """Independent errors of a launch.
 
     Fields:
-        release: standard deviation of the instant of release, s.
+        release: standard deviation of the time of release, s.
         cable_length: standard deviation of the length of each cable at the release, m.
         cable_speed: standard deviation of the rate of each cable's length, m/s.
         encoder: largest error of each length due to the resolution of its encoder, m; uniformly distributed.
@@ -74,7 +77,7 @@ class LaunchErrors:
         """Refuse numbers out of their ranges."""
         for name in ("release", "cable_length", "cable_speed", "encoder"):
             Numbers("a number from 0 to 1000", least=0.0, largest=LARGEST_ERROR).array(name, getattr(self, name))
-        whole("throws", self.throws, 2, MOST_THROWS)
+        whole("throws", self.throws, 2, MAX_THROWS)
         whole("seed", self.seed, 0, LARGEST_SEED)
 
 
@@ -94,17 +97,17 @@ class Scatter:
 
     def to_dict(self) -> dict[str, Any]:
         """Figures of the scatter."""
-        known = self.landings[np.isfinite(self.landings).all(1)]
-        sizes = np.linalg.norm(known, axis=1)
+        landed = self.landings[np.isfinite(self.landings).all(1)]
+        distances = np.linalg.norm(landed, axis=1)
         return {
             "throws": len(self.landings),
-            "missed": len(self.landings) - len(known),
-            "mean": known.mean(0).tolist(),
+            "missed": len(self.landings) - len(landed),
+            "mean": landed.mean(0).tolist(),
             "covariance": self.covariance.tolist(),
             "covariance_first_order": self.first_order.tolist(),
-            "mean_error": float(sizes.mean()),
-            "standard_deviation": float(sizes.std()),
-            "largest_error": float(sizes.max()),
+            "mean_error": float(distances.mean()),
+            "standard_deviation": float(distances.std()),
+            "largest_error": float(distances.max()),
         }
 
 
@@ -131,23 +134,23 @@ def landing(robot: PointMassRobot, throw: Throw, errors: Array) -> Float[Array, 
     lengths, rates, _ = cable_motion(robot, *state[:3])
     position = _placed(robot, state.position, lengths + errors[1 : count + 1])
     velocity = _moving(robot, position, rates + errors[count + 1 :])
-    fall, gravity = throw.target[2] - position[2], robot.gravity
-    time = (jnp.sqrt(velocity[2] ** 2 + 2.0 * gravity * fall) - velocity[2]) / gravity
+    height, gravity = throw.target[2] - position[2], robot.gravity
+    time = (jnp.sqrt(velocity[2] ** 2 + 2.0 * gravity * height) - velocity[2]) / gravity
     return flown(position, velocity, gravity, time)[0][:2] - throw.target[:2]
 
 
 def _placed(robot: PointMassRobot, start: Array, lengths: Array) -> Array:
-    # Find by Newton's method the place where the cables have these lengths; its last step carries the derivatives.
-    def step(place, _):
-        lengths_here = cable_motion(robot, place, place * 0.0, place * 0.0)[0]
-        return place + _moving(robot, place, lengths - lengths_here), None
+    # Find by Newton's method the position where the cables have these lengths; its last step carries the derivatives.
+    def step(position, _):
+        current_lengths = cable_motion(robot, position, position * 0.0, position * 0.0)[0]
+        return position + _moving(robot, position, lengths - current_lengths), None
 
-    return jax.lax.scan(step, start, None, length=NEWTON)[0]
+    return jax.lax.scan(step, start, None, length=NEWTON_STEPS)[0]
 
 
-def _moving(robot: PointMassRobot, place: Array, rates: Array) -> Array:
+def _moving(robot: PointMassRobot, position: Array, rates: Array) -> Array:
     # Return the velocity at which the lengths have these rates; on redundant cables the one that comes nearest.
-    units = jax.jacfwd(lambda velocity: cable_motion(robot, place, velocity, velocity * 0.0)[1])(place * 0.0)
+    units = jax.jacfwd(lambda velocity: cable_motion(robot, position, velocity, velocity * 0.0)[1])(position * 0.0)
     units = units[:, np.array([0, 2])] if is_planar(robot) else units
     if robot.n_cables > robot.dof:
         units, rates = units.T @ units, units.T @ rates
@@ -164,7 +167,7 @@ def _landings(robot: PointMassRobot, throw: Throw, errors: Array) -> Array:
 
 
 @jax.jit
-def _slopes(robot: PointMassRobot, throw: Throw, errors: Array) -> Array:
+def _derivatives(robot: PointMassRobot, throw: Throw, errors: Array) -> Array:
     return jax.jacfwd(lambda error: landing(robot, throw, error))(errors)
 
 
@@ -178,9 +181,9 @@ def scatter(robot: PointMassRobot, throw: Throw, errors: LaunchErrors) -> Scatte
     lengths = lengths + random.uniform(-1.0, 1.0, size=(errors.throws, count)) * errors.encoder
     sample = np.concatenate([release, lengths, rates], axis=1)
     landings = in_batches(partial(_landings, robot, throw), sample, batch_size=BATCH)
-    known = landings[np.isfinite(landings).all(1)]
-    sizes = [errors.release**2]
-    sizes += [errors.cable_length**2 + errors.encoder**2 / 3.0] * count + [errors.cable_speed**2] * count
-    slopes = np.asarray(_slopes(robot, throw, jnp.zeros(1 + 2 * count)))
-    covariance = np.cov(known.T) if len(known) > 1 else np.full((2, 2), np.nan)
-    return Scatter(landings, covariance, (slopes * np.array(sizes)) @ slopes.T)
+    landed = landings[np.isfinite(landings).all(1)]
+    variances = [errors.release**2]
+    variances += [errors.cable_length**2 + errors.encoder**2 / 3.0] * count + [errors.cable_speed**2] * count
+    derivatives = np.asarray(_derivatives(robot, throw, jnp.zeros(1 + 2 * count)))
+    covariance = np.cov(landed.T) if len(landed) > 1 else np.full((2, 2), np.nan)
+    return Scatter(landings, covariance, (derivatives * np.array(variances)) @ derivatives.T)

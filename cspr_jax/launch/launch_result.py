@@ -12,7 +12,7 @@ import numpy as np
 from cspr_jax.config.keys.launch import LaunchTable
 from cspr_jax.launch.flight import flown
 from cspr_jax.launch.landings import LaunchErrors, Scatter, Throw, scatter, state_at
-from cspr_jax.motion.leg_result import LegResult
+from cspr_jax.motion.leg import LegResult
 from cspr_jax.numerics.linear.frames import Frame
 from cspr_jax.robots.model.point_mass import PointMassRobot
 
@@ -39,8 +39,8 @@ class LaunchResult(LegResult):
         robot: centred, z down.
         frame: of the robot file.
         scatter: of the landings, of a plan that names errors.
-        half_axes: (2, 3) of the ellipse that is left, from its centre to the release, and to the place a quarter of a
-            turn later, m; None of other motions.
+        half_axes: (2, 3) of the last ellipse, from its centre to the release, and to the point a quarter of a turn
+            later, m; None of other motions.
     """
 
     segment: int
@@ -77,7 +77,7 @@ class LaunchResult(LegResult):
         if not math.isfinite(self.time + self.flight_time):
             return ["no launch"]
         release, landing = (
-            ", ".join(f"{round(x, 9) + 0.0:.4g}" for x in place.tolist()) for place in (self.position, self.landing)
+            ", ".join(f"{round(x, 9) + 0.0:.4g}" for x in point.tolist()) for point in (self.position, self.landing)
         )
         speed = math.dist(self.velocity, (0.0, 0.0, 0.0))
         line = f"released after {self.time:.4f} s at ({release}) m with {speed:.3f} m/s"
@@ -104,7 +104,7 @@ class LaunchResult(LegResult):
     def scatter_of(self, errors: LaunchErrors) -> Scatter:
         """Scatter of the landings."""
         kernel_scatter = scatter(self.robot, self.throw, errors)
-        # Axes of the file are turned against those of the kernels about x.
+        # Axes of the file are those of the kernels, or rotated about x.
         signs = np.asarray(self.frame.rotated(np.ones(3)))[:2]
         both = np.outer(signs, signs)
         landings, covariance, first_order = dataclasses.astuple(kernel_scatter)
@@ -123,7 +123,7 @@ def launch_result(
     control_points: Float[np.ndarray, "3 3"] | None = None,
     half_axes: Float[np.ndarray, "2 3"] | None = None,
 ) -> LaunchResult:
-    """Outcome of a planned release, with the scatter that its table asks for."""
+    """Result of a planned release, with the scatter that its table asks for."""
     state = state_at(throw, jnp.asarray(0.0))
     landing, _ = flown(state.position, state.velocity, robot.gravity, flight_time)
     launch = LaunchResult(

@@ -1,7 +1,7 @@
 """Motion: what every trajectory family provides, and what a plan asks of it.
 
-A motion is a pytree that gives its duration and the state at each instant (`motion`). Slacks and peaks take any
-motion of any robot; answers, legs and way-points are what families have in common. No file here knows a family.
+A motion is a pytree that gives its duration and the state at each time (`motion`). Slacks and peaks take any
+motion of any robot; answers, legs and waypoints are what families have in common. No file here knows a family.
 
 Files, each importing only from those above it:
 
@@ -12,12 +12,11 @@ Files, each importing only from those above it:
     limits              which limits are set, the quantities that they bound, and their slacks
     given_limits        limits of a file or a caller, checked
     problem             robot, limits and amplitude function
-    slacks              slacks of any motion at one instant
+    slacks              slacks of any motion at one time
     peaks               extremes of tensions, heights, lengths and speeds along a motion
     acceleration_sets   feasible accelerations of a point mass
     cause               a criterion that stands between a motion and feasible
     answers             the record that every family returns
     waypoints           consecutive poses of a plan, as points of the kernels
-    leg_result          what comes of a leg beyond its motion
-    leg                 consecutive poses that one family joins
+    leg                 consecutive poses that one family joins, and what comes of them beyond the motion
 """

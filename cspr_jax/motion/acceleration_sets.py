@@ -1,7 +1,7 @@
 """Feasible accelerations of a point mass on any number of cables: verdicts, margins, and how large they can be.
 
-A place belongs to the static workspace if no cable has to push at rest there, to the wrench-feasible workspace if the
-tensions at rest also keep their limits, to the wrench-closure workspace if the cables can resist any force.
+A position belongs to the static workspace if no cable has to push at rest there, to the wrench-feasible workspace if
+the tensions at rest also keep their limits, to the wrench-closure workspace if the cables can resist any force.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ LEVEL = 1e-12
 
 
 def faces_at(robot: PointMassRobot, limits: Limits, position: Float[Array, "3"]) -> Faces:
-    """Faces of the set of feasible accelerations at one place."""
+    """Faces of the set of feasible accelerations at one position."""
     return acceleration_faces(robot, position, *tension_range(robot, limits))
 
 
 def verdict(
     robot: PointMassRobot, faces: Faces, wider: Faces, position: Float[Array, "3"], acceleration: Float[Array, "3"]
 ) -> Int[Array, ""]:
-    """Verdict of an acceleration at one place, from the faces, and from those of limits as proofs take them."""
+    """Verdict of an acceleration at one position, from the faces, and from those of limits as proofs take them."""
     rounding, slacks = wider.rounding(acceleration), wider.slacks(acceleration)
     # Faces of limits may be touched.
     doubt = jnp.where(wider.offsets < faces.offsets, rounding, jnp.maximum(BOUNDARY * robot.gravity, rounding))
@@ -58,16 +58,16 @@ def verdict(
     return sum((jnp.where(is_so, flag.value, 0) for is_so, flag in flags), jnp.zeros((), int))
 
 
-class AccelerationReach(NamedTuple):
-    """Feasible accelerations at one place, and how large they are; () each.
+class AccelerationRanges(NamedTuple):
+    """Feasible accelerations at one position, and how large they are; () each.
 
     Fields:
-        verdict: of rest at the place, flags of `Verdict`.
+        verdict: of rest there, flags of `Verdict`.
         acceleration_margin: distance of rest from the nearest face, m/s^2: of the wrench-feasible workspace.
         static_margin: the same without limits of the tensions, m/s^2: of the static workspace.
         closure_margin: of the wrench-closure workspace, a pure number.
-        level_acceleration: largest size of level accelerations that is feasible in every direction, m/s^2.
-        level_acceleration_max: largest size of a feasible level acceleration, m/s^2.
+        level_acceleration: largest magnitude of level accelerations that is feasible in every direction, m/s^2.
+        level_acceleration_max: largest magnitude of a feasible level acceleration, m/s^2.
         upward_acceleration: largest upward acceleration, m/s^2.
         downward_acceleration: largest downward acceleration, m/s^2.
     """
@@ -82,11 +82,13 @@ class AccelerationReach(NamedTuple):
     downward_acceleration: Array
 
 
-def reach(robot: PointMassRobot, limits: Limits, allowed: Limits, position: Float[Array, "3"]) -> AccelerationReach:
-    """Feasible accelerations at one place."""
+def acceleration_ranges(
+    robot: PointMassRobot, limits: Limits, allowed: Limits, position: Float[Array, "3"]
+) -> AccelerationRanges:
+    """Feasible accelerations at one position."""
     faces, cone = faces_at(robot, limits, position), faces_at(robot, NO_LIMITS, position)
-    still = jnp.zeros_like(position)
-    slack, margin = faces.slacks(still), faces.margin(still)
+    at_rest = jnp.zeros_like(position)
+    slack, margin = faces.slacks(at_rest), faces.margin(at_rest)
 
     def until(steepness: Array) -> Array:
         # Return the largest acceleration along a direction, or along all directions that are so steep to the faces.
@@ -94,10 +96,10 @@ def reach(robot: PointMassRobot, limits: Limits, allowed: Limits, position: Floa
         return jnp.where(margin > 0.0, jnp.maximum(jnp.min(distance), 0.0), 0.0)
 
     across = jnp.linalg.norm(faces.normals[:, :2], axis=1)
-    return AccelerationReach(
-        verdict=verdict(robot, faces, faces_at(robot, allowed, position), position, still),
+    return AccelerationRanges(
+        verdict=verdict(robot, faces, faces_at(robot, allowed, position), position, at_rest),
         acceleration_margin=margin,
-        static_margin=cone.margin(still),
+        static_margin=cone.margin(at_rest),
         closure_margin=cone.closure,
         level_acceleration=until(across),
         level_acceleration_max=_largest_level(faces, is_planar(robot)),
@@ -107,7 +109,7 @@ def reach(robot: PointMassRobot, limits: Limits, allowed: Limits, position: Floa
 
 
 def _largest_level(faces: Faces, planar: bool) -> Array:
-    # The largest size is that of a corner of the level section; 0 where the section is empty.
+    # The largest one is that of a corner of the level section; 0 where the section is empty.
     normal, offset = faces.normals[:, :2], faces.offsets
     first, second = np.array(list(itertools.combinations(range(len(offset)), 2))).T
     a, b = normal[first], normal[second]
@@ -117,12 +119,12 @@ def _largest_level(faces: Faces, planar: bool) -> Array:
     corner = jnp.stack([p * b[:, 1] - q * a[:, 1], a[:, 0] * q - b[:, 0] * p], 1)
     corner = corner / jnp.where(crosses, determinant, 1.0)[:, None]
     # The level section of a planar robot is part of a line; each of its corners lies on a single face.
-    size = jnp.linalg.norm(normal, axis=1)
-    is_line = jnp.isfinite(offset) & (size > LEVEL)
-    alone = normal * (jnp.where(is_line, offset, 0.0) / jnp.where(is_line, size, 1.0) ** 2)[:, None]
+    length = jnp.linalg.norm(normal, axis=1)
+    is_line = jnp.isfinite(offset) & (length > LEVEL)
+    alone = normal * (jnp.where(is_line, offset, 0.0) / jnp.where(is_line, length, 1.0) ** 2)[:, None]
     points, counts = jnp.concatenate([corner, alone]), jnp.concatenate([crosses, is_line])
-    room = BOUNDARY * (1.0 + jnp.linalg.norm(points, axis=1))
-    inside = counts & (points @ normal.T - offset[None] >= -room[:, None]).all(1)
+    tolerance = BOUNDARY * (1.0 + jnp.linalg.norm(points, axis=1))
+    inside = counts & (points @ normal.T - offset[None] >= -tolerance[:, None]).all(1)
     # The section is unbounded if one can go along the edge of a face without end.
     if planar:
         along = jnp.array([[1.0, 0.0], [-1.0, 0.0]])
@@ -138,7 +140,7 @@ def _largest_level(faces: Faces, planar: bool) -> Array:
 def along(
     robot: PointMassRobot, limits: Limits, position: Float[Array, "3"], direction: Float[Array, "3"]
 ) -> Float[Array, "2"]:
-    """Accelerations along a direction that are feasible at one place, Boralugoda (15) to (21) and figure 4.1."""
+    """Accelerations along a direction that are feasible at one position, Boralugoda (15) to (21) and figure 4.1."""
     faces = faces_at(robot, limits, position)
     steep = faces.normals @ direction
     ends = faces.offsets / jnp.where(jnp.abs(steep) > LEVEL, steep, 1.0)
@@ -149,8 +151,8 @@ def along(
 
 
 @jax.jit
-def reaches(
+def acceleration_ranges_at(
     robot: PointMassRobot, limits: Limits, allowed: Limits, positions: Float[Array, "n 3"]
-) -> AccelerationReach:
-    """Feasible accelerations at many places."""
-    return jax.vmap(lambda position: reach(robot, limits, allowed, position))(positions)
+) -> AccelerationRanges:
+    """Feasible accelerations at many positions."""
+    return jax.vmap(lambda position: acceleration_ranges(robot, limits, allowed, position))(positions)

@@ -1,6 +1,6 @@
-"""Amplitude functions A(tau): how the size of the swing grows from its start to its end.
+"""Amplitude functions A(tau): how the amplitude of the swing grows from its start to its end.
 
-Each is a piecewise polynomial: values and derivatives are exact, a new function is a row of coefficients, and the
+Each is a piecewise polynomial: values and derivatives are exact, a new function is a list of coefficients, and the
 largest value of any derivative is known, which proofs between samples need.
 """
 
@@ -99,12 +99,12 @@ def from_pieces(
 ) -> Amplitude:
     """Amplitude function from its pieces, with its extreme values computed."""
     table = np.zeros((len(pieces), max(COLUMNS, *(len(piece) for piece in pieces))))
-    for row, piece in zip(table, pieces, strict=True):
-        row[: len(piece)] = piece
+    for coefficients, piece in zip(table, pieces, strict=True):
+        coefficients[: len(piece)] = piece
     ends = [0.0, *knots, 1.0]
     extremes = np.zeros((HIGHEST_DERIVATIVE + 1, len(pieces), 2))
-    for i, (origin, row) in enumerate(zip(origins, table, strict=True)):
-        curve = np.polynomial.Polynomial(row)
+    for i, (origin, coefficients) in enumerate(zip(origins, table, strict=True)):
+        curve = np.polynomial.Polynomial(coefficients)
         for j in range(HIGHEST_DERIVATIVE + 1):
             extremes[j, i] = _extremes(curve.deriv(j) if j else curve, ends[i] - origin, ends[i + 1] - origin)
     largest = np.abs(extremes).max((1, 2)) * (1.0 + 1e-9)
@@ -122,8 +122,8 @@ def from_pieces(
 def _extremes(curve: np.polynomial.Polynomial, start: float, stop: float) -> tuple[float, float]:
     # Finding roots divides by the highest coefficient, which overflows for one that is as good as zero; such a
     # coefficient only adds roots far away.
-    slope = curve.deriv().trim(NEGLIGIBLE * float(np.abs(curve.coef).max()))
-    stationary = slope.roots() if slope.degree() > 0 else np.zeros(0)
+    derivative = curve.deriv().trim(NEGLIGIBLE * float(np.abs(curve.coef).max()))
+    stationary = derivative.roots() if derivative.degree() > 0 else np.zeros(0)
     # A double root may come out as a close complex pair: its real part is near enough to evaluate.
     inside = [x.real for x in np.atleast_1d(stationary) if abs(x.imag) < 1e-3 and start < x.real < stop]
     values = curve(np.array([start, stop, *inside]))
@@ -170,17 +170,17 @@ def _with_straight_middle(name: str, epsilon: float) -> Amplitude:
     e = epsilon
     start: tuple[float, ...]
     if name == "effective":
-        slope = 1.0 / (1.0 - e)  # (1.109)
-        start = (0.0, 0.0, 0.0, slope / e**2, -slope / (2 * e**3))  # (1.106)
+        rate = 1.0 / (1.0 - e)  # (1.109)
+        start = (0.0, 0.0, 0.0, rate / e**2, -rate / (2 * e**3))  # (1.106)
     else:
-        slope = 1.0 / (1.0 - 0.8 * e)
-        k = 12.0 * slope / e**4
+        rate = 1.0 / (1.0 - 0.8 * e)
+        k = 12.0 * rate / e**4
         start = (0.0, 0.0, 0.0, k * e**2 / 6, -k * e / 6, k / 20)
     at_knot = sum(c * e**i for i, c in enumerate(start))
     # The end is the start rotated by 180 degrees: A(tau) = 1 - start(1 - tau), in powers of tau - 1.
     end = (1.0, *(-c * (-1) ** i for i, c in enumerate(start) if i > 0))
     label = f"{name} (epsilon {e:g})"
-    return from_pieces(label, (e, 1.0 - e), (0.0, e, 1.0), (start, (at_knot, slope), end))
+    return from_pieces(label, (e, 1.0 - e), (0.0, e, 1.0), (start, (at_knot, rate), end))
 
 
 def from_polynomial(coefficients: Sequence[float]) -> Amplitude:
@@ -194,12 +194,12 @@ def boundary_errors(amplitude: Amplitude, *, free_end: bool = False) -> list[str
     """The conditions of thesis (2.49) that a function breaks: A(0) = 0, A(1) = 1, A' and A'' zero at both ends."""
     first, last = np.asarray(amplitude.coefficients)[[0, -1]]
     errors = []
-    for tau, row, origin in ((0, first, amplitude.origins[0]), (1, last, amplitude.origins[-1])):
-        curve = np.polynomial.Polynomial(row)
-        marks = ("", "'") if free_end and tau == 1 else ("", "'", "''")
-        for order, mark in enumerate(marks):
+    for tau, coefficients, origin in ((0, first, amplitude.origins[0]), (1, last, amplitude.origins[-1])):
+        curve = np.polynomial.Polynomial(coefficients)
+        primes = ("", "'") if free_end and tau == 1 else ("", "'", "''")
+        for order, prime in enumerate(primes):
             value = float((curve.deriv(order) if order else curve)(tau - float(origin)))
             target = float(tau if order == 0 else 0)
             if not abs(value - target) <= BOUNDARY_TOLERANCE * float(amplitude.largest[order]):
-                errors.append(f"A{mark}({tau}) = {value:g}, must be {target:g}")
+                errors.append(f"A{prime}({tau}) = {value:g}, must be {target:g}")
     return errors

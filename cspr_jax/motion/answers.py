@@ -74,10 +74,10 @@ def joined(parts: list[AnyAnswers]) -> AnyAnswers:
 
 
 def replaced(
-    answers: AnyAnswers, rows: Float[np.ndarray, "m"], others: Answers, chosen: Float[np.ndarray, "m"]
+    answers: AnyAnswers, index: Float[np.ndarray, "m"], others: Answers, chosen: Float[np.ndarray, "m"]
 ) -> AnyAnswers:
     """Answers, some of which others replace."""
     columns = {name: np.array(values) for name, values in vars(answers).items()}
     for name, values in columns.items():
-        values[rows] = getattr(others, name)[chosen]
+        values[index] = getattr(others, name)[chosen]
     return type(answers)(**columns)

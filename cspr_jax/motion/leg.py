@@ -5,14 +5,13 @@ from __future__ import annotations
 import abc
 import dataclasses
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import jax
 import numpy as np
 
 from cspr_jax.errors import ConfigError
 from cspr_jax.motion.answers import Answers, joined
-from cspr_jax.motion.leg_result import LegResult
 from cspr_jax.motion.motion import Motion
 from cspr_jax.motion.problem import Problem
 from cspr_jax.motion.waypoints import Waypoints
@@ -34,6 +33,28 @@ class JoinedLeg:
     family: str
     answers: Answers
     motions: list[Motion]
+
+
+class LegResult(abc.ABC):
+    """Result of a leg beyond its motion, in the axes of the robot file; computed once, with the plan.
+
+    Fields:
+        key: name of the result in a plan's JSON.
+    """
+
+    key: ClassVar[str]
+
+    @abc.abstractmethod
+    def to_dict(self) -> dict[str, Any]:
+        """The result as a plan's JSON has it."""
+
+    @abc.abstractmethod
+    def lines(self) -> list[str]:
+        """The result as text."""
+
+    @abc.abstractmethod
+    def columns(self) -> dict[str, np.ndarray]:
+        """Datasets that the result adds to a motion file."""
 
 
 class Leg(abc.ABC):
@@ -88,7 +109,7 @@ class Leg(abc.ABC):
     def result(
         self, problem: Problem, joined: JoinedLeg, tension_min: Float[np.ndarray, "n"], start: float
     ) -> LegResult | None:
-        """Outcome of the joined leg beyond its motion; a plan calls this once."""
+        """Result of the joined leg beyond its motion; a plan calls this once."""
         return None
 
     def warnings(self, problem: Problem) -> list[str]:
@@ -98,4 +119,4 @@ class Leg(abc.ABC):
 
 def each(leaves, count: int) -> list:
     """Parts of a pytree whose leaves have a leading dimension."""
-    return [jax.tree.map(lambda leaf, i=i: np.asarray(leaf)[i], leaves) for i in range(count)]
+    return [jax.tree.map(lambda array, i=i: np.asarray(array)[i], leaves) for i in range(count)]

@@ -29,7 +29,7 @@ def limits_set(limits: Limits) -> tuple[Limit, ...]:
 
 
 def allowance(row: Limit, limit: np.ndarray | float, robot: AnyRobot) -> np.ndarray | float:
-    """By how much a motion may miss a limit and keep it: a share of it, of the floor one of the robot's size."""
+    """By how much a motion may miss a limit and keep it: a part of it, for the floor of the radius of the spools."""
     return TOUCHED * (np.asarray(spool_radius(robot)) if row.is_height else limit)
 
 
@@ -50,10 +50,10 @@ class Values(NamedTuple):
         tension: (n_cables,) N.
         depth: () z of the lowest point of the effector, z down, m.
         length: (n_cables,) of the cables, m.
-        speed: (n_cables,) size of the rate of the length, m/s.
-        acceleration: (n_cables,) size of its second derivative, m/s^2.
+        speed: (n_cables,) magnitude of the rate of the length, m/s.
+        acceleration: (n_cables,) magnitude of its second derivative, m/s^2.
         mass_centre_speed: () m/s.
-        mass_centre_acceleration: () size of it, m/s^2.
+        mass_centre_acceleration: () magnitude, m/s^2.
     """
 
     tension: Array
@@ -80,8 +80,8 @@ def lowest_depth(robot: AnyRobot, state: State, corners: Float[Array, "m 3"] | N
 
 def _values(robot: AnyRobot, state: State, tensions: Array) -> Values:
     length, rate, second_derivative = cables.cable_motion(robot, state)
-    speed, pull = jnp.linalg.norm(state.velocity), jnp.linalg.norm(state.acceleration)
-    return Values(tensions, lowest_depth(robot, state), length, jnp.abs(rate), jnp.abs(second_derivative), speed, pull)
+    of_cables = lowest_depth(robot, state), length, jnp.abs(rate), jnp.abs(second_derivative)
+    return Values(tensions, *of_cables, jnp.linalg.norm(state.velocity), jnp.linalg.norm(state.acceleration))
 
 
 def scales(n_cables: int, weight: Float[Array, ""], z0: Float[Array, "..."]) -> dict[str, tuple[float, Array]]:
@@ -96,8 +96,8 @@ def slack(
     if row.quantity not in scale:
         fraction = value / limit
         return 1.0 - fraction if row.sense == "most" else fraction - 1.0
-    factor, size = scale[row.quantity]
-    return (limit - value if row.sense == "most" else value - limit) * factor / size
+    factor, unit = scale[row.quantity]
+    return (limit - value if row.sense == "most" else value - limit) * factor / unit
 
 
 def other_limits(limits: Limits) -> list[Limit]:

@@ -51,7 +51,7 @@ class Motion(Protocol):
         ...
 
     def state(self, tau: Array) -> State:
-        """State at one instant, with derivatives in time.
+        """State at one time, with derivatives in time.
 
         Args:
             tau: () normalised time in [0, 1].
@@ -62,7 +62,7 @@ class Motion(Protocol):
         ...
 
     def breaks(self) -> Array:
-        """Instants at which the acceleration or its derivative may jump.
+        """Times at which the acceleration or its derivative may jump.
 
         Returns:
             (n,) tau in ]0, 1[, increasing.
@@ -179,9 +179,9 @@ def _is_in_pieces(part: Any) -> bool:
     return hasattr(part, "padded")
 
 
-def states_at(motion: Motion, tau: Float[np.ndarray, "k"], size: int = STATES) -> State:
-    """States of a motion at many instants."""
-    state: Any = in_batches(partial(_states, common_shape(motion)), tau, batch_size=size)
+def states_at(motion: Motion, tau: Float[np.ndarray, "k"], batch_size: int = STATES) -> State:
+    """States of a motion at many times."""
+    state: Any = in_batches(partial(_states, common_shape(motion)), tau, batch_size=batch_size)
     return state
 
 
@@ -193,8 +193,8 @@ def _states(motion: Motion, tau: Array) -> State:
 def inward(frame: Frame, state: State) -> State:
     """State in the kernels' axes, from the axes of a robot file."""
     # The rotation between the axes is its own inverse.
-    place: Any = frame.inward(state.position)
-    return outward(frame, state)._replace(position=place)
+    position: Any = frame.inward(state.position)
+    return outward(frame, state)._replace(position=position)
 
 
 def outward(frame: Frame, state: State) -> State:

@@ -26,10 +26,10 @@ from cspr_jax.runtime.stages import stage
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Samples of an arc, at least, and instants computed at a time.
-SAMPLES, BATCH = 64, 512
+SAMPLES = 64  # of an arc, at least
+BATCH = 512  # samples computed at a time
 # Largest number of samples that is held at a time.
-ROOM = 200_000
+MAX_SAMPLES = 200_000
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,15 +76,15 @@ EXTREMES = [field.name for field in dataclasses.fields(Peaks)][: len(_SIGNS)]
 
 @persistent_jit(static_argnames="rule")
 def _values(robot, limits: Limits, corners, arguments, *, rule: str) -> Array:
-    return jax.vmap(partial(_at_instant, robot, limits, corners, rule))(*arguments)
+    return jax.vmap(partial(_at_time, robot, limits, corners, rule))(*arguments)
 
 
 @persistent_jit(static_argnames="rule")
 def _values_of_one(robot, limits: Limits, corners, motion: Motion, tau: Array, *, rule: str) -> Array:
-    return jax.vmap(partial(_at_instant, robot, limits, corners, rule, motion))(tau)
+    return jax.vmap(partial(_at_time, robot, limits, corners, rule, motion))(tau)
 
 
-def _at_instant(robot, limits: Limits, corners, rule: str, motion: Motion, tau: Array) -> Array:
+def _at_time(robot, limits: Limits, corners, rule: str, motion: Motion, tau: Array) -> Array:
     state = motion.state(tau)
     if robot.n_cables > robot.dof:
         chosen = cables.shared(robot, state, limits, rule)
@@ -128,13 +128,13 @@ def peaks(
         # Motions of one structure and one number of samples are computed together, but for those that may have very
         # many pieces, which would be copied for each instant.
         group = i if has_pieces(motion) else None
-        shapes = tuple(np.shape(leaf) for leaf in jax.tree.leaves(motion))
+        shapes = tuple(np.shape(array) for array in jax.tree.leaves(motion))
         alike.setdefault((group, jax.tree.structure(motion), shapes, len(tau)), []).append(i)
     for (*_, count), members in alike.items():
-        size = max(ROOM // count, 1)
-        for first in range(0, len(members), size):
+        length = max(MAX_SAMPLES // count, 1)
+        for first in range(0, len(members), length):
             stage(f"demands of {len(motions)} segments")
-            batch = members[first : first + size]
+            batch = members[first : first + length]
             table[batch] = _of_alike(
                 robot, limits, corners, rule, [motions[i] for i in batch], [times[i] for i in batch]
             )
@@ -159,11 +159,11 @@ def _of_alike(
 
         return _narrowed(along, times[0][None])
     kernel = partial(_values, robot, limits, corners, rule=rule)
-    stacked = jax.tree.map(lambda *leaves: np.stack([np.asarray(leaf, float) for leaf in leaves]), *motions)
+    stacked = jax.tree.map(lambda *leaves: np.stack([np.asarray(array, float) for array in leaves]), *motions)
 
     def at(tau: np.ndarray) -> np.ndarray:
-        row = np.repeat(np.arange(len(tau)), tau.shape[1])
-        items = jax.tree.map(lambda leaf: leaf[row], stacked)
+        motion = np.repeat(np.arange(len(tau)), tau.shape[1])
+        items = jax.tree.map(lambda array: array[motion], stacked)
         values = in_batches(kernel, (items, tau.ravel()), batch_size=BATCH)
         return values.reshape(*tau.shape, -1)
 

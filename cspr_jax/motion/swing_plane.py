@@ -23,7 +23,7 @@ UPRIGHT = 1e-12
 def swing_plane(
     v1: Float[Array, "3"],
     v2: Float[Array, "3"],
-    size: Float[Array, ""],
+    scale: Float[Array, ""],
     normal: Float[Array, "3"],
     odd: Bool[Array, ""],
 ) -> tuple[Float[Array, "3 2"], Float[Array, ""], Float[Array, ""], Float[Array, ""]]:
@@ -33,7 +33,7 @@ def swing_plane(
     plane, it is the one least inclined to the spool plane.
     """
     r1, r2 = length(v1), length(v2)  # (2.39)
-    from_rest, to_rest = r1 < AT_P0 * size, r2 < AT_P0 * size
+    from_rest, to_rest = r1 < AT_P0 * scale, r2 < AT_P0 * scale
     toward_end = v2 / jnp.where(to_rest, 1.0, r2)
     x_axis = jnp.zeros_like(v1).at[0].set(1.0)
     q1 = jnp.where(from_rest, jnp.where(odd, -1.0, 1.0) * toward_end, v1 / jnp.where(from_rest, 1.0, r1))
@@ -41,7 +41,7 @@ def swing_plane(
     along = jnp.dot(q1, v2)
     across = v2 - q1 * along  # (2.30)
     distance = length(across)
-    in_line = from_rest | to_rest | (distance < AT_P0 * size)
+    in_line = from_rest | to_rest | (distance < AT_P0 * scale)
     q2 = jnp.where(in_line, _least_inclined(normal, q1, x_axis), across / jnp.where(in_line, 1.0, distance))
     # delta, not psi: its arctangent keeps its digits where psi is close to pi.
     forward = jnp.where(from_rest | to_rest, 1.0, jnp.where(odd, -along, along))
@@ -51,7 +51,7 @@ def swing_plane(
 
 def _least_inclined(normal: Array, q1: Array, x_axis: Array) -> Array:
     level = jnp.cross(normal, q1)
-    size = length(level)
-    upright = size < UPRIGHT
+    norm = length(level)
+    upright = norm < UPRIGHT
     fallback = x_axis - q1 * jnp.dot(q1, x_axis)
-    return jnp.where(upright, fallback / jnp.linalg.norm(fallback), level / jnp.where(upright, 1.0, size))
+    return jnp.where(upright, fallback / jnp.linalg.norm(fallback), level / jnp.where(upright, 1.0, norm))

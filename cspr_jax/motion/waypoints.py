@@ -1,4 +1,4 @@
-"""Way-points: consecutive poses of a plan that one family joins, as points of the kernels."""
+"""Waypoints: consecutive poses of a plan that one family joins, as points of the kernels."""
 
 from __future__ import annotations
 
@@ -68,15 +68,15 @@ class Waypoints:
         return f"pose[{self.first + i}]"
 
     def points(self, z0) -> Float[np.ndarray, "... n_poses 3"]:
-        """Places of the poses; poses at rest are in P0."""
+        """Positions of the poses; poses at rest are in P0."""
         at_rest = rest_point(np.asarray(z0))
         anywhere = FAMILIES[self.family].rests_anywhere
         in_p0 = [pose.position is None or (pose.rest and not anywhere) for pose in self.poses]
-        places = [
+        positions = [
             at_rest if rests else self.frame.inward(pose.position)
             for rests, pose in zip(in_p0, self.poses, strict=True)
         ]
-        return np.stack([np.broadcast_to(place, at_rest.shape) for place in places], axis=-2)
+        return np.stack([np.broadcast_to(position, at_rest.shape) for position in positions], axis=-2)
 
     @property
     def targets(self) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Batches of one shape: the only place that vectorises.
+"""Batches of one shape.
 
 XLA compiles for one shape, and the bits of its results can depend on it. So every call has the
 same shape: the last batch is padded with its own last element, and trimmed.

@@ -1,17 +1,17 @@
-"""Cores that a process computes on: all that it may use, or a share where several processes work at once."""
+"""Cores that a process computes on: all that it may use, or a part where several processes work at once."""
 
 import math
 import os
 from pathlib import Path, PurePosixPath
 
 # Environment variable with the number of cores; XLA starts as many threads.
-SHARE = "NPROC"
+VARIABLE = "NPROC"
 _GROUPS, _MOUNTED = Path("/proc/self/cgroup"), Path("/sys/fs/cgroup")
 
 
 def cores() -> int:
     """Number of cores that this process computes on."""
-    fraction = os.environ.get(SHARE, "")
+    fraction = os.environ.get(VARIABLE, "")
     if fraction.isascii() and fraction.isdigit() and int(fraction) > 0:
         return int(fraction)
     affinity = getattr(os, "sched_getaffinity", None)  # not on macOS
@@ -28,13 +28,13 @@ def quota(groups: Path = _GROUPS, mounted: Path = _MOUNTED) -> float:
     minimum = math.inf
     for line in lines:
         _, _, rest = line.partition(":")
-        controllers, _, place = rest.partition(":")
+        controllers, _, group = rest.partition(":")
         if controllers and "cpu" not in controllers.split(","):
             continue
         # In a container the path may be that of the machine, of which only the end, or nothing, exists in the folder.
         # Version 1 has a folder for its controllers; where both versions are in use, version 2 has one, too.
         for root in [mounted / controllers, mounted / "cpu"] if controllers else [mounted, mounted / "unified"]:
-            path = PurePosixPath(place.lstrip("/"))
+            path = PurePosixPath(group.lstrip("/"))
             for level in (path, *path.parents):
                 minimum = min(minimum, _granted(root / level))
     return minimum

@@ -33,8 +33,8 @@ def polynomial(coefficients, x: Float[Array, "..."]) -> Float[Array, "..."]:
 
 def unit_vectors(vectors: Float[np.ndarray, "... k"]) -> Float[np.ndarray, "... k"]:
     """Vectors scaled to length 1; a zero vector stays zero."""
-    sizes = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return vectors / np.where(sizes > 0.0, sizes, 1.0)
+    norms = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors / np.where(norms > 0.0, norms, 1.0)
 
 
 @jax.jit
@@ -108,7 +108,7 @@ def as_float64(value) -> Array:
 
 
 def vertex(left: Array, middle: Array, right: Array) -> tuple[Array, Array]:
-    """Vertex of the parabola through three equidistant values: its place, and the value there."""
+    """Vertex of the parabola through three equidistant values: its position, and the value there."""
     second_derivative = left - 2.0 * middle + right
     move = 0.5 * (left - right) / jnp.where(second_derivative > 0.0, second_derivative, 1.0)
     move = jnp.clip(jnp.where(second_derivative > 0.0, move, jnp.sign(left - right)), -1.0, 1.0)
@@ -130,13 +130,13 @@ def solved(matrix: Float[Array, "n n"], right: Float[Array, "n m"]) -> tuple[Flo
     def eliminate(carry, k):
         rows, determinant = carry
         column, row = lax.dynamic_index_in_dim(rows, k, 1, keepdims=False), lax.dynamic_index_in_dim(rows, k, 0, False)
-        place = jnp.argmax(jnp.where(index < k, -1.0, jnp.abs(column)))
-        is_pivot, is_next = index == place, index == k
+        pivot_index = jnp.argmax(jnp.where(index < k, -1.0, jnp.abs(column)))
+        is_pivot, is_next = index == pivot_index, index == k
         pivot_row = jnp.sum(jnp.where(is_pivot[:, None], rows, 0.0), axis=0)
         pivot = jnp.sum(jnp.where(is_pivot, column, 0.0))
         # Swap the two rows.
         rows, column = jnp.where(is_pivot[:, None], row, rows), jnp.where(is_pivot, column[k], column)
-        determinant = determinant * pivot * jnp.where(place == k, 1.0, -1.0)
+        determinant = determinant * pivot * jnp.where(pivot_index == k, 1.0, -1.0)
         pivot_row = pivot_row / pivot
         return (jnp.where(is_next[:, None], pivot_row, rows - column[:, None] * pivot_row[None]), determinant), None
 

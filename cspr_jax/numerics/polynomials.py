@@ -24,8 +24,8 @@ def product(first: Float[np.ndarray, "... n"], second: Float[np.ndarray, "... m"
 
 def total(first: Float[np.ndarray, "... n"], second: Float[np.ndarray, "... m"]) -> np.ndarray:
     """Sum of polynomials of any degrees."""
-    size = max(first.shape[-1], second.shape[-1])
-    a, b = (np.concatenate([x, np.zeros((*x.shape[:-1], size - x.shape[-1]))], axis=-1) for x in (first, second))
+    n = max(first.shape[-1], second.shape[-1])
+    a, b = (np.concatenate([x, np.zeros((*x.shape[:-1], n - x.shape[-1]))], axis=-1) for x in (first, second))
     return a + b
 
 
@@ -34,8 +34,8 @@ def derivatives(table: Float[np.ndarray, "... n"], order: int) -> list[np.ndarra
     tables = [table]
     for _ in range(order):
         last = tables[-1]
-        size = last.shape[-1]
-        tables.append(last[..., 1:] * np.arange(1, size) if size > 1 else np.zeros_like(last))
+        n = last.shape[-1]
+        tables.append(last[..., 1:] * np.arange(1, n) if n > 1 else np.zeros_like(last))
     return tables
 
 
@@ -59,5 +59,5 @@ def bounds(table: Float[np.ndarray, "... n"]) -> tuple[Float[np.ndarray, "..."],
 
 @cache
 def _weights(degree: int) -> np.ndarray:
-    rows = range(degree + 1)
-    return np.array([[math.comb(i, j) / math.comb(degree, j) if j <= i else 0.0 for j in rows] for i in rows])
+    orders = range(degree + 1)
+    return np.array([[math.comb(i, j) / math.comb(degree, j) if j <= i else 0.0 for j in orders] for i in orders])

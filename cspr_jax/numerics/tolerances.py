@@ -5,7 +5,7 @@ A slack nearer to zero than the tolerance of its proof is undecided, since round
 
 import numpy as np
 
-# Share of a limit by which a motion may miss it and keep it: a limit that is touched is kept (docs/theory/proofs.md).
+# Part of a limit by which a motion may miss it and keep it: a limit that is touched is kept (docs/theory/proofs.md).
 # Rounding takes what is meant to be exact off by some 1e-16 of numbers a hundred times as large; proofs bound the slack
 # of a limit to 1e-10 of it, those of platforms on six cables to 1e-9. No drive, gauge or robot file knows a limit as
 # well, and a limit that is exceeded by a millionth is refused.

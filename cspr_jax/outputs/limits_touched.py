@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cspr_jax.build.scenes import scene_of
+from cspr_jax.curves.interpolation import thinned
 from cspr_jax.curves.spline import Spline
-from cspr_jax.curves.thinned import thinned
 from cspr_jax.motion.cause import Cause
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.verification.bounds.block_slacks import block_slacks

@@ -14,8 +14,7 @@ import numpy as np
 from cspr_jax.build.scenes import scene_of
 from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.cause import Cause
-from cspr_jax.motion.leg import JoinedLeg, Leg
-from cspr_jax.motion.leg_result import LegResult
+from cspr_jax.motion.leg import JoinedLeg, Leg, LegResult
 from cspr_jax.motion.motion import Motion
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.linear.frames import Frame

@@ -16,8 +16,7 @@ from cspr_jax.config.reading import read_text
 from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.errors import ConfigError
 from cspr_jax.motion.answers import Answers, joined
-from cspr_jax.motion.leg import JoinedLeg
-from cspr_jax.motion.leg_result import LegResult
+from cspr_jax.motion.leg import JoinedLeg, LegResult
 from cspr_jax.motion.motion import Motion, Placed, states_at
 from cspr_jax.motion.peaks import SAMPLES, Peaks, peaks
 from cspr_jax.motion.problem import Problem

@@ -17,7 +17,7 @@ from concurrent.futures.process import BrokenProcessPool
 from typing import Any
 
 from cspr_jax.errors import ConfigError, ResourceError
-from cspr_jax.numerics.cores import SHARE, cores
+from cspr_jax.numerics.cores import VARIABLE, cores
 from cspr_jax.runtime.surroundings import check_threads_of_jax
 
 SAFE_PATH = "PYTHONSAFEPATH"
@@ -63,7 +63,7 @@ class Workers:
             sys.warnoptions.append(_NO_COMPLAINT)
         # A child of multiprocessing is started with `python -c`, which looks for modules in the working folder first:
         # a file struct.py that lies there would be executed. It reads this variable; no option can be given.
-        self._settings = {SAFE_PATH: "1", SHARE: str(max(cores() // count, 1))}
+        self._settings = {SAFE_PATH: "1", VARIABLE: str(max(cores() // count, 1))}
         with _environment(self._settings):
             self._pool = concurrent.futures.ProcessPoolExecutor(
                 count,

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from cspr_jax.errors import ConfigError, printable, shown
-from cspr_jax.numerics.cores import SHARE, cores, quota
+from cspr_jax.numerics.cores import VARIABLE, cores, quota
 from cspr_jax.runtime import compile_cache, stages
 from cspr_jax.runtime.compile_options import QUICK
 
@@ -71,7 +71,7 @@ def prepare(
         os.environ.setdefault("JAX_PLATFORMS", "cpu")
     _few_arenas()
     if math.isfinite(quota()):
-        os.environ.setdefault(SHARE, str(cores()))  # XLA would start a thread for each core of the machine
+        os.environ.setdefault(VARIABLE, str(cores()))  # XLA would start a thread for each core of the machine
     folder, flags = _folder(None, warn), os.environ.get("XLA_FLAGS", "")
     if flags.strip():
         _check_flags(folder, flags)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import jax
 import numpy as np
 
-from cspr_jax.motion.acceleration_sets import AccelerationReach, faces_at, reaches, verdict
+from cspr_jax.motion.acceleration_sets import AccelerationRanges, acceleration_ranges_at, faces_at, verdict
 from cspr_jax.motion.limits import touchable_limits
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.robots.model.limits import Limits
@@ -27,9 +27,9 @@ def _size(robot: PointMassRobot, power: int) -> int:
     return max(min(BATCH, _ROOM // robot.n_cables**power), 1)
 
 
-def reach_of(robot: PointMassRobot, limits: Limits, positions: Float[np.ndarray, "n 3"]) -> AccelerationReach:
+def reach_of(robot: PointMassRobot, limits: Limits, positions: Float[np.ndarray, "n 3"]) -> AccelerationRanges:
     """Sizes of the sets of feasible accelerations at many places."""
-    kernel = partial(reaches, robot, limits, touchable_limits(robot, limits))
+    kernel = partial(acceleration_ranges_at, robot, limits, touchable_limits(robot, limits))
     return in_batches(kernel, positions, batch_size=_size(robot, 6))
 
 

@@ -126,7 +126,7 @@ def test_quotas_of_control_groups(tmp_path):
 
 
 def test_a_quota_bounds_the_cores(monkeypatch):
-    monkeypatch.delenv(cores.SHARE, raising=False)
+    monkeypatch.delenv(cores.VARIABLE, raising=False)
     monkeypatch.setattr(cores, "quota", lambda: 0.5)
     assert cores.cores() == 1
 

@@ -100,7 +100,7 @@ def test_orientations():
     noisy = turns + 0.5e-3 * rng.normal(size=turns.shape)
     (line,) = noise_notes(MotionTable(times, still, noisy / np.linalg.norm(noisy, axis=1, keepdims=True)))
     assert line.startswith("angular accelerations jump by") and "rad/s^2" in line
-    assert noise_notes(MotionTable(times, still, turns + 1e-6 * rng.normal(size=turns.shape)), size=0.1) == []
+    assert noise_notes(MotionTable(times, still, turns + 1e-6 * rng.normal(size=turns.shape)), radius=0.1) == []
 
 
 def test_smoothing_finds_the_motion():

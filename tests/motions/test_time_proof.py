@@ -12,8 +12,7 @@ from support.splines import random_spline
 
 import cspr_jax
 from cspr_jax.curves import interpolation
-from cspr_jax.curves.several import SeveralSplines
-from cspr_jax.curves.spline import Spline
+from cspr_jax.curves.spline import Spline, SplineBatch
 from cspr_jax.numerics.tolerances import TOUCHED
 from cspr_jax.robots import cables
 from cspr_jax.robots.contacts import clearance, interference, interference_lanes
@@ -170,7 +169,7 @@ def test_several_motions_have_the_proofs_of_each(name):
     splines = [random_spline(seed, middle=CASES[name][0], size=CASES[name][1], count=4 + seed)[0] for seed in range(3)]
     splines = [Spline(s.knots, s.position, None, s.z0) for s in splines]
     robot, limits = case(name, 0)[:2]
-    several = SeveralSplines(splines)
+    several = SplineBatch(splines)
     together = time_proofs(
         lambda motion, start, end: block_slacks(robot, limits, partial(several.bounds, motion), start, end),
         several.durations,

@@ -35,11 +35,13 @@ def test_bounds_contain_all_values(name, start, width):
     with np.errstate(invalid="ignore"):  # a quotient by what may be zero, of which nothing is known
         jet = formula(Jet((start * one, (start + width) * one), (one, one), (none, none)))
     values = [np.asarray(f(jnp.asarray(x))) for f in DERIVATIVES[name]]
-    for (low, high), found in zip((jet.value, jet.slope, jet.second_derivative), values, strict=True):
+    for (low, high), found in zip((jet.value, jet.derivative, jet.second_derivative), values, strict=True):
         room = 1e-9 * (1.0 + np.abs(found).max())
         assert not low[0] > found.min() + room and not high[0] < found.max() - room
     # Over a block of width 1.
-    scaled = Jet(jet.value, tuple(width * y for y in jet.slope), tuple(width**2 * y for y in jet.second_derivative))
+    scaled = Jet(
+        jet.value, tuple(width * y for y in jet.derivative), tuple(width**2 * y for y in jet.second_derivative)
+    )
     ends = np.asarray(values[0])[[0, -1], None]
     assert lowest(ends, scaled)[0] <= values[0].min() + 1e-9 * (1.0 + np.abs(values[0]).max())
 

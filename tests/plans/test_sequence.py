@@ -18,7 +18,7 @@ from support.commands import cspr
 from support.platforms import state_of
 
 import cspr_jax
-from cspr_jax.motion.leg_result import LegResult
+from cspr_jax.motion.leg import LegResult
 from cspr_jax.schema import map_kinds
 from cspr_jax.schema.families import FAMILIES, moving, registered
 from cspr_jax.schema.verdicts import Verdict

@@ -9,7 +9,7 @@ from hypothesis import strategies as some
 
 from cspr_jax.errors import ConfigError, ResourceError
 from cspr_jax.numerics.batches import in_threads
-from cspr_jax.numerics.cores import SHARE, cores
+from cspr_jax.numerics.cores import VARIABLE, cores
 from cspr_jax.runtime.processes import MOST, Spread, balanced, check_count, usual_count
 
 
@@ -37,13 +37,13 @@ def test_groups_are_balanced(sizes, count):
 
 def test_work_is_spread(monkeypatch):
     """In order, over processes that have a share of the cores each; one process does it here, with all of them."""
-    monkeypatch.setenv(SHARE, "4")
+    monkeypatch.setenv(VARIABLE, "4")
     with Spread(2) as spread:
         assert spread(shares, "abcde", [1, 5, 2, 4, 3]) == [(name, 2) for name in "abcde"]
         assert spread(shares, "f", [1]) == [("f", 2)]
     with Spread(1) as spread:
         assert spread(shares, "ab", [1, 1]) == [("a", 4), ("b", 4)]
-    assert os.environ[SHARE] == "4"
+    assert os.environ[VARIABLE] == "4"
 
 
 def test_a_worker_dies():
@@ -61,17 +61,17 @@ def test_wrong_counts(wrong):
 
 def test_usual_counts(monkeypatch):
     """One a core, but no more than there are parts, nor than memory has room for."""
-    monkeypatch.setenv(SHARE, "3")
+    monkeypatch.setenv(VARIABLE, "3")
     assert [usual_count(parts) for parts in (0, 1, 2, 3, 4, 100)] == [1, 1, 2, 3, 3, 3]
-    monkeypatch.setenv(SHARE, "1000")
+    monkeypatch.setenv(VARIABLE, "1000")
     assert usual_count(10_000) == MOST
 
 
 @pytest.mark.parametrize("given", ["", "0", "-2", "two", "1.5"])
 def test_a_share_that_is_no_number_is_none(monkeypatch, given):
-    monkeypatch.delenv(SHARE, raising=False)
+    monkeypatch.delenv(VARIABLE, raising=False)
     every = cores()
-    monkeypatch.setenv(SHARE, given)
+    monkeypatch.setenv(VARIABLE, given)
     assert cores() == every >= 1
 
 
@@ -82,7 +82,7 @@ def test_one_thread_on_one_core(monkeypatch):
     def one(item):
         return item, threading.get_ident()
 
-    monkeypatch.setenv(SHARE, "1")
+    monkeypatch.setenv(VARIABLE, "1")
     assert in_threads(one, [1, 2, 3]) == [(k, threading.get_ident()) for k in (1, 2, 3)]
-    monkeypatch.setenv(SHARE, "2")
+    monkeypatch.setenv(VARIABLE, "2")
     assert np.array([here != threading.get_ident() for _, here in in_threads(one, [1, 2, 3])]).all()

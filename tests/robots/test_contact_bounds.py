@@ -13,7 +13,7 @@ from support.splines import random_spline, states_of
 import cspr_jax
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, constant
-from cspr_jax.numerics.bounds.determinant_bounds import changes_sign, determinant, magnitude_range
+from cspr_jax.numerics.bounds.function_bounds import changes_sign, determinant, magnitude_range
 from cspr_jax.robots.bounds.contact_bounds import contact_bounds, corner_depths, passings
 from cspr_jax.robots.bounds.state_bounds import StateBounds, cable_bounds
 from cspr_jax.robots.contacts import clearance, convex_gaps

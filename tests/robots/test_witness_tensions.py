@@ -9,7 +9,7 @@ from scipy.optimize import linprog
 from support.splines import random_spline
 
 import cspr_jax
-from cspr_jax.curves.several import SeveralSplines
+from cspr_jax.curves.spline import SplineBatch
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds
 from cspr_jax.robots import cables
@@ -71,7 +71,7 @@ def judged(name: str, seed: int, count: int, low: float, high: float, *, parabol
     times = 0.5 * (edges[:-1] + edges[1:])[:, None] + 0.5 * np.diff(edges)[:, None] * S
     limits = np.full(robot.n_cables, low), np.full(robot.n_cables, high)
     instants = in_batches(partial(EXACT, robot, spline), times / table.x[-1], batch_size=10)
-    several = SeveralSplines([spline])
+    several = SplineBatch([spline])
     states = several.bounds(np.zeros(count, int), edges[:-1], edges[1:], parabolas=parabolas)
     return instants, in_batches(partial(BOUNDS, robot, limits), states, batch_size=10)
 

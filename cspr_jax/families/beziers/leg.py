@@ -14,9 +14,9 @@ from cspr_jax.families.beziers.margins import depths_of
 from cspr_jax.families.beziers.motion import Bezier, end_acceleration
 from cspr_jax.families.beziers.segments import BezierAnswers, answers_of, joined_segments
 from cspr_jax.families.beziers.sequences import Anchored, duration_bounds, least_total, segments_of
+from cspr_jax.launch.flight import parabola_of
 from cspr_jax.launch.landings import Throw
 from cspr_jax.launch.launch_result import LaunchResult, launch_result
-from cspr_jax.launch.parabola import parabola_of
 from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.leg import JoinedLeg, Leg, each
 from cspr_jax.motion.motion import Motion

@@ -47,7 +47,7 @@ def limit_slacks(
         low, attained = (np.stack(x, axis=1) for x in zip(*pairs, strict=True))
         return low, attained
 
-    proved = smallest(full, count, values, np.ones(len(rows)), size=TOGETHER)
+    proved = smallest(full, count, values, np.ones(len(rows)), batch_size=TOGETHER)
     unknown = ~is_below[:, None] & np.array([row.quantity == "tension" for row in rows])[None]
     return Proved(*(np.where(unknown, -np.inf, x) for x in proved))
 

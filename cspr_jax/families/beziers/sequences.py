@@ -20,7 +20,7 @@ from cspr_jax.families.beziers.verdicts import smallest_slacks, verdicts
 from cspr_jax.motion.limits import limits_set
 from cspr_jax.motion.problem import Problem
 from cspr_jax.motion.slacks import slacks
-from cspr_jax.numerics.search.constrained_minima import Judged, least
+from cspr_jax.numerics.search.constrained_minima import Verified, constrained_minimum
 from cspr_jax.robots.model.point_mass import spool_radius
 
 if TYPE_CHECKING:
@@ -84,11 +84,11 @@ def margins_of(problem: Problem, segments: Bezier, samples: int = SAMPLES) -> Ar
     return jax.vmap(one)(segments).ravel()
 
 
-def judged(problem: Problem, segments: Bezier) -> Judged:
+def judged(problem: Problem, segments: Bezier) -> Verified:
     """Judgement of a sequence, proved."""
     judgements = verdicts(problem, jax.tree.map(np.asarray, segments))
     worst = smallest_slacks(problem, judgements).min()
-    return Judged(bool((judgements.verdict == 0).all()), float(worst))
+    return Verified(bool((judgements.verdict == 0).all()), float(worst))
 
 
 def duration_bounds(problem: Problem, points: Float[np.ndarray, "n+1 3"]) -> tuple[float, float]:
@@ -116,7 +116,7 @@ def least_total(problem: Problem, sequence: Anchored, durations: list[float | No
 
     bounds = duration_bounds(problem, np.asarray(sequence.points))
     shortest, longest = (np.full(len(free), bound) for bound in bounds)
-    logarithms = least(
+    logarithms = constrained_minimum(
         _parts,
         (problem, sequence, jnp.asarray(known), free),
         shortest,

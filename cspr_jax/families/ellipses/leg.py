@@ -21,9 +21,9 @@ from cspr_jax.families.ellipses.motion import EllipseMotion, turning
 from cspr_jax.families.ellipses.releases import Release, ReleaseRequirement, chosen_release
 from cspr_jax.families.ellipses.rotation_frequencies import rotation_frequencies
 from cspr_jax.families.ellipses.transfers import Turning, Way, between, least_way, rotation_between, step_of
+from cspr_jax.launch.flight import parabola_of
 from cspr_jax.launch.landings import Throw
 from cspr_jax.launch.launch_result import LaunchResult, launch_result
-from cspr_jax.launch.parabola import parabola_of
 from cspr_jax.motion.answers import Answers
 from cspr_jax.motion.leg import JoinedLeg, Leg
 from cspr_jax.motion.motion import Motion

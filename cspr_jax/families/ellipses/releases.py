@@ -27,8 +27,7 @@ from cspr_jax.families.ellipses.frequencies import natural_frequency, sampled_sl
 from cspr_jax.families.ellipses.harmonics import Ellipse
 from cspr_jax.families.ellipses.hull import formula_hull
 from cspr_jax.families.ellipses.transfers import Turning, motion_between
-from cspr_jax.launch.flight import aimed, flown
-from cspr_jax.launch.parabola import Parabola
+from cspr_jax.launch.flight import Parabola, aimed, flown
 from cspr_jax.motion.problem import Problem
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.verification.proved_answers import proof_of, sampled_proof

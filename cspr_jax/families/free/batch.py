@@ -7,8 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.interpolate import BSpline
 
-from cspr_jax.curves.several import SeveralSplines
-from cspr_jax.curves.spline import Spline
+from cspr_jax.curves.spline import Spline, SplineBatch
 from cspr_jax.families.free.free_motion import FEWEST, FINE
 from cspr_jax.families.free.neighbours import Neighbours
 from cspr_jax.families.free.poses import FreePoses, divided, motions_of
@@ -130,7 +129,7 @@ def _proved(
     left = np.arange(len(rows))
     for number in range(1, ROUNDS + 1):
         if len(left):
-            several = SeveralSplines([motions[k] for k in left.tolist()])
+            several = SplineBatch([motions[k] for k in left.tolist()])
             parts = several.bounds, several.durations, scene, several.jumps
             proofs[left] = proofs_of(problem, *parts, intervals=False)
         left = np.array([k for k in left.tolist() if proofs[k].verdict], int)
@@ -163,6 +162,6 @@ def _clear(question: FreeQuestion, tasks: Tasks, unknowns: Unknowns) -> tuple[Sp
         raise KeyboardInterrupt
     if not proof.answers.feasible.all():
         return None
-    several = SeveralSplines(proof.motions)
+    several = SplineBatch(proof.motions)
     parts = several.bounds, several.durations, question.scene, several.jumps
     return proof.motions[0], proofs_of(question.problem, *parts, intervals=False)[0]

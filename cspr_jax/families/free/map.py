@@ -6,8 +6,7 @@ from jax import Array
 from cspr_jax.config.keys.path import SAME_PLACE
 from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
-from cspr_jax.curves.several import SeveralSplines
-from cspr_jax.curves.spline import Spline
+from cspr_jax.curves.spline import Spline, SplineBatch
 from cspr_jax.errors import ConfigError, InputError
 from cspr_jax.families.free.batch import free_motions
 from cspr_jax.families.free.poses import FreePoses, check_searched
@@ -87,7 +86,7 @@ class FreeMap(ProvedMap):
         motions = [
             Spline(as_float64(np.array([0.0, 1.0])), as_float64(place[None, None]), self._turning()) for place in places
         ]
-        several = SeveralSplines(motions)
+        several = SplineBatch(motions)
         proofs = proofs_of(self._problem, several.bounds, several.durations, self._scene, several.jumps)
         answers = answers_of(proofs, several.durations)
         judge_all_robots(self._problem, answers, motions, self._scene)

@@ -37,7 +37,7 @@ def smallest_slacks(
     def values(part: MinimumBlocks) -> tuple[np.ndarray, np.ndarray]:
         return _of_blocks(lines, laws, durations, part)
 
-    return smallest(_first(laws), len(durations), values, scales, size=size, enough=enough)
+    return smallest(_first(laws), len(durations), values, scales, batch_size=size, enough=enough)
 
 
 def _first(laws: Amplitude) -> MinimumBlocks:

@@ -1,11 +1,11 @@
-"""Affine bounds: over a block of time, a function lies in a band around a straight line.
+"""Affine bounds: Taylor models of the first order, over a block of time.
 
-With s from -1 at the start of a block to 1 at its end, f(s) is within `radius` of `middle + slope s`. Sums, products,
+With s from -1 at the start of a block to 1 at its end, f(s) is within `radius` of `middle + linear s`. Sums, products,
 quotients and roots of such bounds are bounds again. A smooth function's radius shrinks with the square of the length of
-the block, so that halving a block closes what is open, and functions that only have to be continuous have bounds too.
-Bands around parabolas, `middle + slope s + square s^2`, shrink with the third power; few operations know them.
-Each operation widens the band by what rounding may be of it. Operations are compiled functions: kernels of hundreds of
-them are traced, and written down for XLA, as calls of a few.
+the block, so that halving a block decides what is open, and functions that only have to be continuous have bounds too.
+Models of the second order, `middle + linear s + square s^2`, shrink with the third power; few operations know them.
+Each operation adds what rounding may be to the radius. Operations are compiled functions: kernels of hundreds of them
+are traced, and written down for XLA, as calls of a few.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ class AffineBounds(NamedTuple):
 
     def half_range(self) -> Float[Array, "..."]:
         """How far the function may be from `middle`."""
-        reach = jnp.abs(self.linear) + self.radius
-        return reach if self.square is None else reach + jnp.abs(self.square)
+        bound = jnp.abs(self.linear) + self.radius
+        return bound if self.square is None else bound + jnp.abs(self.square)
 
     def low(self) -> Float[Array, "..."]:
         """Lower bound."""
@@ -97,9 +97,9 @@ class AffineBounds(NamedTuple):
         return -self + other
 
 
-def rounded(bounds: AffineBounds, size: Any = 0.0) -> AffineBounds:
-    """Bounds with a band that is wider by the rounding of numbers as large as they are, or more."""
-    return bounds._replace(radius=bounds.radius + ROUNDING * (bounds.magnitude() + size))
+def rounded(bounds: AffineBounds, magnitude: Any = 0.0) -> AffineBounds:
+    """Bounds with a radius that is larger by the rounding of numbers as large as they are, or more."""
+    return bounds._replace(radius=bounds.radius + ROUNDING * (bounds.magnitude() + magnitude))
 
 
 @partial(jax.jit, static_argnames="axis")
@@ -130,39 +130,39 @@ def _scaled(f: AffineBounds, constants: Array) -> AffineBounds:
 
 
 def _products(f: AffineBounds, g: AffineBounds) -> tuple[AffineBounds, Array]:
-    # Bounds of f g but for rounding, and the size of the numbers in its line; s^2 is between 0 and 1.
+    # Bounds of f g but for rounding, and the magnitude of the numbers in its line; s^2 is between 0 and 1.
     if f.square is not None or g.square is not None:
         return _parabola_products(f, g)
     half = 0.5 * f.linear * g.linear
-    sizes = jnp.abs(f.middle) + jnp.abs(f.linear), jnp.abs(g.middle) + jnp.abs(g.linear)
-    radius = jnp.abs(half) + sizes[0] * g.radius + (sizes[1] + g.radius) * f.radius
-    slope = f.middle * g.linear + f.linear * g.middle
-    return AffineBounds(f.middle * g.middle + half, slope, radius), sizes[0] * sizes[1]
+    norms = jnp.abs(f.middle) + jnp.abs(f.linear), jnp.abs(g.middle) + jnp.abs(g.linear)
+    radius = jnp.abs(half) + norms[0] * g.radius + (norms[1] + g.radius) * f.radius
+    linear = f.middle * g.linear + f.linear * g.middle
+    return AffineBounds(f.middle * g.middle + half, linear, radius), norms[0] * norms[1]
 
 
 def _parabola_products(f: AffineBounds, g: AffineBounds) -> tuple[AffineBounds, Array]:
     # s^3 is within 1/4 of 3 s / 4, s^4 between 0 and 1.
     f, g = (x._replace(square=squares(x)) for x in (f, g))
     cubic, quartic = f.linear * g.square + f.square * g.linear, f.square * g.square
-    sizes = [jnp.abs(x.middle) + jnp.abs(x.linear) + jnp.abs(x.square) for x in (f, g)]
-    radius = 0.25 * jnp.abs(cubic) + 0.5 * jnp.abs(quartic) + sizes[0] * g.radius + (sizes[1] + g.radius) * f.radius
+    norms = [jnp.abs(x.middle) + jnp.abs(x.linear) + jnp.abs(x.square) for x in (f, g)]
+    radius = 0.25 * jnp.abs(cubic) + 0.5 * jnp.abs(quartic) + norms[0] * g.radius + (norms[1] + g.radius) * f.radius
     product = AffineBounds(
         f.middle * g.middle + 0.5 * quartic,
         f.middle * g.linear + f.linear * g.middle + 0.75 * cubic,
         radius,
         f.middle * g.square + f.linear * g.linear + f.square * g.middle,
     )
-    return product, sizes[0] * sizes[1]
+    return product, norms[0] * norms[1]
 
 
 @jax.jit
 def _product(f: AffineBounds, g: AffineBounds) -> AffineBounds:
-    product, size = _products(f, g)
-    return product._replace(radius=product.radius + ROUNDING * (product.radius + size))
+    product, magnitude = _products(f, g)
+    return product._replace(radius=product.radius + ROUNDING * (product.radius + magnitude))
 
 
 def squares(f: AffineBounds) -> Float[Array, "..."]:
-    """Shares of s^2."""
+    """Coefficients of s^2."""
     return jnp.zeros_like(f.middle) if f.square is None else f.square
 
 
@@ -199,9 +199,9 @@ def dot(f: AffineBounds, g: AffineBounds | Float[Array, "... n"]) -> AffineBound
     """Bounds of the products of vectors."""
     if not isinstance(g, AffineBounds):
         return (f * g).total()
-    product, size = _products(f, g)
+    product, magnitude = _products(f, g)
     total = product.each(lambda x: jnp.sum(x, axis=-1))
-    return total._replace(radius=total.radius + 3.0 * ROUNDING * (total.radius + jnp.sum(size, axis=-1)))
+    return total._replace(radius=total.radius + 3.0 * ROUNDING * (total.radius + jnp.sum(magnitude, axis=-1)))
 
 
 @jax.jit
@@ -216,11 +216,11 @@ def norm(f: AffineBounds) -> AffineBounds:
     f = flat(f)
     # A length is convex: it lies below the chord between the ends of the line, and above its part along any direction.
     start, end = (jnp.sqrt(jnp.sum((f.middle + side) ** 2, axis=-1)) for side in (-f.linear, f.linear))
-    apart, size = jnp.sqrt(jnp.sum(f.radius**2, axis=-1)), jnp.sqrt(jnp.sum(f.middle**2, axis=-1))
-    along = jnp.sum(f.middle * f.linear, axis=-1) / jnp.where(size > 0.0, size, 1.0)
-    slope, above = 0.5 * (end - start), 0.5 * (start + end) + apart
-    below = size - apart - jnp.abs(along - slope)
-    return rounded(AffineBounds(0.5 * (above + below), slope, 0.5 * (above - below)), start + end)
+    deviation, length = jnp.sqrt(jnp.sum(f.radius**2, axis=-1)), jnp.sqrt(jnp.sum(f.middle**2, axis=-1))
+    along = jnp.sum(f.middle * f.linear, axis=-1) / jnp.where(length > 0.0, length, 1.0)
+    linear, above = 0.5 * (end - start), 0.5 * (start + end) + deviation
+    below = length - deviation - jnp.abs(along - linear)
+    return rounded(AffineBounds(0.5 * (above + below), linear, 0.5 * (above - below)), start + end)
 
 
 @jax.jit

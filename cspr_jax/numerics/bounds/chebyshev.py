@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 DEGREE = 18
 # Bound of Lebesgue's constant of the nodes, by which an error of the values can grow between them.
 LEBESGUE = 3.0
-# Sizes rho of the ellipse; the ellipse with the smaller remainder counts.
+# Sums rho of the semi-axes of the ellipse; the ellipse with the smaller remainder counts.
 RADII = (2.5, 6.0)
 
 
@@ -37,17 +37,17 @@ def nodes() -> Float[np.ndarray, "n+1"]:
 @functools.cache
 def bernstein() -> Float[np.ndarray, "n+1 n+1"]:
     """Matrix from values at the nodes to Bernstein coefficients."""
-    places = [(1 + Fraction(float(x))) / 2 for x in nodes()]
-    scale = max(place.denominator for place in places)  # a power of two, as all of them
-    full, columns = [int(place * scale) for place in places], []
-    for k, place in enumerate(full):
+    exact = [(1 + Fraction(float(x))) / 2 for x in nodes()]
+    scale = max(node.denominator for node in exact)  # a power of two, as all of them
+    full, columns = [int(node * scale) for node in exact], []
+    for k, node in enumerate(full):
         # Lagrange's polynomial of one node, a product of linear ones: coefficients of (1 - t)^(n - j) t^j.
-        powers, size = [1], 1
+        powers, denominator = [1], 1
         for other in full[:k] + full[k + 1 :]:
             powers = [(scale - other) * a - other * b for a, b in zip([0, *powers], [*powers, 0], strict=True)]
-            size *= place - other
+            denominator *= node - other
         # Python rounds quotients of integers once, however large they are; no -0.
-        columns.append([power / (math.comb(DEGREE, j) * size) + 0.0 for j, power in enumerate(powers)])
+        columns.append([power / (math.comb(DEGREE, j) * denominator) + 0.0 for j, power in enumerate(powers)])
     return np.array(columns).T
 
 

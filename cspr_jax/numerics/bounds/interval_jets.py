@@ -42,20 +42,20 @@ class Jet:
 
     Args:
         value: lower and upper bounds of the values, arrays of the blocks' shape.
-        slope: bounds of the first derivative, likewise.
+        derivative: bounds of the first derivative, likewise.
         second_derivative: bounds of the second derivative, likewise.
     """
 
     # NumPy arrays leave arithmetic with jets to the jets.
     __array_ufunc__ = None
 
-    def __init__(self, value: Interval, slope: Interval, second_derivative: Interval) -> None:
+    def __init__(self, value: Interval, derivative: Interval, second_derivative: Interval) -> None:
         """Keep the bounds."""
-        self.value, self.slope, self.second_derivative = value, slope, second_derivative
+        self.value, self.derivative, self.second_derivative = value, derivative, second_derivative
 
     def _each(self, change: Callable[..., np.ndarray], *others: "Jet") -> "Jet":
         jets = (self, *others)
-        parts = zip(*((jet.value, jet.slope, jet.second_derivative) for jet in jets), strict=True)
+        parts = zip(*((jet.value, jet.derivative, jet.second_derivative) for jet in jets), strict=True)
         return Jet(*((change(*(x[0] for x in part)), change(*(x[1] for x in part))) for part in parts))
 
     def expanded(self, axis: int) -> "Jet":
@@ -73,23 +73,23 @@ class Jet:
     def __add__(self, other: Any) -> "Jet":
         """Sum with a jet or with constants."""
         if not isinstance(other, Jet):
-            return Jet((self.value[0] + other, self.value[1] + other), self.slope, self.second_derivative)
+            return Jet((self.value[0] + other, self.value[1] + other), self.derivative, self.second_derivative)
         return Jet(
             _sum(self.value, other.value),
-            _sum(self.slope, other.slope),
+            _sum(self.derivative, other.derivative),
             _sum(self.second_derivative, other.second_derivative),
         )
 
     def __mul__(self, other: Any) -> "Jet":
         """Product with a jet or with constants."""
         if not isinstance(other, Jet):
-            return Jet(*(_scaled(x, other) for x in (self.value, self.slope, self.second_derivative)))
-        crossed = _scaled(_product(self.slope, other.slope), 2.0)
+            return Jet(*(_scaled(x, other) for x in (self.value, self.derivative, self.second_derivative)))
+        crossed = _scaled(_product(self.derivative, other.derivative), 2.0)
         second_derivative = _sum(
             _sum(_product(self.second_derivative, other.value), crossed), _product(self.value, other.second_derivative)
         )
-        slope = _sum(_product(self.slope, other.value), _product(self.value, other.slope))
-        return Jet(_product(self.value, other.value), slope, second_derivative)
+        derivative = _sum(_product(self.derivative, other.value), _product(self.value, other.derivative))
+        return Jet(_product(self.value, other.value), derivative, second_derivative)
 
     __radd__, __rmul__ = __add__, __mul__
 
@@ -108,22 +108,22 @@ class Jet:
     def __pow__(self, power: float) -> "Jet":
         """Square, or any other power of a function whose values are positive."""
         if power == 2:
-            chained = _sum(_square(self.slope), _product(self.value, self.second_derivative))
-            return Jet(_square(self.value), _scaled(_product(self.value, self.slope), 2.0), _scaled(chained, 2.0))
+            chained = _sum(_square(self.derivative), _product(self.value, self.second_derivative))
+            return Jet(_square(self.value), _scaled(_product(self.value, self.derivative), 2.0), _scaled(chained, 2.0))
         low, high = self.value
         positive = np.where(low > 0.0, low, 0.0), np.where(high > 0.0, high, 0.0)
 
-        def derivative(order: int) -> Interval:
+        def power_derivative(order: int) -> Interval:
             factor = np.prod([power - i for i in range(order)])
             ends = [x ** (power - order) for x in positive]
             return _scaled((np.minimum(*ends), np.maximum(*ends)), factor)
 
         with np.errstate(divide="ignore", invalid="ignore"):
-            first = derivative(1)
+            first = power_derivative(1)
             second_derivative = _sum(
-                _product(derivative(2), _square(self.slope)), _product(first, self.second_derivative)
+                _product(power_derivative(2), _square(self.derivative)), _product(first, self.second_derivative)
             )
-            return Jet(derivative(0), _product(first, self.slope), second_derivative)
+            return Jet(power_derivative(0), _product(first, self.derivative), second_derivative)
 
     def __truediv__(self, other: Any) -> "Jet":
         """Quotient by a jet of positive values, or by constants."""
@@ -135,6 +135,6 @@ def lowest(ends: Float[np.ndarray, "2 ..."], jet: Jet) -> Float[np.ndarray, "...
     minimum = ends.min(0)
     with np.errstate(invalid="ignore"):
         low = minimum - np.maximum(jet.second_derivative[1], 0.0) / 8.0
-        # A function whose slope has one sign is nowhere below its lower end.
-        steady = (jet.slope[0] >= 0.0) | (jet.slope[1] <= 0.0)
+        # A function whose derivative has one sign is nowhere below its lower end.
+        steady = (jet.derivative[0] >= 0.0) | (jet.derivative[1] <= 0.0)
     return np.where(steady, minimum, np.where(np.isnan(low), -np.inf, low))

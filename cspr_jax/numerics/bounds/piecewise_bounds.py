@@ -1,8 +1,8 @@
 """Affine bounds of piecewise polynomials over blocks of their variable, each within a piece or over many of them.
 
-Over a piece a polynomial lies within the hull of its Bernstein coefficients, so does what is left of it beside a
-straight line. A block that holds many pieces gets one line, and the widest band that any of them needs. Beside a
-parabola, which a block within one piece may get, less is left.
+Over a piece a polynomial lies within the hull of its Bernstein coefficients, and so does its remainder beside a
+straight line. A block that holds many pieces gets one line, and the largest remainder of any of them. Beside a
+parabola, which a block within one piece may get, the remainder is smaller.
 """
 
 from __future__ import annotations
@@ -43,13 +43,13 @@ def overlaps(
     end: Float[np.ndarray, "k"],
     tables: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> PieceParts:
-    """PieceParts of pieces that blocks hold."""
+    """Parts of pieces that blocks hold."""
     of_knots, of_blocks = (np.zeros(len(knots), int), np.zeros(len(start), int)) if tables is None else tables
     # NumPy orders complex numbers by their real parts first.
-    places = of_knots + 1j * knots
+    ordered = of_knots + 1j * knots
     earliest, latest = np.searchsorted(of_knots, of_blocks), np.searchsorted(of_knots, of_blocks, side="right") - 2
-    first = np.clip(np.searchsorted(places, of_blocks + 1j * start, side="right") - 1, earliest, latest)
-    last = np.maximum(np.clip(np.searchsorted(places, of_blocks + 1j * end) - 1, earliest, latest), first)
+    first = np.clip(np.searchsorted(ordered, of_blocks + 1j * start, side="right") - 1, earliest, latest)
+    last = np.maximum(np.clip(np.searchsorted(ordered, of_blocks + 1j * end) - 1, earliest, latest), first)
     counts = last - first + 1
     block = np.repeat(np.arange(len(start)), counts)
     knot = first[block] + np.arange(len(block)) - np.repeat(np.cumsum(counts) - counts, counts)
@@ -68,15 +68,15 @@ def piecewise_bounds(
     """Bounds of a piecewise polynomial and of its derivatives."""
     if parabolas and (np.diff(parts.block) != 1).any():
         raise ValueError("parabolas are of blocks within one piece")
-    coefficients, bands = table[parts.piece], []
+    coefficients, bounds = table[parts.piece], []
     for order in range(orders):
         degree = coefficients.shape[1] - 1
         between = _between(coefficients, *parts.of_piece)
-        bands.append(_parabola_band(between) if parabolas else _band(between, parts))
+        bounds.append(_parabola(between) if parabolas else _affine(between, parts))
         if order + 1 < orders:
             steps = degree / parts.width[:, None, None]
             coefficients = np.diff(coefficients, axis=1) * steps if degree else 0.0 * coefficients
-    return bands
+    return bounds
 
 
 def bernstein_of_powers(coefficients: Float[np.ndarray, "... degree+1 n"]) -> Float[np.ndarray, "... degree+1 n"]:
@@ -93,49 +93,49 @@ def _between(coefficients: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.
     after = _split(coefficients, high[:, None, None])
     with np.errstate(divide="ignore", invalid="ignore"):
         fraction = np.where(high > 0.0, low / high, 0.0)[:, None, None]
-    # Reversed, the part up to an instant is the part from there on.
+    # Reversed, the part up to a time is the part from there on.
     return _split(after[:, ::-1], 1.0 - fraction)[:, ::-1]
 
 
 def _split(coefficients: np.ndarray, fraction: np.ndarray) -> np.ndarray:
-    # Bernstein coefficients over [0, share].
-    rows, ends = coefficients, [coefficients[:, :1]]
-    while rows.shape[1] > 1:
-        rows = rows[:, :-1] + fraction * np.diff(rows, axis=1)
-        ends.append(rows[:, :1])
+    # Bernstein coefficients over [0, fraction].
+    remaining, ends = coefficients, [coefficients[:, :1]]
+    while remaining.shape[1] > 1:
+        remaining = remaining[:, :-1] + fraction * np.diff(remaining, axis=1)
+        ends.append(remaining[:, :1])
     return np.concatenate(ends, axis=1)
 
 
-def _band(coefficients: np.ndarray, parts: PieceParts) -> AffineBounds:
+def _affine(coefficients: np.ndarray, parts: PieceParts) -> AffineBounds:
     degree = coefficients.shape[1] - 1
     starts = np.flatnonzero(np.diff(parts.block, prepend=-1))
     ends = np.append(starts[1:], len(parts.block)) - 1
     first, last = coefficients[starts, 0], coefficients[ends, -1]
-    middle, slope = 0.5 * (first + last), 0.5 * (last - first)
-    shares = np.linspace(0.0, 1.0, degree + 1) if degree else np.array([0.5])
+    middle, linear = 0.5 * (first + last), 0.5 * (last - first)
+    fractions = np.linspace(0.0, 1.0, degree + 1) if degree else np.array([0.5])
     low, high = parts.of_block
-    places = low[:, None] + (high - low)[:, None] * shares
-    rest = coefficients - middle[parts.block, None] - slope[parts.block, None] * places[..., None]
+    s = low[:, None] + (high - low)[:, None] * fractions
+    rest = coefficients - middle[parts.block, None] - linear[parts.block, None] * s[..., None]
     top, bottom = (
         reduce.reduceat(getattr(rest, name)(axis=1), starts)
         for reduce, name in ((np.maximum, "max"), (np.minimum, "min"))
     )
-    size = np.maximum.reduceat(np.abs(coefficients).max(axis=1), starts)
-    return AffineBounds(middle + 0.5 * (top + bottom), slope, 0.5 * (top - bottom) + 4.0 * ROUNDING * size)
+    magnitude = np.maximum.reduceat(np.abs(coefficients).max(axis=1), starts)
+    return AffineBounds(middle + 0.5 * (top + bottom), linear, 0.5 * (top - bottom) + 4.0 * ROUNDING * magnitude)
 
 
-def _parabola_band(coefficients: np.ndarray) -> AffineBounds:
+def _parabola(coefficients: np.ndarray) -> AffineBounds:
     # The parabola has the mean second difference of the coefficients, which are those over the block.
     # Sums along a first axis are fast.
-    rows, degree = np.ascontiguousarray(np.moveaxis(coefficients, 1, 0)), coefficients.shape[1] - 1
+    control, degree = np.ascontiguousarray(np.moveaxis(coefficients, 1, 0)), coefficients.shape[1] - 1
     number, scale = np.arange(degree + 1)[:, None, None], max(degree * (degree - 1), 1)
     # Coefficients of s and of s^2 over [-1, 1].
-    places = 2.0 * number / max(degree, 1) - 1.0
-    squares = 4.0 * number * (number - 1) / scale - 2.0 * places - 1.0
-    first, last = rows[0], rows[-1]
-    square = np.zeros_like(first) if degree < 2 else scale / 8.0 * np.diff(rows, 2, axis=0).mean(0)
-    middle, slope = 0.5 * (first + last) - square, 0.5 * (last - first)
-    rest = rows - middle - slope * places - square * squares
+    s = 2.0 * number / max(degree, 1) - 1.0
+    squares = 4.0 * number * (number - 1) / scale - 2.0 * s - 1.0
+    first, last = control[0], control[-1]
+    square = np.zeros_like(first) if degree < 2 else scale / 8.0 * np.diff(control, 2, axis=0).mean(0)
+    middle, linear = 0.5 * (first + last) - square, 0.5 * (last - first)
+    rest = control - middle - linear * s - square * squares
     top, bottom = rest.max(axis=0), rest.min(axis=0)
-    size = np.abs(rows).max(axis=0) + np.abs(square)
-    return AffineBounds(middle + 0.5 * (top + bottom), slope, 0.5 * (top - bottom) + 4.0 * ROUNDING * size, square)
+    largest = np.abs(control).max(axis=0) + np.abs(square)
+    return AffineBounds(middle + 0.5 * (top + bottom), linear, 0.5 * (top - bottom) + 4.0 * ROUNDING * largest, square)

@@ -28,14 +28,14 @@ def rotation_bounds(quaternion: AffineBounds, first: AffineBounds, second: Affin
     """
     unit, inverse = unit_rotation_bounds(quaternion, first, second), reciprocal(norm_squared(quaternion))
     angular_velocity = unit.angular_velocity * inverse
-    stretch = 2.0 * dot(quaternion, first) * inverse
-    angular_acceleration = unit.angular_acceleration * inverse - angular_velocity * stretch
+    relative_rate = 2.0 * dot(quaternion, first) * inverse
+    angular_acceleration = unit.angular_acceleration * inverse - angular_velocity * relative_rate
     return RotationBounds(unit.rotation * inverse, angular_velocity, angular_acceleration)
 
 
 def unit_rotation_bounds(quaternion: AffineBounds, first: AffineBounds, second: AffineBounds) -> RotationBounds:
     """Bounds of the rotation of a unit quaternion."""
-    w, x, y, z = (quaternion.each(lambda leaf, i=i: leaf[i]) for i in range(4))
+    w, x, y, z = (quaternion.each(lambda array, i=i: array[i]) for i in range(4))
     ww, xx, yy, zz = (squared(part) for part in (w, x, y, z))
     rows = [
         [ww + xx - yy - zz, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],

@@ -25,36 +25,36 @@ class Bounds(NamedTuple):
 
     Fields:
         value: (...) bound of |f|.
-        slope: (...) bound of |f'|, derivative with respect to the interval's variable.
+        derivative: (...) bound of |f'|, with respect to the interval's variable.
         curvature: (...) bound of |f''|.
     """
 
     value: Array
-    slope: Array
+    derivative: Array
     curvature: Array
 
     def __add__(self, other: "Bounds") -> "Bounds":  # type: ignore[override]
         """Bounds of f + g, and of f - g."""
-        return Bounds(self.value + other.value, self.slope + other.slope, self.curvature + other.curvature)
+        return Bounds(self.value + other.value, self.derivative + other.derivative, self.curvature + other.curvature)
 
     def __mul__(self, other: "Bounds") -> "Bounds":  # type: ignore[override]
         """Bounds of f g (Leibniz)."""
         return Bounds(
             self.value * other.value,
-            self.slope * other.value + self.value * other.slope,
-            self.curvature * other.value + 2.0 * self.slope * other.slope + self.value * other.curvature,
+            self.derivative * other.value + self.value * other.derivative,
+            self.curvature * other.value + 2.0 * self.derivative * other.derivative + self.value * other.curvature,
         )
 
     def times(self, factor: Array | float) -> "Bounds":
         """Bounds of factor f, for a constant factor (its sign does not matter)."""
-        size = jnp.abs(factor)
-        return Bounds(size * self.value, size * self.slope, size * self.curvature)
+        magnitude = jnp.abs(factor)
+        return Bounds(magnitude * self.value, magnitude * self.derivative, magnitude * self.curvature)
 
     def combined(self, other: "Bounds") -> "Bounds":
         """Bounds of the length of a vector whose perpendicular components have these bounds."""
         return Bounds(
             hypotenuse(self.value, other.value),
-            hypotenuse(self.slope, other.slope),
+            hypotenuse(self.derivative, other.derivative),
             hypotenuse(self.curvature, other.curvature),
         )
 
@@ -62,6 +62,6 @@ class Bounds(NamedTuple):
         """Bounds of the length of a vector and its derivatives, seen from axes it turns against at a constant rate."""
         return Bounds(
             self.value,
-            self.slope + rate * self.value,
-            self.curvature + 2.0 * rate * self.slope + rate**2 * self.value,
+            self.derivative + rate * self.value,
+            self.curvature + 2.0 * rate * self.derivative + rate**2 * self.value,
         )

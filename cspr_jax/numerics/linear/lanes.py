@@ -64,7 +64,7 @@ def about_axis(axis: Vector, sine: Float[Array, "..."], cosine: Float[Array, "..
 
 
 def smallest(values: Sequence[Array]) -> Float[Array, "..."]:
-    """The smallest of several arrays, case by case; NaN stays NaN."""
+    """The smallest of some arrays, case by case; NaN stays NaN."""
     minimum = values[0]
     for value in values[1:]:
         minimum = jnp.minimum(minimum, value)
@@ -72,7 +72,7 @@ def smallest(values: Sequence[Array]) -> Float[Array, "..."]:
 
 
 def largest(values: Sequence[Array]) -> Float[Array, "..."]:
-    """The largest of several arrays, case by case; NaN stays NaN."""
+    """The largest of some arrays, case by case; NaN stays NaN."""
     maximum = values[0]
     for value in values[1:]:
         maximum = jnp.maximum(maximum, value)

@@ -15,7 +15,7 @@ ROUNDS = 64
 # A bound and an attained value agree if they differ by no more than this part of the scale of the values.
 AGREED = 1e-12
 # Halving ends after this many blocks: the bounds that are proved by then are the answer.
-MOST = 2_000_000
+MAX_BLOCKS = 2_000_000
 
 
 class Proved(NamedTuple):
@@ -62,18 +62,18 @@ def smallest(
     values: Callable[[MinimumBlocks], tuple[np.ndarray, np.ndarray]],
     scales: Float[np.ndarray, "n_groups"],
     *,
-    size: int,
+    batch_size: int,
     enough: float = math.inf,
 ) -> Proved:
     """Smallest values over all blocks of each case."""
     best = np.full((count, len(scales)), np.inf)
     done, seen = best.copy(), 0
     for halvings in range(ROUNDS + 1):
-        low, attained = _of(values, blocks, size)
+        low, attained = _of(values, blocks, batch_size)
         np.minimum.at(best, blocks.case, attained)
         sharp = (low >= best[blocks.case] - AGREED * scales) | (low > enough * scales)
         seen += len(low)
-        is_open = ~sharp.all(1) & (seen < MOST) & (halvings < ROUNDS)
+        is_open = ~sharp.all(1) & (seen < MAX_BLOCKS) & (halvings < ROUNDS)
         np.minimum.at(done, blocks.case[~is_open], low[~is_open])
         if not is_open.any():
             break
@@ -81,7 +81,7 @@ def smallest(
     return Proved(best, done)
 
 
-def _of(values, blocks: MinimumBlocks, size: int) -> tuple[np.ndarray, np.ndarray]:
-    parts = [values(blocks.rows(slice(i, i + size))) for i in range(0, len(blocks.case), size)]
+def _of(values, blocks: MinimumBlocks, batch_size: int) -> tuple[np.ndarray, np.ndarray]:
+    parts = [values(blocks.rows(slice(i, i + batch_size))) for i in range(0, len(blocks.case), batch_size)]
     low, attained = (np.concatenate(x) for x in zip(*parts, strict=True))
     return low, attained

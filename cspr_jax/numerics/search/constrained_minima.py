@@ -1,4 +1,4 @@
-"""Least value of a smooth objective under smallest margins: the best of many places are improved, and proved."""
+"""Constrained minimum of a smooth objective: the best of many points are improved, and proved."""
 
 from __future__ import annotations
 
@@ -18,14 +18,17 @@ if TYPE_CHECKING:
 
 # A function of arguments and unknowns (n,) that gives the objective () and the margins (n_margins,).
 Parts = Callable[[Any, Array], tuple[Array, Array]]
-LOOKED_AT, IMPROVED, BATCH = 4096, 8, 512
+SAMPLES = 4096  # points that are evaluated
+IMPROVED = 8  # of which the best are starts of a search
+BATCH = 512
 # Smallest margins that are required, one after the other, until the answer is proved.
 MARGINS = (1e-9, 1e-7, 1e-5, 1e-3)
-STEPS, AGREED = 200, 1e-12
+STEPS = 200
+AGREED = 1e-12
 
 
-class Judged(NamedTuple):
-    """Judgement of one place.
+class Verified(NamedTuple):
+    """Verdict of one point.
 
     Fields:
         feasible: whether it is proved feasible.
@@ -37,12 +40,12 @@ class Judged(NamedTuple):
 
 
 @partial(jax.jit, static_argnums=0)
-def _screened(parts: Parts, arguments: Any, places: Array) -> tuple[Array, Array]:
+def _screened(parts: Parts, arguments: Any, points: Array) -> tuple[Array, Array]:
     def one(x):
         value, margins = parts(arguments, x)
         return value, jnp.min(margins)
 
-    return jax.vmap(one)(places)
+    return jax.vmap(one)(points)
 
 
 @partial(jax.jit, static_argnums=0)
@@ -51,37 +54,37 @@ def _both(parts: Parts, arguments: Any, x: Array) -> tuple[Array, Array]:
 
 
 @partial(jax.jit, static_argnums=0)
-def _slopes(parts: Parts, arguments: Any, x: Array) -> tuple[Array, Array]:
+def _derivatives(parts: Parts, arguments: Any, x: Array) -> tuple[Array, Array]:
     return jax.jacfwd(lambda unknowns: parts(arguments, unknowns))(x)
 
 
-def least(
+def constrained_minimum(
     parts: Parts,
     arguments: Any,
     low: Float[np.ndarray, "n"],
     high: Float[np.ndarray, "n"],
-    judged: Callable[[np.ndarray], Judged],
+    verified: Callable[[np.ndarray], Verified],
 ) -> Float[np.ndarray, "n"]:
     """Unknowns with the least objective among feasible ones: a local minimum, or the best of several."""
     from scipy.stats import qmc  # it takes a second to import
 
-    fraction = qmc.Halton(len(low), seed=0).random(LOOKED_AT)
-    places = low + (high - low) * fraction
-    value, margin = in_batches(partial(_screened, parts, arguments), places, batch_size=BATCH)
+    fraction = qmc.Halton(len(low), seed=0).random(SAMPLES)
+    points = low + (high - low) * fraction
+    value, margin = in_batches(partial(_screened, parts, arguments), points, batch_size=BATCH)
     usable = np.isfinite(value) & np.isfinite(margin)
     margin = np.where(usable, margin, -np.inf)
-    # Feasible places come first, the smallest objective ahead; then the places that are nearest to being feasible.
+    # Feasible points come first, the smallest objective ahead; then the points that are nearest to being feasible.
     order = np.lexsort((np.where(margin > 0.0, value, -margin), margin <= 0.0))
-    best, verdict = places[order[0]], judged(places[order[0]])
-    size = float(value[order[0]])
-    for start in places[order[:IMPROVED]]:
-        candidate = _improved(parts, arguments, start, list(zip(low, high, strict=True)), judged)
-        other, length = judged(candidate), float(_both(parts, arguments, jnp.asarray(candidate))[0])
-        if (other.feasible, -length if other.feasible else other.margin) > (
+    best, verdict = points[order[0]], verified(points[order[0]])
+    objective = float(value[order[0]])
+    for start in points[order[:IMPROVED]]:
+        candidate = _improved(parts, arguments, start, list(zip(low, high, strict=True)), verified)
+        other, other_objective = verified(candidate), float(_both(parts, arguments, jnp.asarray(candidate))[0])
+        if (other.feasible, -other_objective if other.feasible else other.margin) > (
             verdict.feasible,
-            -size if verdict.feasible else verdict.margin,
+            -objective if verdict.feasible else verdict.margin,
         ):
-            best, verdict, size = candidate, other, length
+            best, verdict, objective = candidate, other, other_objective
     return best
 
 
@@ -90,21 +93,21 @@ def _improved(
     arguments: Any,
     start: np.ndarray,
     bounds: list[tuple[float, float]],
-    judged: Callable[[np.ndarray], Judged],
+    verified: Callable[[np.ndarray], Verified],
 ) -> np.ndarray:
     from scipy.optimize import minimize  # likewise
 
     def of(function, index: int) -> Callable[[np.ndarray], np.ndarray]:
         return lambda x: np.asarray(function(parts, arguments, jnp.asarray(x))[index])
 
-    place = start
+    point = start
     for margin in MARGINS:
-        limit = {"type": "ineq", "fun": lambda x, m=margin: of(_both, 1)(x) - m, "jac": of(_slopes, 1)}
+        limit = {"type": "ineq", "fun": lambda x, m=margin: of(_both, 1)(x) - m, "jac": of(_derivatives, 1)}
         with np.errstate(all="ignore"):
             answer = minimize(
                 of(_both, 0),
-                place,
-                jac=of(_slopes, 0),
+                point,
+                jac=of(_derivatives, 0),
                 method="SLSQP",
                 bounds=bounds,
                 constraints=[limit],
@@ -112,7 +115,7 @@ def _improved(
             )
         if not np.isfinite(answer.x).all():
             break
-        place = answer.x
-        if judged(place).feasible:
+        point = answer.x
+        if verified(point).feasible:
             break
-    return place
+    return point

@@ -1,9 +1,9 @@
 """Least value of an objective under smallest margins, for many questions at once: differential evolution.
 
-A fixed set of places is evaluated in groups, and the best of each group form a population. Each generation moves every
+A fixed set of points is evaluated in groups, and the best of each group form a population. Each generation moves every
 member towards one of the best and along the difference of two others, and keeps the move if it is no worse: so steps
 shrink with the population, and follow the valleys in which it lies. Smallest margins have kinks, at which a search by
-gradients would get stuck. All questions use the same places and moves, so that answers are repeatable and do not depend
+gradients would get stuck. All questions use the same points and moves, so that answers are repeatable and do not depend
 on other questions.
 """
 
@@ -26,12 +26,14 @@ if TYPE_CHECKING:
 # A function of arguments, a question and unknowns (d,) in [0, 1] that gives the objective () >= 0 and the smallest
 # margin ().
 Parts = Callable[[Any, Any, Array], tuple[Array, Array]]
-# Places in a group, generations for each member, and members for each of the best ones; measured.
-GROUP, GENERATIONS, LED = 64, 2, 10
-# Range of the lengths of steps, and probability that an unknown takes part in a step.
-STEPS, CHANCE = (0.4, 0.9), 0.9
-# Questions of a batch, and the largest number of questions of a thread at a time.
-BATCH, PART = 16, 256
+# Measured.
+GROUP = 64  # points of which the best is a member
+GENERATIONS = 2  # for each member
+LED = 10  # members for each of the best ones
+STEPS = (0.4, 0.9)  # range of their lengths
+CHANCE = 0.9  # that an unknown takes part in a step
+BATCH = 16  # questions
+PART = 256  # questions of a thread at a time
 
 
 class Moves(NamedTuple):
@@ -42,14 +44,14 @@ class Moves(NamedTuple):
         first: (n_generations, n) number of the first member of the difference.
         second: (n_generations, n) number of the second member of the difference.
         step: (n_generations, n, 1) length of the step.
-        taken: (n_generations, n, d) mask of the unknowns that take part.
+        is_moved: (n_generations, n, d) mask of the unknowns that take part.
     """
 
     leader: Any
     first: Any
     second: Any
     step: Any
-    taken: Any
+    is_moved: Any
 
 
 def moves_of(unknowns: int, population: int) -> Moves:
@@ -58,10 +60,10 @@ def moves_of(unknowns: int, population: int) -> Moves:
     shape = (GENERATIONS * population, population)
     # A permutation and the same permutation rolled pair no member with itself.
     first = random.permuted(np.tile(np.arange(population), (shape[0], 1)), axis=1)
-    taken = random.random((*shape, unknowns)) < CHANCE
-    np.put_along_axis(taken, random.integers(unknowns, size=(*shape, 1)), True, axis=2)
+    is_moved = random.random((*shape, unknowns)) < CHANCE
+    np.put_along_axis(is_moved, random.integers(unknowns, size=(*shape, 1)), True, axis=2)
     leader = random.integers(_leaders(population), size=shape)
-    return Moves(leader, first, np.roll(first, 1, axis=1), random.uniform(*STEPS, (*shape, 1)), taken)
+    return Moves(leader, first, np.roll(first, 1, axis=1), random.uniform(*STEPS, (*shape, 1)), is_moved)
 
 
 def _leaders(population: int) -> int:
@@ -69,16 +71,16 @@ def _leaders(population: int) -> int:
 
 
 @partial(jax.jit, static_argnums=0)
-def _evolved(parts: Parts, arguments: Any, margins: Array, places: Array, moves: Moves, questions: Any) -> Array:
+def _evolved(parts: Parts, arguments: Any, margins: Array, points: Array, moves: Moves, questions: Any) -> Array:
     def one(question: Any) -> Array:
-        judged = partial(_judged, parts, arguments, question)
-        value, margin = judged(places)
+        evaluate = partial(_evaluated, parts, arguments, question)
+        value, margin = evaluate(points)
 
         def search(threshold: Array, search_moves: Moves) -> Array:
             rank = _rank(value, margin, threshold)
-            groups = jnp.arange(len(places)).reshape(-1, GROUP)
+            groups = jnp.arange(len(points)).reshape(-1, GROUP)
             at = jnp.take_along_axis(groups, jnp.argmin(rank[groups], axis=1)[:, None], axis=1)[:, 0]
-            members, rank = lax.scan(partial(_generation, judged, threshold), (places[at], rank[at]), search_moves)[0]
+            members, rank = lax.scan(partial(_generation, evaluate, threshold), (points[at], rank[at]), search_moves)[0]
             return members[jnp.argmin(rank)]
 
         return jax.vmap(search)(margins, moves)
@@ -86,44 +88,44 @@ def _evolved(parts: Parts, arguments: Any, margins: Array, places: Array, moves:
     return jax.vmap(one)(questions)
 
 
-def _judged(parts: Parts, arguments: Any, question: Any, places: Array) -> tuple[Array, Array]:
-    value, margin = jax.vmap(lambda x: parts(arguments, question, x))(places)
+def _evaluated(parts: Parts, arguments: Any, question: Any, points: Array) -> tuple[Array, Array]:
+    value, margin = jax.vmap(lambda x: parts(arguments, question, x))(points)
     usable = (value * 0.0 == 0.0) & (margin * 0.0 == 0.0)
     return jnp.where(usable, value, jnp.inf), jnp.where(usable, margin, -jnp.inf)
 
 
 def _generation(
-    judged: Callable[[Array], tuple[Array, Array]], threshold: Array, state: tuple[Array, Array], move: Moves
+    evaluate: Callable[[Array], tuple[Array, Array]], threshold: Array, state: tuple[Array, Array], move: Moves
 ) -> tuple[tuple[Array, Array], None]:
     members, rank = state
     good = members[lax.top_k(-rank, _leaders(len(members)))[1]][move.leader]
     moved = members + move.step * (good - members + members[move.first] - members[move.second])
     # Go half of the way to a bound that a step would cross.
     moved = jnp.where(moved < 0.0, 0.5 * members, jnp.where(moved > 1.0, 0.5 * (members + 1.0), moved))
-    moved = jnp.where(move.taken, moved, members)
-    new = _rank(*judged(moved), threshold)
+    moved = jnp.where(move.is_moved, moved, members)
+    new = _rank(*evaluate(moved), threshold)
     better = new <= rank
     return (jnp.where(better[:, None], moved, members), jnp.where(better, new, rank)), None
 
 
 def _rank(value: Array, margin: Array, threshold: Array) -> Array:
-    # Places with the margin first, by their objective; then the others, by their margin. The least is the best.
+    # Points with the margin first, by their objective; then the others, by their margin. The least is the best.
     return jnp.where(margin >= threshold, -1.0 - 1.0 / (1.0 + value), -margin)
 
 
 def evolved(
     parts: Parts, arguments: Any, questions: Any, *, unknowns: int, margins: tuple[float, ...], population: int
 ) -> Float[np.ndarray, "n n_margins d"]:
-    """Best places of many questions."""
+    """Best points of many questions."""
     from scipy.stats import qmc  # it takes a second to import
 
-    places = qmc.Halton(unknowns, seed=0).random(GROUP * population)
+    points = qmc.Halton(unknowns, seed=0).random(GROUP * population)
     base_moves = moves_of(unknowns, population)
-    # Each search gets its own moves: one may find the place that another one misses.
+    # Each search gets its own moves: one may find the point that another one misses.
     moves = jax.tree.map(lambda x: np.stack([np.roll(x, i, axis=0) for i in range(len(margins))]), base_moves)
-    kernel = partial(_evolved, parts, arguments, np.asarray(margins), places, moves)
+    kernel = partial(_evolved, parts, arguments, np.asarray(margins), points, moves)
 
-    def part(rows: slice) -> np.ndarray:
-        return in_batches(kernel, jax.tree.map(lambda x: x[rows], questions), batch_size=BATCH)
+    def part(index: slice) -> np.ndarray:
+        return in_batches(kernel, jax.tree.map(lambda x: x[index], questions), batch_size=BATCH)
 
     return np.concatenate(in_parts(part, len(jax.tree.leaves(questions)[0]), PART))

@@ -14,11 +14,14 @@ if TYPE_CHECKING:
 
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
-# Places that are refined for each function, points at each place, and rounds, each eight times as fine as the last.
-PLACES, POINTS, ROUNDS = 3, 17, 4
+# Minima are refined around so many samples of each function, by so many points around each, round by round, each eight
+# times as fine as the last.
+STARTS = 3
+POINTS = 17
+ROUNDS = 4
 # Distances of samples whose ratio is at least this tell the curvature of a function.
 EVEN = 1e-6
-CLOSE = 1e-12  # between samples of one place, on both sides of a joint
+CLOSE = 1e-12  # between samples on both sides of a joint
 
 
 class Bracket(NamedTuple):
@@ -94,16 +97,16 @@ def lowest_samples(
 def narrowed(
     function: Callable[[np.ndarray], np.ndarray], tau: np.ndarray, values: Float[np.ndarray, "n_motions n n_functions"]
 ) -> Float[np.ndarray, "n_motions n_functions"]:
-    """Smallest value of each function along each of several motions."""
+    """Smallest value of each function along each of some motions."""
     return narrowed_times(function, tau, values)[0]
 
 
 def narrowed_times(
     function: Callable[[np.ndarray], np.ndarray], tau: np.ndarray, values: Float[np.ndarray, "n_motions n n_functions"]
 ) -> tuple[Float[np.ndarray, "n_motions n_functions"], Float[np.ndarray, "n_motions n_functions"]]:
-    """Smallest value of each function along each of several motions, and the instant at which it is attained."""
+    """Smallest value of each function along each of several motions, and the time at which it is attained."""
     tau = np.broadcast_to(tau, values.shape[:2])
-    starts = lowest_samples(values, vertex_values(tau, values), PLACES)
+    starts = lowest_samples(values, vertex_values(tau, values), STARTS)
     return followed(function, tau, starts, ROUNDS)
 
 
@@ -112,7 +115,7 @@ def followed(
     tau: Float[np.ndarray, "n_motions n"],
     starts: Int[np.ndarray, "n_motions n_starts n_functions"],
     rounds: int,
-    n_followed: int = PLACES,
+    n_followed: int = STARTS,
 ) -> tuple[Float[np.ndarray, "n_motions n_functions"], Float[np.ndarray, "n_motions n_functions"]]:
     """Smallest value of each function near some of its samples, and the time at which it is attained."""
     motion, column = np.arange(len(tau))[:, None, None], np.arange(starts.shape[2])
@@ -132,7 +135,7 @@ def followed(
 
 
 def _distances(tau: np.ndarray) -> np.ndarray:
-    # Distance of each sample (n_motions, n) from the farther of the samples before and after its place.
+    # Distance of each sample (n_motions, n) from the farther of the samples before and after it.
     first, last, is_apart = tau[:, :1], tau[:, -1:], np.diff(tau, axis=1) > CLOSE
     before = np.maximum.accumulate(np.where(is_apart, tau[:, :-1], first), axis=1)
     after = np.minimum.accumulate(np.where(is_apart, tau[:, 1:], last)[:, ::-1], axis=1)[:, ::-1]

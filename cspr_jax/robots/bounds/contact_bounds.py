@@ -22,7 +22,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, constant, cross, dot, norm_squared, rotated, stacked
-from cspr_jax.numerics.bounds.determinant_bounds import changes_sign
+from cspr_jax.numerics.bounds.function_bounds import changes_sign
 from cspr_jax.robots.bounds.state_bounds import CableBounds, StateBounds
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.contacts.contact_bodies import Bodies, Shape

@@ -18,7 +18,7 @@ from jax import Array
 from cspr_jax.motion.limits import limits_set
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.bounds.affine_bounds import AffineBounds, dot, norm
-from cspr_jax.numerics.bounds.determinant_bounds import changes_sign, determinant, magnitude_range
+from cspr_jax.numerics.bounds.function_bounds import changes_sign, determinant, magnitude_range
 from cspr_jax.robots.bounds.contact_bounds import contact_bounds, corner_depths, passings
 from cspr_jax.robots.bounds.state_bounds import CableBounds, StateBounds, balance_bounds, cable_bounds
 from cspr_jax.robots.bounds.witness_tensions import witness_tensions

@@ -15,7 +15,7 @@ from cspr_jax.families.beziers.launches.through_release import through
 from cspr_jax.families.beziers.sequences import Anchored, duration_bounds, judged, margins_of, segments_of
 from cspr_jax.launch.flight import aimed, flown
 from cspr_jax.motion.problem import Problem
-from cspr_jax.numerics.search.constrained_minima import least
+from cspr_jax.numerics.search.constrained_minima import constrained_minimum
 
 # Parts of the duration of its segment between which a release is looked for.
 EARLIEST, LATEST = 0.05, 0.95
@@ -135,4 +135,4 @@ def _searched(problem: Problem, launch: Launch, durations: list[float | None], p
         return judged(problem, segments_of(candidate.sequence, candidate.durations))
 
     low, high = (np.array(side) for side in zip(*bounds, strict=True))
-    return _sequence_of(arguments, jnp.asarray(least(parts, arguments, low, high, judge)))
+    return _sequence_of(arguments, jnp.asarray(constrained_minimum(parts, arguments, low, high, judge)))

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
-from cspr_jax.curves.several import SeveralSplines
-from cspr_jax.curves.spline import Spline
+from cspr_jax.curves.spline import Spline, SplineBatch
 from cspr_jax.families.paths.least_time.discrete import GridMargins
 from cspr_jax.motion.problem import Problem
 from cspr_jax.runtime.stages import stage
@@ -115,7 +114,7 @@ class CellSlacks(NamedTuple):
 def cell_slacks(problem: Problem, trials: Sequence[Trial]) -> list[CellSlacks]:
     """Bounds of slacks that depend on how fast motions are, over each of their pieces; the last is that of feeds."""
     motions = [trial.motion for trial in trials]
-    robot, limits, several = problem.robot, problem.limits, SeveralSplines(motions)
+    robot, limits, several = problem.robot, problem.limits, SplineBatch(motions)
     rows = criteria(robot, limits)
     weight = float(robot.mass * robot.gravity)
     chosen = [k for k, row in enumerate(rows) if row.flag & TENSIONS or row.unit in (SPEEDS, ACCELERATIONS)]

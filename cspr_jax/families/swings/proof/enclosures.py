@@ -72,7 +72,7 @@ def _block(problem: Problem, segment: Segment, arcs: Array, start: Array, stop: 
         fraction(jnp.max(kappa, axis=0) + taut, False),
         0.5 * half * half * pace.curvature,
         half * pace.curvature / time,
-        half * pull.slope / time**2,
+        half * pull.derivative / time**2,
     )
 
 

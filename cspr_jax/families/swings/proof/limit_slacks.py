@@ -93,7 +93,7 @@ def _rated(over: _OverInterval, limit: Array) -> Array:
 
 def _bent(over: _OverInterval, limit: Array) -> Array:
     length, second_derivative = over.length, _bend(over.length, over.pace, over.pull, over.square)
-    cube = 6.0 * length.value * over.pace.slope**2 + 3.0 * length.value**2 * over.pace.curvature
+    cube = 6.0 * length.value * over.pace.derivative**2 + 3.0 * length.value**2 * over.pace.curvature
     return (cube + second_derivative.curvature / (limit * over.time**2)) / over.z0**3
 
 
@@ -119,13 +119,13 @@ CLOSED = {
     "speed_max": _Closed(
         lambda state, limit: _square_share(state.velocity, state.time * limit),
         lambda over, limit: (
-            2.0 * (over.pace.curvature**2 + over.pace.slope * over.pull.slope) / (over.time * limit) ** 2
+            2.0 * (over.pace.curvature**2 + over.pace.derivative * over.pull.derivative) / (over.time * limit) ** 2
         ),
     ),
     "acceleration_max": _Closed(
         lambda state, limit: _square_share(state.acceleration, state.time**2 * limit),
         lambda over, limit: (
-            2.0 * (over.pull.slope**2 + over.pull.value * over.pull.curvature) / (over.time**2 * limit) ** 2
+            2.0 * (over.pull.derivative**2 + over.pull.value * over.pull.curvature) / (over.time**2 * limit) ** 2
         ),
     ),
 }
@@ -203,7 +203,7 @@ def limit_curvatures(
     depth = row_bounds(segment, arcs, over, segment.plane[2])
 
     def cable_bounds(kappa: Bounds, length: Bounds) -> _OverInterval:
-        square = 2.0 * (pace.slope**2 + length.value * pace.curvature)
+        square = 2.0 * (pace.derivative**2 + length.value * pace.curvature)
         return _OverInterval(robot.n_cables, z0, time, weight, kappa, eta, depth, length, pace, pull, square)
 
     cables = [cable_bounds(*each) for each in zip(kappa, _lengths(robot, segment, over, pace, eta), strict=True)]
@@ -234,9 +234,9 @@ def pace_bounds(segment: Segment, arcs: Num[Array, ""], over: Stretch) -> tuple[
 def _lengths(robot: PointMassRobot, segment: Segment, over: Stretch, pace: Bounds, eta: Bounds) -> list[Bounds]:
     # |rho'| <= |p'|, and rho'' = (|p'|^2 - rho'^2 + ray . p'') / rho.
     nearest = least_lengths(robot, segment, over, pace, eta)
-    farthest = [x + over.radius * pace.slope for x in _at_middle(robot, segment, over)]
-    bends = [pace.slope**2 / x + pace.curvature for x in nearest]
-    return [Bounds(x, pace.slope, second_derivative) for x, second_derivative in zip(farthest, bends, strict=True)]
+    farthest = [x + over.radius * pace.derivative for x in _at_middle(robot, segment, over)]
+    bends = [pace.derivative**2 / x + pace.curvature for x in nearest]
+    return [Bounds(x, pace.derivative, second_derivative) for x, second_derivative in zip(farthest, bends, strict=True)]
 
 
 def _at_middle(robot: PointMassRobot, segment: Segment, over: Stretch) -> list[Array]:
@@ -255,24 +255,24 @@ def least_lengths(robot: PointMassRobot, segment: Segment, over: Stretch, pace: 
     greatest distance from P0 and its least depth say more than its length and depth in the middle.
     """
     tilt = segment.tilt[0] * over.place[0] + segment.tilt[1] * over.place[1]
-    lowest = jnp.maximum(tilt - over.radius * eta.slope, -eta.value)
+    lowest = jnp.maximum(tilt - over.radius * eta.derivative, -eta.value)
     depth = jnp.maximum((1.0 + lowest) * segment.center[2] / jnp.linalg.norm(plane_normal(robot)), 0.0)
     each = zip(_at_middle(robot, segment, over), _distances(robot, segment.center), strict=True)
-    return [largest([x - over.radius * pace.slope, y - pace.value, depth]) for x, y in each]
+    return [largest([x - over.radius * pace.derivative, y - pace.value, depth]) for x, y in each]
 
 
 def _rate(length: Bounds, pace: Bounds, pull: Bounds) -> Bounds:
     # w = ray . p'
     return Bounds(
-        length.value * pace.slope,
-        pace.slope**2 + length.value * pace.curvature,
-        3.0 * pace.slope * pace.curvature + length.value * pull.slope,
+        length.value * pace.derivative,
+        pace.derivative**2 + length.value * pace.curvature,
+        3.0 * pace.derivative * pace.curvature + length.value * pull.derivative,
     )
 
 
 def _bend(length: Bounds, pace: Bounds, pull: Bounds, square: Array) -> Bounds:
     # rho^2 w' - w^2, with w' = |p'|^2 + ray . p'' and the bounds of rho^2 that need no division.
     rate = _rate(length, pace, pull)
-    last = 3.0 * pace.curvature**2 + 4.0 * pace.slope * pull.slope + length.value * pull.curvature
-    slope = Bounds(rate.slope, rate.curvature, last)
-    return Bounds(length.value**2, 2.0 * length.value * pace.slope, square) * slope + rate * rate
+    last = 3.0 * pace.curvature**2 + 4.0 * pace.derivative * pull.derivative + length.value * pull.curvature
+    slope = Bounds(rate.derivative, rate.curvature, last)
+    return Bounds(length.value**2, 2.0 * length.value * pace.derivative, square) * slope + rate * rate

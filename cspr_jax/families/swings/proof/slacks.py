@@ -162,10 +162,10 @@ def _oscillating(cosine: Bounds, sine: Bounds, omega: Array) -> Bounds:
     # Bound f cos(omega tau) + g sin(omega tau) and its derivatives, with their factors joined at the worst phase.
     return Bounds(
         hypotenuse(cosine.value, sine.value),
-        hypotenuse(cosine.slope + omega * sine.value, sine.slope + omega * cosine.value),
+        hypotenuse(cosine.derivative + omega * sine.value, sine.derivative + omega * cosine.value),
         hypotenuse(
-            cosine.curvature + 2.0 * omega * sine.slope + omega**2 * cosine.value,
-            sine.curvature + 2.0 * omega * cosine.slope + omega**2 * sine.value,
+            cosine.curvature + 2.0 * omega * sine.derivative + omega**2 * cosine.value,
+            sine.curvature + 2.0 * omega * cosine.derivative + omega**2 * sine.value,
         ),
     )
 
