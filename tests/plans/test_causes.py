@@ -195,6 +195,7 @@ def test_a_platform_that_one_limit_refuses(limits, key, flag):
     assert 0.0 < cause.t < bound["duration"] and len(cause.cables) == 1
 
 
+@pytest.mark.thorough
 def test_a_contact_has_a_time_where_nothing_else_refutes_the_motion():
     """The time at which tensions or limits refute it is not that of the contact."""
     plan = cspr_jax.plan(MSSM | {"cable_speed_max": 1.2})

@@ -43,6 +43,7 @@ def test_swings_take_the_smallest_number_of_arcs_beside_an_obstacle():
     assert beside.to_dict()["segments"][0]["failing"] == []
 
 
+@pytest.mark.thorough
 def test_swings_that_all_touch_an_obstacle():
     """The motion that is shown is the one without obstacles; its cause and intervals are those of the proof."""
     plan = planned(SWING, 0.06, max_arcs=3, samples=4001)

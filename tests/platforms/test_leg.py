@@ -153,6 +153,7 @@ def test_verdicts_against_dense_samples(checker):
     assert ((verdicts & Verdict.UNDECIDED) != 0).sum() < 5 and good > 500, good
 
 
+@pytest.mark.thorough
 def test_blocks_are_halved_where_cables_turn(checker, monkeypatch):
     """With one block an arc what interferes is still what it is with four; which contact is found first may differ."""
     cases = random_cases(17, 60, lowest=-8.0, highest=1.0, arcs=(2, 6))
@@ -163,6 +164,7 @@ def test_blocks_are_halved_where_cables_turn(checker, monkeypatch):
     assert (before > 0).sum() > 3
 
 
+@pytest.mark.thorough
 def test_what_stays_undecided_is_said(checker, monkeypatch):
     """A smaller number of arcs that cannot be told leaves a flag; where nothing else is found, it is the answer."""
     start, end = (random_pose(np.random.default_rng(1), rest=True), (np.array([1.0, 0.0, 1.4]), np.eye(4)[0]))

@@ -200,6 +200,7 @@ def whole_map(tmp_path_factory):
     return every_orientation(tmp_path_factory.mktemp("map"), "down", robot='"laval-mssm"', **at)
 
 
+@pytest.mark.thorough
 def test_a_map_of_every_orientation(whole_map):
     """Its cells are those of the functions."""
     there, result = THERE, open_result(whole_map)
@@ -219,6 +220,7 @@ def test_a_map_of_every_orientation(whole_map):
     assert (arcs > 0).sum() > 0.8 * seen.sum()
 
 
+@pytest.mark.thorough
 def test_a_map_in_axes_turned_over(whole_map, tmp_path):
     """The same robot, z up: phi becomes -phi, sigma -sigma."""
     arcs, at = open_result(whole_map).data["arcs"][0, 0, 0], dict(zip("xyz", THERE, strict=True))

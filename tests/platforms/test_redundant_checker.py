@@ -107,6 +107,7 @@ def room(tension):
     return np.minimum(tension - LOW, HIGH - tension).min(1)
 
 
+@pytest.mark.thorough
 def test_margins_are_those_of_linear_programs(robot, example, rows):
     """Along the path, with wrenches from differences of poses; the least of a segment is the plan's."""
     for table, segment in zip(rows, example.to_dict()["segments"], strict=True):
@@ -126,6 +127,7 @@ def test_the_motion_of_a_plan_is_proved_to_its_margin(example):
     np.testing.assert_allclose(bound, margin, rtol=0.02)
 
 
+@pytest.mark.thorough
 def test_what_no_proof_closes_is_undecided(monkeypatch):
     """Samples alone make no motion feasible."""
     keys = FIXED | {"pose": [{"rest": True}, POSE]}
@@ -235,6 +237,7 @@ def test_mistakes_are_one_line(change, error):
     assert error in str(caught.value) and "\n" not in str(caught.value)
 
 
+@pytest.mark.thorough
 def test_files_hold_residuals_and_pictures_limits(example, tmp_path):
     """HDF5, CSV and xarray; the picture names the rule and draws the smallest tension."""
     path = example.save(tmp_path / "motion.h5")
