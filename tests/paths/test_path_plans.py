@@ -131,6 +131,7 @@ def test_files(tmp_path):
         np.testing.assert_allclose(walked(cspr_jax.plan(path)), whole, atol=1e-12)
 
 
+@pytest.mark.thorough
 def test_a_platform_turns_on_the_spot():
     """Its place stays, and the turn is the shortest."""
     place, turn = [-0.5, 0.0, 1.0], [np.cos(0.15), 0.0, 0.0, np.sin(0.15)]

@@ -82,6 +82,7 @@ def test_ends_stay(swing):
     np.testing.assert_array_equal(retimed.points, planned.points)
 
 
+@pytest.mark.thorough
 def test_reversal(swing):
     backwards = cspr_jax.retime(hypocycloid(POSES[::-1]))
     assert backwards.answers.duration == pytest.approx(swing[1].answers.duration, rel=1e-3)
