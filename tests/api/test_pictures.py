@@ -6,6 +6,7 @@ from outputs.test_outputs import cspr, made
 import cspr_jax
 
 
+@pytest.mark.thorough
 def test_pictures(tmp_path, capsys):
     """The same bytes as the command's; no file where none is asked for."""
     path = made(tmp_path / "map.h5")

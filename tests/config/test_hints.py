@@ -108,6 +108,7 @@ position = [-0.2, 0.1, 1.33]
 """
 
 
+@pytest.mark.thorough
 def test_p0_can_be_copied_from_the_table_of_a_plan(capsys, tmp_path):
     """With all of its digits it is at rest there; with four it is not, and a hint says so."""
     path = tmp_path / "plan.toml"

@@ -62,6 +62,7 @@ SOLIDS = {
 }
 
 
+@pytest.mark.quick("platform and box")
 @pytest.mark.parametrize("kind", SOLIDS)
 def test_planes_are_clearances_to_first_order(kind):
     """Their values are the clearances of the motion; of one that is near it, they differ by squares of the distance."""

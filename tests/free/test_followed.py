@@ -85,6 +85,7 @@ def test_given_accelerations_are_those_at_the_poses(turning):
     np.testing.assert_allclose(ends.angular_acceleration, accelerations[0, :, 3:], atol=1e-8)
 
 
+@pytest.mark.thorough
 def test_energy_is_that_of_the_tensions_that_are_printed():
     """Those of redundant cables depend on the limits of tensions."""
     poses = [{"position": [36.0, 11.0, -21.0]}, {"position": [60.0, 38.0, -60.0]}]

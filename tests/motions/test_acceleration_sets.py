@@ -265,6 +265,7 @@ def reach_by_samples(robot, place, direction, low, high) -> float:
     return near
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "limits", [pytest.param("", marks=pytest.mark.thorough), "[limits]\ntension_min = 0.5\ntension_max = 60\n"]
 )

@@ -118,6 +118,7 @@ def test_a_planar_robot_between_its_tensions(capsys, tmp_path, figures, z_axis):
     assert "t = 1 s (nearest to 0.9 s)" in title and f"margin {margins[1]:.3g} m/s²" in title
 
 
+@pytest.mark.thorough
 def test_a_spatial_robot_in_three_sections(capsys, tmp_path, figures):
     """Its cone, above the mass a rectangle like that of its spools; outside the margin is negative."""
     place, inside, outside = [10.0, 20.0, 6.0], [0.5, -1.0, -0.7], [15.0, -1.0, -0.7]

@@ -71,8 +71,8 @@ def test_other_widths_are_refused(capsys):
         style_of(None, None, None, "side")
 
 
+@pytest.mark.thorough
 @pytest.mark.ci("4.0-4")
-@pytest.mark.quick("0.25-2")
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 6])
 @pytest.mark.parametrize("stretched", [0.25, 4.0])
 def test_sections_of_a_column_name_their_axes(reference, count, stretched):

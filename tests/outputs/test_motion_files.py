@@ -72,6 +72,7 @@ def test_verify(motions, tmp_path, capsys):
             assert len(line.splitlines()) == 1 and "its bytes have changed" in line
 
 
+@pytest.mark.thorough
 def test_pictures_are_marked(motions, figures, capsys):
     assert [main(["plot", str(motions / f"{name}.h5")]) for name in ("good", "hard")] == [0, 0]
     good, hard = (figure.get_suptitle() for figure in figures)

@@ -136,7 +136,7 @@ def test_other_spools_have_their_own_shape(capsys, tmp_path, figures, base, side
     assert (last.get_marker() == "s") == (sides < 3) and (last.get_linewidth() > 0.0) == (sides > 0)
 
 
-@pytest.mark.quick("margin")
+@pytest.mark.thorough
 @pytest.mark.parametrize("quantity", ["arcs", "margin"])
 def test_sections_are_moved_to_what_is_marked(capsys, tmp_path, figures, quantity):
     """Of 30 heights six are shown; P0 at 1.7 m and the start at 3.0 m are among them, for every quantity."""

@@ -62,7 +62,7 @@ def check_cell(cell, planned):
     assert not planned.feasible or not cell["lower_bound"] > cell["duration"]
 
 
-@pytest.mark.quick("lifts")
+@pytest.mark.thorough
 @pytest.mark.parametrize("sweep", [pytest.param(LINES, id="lines"), pytest.param(LIFTS, id="lifts")])
 def test_cells_are_what_plans_say(sweep):
     verdicts = []

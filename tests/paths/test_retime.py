@@ -102,6 +102,7 @@ TIMES = np.array([0.0, 2.0, 4.0, 6.0])
 PLACES = np.array([[0.0, 0.0, 1.5], [0.2, 0.1, 1.3], [-0.1, 0.2, 1.4], [0.0, -0.1, 1.5]])
 
 
+@pytest.mark.thorough
 def test_checked_spline():
     curve = make_interp_spline(TIMES, PLACES, 5, bc_type=([(1, [0.0] * 3), (2, [0.0] * 3)],) * 2)
     checked = cspr_jax.check("prototype", curve, limits={"tension_max": 1.6})
@@ -182,6 +183,7 @@ def test_time_that_nothing_bounds(tmp_path):
         assert (line in cspr_jax.retime(checked, grid=100).plan.warnings) == is_told
 
 
+@pytest.mark.thorough
 def test_command(tmp_path):
     text = 'schema = 1\nrobot = "prototype"\nfamily = "spline"\n[limits]\ntension_max = 1.6\n'
     text += "".join(f"[[pose]]\nposition = {PLACES[i].tolist()}\ntime = {TIMES[i]}\n" for i in range(2))

@@ -47,6 +47,7 @@ FAR = {
 ALL = Verdict(sum(flag.value for _, flag in FAR.values()))
 
 
+@pytest.mark.thorough
 def test_a_segment_that_is_only_too_fast_is_not_called_slack(tmp_path):
     """It is shown as it is without the limit, which it needs to be higher: by how much, where and when."""
     free = planned(tmp_path, LAB.replace("SPEED", ""))["segments"]

@@ -142,6 +142,7 @@ def test_robots_within_an_uncertainty_keep_clear(keys):
     assert (cause.criterion, cause.needed) == ("uncertainty", 1.0) and cause.allowed < 1.0
 
 
+@pytest.mark.thorough
 def test_an_uncertain_mass_moves_no_cable():
     off = {"limits": {"uncertainty": {"mass_factor": 1.01}}}
     plain, beside = planned(SWING, **off), planned(SWING, 0.01, [0.11, -0.1, 0.75], **off)

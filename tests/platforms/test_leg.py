@@ -363,6 +363,7 @@ def test_a_free_beta_hat_needs_no_more_arcs(tmp_path):
     assert ends[0][1] == ends[1][0] and ends[0][0] == ends[1][1] == -1.0
 
 
+@pytest.mark.thorough
 def test_the_motion(tmp_path):
     """Columns, the oracle's numbers, and no jump of acceleration, angular acceleration and tension between segments."""
     code, out, err = plan(tmp_path, SHORT, "--json", "-o", tmp_path / "motion.csv")

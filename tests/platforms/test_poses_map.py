@@ -126,6 +126,7 @@ slacks_of, gaps_of = jax.jit(pose_slacks), jax.jit(interference.gaps)
 directions_of = jax.jit(interference.cable_directions)
 
 
+@pytest.mark.thorough
 def test_lanes_are_the_readable_slacks():
     """Every criterion with every limit, and distances between cables, at instants of random motions from rest."""
     package, rng, p = ours(MSSM), np.random.default_rng(3), 5

@@ -233,6 +233,7 @@ def test_no_largest_tension_is_a_very_large_one():
     assert (1.0 - 2.0 * SHORTER) * none.time <= none.lower <= none.time
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("kind", ["2T-3", pytest.param("3R3T-7", marks=pytest.mark.soak)])
 def test_backwards_it_takes_as_long(kind):
     case = least_time_cases.case(kind, 1)
@@ -242,6 +243,7 @@ def test_backwards_it_takes_as_long(kind):
     assert max(ahead.lower, back.lower) <= min(ahead.time, back.time)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("kind", ["3T-3", pytest.param("1R2T-4", marks=pytest.mark.soak)])
 def test_lengths_and_masses_scale(kind):
     case, scale = least_time_cases.case(kind, 1), least_time_forms.Scale(4.0, 7.0)

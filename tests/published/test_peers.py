@@ -29,6 +29,7 @@ def check(monkeypatch, chosen):
             assert cells[name, f"differ, {way}", ""] == 0.0 and cells[name, f"us, {way}", ""] > 0.0
 
 
+@pytest.mark.thorough
 def test_cogiro_beside_linear_programs(monkeypatch):
     check(monkeypatch, ["CoGiRo, wrench-feasible"])
 

@@ -64,6 +64,7 @@ def checked(request, tmp_path_factory):
     return folder, robot, places, turns, words, found
 
 
+@pytest.mark.thorough
 def test_what_was_given_comes_back(checked):
     folder, robot, places, turns, _, found = checked
     assert "files hold the positions of the origin of the platform's axes" in found[0][1]

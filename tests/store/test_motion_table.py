@@ -121,6 +121,7 @@ def test_where_z_points(folder, upward):
         cspr_jax.open_result(earlier)
 
 
+@pytest.mark.thorough
 def test_a_level_motion_does_not_tell(upward):
     head, *rows = upward.joinpath("motion.csv").read_text().splitlines()
     names, level = head.split(","), upward / "level.csv"

@@ -67,6 +67,7 @@ def test_cells_are_what_plans_say(result):
         assert cell["clearance"] == pytest.approx(float(proof.proof.high.min()), rel=0.01, abs=1e-6)
 
 
+@pytest.mark.thorough
 def test_cells_have_the_smallest_number_whose_motion_keeps_clear(result):
     """Of all numbers of arcs, tried one by one without the ball; samples tell how near the motions come to it."""
     kinds = set()

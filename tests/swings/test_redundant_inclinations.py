@@ -22,6 +22,7 @@ def plan_of(robot, target, inclination, **pose):
     )
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "robot", [pytest.param("boralugoda-rectangle", marks=pytest.mark.thorough), "boralugoda-planar-three"]
 )

@@ -174,6 +174,7 @@ def test_far_targets_need_oscillations_in_proportion(name):
     assert n == pytest.approx(3000.0 * float(amplitude.largest[1]) / math.pi, rel=1e-5)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_the_best_inclination(name):
     """No inclination of a fine scan needs less; it is against the largest weight, and zero where two are largest."""
