@@ -1,17 +1,19 @@
 """Checks of motions from Python: is a motion within the limits of a robot, at every instant, and if not, where?"""
 
+from __future__ import annotations
+
 import dataclasses
 import json
 import re
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
 
 import numpy as np
 
 from cspr_jax.api.arguments.check_keys import NAME, check_keys
-from cspr_jax.api.arguments.checks import checked
+from cspr_jax.api.arguments.checks import LimitsOrSpec, MotionSource, RobotOrFile, checked
 from cspr_jax.api.notebooks import Displayed
 from cspr_jax.api.plans import Plan
 from cspr_jax.build.robots import build_robot
@@ -23,6 +25,7 @@ from cspr_jax.config.robot import resolve_robot
 from cspr_jax.curves.files import reference_of, samples_of
 from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.errors.arguments import Points, Positive, Quaternions
 from cspr_jax.families.splines.functions import FunctionMotion, function_motion
 from cspr_jax.motion.motion import Placed
 from cspr_jax.numerics.elementary import double_precision
@@ -31,8 +34,6 @@ from cspr_jax.outputs import check_report
 from cspr_jax.outputs.limits_touched import TouchedLimit, limits_touched
 from cspr_jax.plans import planning
 from cspr_jax.plans.long_motions import long_plan
-from cspr_jax.robots.cables import AnyRobot
-from cspr_jax.robots.model.limits import Limits
 from cspr_jax.schema.limits import LIMITS
 from cspr_jax.verification.proved_answers import MotionProof, proof_of
 from cspr_jax.verification.time_stretching import SLOWEST, least_stretching
@@ -199,22 +200,22 @@ class Stretched(NamedTuple):
         ]
 
 
-@checked
+@checked(motion="spline")
 def check(  # noqa: PLR0913
-    robot: AnyRobot | str | Path,
-    times,
-    positions=None,
-    quaternions=None,
+    robot: RobotOrFile,
+    times: MotionSource,
+    positions: Points | None = None,
+    quaternions: Quaternions | None = None,
     *,
-    velocities=None,
-    accelerations=None,
-    interpolation: str | None = None,
-    ends: str | None = None,
-    smooth: float | None = None,
-    point: str | None = None,
+    velocities: Points | None = None,
+    accelerations: Points | None = None,
+    interpolation: Literal["cubic", "quintic", "hermite"] | None = None,
+    ends: Literal["rest", "natural", "periodic"] | None = None,
+    smooth: Positive | None = None,
+    point: Literal["mass-centre", "origin"] | None = None,
     trajectory: str | None = None,
-    duration: float | None = None,
-    limits: Limits | Mapping[str, Any] | None = None,
+    duration: Positive | None = None,
+    limits: LimitsOrSpec = None,
 ) -> Check:
     """Check a motion against the limits of a robot, at every instant, with a proof.
 

@@ -1,14 +1,15 @@
 """Checks of many motions of one robot from Python."""
 
+from __future__ import annotations
+
 import dataclasses
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from cspr_jax.api.arguments.check_keys import NAME, check_keys
-from cspr_jax.api.arguments.checks import checked
+from cspr_jax.api.arguments.checks import LimitsOrSpec, RobotOrFile, checked
 from cspr_jax.build.problems import build_problem
 from cspr_jax.build.robots import build_robot
 from cspr_jax.build.scenes import scene_of
@@ -18,11 +19,10 @@ from cspr_jax.config.robot import resolve_robot
 from cspr_jax.curves.files import kept_to, placed_inward, reference_of, samples_of, source_spline
 from cspr_jax.curves.spline import SplineBatch
 from cspr_jax.errors import InputError
+from cspr_jax.errors.arguments import ManyTimes, PointsOfMany, QuaternionsOfMany, VectorsOfMany
 from cspr_jax.motion.cause import Cause
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.numerics.linear.frames import frame_of
-from cspr_jax.robots.cables import AnyRobot
-from cspr_jax.robots.model.limits import Limits
 from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.families import FAMILIES
 from cspr_jax.verification.attained import with_attained
@@ -57,18 +57,18 @@ class ManyChecks(Columns):
         return self.verdict == 0
 
 
-@checked
+@checked(motion="spline")
 def check_many(
-    robot: AnyRobot | str | Path,
-    times,
-    positions,
-    quaternions=None,
+    robot: RobotOrFile,
+    times: ManyTimes,
+    positions: PointsOfMany,
+    quaternions: QuaternionsOfMany | None = None,
     *,
-    velocities=None,
-    accelerations=None,
-    interpolation: str | None = None,
-    ends: str | None = None,
-    limits: Limits | Mapping[str, Any] | None = None,
+    velocities: VectorsOfMany | None = None,
+    accelerations: VectorsOfMany | None = None,
+    interpolation: Literal["cubic", "quintic", "hermite"] | None = None,
+    ends: Literal["rest", "natural", "periodic"] | None = None,
+    limits: LimitsOrSpec = None,
 ) -> ManyChecks:
     """Check many motions of one robot; see `check`.
 
@@ -90,7 +90,8 @@ def check_many(
         InputError: samples that make no motion, or an impossible argument.
     """
     keys = plan_keys(check_keys(robot, limits, interpolation=interpolation, ends=ends), NAME)
-    columns = (positions, quaternions, velocities, accelerations)
+    samples_of_all = (positions, quaternions, velocities, accelerations)
+    columns = [None if column is None else np.asarray(column) for column in samples_of_all]
     others = {"times": times, "quaternions": quaternions, "velocities": velocities, "accelerations": accelerations}
     count, rows = np.shape(positions)[:2]
     _check_shapes(count, rows, {name: np.shape(array) for name, array in others.items() if array is not None})

@@ -1,5 +1,7 @@
 """Plans from Python: what `cspr plan` computes, prints and writes."""
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,6 +14,7 @@ from cspr_jax.api.notebooks import Displayed, plan_summary
 from cspr_jax.config.mappings import plain, text_of
 from cspr_jax.config.plan import plan_keys
 from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.errors.arguments import File
 from cspr_jax.launch.landings import LaunchErrors, Scatter
 from cspr_jax.launch.launch_result import LaunchResult
 from cspr_jax.numerics.elementary import double_precision
@@ -35,7 +38,7 @@ NAME = Path("plan")
 class Plan(Displayed, planning.PlannedMotions):
     """A planned sequence of motions; see `cspr_jax.plans.planning.PlannedMotions` for its fields."""
 
-    @checked
+    @checked()
     def rows(self, rate: float | None = None) -> dict[str, np.ndarray]:
         """The motion as rows over time.
 
@@ -52,7 +55,7 @@ class Plan(Displayed, planning.PlannedMotions):
         with double_precision():
             return motion_files.rows(self, rate=rate)
 
-    @checked
+    @checked()
     def rows_to_dict(self, rate: float | None = None) -> dict[str, Any]:
         """The motion as rows over time, as plain values for JSON.
 
@@ -70,7 +73,7 @@ class Plan(Displayed, planning.PlannedMotions):
         with double_precision():
             return motion_json.rows_object(self, rate)
 
-    @checked
+    @checked()
     def save(self, path: str | Path, rate: float | None = None, anyway: bool = False) -> Path:
         """Write the motion.
 
@@ -98,7 +101,7 @@ class Plan(Displayed, planning.PlannedMotions):
             write(self, path, rate=rate)
         return path
 
-    @checked
+    @checked()
     def save_mjcf(self, path: str | Path, step: float = STEP, anyway: bool = False) -> Path:
         """Write a model of the robot for MuJoCo, and beside it NAME_control.csv, the tensions that play the plan.
 
@@ -126,7 +129,7 @@ class Plan(Displayed, planning.PlannedMotions):
             write_mjcf(self, path, step)
         return path
 
-    @checked
+    @checked()
     def animate(self, path: str | Path, speed: float = 1.0, anyway: bool = False) -> Path:
         """Write a film of the motion: the robot in space, its cables coloured by tension, and its tensions.
 
@@ -164,7 +167,7 @@ class Plan(Displayed, planning.PlannedMotions):
         publish(Disk(), path, data)
         return path
 
-    def to_result(self) -> "Result":
+    def to_result(self) -> Result:
         """The motion as `open_result` gives it of a motion file, to be drawn.
 
         Returns:
@@ -202,7 +205,7 @@ class Plan(Displayed, planning.PlannedMotions):
     def _summary(self) -> list[str]:
         return plan_summary(self)
 
-    def _drawn_result(self) -> "Result":
+    def _drawn_result(self) -> Result:
         return self.to_result()
 
     @property
@@ -210,7 +213,7 @@ class Plan(Displayed, planning.PlannedMotions):
         """Release and flight of the object that the plan launches; None: it launches nothing."""
         return next((outcome for outcome in self.outcomes if isinstance(outcome, LaunchResult)), None)
 
-    @checked
+    @checked()
     def scatter(self, errors: LaunchErrors) -> Scatter:
         """Scatter of the landings of the object that the plan launches.
 
@@ -229,8 +232,8 @@ class Plan(Displayed, planning.PlannedMotions):
         with double_precision():
             return launch.scatter_of(errors)
 
-    @checked
-    def to_xarray(self, rate: float | None = None) -> "xarray.Dataset":
+    @checked()
+    def to_xarray(self, rate: float | None = None) -> xarray.Dataset:
         """The motion for xarray, with units and long names.
 
         Args:
@@ -248,8 +251,8 @@ class Plan(Displayed, planning.PlannedMotions):
         return labelled.motion(arrays, motion_files.attributes(self))
 
 
-@checked
-def plan(given: str | Path | Mapping[str, Any]) -> Plan:
+@checked()
+def plan(given: File) -> Plan:
     """Plan a sequence of poses.
 
     Args:

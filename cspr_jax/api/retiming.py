@@ -1,20 +1,29 @@
 """Motions retimed, from Python: the same paths in the least time that all limits allow."""
 
-import dataclasses
-from typing import TypeVar
+from __future__ import annotations
 
-from cspr_jax.api.arguments.checks import checked
+import dataclasses
+from typing import Annotated, TypeVar
+
+from cspr_jax.api.arguments.checks import GridSize, checked
 from cspr_jax.api.checks import Check
 from cspr_jax.api.plans import NAME, Plan
 from cspr_jax.config.keys.path import GRID, RAMP_TIME
+from cspr_jax.errors.arguments import Kind as KindRule
+from cspr_jax.errors.arguments import RampTime
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.plans.retiming import retimed
 
 Kind = TypeVar("Kind", Plan, Check)
 
 
-@checked
-def retime(plan: Kind, *, grid: int = GRID, ramp_time: float = RAMP_TIME) -> Kind:
+@checked(motion="spline")
+def retime(
+    plan: Annotated[Kind, KindRule("a plan, or a check", has=("feasible", "to_table"))],
+    *,
+    grid: GridSize = GRID,
+    ramp_time: RampTime = RAMP_TIME,
+) -> Kind:
     """Run along the paths of a plan, or of a checked motion, in the least time that all limits allow.
 
     Every place at which the motion stops is kept, and so are its speeds at ends at which it moves. Between them the

@@ -1,10 +1,13 @@
 """Robots from Python: from numbers, as in a robot file, or from other robots."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from cspr_jax.api.arguments.checks import checked
 from cspr_jax.build.robots import load_robot as _load_robot
 from cspr_jax.errors import InputError
+from cspr_jax.errors.arguments import Inertia, PointOfEachCable, Positive
 from cspr_jax.motion.given_limits import pair_limits
 from cspr_jax.robots.cables import with_cables as _with_cables
 from cspr_jax.robots.model.limits import Limits
@@ -13,18 +16,18 @@ from cspr_jax.robots.model.platform import RIGID, PlatformRobot, platform_robot
 from cspr_jax.robots.model.point_mass import STANDARD_GRAVITY, Axis, PointMassRobot
 from cspr_jax.robots.model.point_mass import point_mass_robot as _point_mass_robot
 
-load_robot = checked(_load_robot, "load_robot", __name__)
-platform = checked(platform_robot, "platform", __name__)
-point_mass_robot = checked(_point_mass_robot, "point_mass_robot", __name__)
-with_cables = checked(_with_cables, "with_cables", __name__)
+load_robot = checked(name="load_robot", module=__name__)(_load_robot)
+platform = checked(traced=True, name="platform", module=__name__)(platform_robot)
+point_mass_robot = checked(traced=True, name="point_mass_robot", module=__name__)(_point_mass_robot)
+with_cables = checked(traced=True, name="with_cables", module=__name__)(_with_cables)
 
 
-@checked
+@checked(traced=True)
 def point_mass(
-    base_points,
+    base_points: PointOfEachCable,
     *,
-    mass: float,
-    gravity: float = STANDARD_GRAVITY,
+    mass: Positive,
+    gravity: Positive = STANDARD_GRAVITY,
     z_axis: Axis = "down",
     planar: bool = False,
     name: str = "robot",
@@ -56,14 +59,14 @@ def point_mass(
     )
 
 
-@checked
+@checked(traced=True)
 def parallel_pair_robot(
-    spool_radius: float,
-    platform_radius: float,
+    spool_radius: Positive,
+    platform_radius: Positive,
     *,
-    mass: float,
-    inertia=None,
-    gravity: float = STANDARD_GRAVITY,
+    mass: Positive,
+    inertia: Inertia | None = None,
+    gravity: Positive = STANDARD_GRAVITY,
     z_axis: Axis = "down",
     name: str = "robot",
     limits: Limits | None = None,
@@ -103,7 +106,7 @@ def parallel_pair_robot(
     )
 
 
-@checked
+@checked(traced=True)
 def three_cable_equivalent(robot: PlatformRobot) -> PointMassRobot:
     """Point mass on three cables, equivalent to a platform on six in parallel pairs; see `robots.model.parallel_pairs`.
 

@@ -1,5 +1,7 @@
 """Sweeps from Python: run into a directory as by `cspr run`, or computed in memory; inspection of runs and results."""
 
+from __future__ import annotations
+
 import contextlib
 import dataclasses
 import functools
@@ -12,10 +14,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cspr_jax.api.arguments.checks import checked
+from cspr_jax.api.arguments.checks import ResultOrPath, checked
 from cspr_jax.api.notebooks import Displayed
 from cspr_jax.config.mappings import plain, text_of
 from cspr_jax.errors import ConfigError
+from cspr_jax.errors.arguments import AnyInteger, File, PathNames, TileRange
 from cspr_jax.outputs.volumes import WorkspaceVolume, volume_of
 from cspr_jax.runtime.processes import check_count
 from cspr_jax.runtime.xla import keep_compiled_code as _keep_compiled_code
@@ -32,7 +35,7 @@ if TYPE_CHECKING:
 # Errors and files are named after this where there is no sweep file; paths are relative to the current folder.
 NAME = Path("sweep")
 
-keep_compiled_code = checked(_keep_compiled_code, "keep_compiled_code", __name__)
+keep_compiled_code = checked(name="keep_compiled_code", module=__name__)(_keep_compiled_code)
 
 
 class DisplayedResult(Displayed, Result):
@@ -54,7 +57,7 @@ class DisplayedResult(Displayed, Result):
         return self
 
 
-@checked
+@checked()
 def open_result(path: str | Path) -> Result:
     """Read a result of `run` or `merge`, or a motion of `Plan.save`; also those of the command line.
 
@@ -170,16 +173,16 @@ def checked_sweep(source: str | Path | Mapping[str, Any]) -> Sweep:
     return sweep_of(data, NAME, text=text_of(data))
 
 
-@checked
+@checked()
 def run(
-    given: str | Path | Mapping[str, Any],
+    given: File,
     directory: str | Path | None = None,
     *,
-    workers: int = 1,
+    workers: AnyInteger | None = 1,
     scheduler: str | None = None,
     prune: bool = False,
     accept_environment_change: bool = False,
-    tiles: tuple[int, int] | None = None,
+    tiles: TileRange | None = None,
     on_tile: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Compute a sweep into an HDF5 result; tiles that an earlier run has finished are kept.
@@ -224,8 +227,8 @@ def check_tiles(tiles: tuple[int, int] | None, count: int) -> None:
         raise ConfigError("--tiles", f"{tiles[0]}:{tiles[1]}: must be FIRST:END within the {count} tiles, such as 0:8")
 
 
-@checked
-def merge(paths: Sequence[str | Path], directory: str | Path, *, accept_environment_change: bool = False) -> Path:
+@checked()
+def merge(paths: PathNames, directory: str | Path, *, accept_environment_change: bool = False) -> Path:
     """Join maps into one result: parts of one map (`run(..., tiles=...)`), or maps that differ in one axis.
 
     Args:
@@ -257,8 +260,8 @@ def merged(
     return run.finished() or run.go(tiles).result
 
 
-@checked
-def compute_sweep(given: str | Path | Mapping[str, Any]) -> "xarray.Dataset":
+@checked()
+def compute_sweep(given: File) -> xarray.Dataset:
     """Compute a small sweep and keep no file; long sweeps take `run`, which can resume.
 
     Args:
@@ -276,7 +279,7 @@ def compute_sweep(given: str | Path | Mapping[str, Any]) -> "xarray.Dataset":
         return open_result(run(given, Path(folder) / "run")).to_xarray()
 
 
-@checked
+@checked()
 def status(directory: str | Path) -> dict[str, Any]:
     """Progress of a run, without changing it.
 
@@ -289,7 +292,7 @@ def status(directory: str | Path) -> dict[str, Any]:
     return inspection.status(Path(directory))
 
 
-@checked
+@checked()
 def verify(path: str | Path) -> dict[str, Any]:
     """Reread and check all files of a run, or a result or motion file.
 
@@ -305,8 +308,8 @@ def verify(path: str | Path) -> dict[str, Any]:
     return inspection.verify(Path(path))
 
 
-@checked
-def workspace_volume(result: "Result | xarray.Dataset | str | Path") -> WorkspaceVolume:
+@checked()
+def workspace_volume(result: ResultOrPath) -> WorkspaceVolume:
     """Volume of the workspace of a map, or its area if the map is a section.
 
     Args:

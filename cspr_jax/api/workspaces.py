@@ -1,13 +1,29 @@
 """Poses at rest from Python: which poses a robot can hold, how exactly, and which accelerations it can have there."""
 
+from __future__ import annotations
+
 import dataclasses
 import math
+from typing import Any, Literal
 
 import numpy as np
 
 from cspr_jax.api.arguments.checks import checked
 from cspr_jax.api.arguments.kernel_arguments import check_in_plane, check_point_mass, points_of, quaternions
 from cspr_jax.errors import InputError
+from cspr_jax.errors.arguments import (
+    Acceleration,
+    CableErrors,
+    Length,
+    Points,
+    Positive,
+    Quaternions,
+    Tensions,
+    VectorOrVectors,
+    Wrenches,
+    WrenchExtents,
+)
+from cspr_jax.errors.given_numbers import numbers
 from cspr_jax.errors.suggestions import one_of
 from cspr_jax.motion.given_limits import limits_over
 from cspr_jax.motion.limits import touchable_limits
@@ -19,7 +35,6 @@ from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import PLANAR, PointMassRobot
 from cspr_jax.robots.statics.kernel_axes import centred, prepared
 from cspr_jax.robots.statics.wrench_sets import Faces, spanning
-from cspr_jax.schema.given_numbers import numbers
 from cspr_jax.schema.verdicts import FLAGS
 from cspr_jax.workspaces.acceleration_search import faces_of, judged
 from cspr_jax.workspaces.poses.geometry import mass_centres
@@ -28,24 +43,25 @@ from cspr_jax.workspaces.search import WorkspaceAnswers, WorkspaceSearch
 from cspr_jax.workspaces.sensitivities import SensitivitySearch
 
 PRECISIONS = ("float64", "float32")
+TENSIONS = "tensions of a state of motion"
 
 
-@checked
+@checked(instead=TENSIONS)
 def workspace(  # noqa: PLR0913
     robot: PointMassRobot | PlatformRobot,
-    positions,
-    orientations=None,
+    positions: Points,
+    orientations: Quaternions | None = None,
     *,
     condition: str = FEASIBLE,
-    tension_min=None,
-    tension_max=None,
-    wrenches=None,
-    wrench_box=None,
-    wrench_ellipsoid=None,
-    acceleration=None,
-    capacity_length: float | None = None,
+    tension_min: Tensions = None,
+    tension_max: Tensions = None,
+    wrenches: Wrenches | None = None,
+    wrench_box: WrenchExtents | None = None,
+    wrench_ellipsoid: WrenchExtents | None = None,
+    acceleration: Acceleration | None = None,
+    capacity_length: Length | None = None,
     precision: str = "float64",
-    point: str | None = None,
+    point: Literal["mass-centre", "origin"] | None = None,
 ) -> WorkspaceAnswers:
     """Tell whether each of n poses is in the workspace of a robot, of any pattern on any number of cables.
 
@@ -143,8 +159,8 @@ class Sensitivity:
     sigma_p: np.ndarray
     sigma_r: np.ndarray
 
-    @checked
-    def errors(self, cable_error) -> tuple[np.ndarray, np.ndarray]:
+    @checked()
+    def errors(self, cable_error: CableErrors) -> tuple[np.ndarray, np.ndarray]:
         """Bounds of the errors of the pose, to first order.
 
         Args:
@@ -162,9 +178,13 @@ class Sensitivity:
         return self.sigma_p * error, self.sigma_r * error
 
 
-@checked
+@checked(instead=TENSIONS)
 def sensitivity(
-    robot: PointMassRobot | PlatformRobot, positions, orientations=None, *, point: str | None = None
+    robot: PointMassRobot | PlatformRobot,
+    positions: Points,
+    orientations: Quaternions | None = None,
+    *,
+    point: Literal["mass-centre", "origin"] | None = None,
 ) -> Sensitivity:
     """Sensitivities of a robot to errors of its cable lengths.
 
@@ -201,8 +221,8 @@ def sensitivity(
     return Sensitivity(places, np.asarray(answers.sigma_p), np.asarray(answers.sigma_r))
 
 
-@checked
-def encoder_error(drum_radius: float, pulses: float) -> float:
+@checked()
+def encoder_error(drum_radius: Positive, pulses: Positive) -> float:
     """Error of a cable's length from the resolution of its winch's encoder, 2 pi r / pulses.
 
     Args:
@@ -242,8 +262,8 @@ class AvailableAccelerations:
     _allowed: Faces
     _frame: Frame
 
-    @checked
-    def margin(self, accelerations) -> np.ndarray:
+    @checked()
+    def margin(self, accelerations: VectorOrVectors) -> np.ndarray:
         """Distance of accelerations from the nearest face.
 
         Args:
@@ -258,8 +278,8 @@ class AvailableAccelerations:
         """
         return self._judged(accelerations)[0]
 
-    @checked
-    def verdict(self, accelerations) -> np.ndarray:
+    @checked()
+    def verdict(self, accelerations: VectorOrVectors) -> np.ndarray:
         """Verdicts of accelerations.
 
         Args:
@@ -286,9 +306,9 @@ class AvailableAccelerations:
             return judged(self._robot, self._faces, self._allowed, self._frame.inward(self.positions), rotated)
 
 
-@checked
+@checked(instead=TENSIONS)
 def available_accelerations(
-    robot: PointMassRobot, positions, *, tension_min=None, tension_max=None
+    robot: PointMassRobot, positions: Points, *, tension_min: Tensions = None, tension_max: Tensions = None
 ) -> AvailableAccelerations:
     """Feasible accelerations of a point mass on any number of cables, Boralugoda (2) to (6) and beyond.
 
@@ -309,7 +329,8 @@ def available_accelerations(
     places = points_of("positions", positions)
     check_in_plane("positions", places, is_planar=robot.dof == PLANAR)
     with double_precision():
-        limits = limits_over(robot, Limits(tension_min=tension_min, tension_max=tension_max))
+        tensions: dict[str, Any] = {"tension_min": tension_min, "tension_max": tension_max}
+        limits = limits_over(robot, Limits(**tensions))
         prepared_robot, frame = prepared(robot)
         allowed = touchable_limits(prepared_robot, limits)
         faces, wider = (faces_of(prepared_robot, each, frame.inward(places)) for each in (limits, allowed))

@@ -61,8 +61,8 @@ def build_robot(robot_file: RobotFile, keys: TrajectoryKeys, file: object) -> Po
     try:
         if not robot_file.is_platform:
             return with_cables(point_mass_robot(robot_file.base_points, **settings), **_of_cables(robot_file))
-        settings |= {"inertia": robot_file.inertia, "centre_of_mass": robot_file.centre_of_mass}
-        robot = platform_robot(robot_file.base_points, robot_file.platform_points, **settings)
+        settings |= {name: getattr(robot_file, name) for name in ("platform_points", "inertia", "centre_of_mass")}
+        robot = platform_robot(robot_file.base_points, **settings)
         return with_cables(robot, **_of_cables(robot_file))
     except InputError as error:
         raise ConfigError(file, robot_file.typed(error)) from error

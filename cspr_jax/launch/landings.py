@@ -17,6 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from cspr_jax.errors.given_numbers import Numbers, whole
 from cspr_jax.errors.suggestions import with_suggestions
 from cspr_jax.launch.flight import flown
 from cspr_jax.motion.motion import Motion
@@ -25,7 +26,6 @@ from cspr_jax.numerics.elementary import solved
 from cspr_jax.robots.model.point_mass import PointMassRobot, is_planar
 from cspr_jax.robots.model.state import State
 from cspr_jax.robots.statics.force_balance import cable_motion
-from cspr_jax.schema.given_numbers import Numbers, whole
 
 if TYPE_CHECKING:
     from jaxtyping import Float
@@ -76,7 +76,7 @@ class LaunchErrors:
     def __post_init__(self) -> None:
         """Refuse numbers out of their ranges."""
         for name in ("release", "cable_length", "cable_speed", "encoder"):
-            Numbers("a number from 0 to 1000", least=0.0, largest=LARGEST_ERROR).array(name, getattr(self, name))
+            Numbers("a number from 0 to 1000", minimum=0.0, maximum=LARGEST_ERROR).array(name, getattr(self, name))
         whole("throws", self.throws, 2, MAX_THROWS)
         whole("seed", self.seed, 0, LARGEST_SEED)
 

@@ -8,6 +8,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.errors import InputError
+from cspr_jax.errors.given_numbers import SMALLEST, numbers
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.numerics.linear.frames import frame_of
 from cspr_jax.robots.model.limits import NO_LIMITS, Limits, Uncertainty
@@ -15,7 +16,6 @@ from cspr_jax.robots.model.parallel_pairs import ParallelPairs
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import PointMassRobot
 from cspr_jax.schema.families import FAMILIES
-from cspr_jax.schema.given_numbers import SMALLEST, numbers
 from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES, Limit
 
 

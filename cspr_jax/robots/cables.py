@@ -12,6 +12,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.errors import InputError
+from cspr_jax.errors.arguments import Axes, Diameter, Radii
 from cspr_jax.numerics.elementary import as_float64, solved
 from cspr_jax.robots.model.limits import NO_LIMITS, Limits
 from cspr_jax.robots.model.patterns import PATTERNS
@@ -33,7 +34,13 @@ AnyRobot: TypeAlias = PointMassRobot | PlatformRobot
 RobotKind = TypeVar("RobotKind", bound=AnyRobot)
 
 
-def with_cables(robot: RobotKind, *, cable_diameter=None, pulley_radius=None, pulley_axes=None) -> RobotKind:
+def with_cables(
+    robot: RobotKind,
+    *,
+    cable_diameter: Diameter | None = None,
+    pulley_radius: Radii | None = None,
+    pulley_axes: Axes | None = None,
+) -> RobotKind:
     """A robot with thick cables, or pulleys.
 
     Args:

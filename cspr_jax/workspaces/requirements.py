@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 
 from cspr_jax.errors import InputError
+from cspr_jax.errors.given_numbers import numbers
 from cspr_jax.numerics.linear.frames import IDENTITY, Frame
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.statics.wrench_sets import tension_range
-from cspr_jax.schema.given_numbers import numbers
 from cspr_jax.workspaces.poses import geometry
 from cspr_jax.workspaces.required_wrenches import RequiredWrenches
 

@@ -4,7 +4,10 @@ import copy
 import dataclasses
 import inspect
 import pickle
+import re
 from fractions import Fraction
+from pathlib import Path
+from typing import Annotated, Literal, get_origin
 
 import jax
 import jax.numpy as jnp
@@ -13,9 +16,11 @@ import pytest
 
 import cspr_jax
 from cspr_jax.api import plans, workspaces
+from cspr_jax.api.arguments.checks import rule_of, rules_of
 from cspr_jax.api.files import imports, replays
 from cspr_jax.errors import CsprError, InputError
-from cspr_jax.schema.given_numbers import numbers
+from cspr_jax.errors.arguments import Positive
+from cspr_jax.errors.given_numbers import numbers
 
 PUBLIC = {name: getattr(cspr_jax, name) for name in cspr_jax.__all__}
 METHODS = {
@@ -144,6 +149,48 @@ def test_bad_arguments(function, good, tmp_path, monkeypatch):
     assert count >= 10 and not list(tmp_path.iterdir())
 
 
+def test_every_argument_has_a_rule():
+    """By its type, which help and editors show by its name."""
+    for name, function in TAKING.items():
+        parameters = inspect.signature(function).parameters
+        assert set(rules_of(function)) == set(parameters) - {"self"}, name
+        kinds = [one.annotation for key, one in parameters.items() if key != "self"]
+        assert all(isinstance(kind, str) for kind in kinds if get_origin(kind) is Annotated), name
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "allowed"),
+    [
+        (Positive, 0.0, "a finite number > 0"),
+        (Positive | None, 0.0, "a finite number > 0, or None"),
+        (Literal["a", "b"], None, '"a" or "b"'),
+        (Literal["a", "b"] | None, "c", '"a" or "b", or None'),
+        (str | Path, 1, "a path"),
+        (str | Path | None, 1, "a path, or None"),
+        (bool, 1, "True or False"),
+    ],
+)
+def test_unions_say_what_they_allow(kind, value, allowed):
+    rule = rule_of(kind)
+    with pytest.raises(InputError, match=f"^x = .*: must be {re.escape(allowed)}$"):
+        rule("x", value)
+    if "None" in allowed:
+        rule("x", None)
+
+
+def test_collections_without_dimensions_are_refused():
+    scalar = np.array(1.0)
+    for call in (cspr_jax.list_robots, cspr_jax.copy_examples, lambda one: cspr_jax.merge(one, "a")):
+        with pytest.raises(InputError, match=r"^(names|paths) = array\(1\.\): must be"):
+            call(scalar)
+
+
+def test_one_robot_is_listed_by_its_name():
+    assert cspr_jax.list_robots("prototype") == cspr_jax.list_robots(["prototype"])
+    with pytest.raises(InputError, match=r"^names = "):
+        cspr_jax.list_robots("a\0b")
+
+
 @pytest.mark.parametrize("function", ["plan", "run", "compute_sweep", "replay"])
 def test_dictionaries_that_hold_themselves(function):
     with pytest.raises(CsprError, match=r"given: nested too deep|mujoco") as raised:
@@ -241,6 +288,9 @@ def test_tracers_are_refused_where_nothing_is_differentiated(good):
         r"given\['z0'\]: .*single motions": lambda x: cspr_jax.plan({"schema": 1, "z0": x}),
         "positions: .*tensions": lambda x: cspr_jax.workspace(robot, points * x, condition="static"),
         "times: .*other arguments": lambda x: cspr_jax.spline(robot, times * x, points),
+        "inertia: .*other arguments": lambda x: cspr_jax.platform(
+            robot.base_points, robot.base_points, mass=1.0, inertia=np.eye(3) * x
+        ),
         "quaternions: .*other arguments": lambda x: cspr_jax.spline(robot, times, points, jnp.eye(4)[:2] * x),
     }
     for words, function in cases.items():

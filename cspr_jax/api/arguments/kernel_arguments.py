@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import jax
 import numpy as np
 
-from cspr_jax.api.arguments.checks import DEPTH, DEPTH_WORDS, LENGTHS, POINTS_WORDS
 from cspr_jax.config.near_rest import almost_at_rest
 from cspr_jax.errors import InputError
+from cspr_jax.errors.arguments import DEPTHS, POINTS
 from cspr_jax.errors.suggestions import one_of
 from cspr_jax.motion.amplitudes import NAMES, Amplitude, boundary_errors, named
 from cspr_jax.motion.answers import Answers
@@ -24,13 +24,9 @@ from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import PLANAR, PointMassRobot
 from cspr_jax.robots.model.robot import check_determined, check_moved
 from cspr_jax.robots.statics.kernel_axes import prepared
-from cspr_jax.schema.given_numbers import ANY, Numbers
 
 if TYPE_CHECKING:
     from jaxtyping import Float
-
-POINTS = Numbers(POINTS_WORDS, ((ANY, 3),), **LENGTHS)
-DEPTHS = Numbers(DEPTH_WORDS, ((), (ANY,)), **DEPTH)
 
 
 def check_point_mass(robot: Any) -> None:

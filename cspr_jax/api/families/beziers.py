@@ -1,11 +1,13 @@
 """Bezier segments of point masses from Python: one motion in pure jax, verdicts, durations and launches of many."""
 
+from __future__ import annotations
+
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import ArrayLike
 
 from cspr_jax.api.arguments.checks import checked
 from cspr_jax.api.arguments.kernel_arguments import (
@@ -17,6 +19,16 @@ from cspr_jax.api.arguments.kernel_arguments import (
     starts_and_ends,
 )
 from cspr_jax.errors import InputError
+from cspr_jax.errors.arguments import (
+    Duration,
+    Durations,
+    Point,
+    PointOrPoints,
+    Points,
+    Population,
+    Positive,
+    ReleaseRange,
+)
 from cspr_jax.families.beziers.duration_roots import Ends
 from cspr_jax.families.beziers.durations import feasible_durations
 from cspr_jax.families.beziers.launches.launch_range import POPULATION, LaunchRange
@@ -59,8 +71,10 @@ class BezierVerdicts(Columns):
         return self.verdict == 0
 
 
-@checked
-def bezier(robot: PointMassRobot, start, control_point, end, *, duration) -> Placed[Bezier]:
+@checked(traced=True)
+def bezier(
+    robot: PointMassRobot, start: Point, control_point: Point, end: Point, *, duration: Duration
+) -> Placed[Bezier]:
     """Motion along a Bezier curve of the second order from rest to rest, launch paper (9), (13).
 
     Args:
@@ -84,9 +98,15 @@ def bezier(robot: PointMassRobot, start, control_point, end, *, duration) -> Pla
     )
 
 
-@checked
+@checked(motion="bezier")
 def bezier_verdicts(
-    robot: PointMassRobot, starts, control_points, ends, *, durations, limits: Limits | None = None
+    robot: PointMassRobot,
+    starts: Points,
+    control_points: Points,
+    ends: Points,
+    *,
+    durations: Durations,
+    limits: Limits | None = None,
 ) -> BezierVerdicts:
     """Verdicts of Bezier segments: exact for taut cables, proved for limits and on redundant cables.
 
@@ -117,9 +137,14 @@ def bezier_verdicts(
         return BezierVerdicts(answers.verdict, answers.margin, answers.bound, answers.room)
 
 
-@checked
+@checked(motion="bezier")
 def bezier_durations(
-    robot: PointMassRobot, starts, ends, *, control_points=None, accelerations=None
+    robot: PointMassRobot,
+    starts: Points,
+    ends: Points,
+    *,
+    control_points: Points | None = None,
+    accelerations: Points | None = None,
 ) -> list[np.ndarray]:
     """Durations of Bezier segments that keep every cable taut below the spools, by roots of polynomials.
 
@@ -161,17 +186,17 @@ def bezier_durations(
         return [durations for durations in intervals if durations is not None]
 
 
-@checked
+@checked(motion="bezier")
 def launch_range(
     robot: PointMassRobot,
-    targets: ArrayLike,
+    targets: Points,
     *,
-    start: ArrayLike,
-    release_x: Sequence[float] | None = None,
-    release_y: Sequence[float] | None = None,
-    release_z: Sequence[float] | None = None,
-    max_duration: float | None = None,
-    population: int = POPULATION,
+    start: PointOrPoints,
+    release_x: ReleaseRange = None,
+    release_y: ReleaseRange = None,
+    release_z: ReleaseRange = None,
+    max_duration: Positive | None = None,
+    population: Population = POPULATION,
     limits: Limits | None = None,
 ) -> LaunchRange:
     """Launches of least speed to landing places, by one Bezier segment from rest, launch paper (26) and (29).
@@ -205,7 +230,7 @@ def launch_range(
         return launches.placed(frame)
 
 
-def _points(robot: PointMassRobot, arguments: dict[str, object]) -> list[np.ndarray]:
+def _points(robot: PointMassRobot, arguments: Mapping[str, Any]) -> list[np.ndarray]:
     arrays = [points_of(name, points) for name, points in arguments.items()]
     for name, points in zip(arguments, arrays, strict=True):
         if points.shape != arrays[0].shape:

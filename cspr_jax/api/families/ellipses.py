@@ -1,13 +1,15 @@
 """Harmonic ellipses of point masses from Python: one motion, and frequencies and margins of many by formulas."""
 
+from __future__ import annotations
+
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import ArrayLike
 
 from cspr_jax.api.arguments.checks import checked
 from cspr_jax.api.arguments.kernel_arguments import check_in_plane, check_point_mass
 from cspr_jax.errors import InputError
+from cspr_jax.errors.arguments import Frequencies, Frequency, Phase, Point, PointOrPoints, Points, Turns
 from cspr_jax.families.ellipses import harmonics
 from cspr_jax.families.ellipses.frequencies import chosen_frequency
 from cspr_jax.families.ellipses.harmonics import Ellipse
@@ -24,16 +26,16 @@ from cspr_jax.robots.model.point_mass import PLANAR, PointMassRobot
 from cspr_jax.robots.statics.kernel_axes import prepared
 
 
-@checked
+@checked(traced=True)
 def ellipse(
     robot: PointMassRobot,
-    centre,
-    a,
-    b,
+    centre: Point,
+    a: PointOrPoints,
+    b: PointOrPoints,
     *,
-    frequency="natural",
-    phase=0.0,
-    turns=1.0,
+    frequency: Frequency = "natural",
+    phase: Phase = 0.0,
+    turns: Turns = 1.0,
     limits: Limits | None = None,
 ) -> Placed[EllipseMotion]:
     """Motion centre + a cos(angle) + b sin(angle) whose angle grows evenly.
@@ -65,8 +67,8 @@ def ellipse(
     return Placed(turning(place, jnp.asarray(frequency, float), jnp.asarray(phase, float), turns), frame)
 
 
-@checked
-def ellipse_frequencies(robot: PointMassRobot, centres: ArrayLike, a: ArrayLike, b: ArrayLike) -> list[np.ndarray]:
+@checked(motion="ellipse")
+def ellipse_frequencies(robot: PointMassRobot, centres: Points, a: PointOrPoints, b: PointOrPoints) -> list[np.ndarray]:
     """Frequencies at which all cables stay taut on ellipses, by formulas.
 
     Args:
@@ -92,9 +94,9 @@ def ellipse_frequencies(robot: PointMassRobot, centres: ArrayLike, a: ArrayLike,
     return intervals
 
 
-@checked
+@checked(motion="ellipse")
 def ellipse_margins(
-    robot: PointMassRobot, centres: ArrayLike, a: ArrayLike, b: ArrayLike, frequencies: ArrayLike
+    robot: PointMassRobot, centres: Points, a: PointOrPoints, b: PointOrPoints, frequencies: Frequencies
 ) -> np.ndarray:
     """Margins of motions on ellipses, by formulas: positive exactly where all cables stay taut.
 

@@ -1,12 +1,14 @@
 """Straight lines of point masses from Python: one motion in pure jax, and least durations of many."""
 
+from __future__ import annotations
+
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import ArrayLike
 
 from cspr_jax.api.arguments.checks import checked
 from cspr_jax.api.arguments.kernel_arguments import check_point_mass, starts_and_ends
 from cspr_jax.errors import InputError
+from cspr_jax.errors.arguments import Duration, DurationOrNone, Point, PointOrPoints, Points, Positive
 from cspr_jax.errors.suggestions import one_of
 from cspr_jax.families.lines.least_time import LeastTimes, least_times
 from cspr_jax.families.lines.motion import LAWS, TimedLine, fixed_law, s_curve
@@ -20,9 +22,15 @@ from cspr_jax.robots.model.point_mass import PointMassRobot
 from cspr_jax.robots.statics.kernel_axes import prepared
 
 
-@checked
+@checked(traced=True)
 def straight_line(
-    robot: PointMassRobot, start, end, *, duration, law: str = "s-curve", acceleration_time=None
+    robot: PointMassRobot,
+    start: Point,
+    end: Point,
+    *,
+    duration: Duration,
+    law: str = "s-curve",
+    acceleration_time: DurationOrNone = None,
 ) -> Placed[TimedLine]:
     """Motion along a straight line from rest to rest, Boralugoda (7) to (9) and Table 3.2.
 
@@ -50,13 +58,13 @@ def straight_line(
     return Placed(TimedLine(first, last - first, shape, time), frame)
 
 
-@checked
+@checked(motion="straight_line")
 def least_time(
     robot: PointMassRobot,
-    targets: ArrayLike,
+    targets: Points,
     *,
-    start: ArrayLike,
-    max_acceleration: float | None = None,
+    start: PointOrPoints,
+    max_acceleration: Positive | None = None,
     limits: Limits | None = None,
 ) -> LeastTimes:
     """Least durations along straight lines from rest to rest: of the S-model, and of any motion.

@@ -4,8 +4,10 @@ Motions and margins here have the precision that jax is set to: call `jax.config
 float64, as searches use whatever jax is set to.
 """
 
+from __future__ import annotations
+
 import dataclasses
-from typing import Any
+from typing import Any, Literal
 
 import jax
 import jax.numpy as jnp
@@ -18,6 +20,19 @@ from cspr_jax.curves.files import kept_to, placed_inward, reference_of, samples_
 from cspr_jax.curves.interpolation import linear_maps
 from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import InputError
+from cspr_jax.errors.arguments import (
+    Arcs,
+    BetaHats,
+    Depth,
+    Point,
+    Points,
+    Quaternions,
+    QuaternionsAtEnds,
+    Samples,
+    Tau,
+    Times,
+    Turns,
+)
 from cspr_jax.errors.suggestions import one_of
 from cspr_jax.families.platforms.end_acceleration import AT_REST
 from cspr_jax.families.platforms.platform_segment import PlatformMotion, pose_segment
@@ -39,13 +54,13 @@ from cspr_jax.robots.model.state import State
 from cspr_jax.robots.model.tension_rule_table import CENTRED, TENSION_RULES
 from cspr_jax.robots.statics.kernel_axes import centred, prepared
 
-amplitude = checked(named, "amplitude", __name__)
+amplitude = checked(name="amplitude", module=__name__)(named)
 # Compiled whole: XLA would compile each of their operations by itself.
 _SLACKS = jax.jit(motion_slacks.slacks)
 _MARGIN = jax.jit(motion_slacks.sampled_margin, static_argnames="samples")
 
 
-@checked
+@checked(traced=True)
 def make_problem(
     robot: AnyRobot, *, amplitude: str | Amplitude = "quintic", limits: Limits | None = None
 ) -> Problem[Any]:
@@ -65,9 +80,15 @@ def make_problem(
     return kernel_problem(robot, amplitude, limits, free_end=None)[0]
 
 
-@checked
+@checked(traced=True)
 def hypocycloid(
-    robot: PointMassRobot, start, end, *, z0, arcs, amplitude: str | Amplitude = "quintic"
+    robot: PointMassRobot,
+    start: Point | None,
+    end: Point,
+    *,
+    z0: Depth,
+    arcs: Arcs,
+    amplitude: str | Amplitude = "quintic",
 ) -> Placed[Hypocycloid]:
     """Standard hypocycloid of a point mass between two points, thesis chapter 2.
 
@@ -94,9 +115,14 @@ def hypocycloid(
     return Placed(Hypocycloid(geometry, function, p), frame)
 
 
-@checked
+@checked(traced=True)
 def transition(
-    robot: PointMassRobot, target, *, z0, oscillations, amplitude: str | Amplitude = "quintic"
+    robot: PointMassRobot,
+    target: Point,
+    *,
+    z0: Depth,
+    oscillations: Turns,
+    amplitude: str | Amplitude = "quintic",
 ) -> Placed[Hypocycloid]:
     """Transition of a point mass from rest in P0 to a target, thesis chapter 1.
 
@@ -120,16 +146,16 @@ def transition(
     return Placed(Hypocycloid(geometry, function, 2.0 * jnp.asarray(oscillations, float)), frame)
 
 
-@checked
+@checked(traced=True)
 def platform_motion(
     robot: PlatformRobot,
-    start,
-    end,
+    start: Point | None,
+    end: Point,
     *,
-    z0,
-    arcs,
-    orientations=(IDENTITY, IDENTITY),
-    beta_hat=(AT_REST, AT_REST),
+    z0: Depth,
+    arcs: Arcs,
+    orientations: QuaternionsAtEnds = (IDENTITY, IDENTITY),
+    beta_hat: BetaHats = (AT_REST, AT_REST),
     amplitude: str | Amplitude = "quintic",
     variable: bool = True,
 ) -> Placed[PlatformMotion]:
@@ -162,17 +188,17 @@ def platform_motion(
     return Placed(PlatformMotion(geometry, function, p, PlatformMotionKind(variable=variable)), frame)
 
 
-@checked
+@checked(traced=True)
 def spline(
     robot: AnyRobot,
-    times,
-    positions,
-    quaternions=None,
+    times: Times,
+    positions: Points,
+    quaternions: Quaternions | None = None,
     *,
-    velocities=None,
-    accelerations=None,
-    interpolation: str | None = None,
-    ends: str | None = None,
+    velocities: Points | None = None,
+    accelerations: Points | None = None,
+    interpolation: Literal["cubic", "quintic", "hermite"] | None = None,
+    ends: Literal["rest", "natural", "periodic"] | None = None,
 ) -> Placed[Spline]:
     """Motion through samples, as a piecewise polynomial in time.
 
@@ -213,7 +239,7 @@ def _spline(robot: AnyRobot, times, quaternions, arrays: list, **options: str | 
     return Placed(placed_inward(curve, frame, reference_of(robot)), frame)
 
 
-@checked
+@checked(traced=True)
 def tensions(robot: AnyRobot, state: State, rule: str = CENTRED) -> Array:
     """Tensions of the cables in a state of motion.
 
@@ -244,8 +270,8 @@ def _is_finite(numbers: Array) -> bool:
     return isinstance(numbers, jax.core.Tracer) or bool(np.isfinite(np.asarray(numbers)).all())
 
 
-@checked
-def slacks(problem: Problem, motion: Motion, tau) -> Array:
+@checked(traced=True)
+def slacks(problem: Problem, motion: Motion, tau: Tau) -> Array:
     """Slacks of all criteria at one instant of a motion: taut cables, determinant, depth, limits.
 
     Args:
@@ -259,8 +285,8 @@ def slacks(problem: Problem, motion: Motion, tau) -> Array:
     return _SLACKS(problem, _inner(motion), jnp.asarray(tau, float))
 
 
-@checked
-def sampled_margin(problem: Problem, motion: Motion, samples: int = 64) -> Array:
+@checked(traced=True)
+def sampled_margin(problem: Problem, motion: Motion, samples: Samples = 64) -> Array:
     """Smallest slack at equidistant instants of a motion; it can be differentiated.
 
     If it is positive, no sample refutes the motion, but nothing is proved: searches prove feasibility.

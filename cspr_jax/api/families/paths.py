@@ -1,14 +1,15 @@
 """Least times along many paths of one robot from Python."""
 
+from __future__ import annotations
+
 import dataclasses
-from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from cspr_jax.api.arguments.check_keys import NAME, check_keys
-from cspr_jax.api.arguments.checks import checked
+from cspr_jax.api.arguments.checks import GridSize, LimitsOrSpec, RobotOrFile, checked
 from cspr_jax.build.problems import build_problem
 from cspr_jax.build.robots import build_robot
 from cspr_jax.build.scenes import scene_of
@@ -20,14 +21,13 @@ from cspr_jax.config.robot import RobotFile, resolve_robot
 from cspr_jax.curves.files import kept_to, placed_inward, reference_of
 from cspr_jax.curves.spline import Spline
 from cspr_jax.errors import InputError
+from cspr_jax.errors.arguments import PointsOfPaths, Positive, QuaternionsOfPaths, RampTime
 from cspr_jax.families.paths.batch import least_times
 from cspr_jax.families.paths.geometry.path_specs import course_through
 from cspr_jax.families.paths.geometry.section import Section
 from cspr_jax.motion.motion import Placed
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.numerics.linear.frames import frame_of
-from cspr_jax.robots.cables import AnyRobot
-from cspr_jax.robots.model.limits import Limits
 from cspr_jax.schema.columns import Columns
 from cspr_jax.schema.families import FAMILIES
 
@@ -63,18 +63,18 @@ class LeastTimePaths(Columns):
         return self.verdict == 0
 
 
-@checked
+@checked(motion="spline")
 def least_time_paths(
-    robot: AnyRobot | str | Path,
-    paths,
-    quaternions=None,
+    robot: RobotOrFile,
+    paths: PointsOfPaths,
+    quaternions: QuaternionsOfPaths | None = None,
     *,
-    kind: str | None = None,
-    corner: str | None = None,
-    blend_tolerance: float | None = None,
-    grid: int = GRID,
-    ramp_time: float = 0.0,
-    limits: Limits | Mapping[str, Any] | None = None,
+    kind: Literal["line", "polyline", "cubic", "quintic"] | None = None,
+    corner: Literal["stop", "blend"] | None = None,
+    blend_tolerance: Positive | None = None,
+    grid: GridSize = GRID,
+    ramp_time: RampTime = 0.0,
+    limits: LimitsOrSpec = None,
 ) -> LeastTimePaths:
     """Run along many paths in the least time that the limits allow, each from zero speed to zero speed.
 
@@ -130,7 +130,7 @@ def least_time_paths(
     )
 
 
-def _sections(i: int, file: RobotFile, table: PathTable, points: Any, quaternions: Sequence | None) -> list[Section]:
+def _sections(i: int, file: RobotFile, table: PathTable, points: Any, quaternions: Any) -> list[Section]:
     # Sections of one path, in the axes of the robot.
     places = _numbers(f"paths[{i}]", points, 3)
     units = None

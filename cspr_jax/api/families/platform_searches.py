@@ -1,16 +1,18 @@
 """Searches of platforms from Python: poses and orientations in, answers out; see `api.families.searches`."""
 
+from __future__ import annotations
+
 import dataclasses
 from functools import partial
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from cspr_jax.api.arguments.checks import checked
+from cspr_jax.api.arguments.checks import MaxArcs, checked
 from cspr_jax.api.arguments.kernel_arguments import batched, depths, kernel_problem, points_of, quaternions
 from cspr_jax.api.families.searches import WithMotions
 from cspr_jax.errors import InputError
+from cspr_jax.errors.arguments import BetaHat, Definition, Depth, Depths, Divisions, Point, Points, Pose, Quaternions
 from cspr_jax.errors.suggestions import one_of
 from cspr_jax.families.platforms.answers import PlatformMotionAnswers
 from cspr_jax.families.platforms.arcs import Candidates, segments_with
@@ -38,18 +40,18 @@ class PlatformAnswers(PlatformMotionAnswers, WithMotions):
     """Answers of `minimum_pose_arcs`; see `families.platforms.answers.PlatformMotionAnswers`."""
 
 
-@checked
+@checked(motion="platform_motion")
 def minimum_pose_arcs(  # noqa: PLR0913
     robot: PlatformRobot,
-    positions: ArrayLike,
-    orientations: ArrayLike | None = None,
+    positions: Points,
+    orientations: Quaternions | None = None,
     *,
-    start: tuple[ArrayLike, ArrayLike] | None = None,
-    z0: ArrayLike,
-    beta_hat: float | Literal["preferred"] | None = None,
+    start: Pose | None = None,
+    z0: Depths,
+    beta_hat: BetaHat = None,
     amplitude: str | Amplitude = "quintic",
     limits: Limits | None = None,
-    max_arcs: int = 30,
+    max_arcs: MaxArcs = 30,
     variable: bool = True,
 ) -> PlatformAnswers:
     """Smallest number of arcs of a platform to each of many poses, thesis chapter 3.
@@ -107,9 +109,9 @@ def _motions(
     return batched(PlatformMotion, segments, problem, answers, frame, kind)
 
 
-@checked
+@checked(motion="platform_motion")
 def accessible(
-    robot: PlatformRobot, place, *, definition: Literal["grid", "scan", "equal-volume"] = "scan", divisions: int = 32
+    robot: PlatformRobot, place: Point, *, definition: Definition = "scan", divisions: Divisions = 32
 ) -> Accessible:
     """Accessible orientations of a place, which free ways join with the reference orientation, section 3.11.
 
@@ -132,17 +134,17 @@ def accessible(
         return search_accessible(problem.robot, where, definition, divisions)
 
 
-@checked
+@checked(motion="platform_motion")
 def attainable(
     robot: PlatformRobot,
-    place,
+    place: Point,
     *,
-    z0: float | None = None,
-    definition: Literal["grid", "scan", "equal-volume"] = "scan",
-    divisions: int = 32,
+    z0: Depth | None = None,
+    definition: Definition = "scan",
+    divisions: Divisions = 32,
     amplitude: str | Amplitude = "quintic",
     limits: Limits | None = None,
-    max_arcs: int = 30,
+    max_arcs: MaxArcs = 30,
 ) -> tuple[Accessible, PlatformMotionAnswers]:
     """Search the accessible orientations of a place that a motion from rest attains, section 3.12.3.
 

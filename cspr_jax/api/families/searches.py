@@ -4,17 +4,19 @@ Searches work in the axes of the robot, and in float64 whatever jax is set to. A
 differentiated, and can make their motions.
 """
 
+from __future__ import annotations
+
 import dataclasses
 from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from cspr_jax.api.arguments.checks import checked
+from cspr_jax.api.arguments.checks import AmplitudeOrNone, MaxArcs, checked
 from cspr_jax.api.arguments.kernel_arguments import batched, check_point_mass, depths, kernel_problem, points_of
 from cspr_jax.errors import InputError
+from cspr_jax.errors.arguments import Depths, Points, StartOrRest
 from cspr_jax.families.swings.arcs import minimum_arcs as search_arcs
 from cspr_jax.families.swings.arcs import segments_between
 from cspr_jax.families.swings.hypocycloid import Hypocycloid, Segment
@@ -80,16 +82,16 @@ class TransitionAnswers(OscillationAnswers, WithMotions):
     """Answers of `minimum_oscillations`; see `families.swings.transitions.oscillations.OscillationAnswers`."""
 
 
-@checked
+@checked(motion="hypocycloid")
 def minimum_arcs(
     robot: PointMassRobot,
-    targets: ArrayLike,
+    targets: Points,
     *,
-    start: ArrayLike | None = None,
-    z0: ArrayLike,
-    amplitude: str | Amplitude | None = None,
+    start: StartOrRest | None = None,
+    z0: Depths,
+    amplitude: AmplitudeOrNone = None,
     limits: Limits | None = None,
-    max_arcs: int = 30,
+    max_arcs: MaxArcs = 30,
 ) -> ArcsAnswers:
     """Smallest number of arcs to each of many targets, with duration, margin and verdict.
 
@@ -139,15 +141,15 @@ def _motions_between(
     return batched(Hypocycloid, chosen, problem, answers, frame)
 
 
-@checked
+@checked(motion="transition")
 def minimum_oscillations(
     robot: PointMassRobot,
-    targets: ArrayLike,
+    targets: Points,
     *,
-    z0: ArrayLike,
+    z0: Depths,
     amplitude: str | Amplitude = "quintic",
     limits: Limits | None = None,
-    max_arcs: int = 30,
+    max_arcs: MaxArcs = 30,
 ) -> TransitionAnswers:
     """Smallest number of oscillations of a transition from rest to each of many targets, thesis chapter 1.
 

@@ -1,12 +1,11 @@
 """Launches from swings to many landing places, from Python."""
 
-from collections.abc import Sequence
-
-from numpy.typing import ArrayLike
+from __future__ import annotations
 
 from cspr_jax.api.arguments.checks import checked
 from cspr_jax.api.arguments.kernel_arguments import release_ranges, starts_and_ends
 from cspr_jax.errors import InputError
+from cspr_jax.errors.arguments import PointOrPoints, Points, ReleaseRange
 from cspr_jax.families.ellipses.swing_range import SwingRange, other_limit
 from cspr_jax.families.ellipses.swing_range import swing_range as slowest_releases
 from cspr_jax.maps.release_box import box_of
@@ -17,15 +16,15 @@ from cspr_jax.robots.model.point_mass import PointMassRobot
 from cspr_jax.robots.statics.kernel_axes import prepared
 
 
-@checked
+@checked(motion="ellipse")
 def swing_range(
     robot: PointMassRobot,
-    targets: ArrayLike,
+    targets: Points,
     *,
-    start: ArrayLike,
-    release_x: Sequence[float] | None = None,
-    release_y: Sequence[float] | None = None,
-    release_z: Sequence[float] | None = None,
+    start: PointOrPoints,
+    release_x: ReleaseRange = None,
+    release_y: ReleaseRange = None,
+    release_z: ReleaseRange = None,
     limits: Limits | None = None,
 ) -> SwingRange:
     """Launches of least speed to landing places, from ellipses about places of rest at their natural frequencies.

@@ -1,5 +1,7 @@
 """Robots of other programs from Python: read, and written as robot files."""
 
+from __future__ import annotations
+
 import dataclasses
 from pathlib import Path
 from typing import Any
@@ -44,7 +46,7 @@ class ImportedRobot:
         """
         return robot_text(self.keys, self._imported.cable_names)
 
-    @checked
+    @checked()
     def save(self, path: str | Path) -> Path:
         """Write the robot file.
 
@@ -65,7 +67,7 @@ class ImportedRobot:
         return target
 
 
-@checked
+@checked()
 def import_robot(path: str | Path, cable_set: str | None = None) -> ImportedRobot:
     """Read a robot of CASPR (NAME_cables.xml beside NAME_bodies.xml), cdpyr (.json, .yaml) or WireX (.wcrfx).
 

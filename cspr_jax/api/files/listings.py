@@ -1,11 +1,13 @@
 """Lists of robots, quantities and examples, and new files to start from, from Python; without jax."""
 
-from collections.abc import Iterable
+from __future__ import annotations
+
 from pathlib import Path
 from typing import Any
 
 from cspr_jax.api.arguments.checks import checked
 from cspr_jax.errors import ConfigError, InputError, demand
+from cspr_jax.errors.arguments import Names, RobotNames
 from cspr_jax.errors.suggestions import one_of
 from cspr_jax.outputs import example_files, listings
 
@@ -13,8 +15,8 @@ from cspr_jax.outputs import example_files, listings
 KINDS = ("robot", "sweep", "plan")
 
 
-@checked
-def list_robots(names: str | Iterable[str | Path] = ()) -> list[dict[str, Any]]:
+@checked()
+def list_robots(names: RobotNames = ()) -> list[dict[str, Any]]:
     """The robots of the catalogue, or the robots that are named.
 
     Args:
@@ -50,8 +52,8 @@ def list_examples() -> dict[str, str]:
     return example_files.examples()
 
 
-@checked
-def copy_examples(names: str | Iterable[str], folder: str | Path = ".") -> list[Path]:
+@checked()
+def copy_examples(names: Names, folder: str | Path = ".") -> list[Path]:
     """Copy example files, to be changed; nothing is overwritten.
 
     Args:
@@ -69,7 +71,7 @@ def copy_examples(names: str | Iterable[str], folder: str | Path = ".") -> list[
     return example_files.copy([names] if isinstance(names, str) else list(names), Path(folder))
 
 
-@checked
+@checked()
 def new_file(
     what: str,
     path: str | Path,

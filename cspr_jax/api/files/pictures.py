@@ -1,13 +1,16 @@
 """Pictures of results from Python, as `cspr plot` draws them."""
 
-from collections.abc import Callable, Mapping, Sequence
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from matplotlib.figure import Figure
 
-from cspr_jax.api.arguments.checks import checked
+from cspr_jax.api.arguments.checks import ResultOrResults, RobotOrFileOrNone, checked
 from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.errors.arguments import Coordinates, Names, PictureSize
 from cspr_jax.outputs.plots.draw import drawn
 from cspr_jax.outputs.plots.motions.motion_source import completed
 from cspr_jax.outputs.plots.selection import is_own_motion, result_at
@@ -21,25 +24,25 @@ if TYPE_CHECKING:
     from cspr_jax.robots.cables import AnyRobot
 
 
-@checked
+@checked()
 def plot(  # noqa: PLR0913
-    results: str | Path | Result | Sequence[str | Path | Result],
+    results: ResultOrResults,
     *,
     quantity: str | None = None,
-    at: Mapping[str, float] | None = None,
-    best: str | Sequence[str] = (),
+    at: Coordinates | None = None,
+    best: Names = (),
     lines: str | None = None,
     envelope: bool = False,
     solid: bool = False,
     ratio: bool = False,
-    size: str | tuple[float, float] | None = None,
+    size: PictureSize | None = None,
     dpi: float | None = None,
     font_size: float | None = None,
     preset: str | None = None,
     title: bool = True,
     plan: str | Path | None = None,
-    robot: "AnyRobot | str | Path | None" = None,
-    z_axis: str | None = None,
+    robot: RobotOrFileOrNone = None,
+    z_axis: Literal["down", "up"] | None = None,
     output: str | Path | None = None,
 ) -> Figure:
     """Draw one result, or several in one picture: maps as lines, workspaces as outlines, motions over time.
@@ -96,9 +99,7 @@ def plot(  # noqa: PLR0913
     return finished(draw, names[0], style, output)
 
 
-def sources_beside(
-    plan: str | Path | None, robot: "AnyRobot | str | Path | None", z_axis: str | None
-) -> dict[str, Any]:
+def sources_beside(plan: str | Path | None, robot: AnyRobot | str | Path | None, z_axis: str | None) -> dict[str, Any]:
     """Robot, plan or axes beside motions in CSV."""
     sources = {"--plan": plan, "--robot": robot, "--z-axis": z_axis}
     options = [option for option, value in sources.items() if value is not None]
@@ -120,7 +121,7 @@ def _opened(source: Path | Result, name: str, beside: dict[str, Any]) -> Result:
     return check_file(source, beside["robot"], outputs=["-o"]).plan.to_result()
 
 
-def names_of(axes: str | Sequence[str]) -> list[str]:
+def names_of(axes: str | Iterable[str]) -> list[str]:
     """Names of axes that may be given as one."""
     return [axes] if isinstance(axes, str) else list(axes)
 

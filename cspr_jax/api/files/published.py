@@ -1,10 +1,13 @@
 """Published tables from Python, computed again as by `cspr table`, and raw speed, measured as by `cspr bench`."""
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from __future__ import annotations
 
-from cspr_jax.api.arguments.checks import checked
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cspr_jax.api.arguments.checks import MaxArcs, checked
 from cspr_jax.errors import ConfigError, demand, shown
+from cspr_jax.errors.arguments import TEXT, AnyInteger, Count, or_none
 from cspr_jax.errors.suggestions import one_of
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.runtime.processes import LARGEST, check_count, usual_count
@@ -26,18 +29,18 @@ def list_tables() -> dict[str, str]:
     return {name: source.title for name, source in TABLES.items()}
 
 
-@checked
+@checked()
 def table(
-    name: str,
+    name: Annotated[str, or_none(TEXT)],
     *,
     definition: str | None = None,
     amplitude: str | None = None,
     fine: bool = False,
-    max_arcs: int | None = None,
-    values: int | None = None,
-    workers: int | None = 1,
+    max_arcs: MaxArcs | None = None,
+    values: Count | None = None,
+    workers: AnyInteger | None = 1,
     again: bool = True,
-) -> "list[Cell]":
+) -> list[Cell]:
     """Compute a published table again.
 
     Args:
@@ -74,7 +77,7 @@ def table(
         return table_cells(name, choice, workers, again=again)
 
 
-@checked
+@checked()
 def benchmark(kernels: str | Path | None = None) -> dict[str, Any]:
     """Measure feasibility checks per second, beside a NumPy version of the same check; this takes a minute.
 

@@ -1,9 +1,12 @@
 """Plans played in MuJoCo from Python, as `cspr replay` plays them."""
 
+from __future__ import annotations
+
 import dataclasses
+import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from matplotlib.figure import Figure
 
@@ -11,6 +14,7 @@ from cspr_jax.api.arguments.checks import checked
 from cspr_jax.api.files.pictures import finished
 from cspr_jax.api.plans import NAME, Plan, plan
 from cspr_jax.errors import ConfigError
+from cspr_jax.errors.arguments import Kind, PictureSize
 from cspr_jax.errors.suggestions import with_suggestions
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.outputs.mujoco import replay as replays
@@ -19,17 +23,22 @@ from cspr_jax.outputs.mujoco.motion import STEP
 from cspr_jax.outputs.plots.films.replay import replay_figure
 from cspr_jax.outputs.plots.style.style import style_of
 
+PlanOrFile = Annotated[
+    str | Path | Mapping[str, Any] | Plan,
+    Kind("a plan, its file, or a dictionary of that", (str, os.PathLike, Mapping), ("answers", "points", "robot_file")),
+]
+
 
 @with_suggestions
 @dataclasses.dataclass(frozen=True)
 class Replay(replays.PlayedPlan):
     """A plan, and its motion as MuJoCo plays it; see `cspr_jax.outputs.mujoco.replay.PlayedPlan` for the fields."""
 
-    @checked
+    @checked()
     def plot(
         self,
         *,
-        size: str | tuple[float, float] | None = None,
+        size: PictureSize | None = None,
         dpi: float | None = None,
         font_size: float | None = None,
         preset: str | None = None,
@@ -58,8 +67,8 @@ class Replay(replays.PlayedPlan):
         )
 
 
-@checked
-def replay(given: str | Path | Mapping[str, Any] | Plan, *, step: float = STEP, anyway: bool = False) -> Replay:
+@checked()
+def replay(given: PlanOrFile, *, step: float = STEP, anyway: bool = False) -> Replay:
     """Play a plan in MuJoCo: the path that its tensions give, and the tensions that MuJoCo needs along its path.
 
     Args:

@@ -1,17 +1,21 @@
 """Pages to explore results and plans in a browser, as `cspr report` writes them."""
 
+from __future__ import annotations
+
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
 from cspr_jax.api import plans
-from cspr_jax.api.arguments.checks import checked
+from cspr_jax.api.arguments.checks import RobotOrFileOrNone, checked
 from cspr_jax.api.checks import check_file
 from cspr_jax.api.files.pictures import names_of, sources_beside
 from cspr_jax.api.plans import Plan
 from cspr_jax.errors import ConfigError, InputError
+from cspr_jax.errors.arguments import AnyInteger, CellCoordinates, Kind, Names
 from cspr_jax.numerics.elementary import double_precision
 from cspr_jax.outputs import motion_files
 from cspr_jax.outputs.path_columns import path_columns
@@ -25,29 +29,31 @@ from cspr_jax.outputs.plots.selection import is_own_motion, nearest, result_at
 from cspr_jax.outputs.plots.style.fitting import shortened
 from cspr_jax.outputs.plots.style.labels import heading, robot_name, value
 from cspr_jax.plans.cell_plan import cell_plan
-from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.runtime.stages import stage
 from cspr_jax.schema.map_kinds import MAP_KINDS
 from cspr_jax.store.files.disk import Disk
 from cspr_jax.store.files.publishing import check_place, publish
 from cspr_jax.store.reading.result import Result, open_result
 
+ResultOrPlan = Annotated[
+    str | Path | Result | Plan, Kind("a result, a plan, or the path of one", (str, os.PathLike), ("to_xarray",))
+]
 # Motions of cells where nobody says how many, and at most; rows a second of a plan's motion.
 USUAL, MOST, RATE, STEP = 50, 500, 60.0, 100
 
 
-@checked
+@checked()
 def report(
-    given: str | Path | Result | Plan,
+    given: ResultOrPlan,
     output: str | Path,
     *,
-    trajectories: int = USUAL,
-    cells: Sequence[Mapping[str, float]] = (),
+    trajectories: AnyInteger = USUAL,
+    cells: CellCoordinates = (),
     quantity: str | None = None,
-    best: str | Sequence[str] = (),
+    best: Names = (),
     plan: str | Path | None = None,
-    robot: AnyRobot | str | Path | None = None,
-    z_axis: str | None = None,
+    robot: RobotOrFileOrNone = None,
+    z_axis: Literal["down", "up"] | None = None,
 ) -> list[str]:
     """Write a page to explore a map, or a plan, in a browser: one file that needs no network.
 

@@ -12,7 +12,7 @@ from cspr_jax.config.gcode.words import LENGTHS, SETTINGS, GcodeLine, Word, Word
 from cspr_jax.config.keys.limits import LARGEST_LENGTH
 from cspr_jax.config.reading import read_text
 from cspr_jax.errors import ConfigError
-from cspr_jax.schema.given_numbers import LARGEST, SMALLEST
+from cspr_jax.errors.given_numbers import LARGEST, SMALLEST
 
 _UNITS = {20: 0.0254, 21: 0.001}
 _DECIMALS = re.compile(r"[XYZIJKR]\s*[+-]?\d*\.(\d+)", re.IGNORECASE)

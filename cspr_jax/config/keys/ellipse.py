@@ -12,7 +12,7 @@ from cspr_jax.config.keys.limits import Point, Positive, has_direction
 from cspr_jax.config.keys.trajectory import Angle
 from cspr_jax.config.reading import Table
 from cspr_jax.config.wording import fault
-from cspr_jax.schema.given_numbers import SMALLEST
+from cspr_jax.errors.given_numbers import SMALLEST
 
 if TYPE_CHECKING:
     from jaxtyping import Float

@@ -17,7 +17,7 @@ from pydantic import (
 
 from cspr_jax.config.reading import Table
 from cspr_jax.config.wording import fault
-from cspr_jax.schema.given_numbers import LARGEST, SMALLEST
+from cspr_jax.errors.given_numbers import LARGEST, SMALLEST
 from cspr_jax.schema.limits import LIMITS, UNCERTAINTIES
 
 # Beyond these bounds squares and cubes of numbers overflow; no robot is near them. As in `robots.model.point_mass`,

@@ -11,7 +11,7 @@ from cspr_jax.config.keys.trajectory import Angle, Quaternion
 from cspr_jax.config.reading import Table
 from cspr_jax.config.wording import either, fault
 from cspr_jax.errors import shown
-from cspr_jax.schema.given_numbers import SMALLEST
+from cspr_jax.errors.given_numbers import SMALLEST
 from cspr_jax.schema.limits import LARGEST_GRID
 
 # Keys of a shape, by the kinds that take them.

@@ -16,6 +16,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.errors import InputError
+from cspr_jax.errors.arguments import Coordinates3, Inertia, PointOfEachCable, Positive
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.model.body_geometry import checked_centre, checked_inertia, checked_platform, is_same
 from cspr_jax.robots.model.limits import NO_LIMITS, Limits
@@ -120,13 +121,13 @@ jax.tree_util.register_dataclass(
 
 
 def platform_robot(  # noqa: PLR0913
-    base_points,
-    platform_points,
+    base_points: PointOfEachCable,
+    platform_points: PointOfEachCable,
     *,
-    mass: float,
-    inertia,
-    centre_of_mass=None,
-    gravity: float = STANDARD_GRAVITY,
+    mass: Positive,
+    inertia: Inertia,
+    centre_of_mass: Coordinates3 | None = None,
+    gravity: Positive = STANDARD_GRAVITY,
     name: str = "robot",
     z_axis: Axis = "down",
     limits: Limits | None = None,

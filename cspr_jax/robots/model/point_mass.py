@@ -16,6 +16,7 @@ import numpy as np
 from jax import Array
 
 from cspr_jax.errors import InputError
+from cspr_jax.errors.arguments import PointOfEachCable, Positive
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.model.limits import NO_LIMITS, Limits
 from cspr_jax.robots.model.patterns import PATTERNS
@@ -101,10 +102,10 @@ jax.tree_util.register_dataclass(
 
 
 def point_mass_robot(
-    base_points,
+    base_points: PointOfEachCable,
     *,
-    mass: float,
-    gravity: float = STANDARD_GRAVITY,
+    mass: Positive,
+    gravity: Positive = STANDARD_GRAVITY,
     name: str = "robot",
     z_axis: Axis = "down",
     limits: Limits | None = None,

@@ -4,6 +4,8 @@ import dataclasses
 import math
 import numbers as kinds
 import operator
+import sys
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,7 @@ from cspr_jax.errors import InputError
 SMALLEST, LARGEST = 1e-9, 1e9
 # A shape has this in place of a length that may be any from 1 on.
 ANY = None
+DEPTH = 4  # levels of lists and dictionaries that are searched for what jax traces
 
 
 def numbers(key: str, value: Any, allowed: str) -> np.ndarray:
@@ -36,14 +39,14 @@ def numbers(key: str, value: Any, allowed: str) -> np.ndarray:
     raise InputError(key, value, allowed)
 
 
-def whole(key: str, value: Any, least: int, largest: int) -> int:
+def whole(key: str, value: Any, minimum: int, maximum: int) -> int:
     """Integer that a caller gave."""
-    allowed = f"an integer from {least} to {largest}"
+    allowed = f"an integer from {minimum} to {maximum}"
     try:
         number = operator.index(value)
     except TypeError as error:
         raise InputError(key, value, allowed) from error
-    if isinstance(value, bool) or not least <= number <= largest:
+    if isinstance(value, bool) or not minimum <= number <= maximum:
         raise InputError(key, value, allowed)
     return number
 
@@ -55,20 +58,27 @@ class Numbers:
     Fields:
         allowed: in words, for errors.
         shapes: that are allowed; `ANY` is a length from 1 on. None: all.
-        least: smallest number.
-        largest: largest number; inf: none, and infinite ones are taken only with `infinite`.
-        above: whether the smallest number itself is refused.
+        minimum: smallest number.
+        maximum: largest number; inf: none, and infinite ones are taken only with `infinite`.
+        positive: whether numbers must be from `SMALLEST` to `LARGEST`, above 0.
         infinite: whether inf is taken.
         nan: whether NaN is taken, since the function itself says what it allows instead.
+        traced: whether what jax traces passes, where jax may trace a function.
     """
 
     allowed: str
     shapes: tuple[tuple[int | None, ...], ...] | None = ((),)
-    least: float = -math.inf
-    largest: float = math.inf
-    above: bool = False
+    minimum: float = -math.inf
+    maximum: float = math.inf
+    positive: bool = False
     infinite: bool = False
     nan: bool = False
+    traced: bool = False
+
+    def __call__(self, key: str, value: Any) -> None:
+        """Refuse other values."""
+        if not (self.traced and traced_part(value) is not None):
+            self.array(key, value)
 
     def array(self, key: str, value: Any) -> np.ndarray:
         """The numbers."""
@@ -77,10 +87,10 @@ class Numbers:
             if not values.ndim:
                 raise InputError(key, value, self.allowed)
             raise InputError(key, None, f"must be {self.allowed}", fault=f"an array of shape {values.shape}")
-        inside = (values > self.least if self.above else values >= self.least) & (values <= self.largest)
+        inside = (values > 0.0 if self.positive else values >= self.minimum) & (values <= self.maximum)
         inside &= ~np.isnan(values) if self.infinite else np.isfinite(values)
         inside |= np.isnan(values) & self.nan
-        if self.above and self.least == 0.0 and inside.all() and ((values < SMALLEST) | (values > LARGEST)).any():
+        if self.positive and inside.all() and ((values < SMALLEST) | (values > LARGEST)).any():
             beyond = float(values.min() if values.min() < SMALLEST else values.max())
             raise InputError(key, beyond, f"{self.allowed}, from {SMALLEST:g} to {LARGEST:g}")
         if not inside.all():
@@ -92,10 +102,34 @@ class Numbers:
 
 def _fits(shape: tuple[int, ...], lengths: tuple[int | None, ...]) -> bool:
     return len(shape) == len(lengths) and all(
-        size >= 1 if length is ANY else size == length for size, length in zip(shape, lengths, strict=True)
+        n >= 1 if length is ANY else n == length for n, length in zip(shape, lengths, strict=True)
     )
 
 
 def _is_real(value: object) -> bool:
     is_number = isinstance(value, kinds.Real) or type(value).__name__ == "Decimal"
     return is_number and not isinstance(value, bool | np.bool_)
+
+
+def traced_part(value: Any, depth: int = DEPTH) -> str | None:
+    """Part of a value that jax traces, as Python writes it behind the value's name; None: none."""
+    jax = sys.modules.get("jax")
+    if jax is None or isinstance(value, jax.core.Tracer):
+        return None if jax is None else ""
+    parts: Iterable[tuple[str, Any]] = ()
+    if isinstance(value, Mapping):
+        parts = ((f"[{key!r}]", part) for key, part in value.items())
+    elif isinstance(value, list | tuple):
+        parts = ((f"[{i}]", part) for i, part in enumerate(value))
+    elif dataclasses.is_dataclass(value) and not isinstance(value, type):
+        parts = ((f".{field.name}", getattr(value, field.name)) for field in dataclasses.fields(value))
+    inner = ((name, traced_part(part, depth - 1)) for name, part in parts) if depth else ()
+    return next((name + rest for name, rest in inner if rest is not None), None)
+
+
+def refuse_tracers(key: str, value: Any, instead: str) -> None:
+    """Refuse what jax traces, anywhere in an argument of a function that computes with NumPy."""
+    part = traced_part(value)
+    if part is not None:
+        error = "a tracer of jax, as grad, jit and vmap pass"
+        raise InputError(key + part, None, f"must be numbers: {instead}", fault=error)
