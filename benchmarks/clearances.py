@@ -51,7 +51,7 @@ def main() -> None:
         scene = clearance.scene(robot, diameter=0.01, obstacles=list(room.values()), body=body)
         terms = list(clearance._terms(scene, np.zeros(3), dtype))
         for kind, first, term in terms:
-            meeting = scene.meetings[first]
+            meeting = scene.contact_pairs[first]
             what = f"{kind} {list(room)[meeting.other]}" if "obstacle" in kind else kind
             seconds = cpu(lambda term=term: jax.block_until_ready(term(poses)), ROUNDS)
             print(f"{what:28s} {1e9 * seconds / some:8.1f} ns a pose")

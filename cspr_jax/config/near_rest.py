@@ -7,7 +7,7 @@ import numpy as np
 
 from cspr_jax.errors import shown
 from cspr_jax.numerics.linear.frames import frame_of
-from cspr_jax.robots.model.spool_plane import AT_P0, size
+from cspr_jax.robots.model.spool_plane import AT_P0, largest_radius
 
 # Places nearer to P0 than this, m or of z0, are hardly meant to be other places.
 NEAR_P0 = 1e-3
@@ -18,7 +18,7 @@ def almost_at_rest(key: str, place: Sequence[float], z0: float, robot: Any, cure
     spools = np.asarray(robot.base_points)
     rest = frame_of(spools, robot.z_axis).outward(np.array([0.0, 0.0, z0]))
     apart = float(np.linalg.norm(np.asarray(place) - rest))
-    if not AT_P0 * size(spools) < apart <= NEAR_P0 * max(1.0, z0):
+    if not AT_P0 * largest_radius(spools) < apart <= NEAR_P0 * max(1.0, z0):
         return ""
     written = ", ".join(f"{value:.12g}" for value in (np.round(rest, 12) + 0.0).tolist())
     return (

@@ -16,7 +16,7 @@ from cspr_jax.motion.cause import Cause
 from cspr_jax.plans.planning import PlannedMotions
 from cspr_jax.verification.bounds.block_slacks import block_slacks
 from cspr_jax.verification.proved_answers import MotionProof, cause_of
-from cspr_jax.verification.robustness.motion_tolerances import instant_states
+from cspr_jax.verification.robustness.motion_tolerances import states_as_bounds
 
 # Share of its scale within which the smallest slack of a criterion is compared with what samples leave open.
 NEAR = 1e-3
@@ -71,7 +71,7 @@ def _compared(plan: PlannedMotions, motion: Spline, case: MotionProof, k: int) -
     scene = scene_of(plan.problem.robot, plan.robot_file, plan.frame, plan.keys, Path("motion"), trajectory=plan.keys)
 
     def slacks(curve: Spline) -> np.ndarray:
-        states = instant_states(curve, taus)
+        states = states_as_bounds(curve, taus)
         return block_slacks(plan.problem.robot, plan.problem.limits, lambda *_: states, taus, taus, scene).high[:, k]
 
     fine = slacks(motion)

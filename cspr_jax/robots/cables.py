@@ -93,12 +93,12 @@ def shared(robot: AnyRobot, state: State, limits: Limits, rule: str) -> Distribu
 
 
 def wrench_units(robot: AnyRobot) -> Float[Array, "dof"]:
-    """Divisors that make components of wrenches comparable: 1 of forces, the platform's size of moments."""
+    """Divisors that make components of wrenches comparable: 1 of forces, the platform's radius of moments."""
     forces = np.ones(len(PATTERNS[robot.pattern].forces))
     if not isinstance(robot, PlatformRobot):
         return jnp.asarray(forces)
-    size = jnp.sqrt(jnp.mean(jnp.sum(robot.platform_points**2, axis=1)))
-    return jnp.concatenate([jnp.asarray(forces), jnp.full(robot.dof - len(forces), size)])
+    radius = jnp.sqrt(jnp.mean(jnp.sum(robot.platform_points**2, axis=1)))
+    return jnp.concatenate([jnp.asarray(forces), jnp.full(robot.dof - len(forces), radius)])
 
 
 def cable_motion(

@@ -1,4 +1,4 @@
-"""Tell whether a robot on any number of cables can hang still, all of them taut: single poses by a linear program."""
+"""Tell whether a robot on any number of cables can hang at rest, all of them taut: single poses by a linear program."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -15,16 +15,16 @@ DEPTHS = np.linspace(-0.95, 1.0, 40)
 
 def slack_at_rest(robot: AnyRobot, limits: Limits) -> str | None:
     """Reason why a robot cannot hang still with every cable taut, whichever way the cables share its weight."""
-    size = float(np.linalg.norm(np.asarray(robot.base_points), axis=1).mean())
+    distance = float(np.linalg.norm(np.asarray(robot.base_points), axis=1).mean())
     low = np.zeros(robot.n_cables) if limits.tension_min is None else np.asarray(limits.tension_min)
     high = np.full(robot.n_cables, np.inf) if limits.tension_max is None else np.asarray(limits.tension_max)
     with double_precision():
-        for depth in DEPTHS * size:
-            still = at_rest(jnp.array([0.0, 0.0, depth]), jnp.eye(3))
-            matrix, wrench = np.asarray(robot.wrench_matrix(still)), np.asarray(robot.inertial_wrench(still))
+        for depth in DEPTHS * distance:
+            rest = at_rest(jnp.array([0.0, 0.0, depth]), jnp.eye(3))
+            matrix, wrench = np.asarray(robot.wrench_matrix(rest)), np.asarray(robot.inertial_wrench(rest))
             if np.isfinite(matrix).all() and by_program(matrix, wrench, low, high):
                 return None
     return (
-        f"at no depth down to {size:.4g} m below the centroid of its spools, in the orientation of its file, do "
+        f"at no depth down to {distance:.4g} m below the centroid of its spools, in the orientation of its file, do "
         "tensions within its limits hold it with every cable taut"
     )

@@ -19,7 +19,7 @@ from cspr_jax.verification.bounds.block_parts import TimeBlocks
 from cspr_jax.verification.bounds.block_slacks import block_slacks
 from cspr_jax.verification.criteria import levels
 from cspr_jax.verification.proved_answers import MotionProof, ProvedAnswers, margins_of
-from cspr_jax.verification.robustness.motion_tolerances import instant_states
+from cspr_jax.verification.robustness.motion_tolerances import states_as_bounds
 
 # Samples that are followed for each criterion at first, and then; rounds, each eight times as fine.
 STARTS, FOLLOWED, ROUNDS = 6, 2, 7
@@ -50,7 +50,7 @@ def attained(
 
     def slacks(tau: np.ndarray) -> np.ndarray:
         times = tau[0]
-        states = instant_states(motion, times)
+        states = states_as_bounds(motion, times)
         bounds = problem.robot, problem.limits, lambda *_: states, times, times, scene
         return block_slacks(*bounds, contacts_alone=contacts_alone).high[None, :, columns]
 

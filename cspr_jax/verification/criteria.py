@@ -21,7 +21,7 @@ from cspr_jax.motion.limits import allowance, limits_set
 from cspr_jax.numerics.tolerances import TOUCHED
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.contacts.clearance import Scene
-from cspr_jax.robots.contacts.contact_bodies import default_scene, meetings
+from cspr_jax.robots.contacts.contact_bodies import contact_pairs, default_scene
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.platform import RIGID, PlatformRobot
@@ -106,7 +106,7 @@ def levels(rows: Sequence[Criterion]) -> np.ndarray:
 def contact_criteria(robot: AnyRobot, limits: Limits, scene: Scene | None = None) -> list[Criterion]:
     """Criteria of bodies that can meet: the last of all criteria."""
     rows, around = [], scene or default_scene(robot)
-    for kind, cable, other in meetings(robot, around):
+    for kind, cable, other in contact_pairs(robot, around):
         bodies = [k for k in (cable, other if kind == "cables" else -1) if k >= 0]
         rows.append(Criterion(FLAGS[kind], tuple(bodies), "m", other if FLAGS[kind] == Verdict.OBSTACLE else None))
     if limits.floor is not None and has_extent(robot, around):

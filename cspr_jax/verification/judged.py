@@ -116,7 +116,7 @@ class Judge(NamedTuple):
     def _proofs(self, motions: Any, rows: np.ndarray, intervals: bool) -> list[MotionProof]:
         how: Any = {"scene": self.scene, "contacts_alone": not self.has_pulleys}
         if not isinstance(motions, list):
-            several = motions.taken(rows)
+            several = motions.take(rows)
             return proofs_of(self.problem, several.bounds, several.durations, intervals=intervals, **how)
         chosen = [motions[i] for i in rows]
         return [

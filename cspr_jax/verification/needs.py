@@ -18,7 +18,7 @@ from cspr_jax.numerics.search.minima import narrowed_times
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.contacts.interference import gaps
 from cspr_jax.robots.model.limits import Limits
-from cspr_jax.robots.model.platform import PlatformRobot, pairs_apart
+from cspr_jax.robots.model.platform import PlatformRobot, separate_pairs
 from cspr_jax.robots.model.point_mass import plane_normal, rest_point
 from cspr_jax.robots.statics import wrench_balance
 from cspr_jax.schema.verdicts import Verdict
@@ -90,7 +90,7 @@ def _with_tensions(robot: AnyRobot, limits: Limits) -> Limits:
 
 
 def _pairs(robot: AnyRobot) -> tuple[tuple[int, int], ...]:
-    return pairs_apart(robot) if isinstance(robot, PlatformRobot) else ()
+    return separate_pairs(robot) if isinstance(robot, PlatformRobot) else ()
 
 
 def _criteria(robot: AnyRobot, limits: Limits) -> list[_Criterion]:

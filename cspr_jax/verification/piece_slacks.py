@@ -15,7 +15,7 @@ from cspr_jax.robots.bounds.state_bounds import StateBounds
 from cspr_jax.robots.contacts.clearance import Scene
 from cspr_jax.verification.bounds.block_slacks import BATCH, block_slacks
 from cspr_jax.verification.criteria import Criterion, criteria
-from cspr_jax.verification.robustness.uncertain_slacks import lower_slacks, share_of
+from cspr_jax.verification.robustness.uncertain_slacks import lower_slacks, radii_of
 
 if TYPE_CHECKING:
     from jaxtyping import Float
@@ -62,7 +62,7 @@ def piece_slacks(
 
 def all_robots_slacks(problem: Problem, states: StateBounds, multiple: float = 1.0) -> Float[np.ndarray, "k n"]:
     """Lower bounds of the slacks of tensions and limits of all robots within an uncertainty."""
-    fraction = share_of(problem.limits, np.full(len(states.position.middle), multiple))
+    fraction = radii_of(problem.limits, np.full(len(states.position.middle), multiple))
     return in_batches(partial(lower_slacks, problem.robot, problem.limits), (states, fraction), batch_size=BATCH)
 
 

@@ -22,7 +22,7 @@ from cspr_jax.schema.verdicts import FLAGS, Verdict
 from cspr_jax.verification.bounds.block_parts import TimeBlocks
 from cspr_jax.verification.bounds.block_slacks import BlockSlacks, block_slacks
 from cspr_jax.verification.criteria import AT_INSTANTS, Criterion, contact_criteria, criteria, levels
-from cspr_jax.verification.robustness.motion_tolerances import instant_states, motion_tolerances
+from cspr_jax.verification.robustness.motion_tolerances import motion_tolerances, states_as_bounds
 from cspr_jax.verification.time_proof import TimeProof, time_proofs
 
 if TYPE_CHECKING:
@@ -279,7 +279,7 @@ def sampled_proof(
     """Refute a motion that has no bounds by its samples, or leave it undecided."""
     tau = np.linspace(0.0, 1.0, samples + 1)
     # A block without a length has the slacks of its instant.
-    states = instant_states(motion, tau)
+    states = states_as_bounds(motion, tau)
     rows = _criteria(problem, scene, contacts_alone)
     high = block_slacks(
         problem.robot, problem.limits, lambda start, end: states, tau, tau, scene, contacts_alone=contacts_alone

@@ -94,14 +94,14 @@ def time_proofs(
             fails |= np.bincount(blocks.motion, (blocks.slacks.high < level).any(1), count) > 0.0
             is_open &= ~fails[blocks.motion]
         is_open &= (totals + 2 * np.bincount(blocks.motion[is_open], minlength=count))[blocks.motion] <= MOST
-        leaves.append(blocks.taken(~is_open))
+        leaves.append(blocks.take(~is_open))
         first, last = blocks.rest(np.asarray(level), undecided, has_upper=True)
-        outside, inner = blocks.taken(is_open).cut(first[is_open], last[is_open], at_jumps)
+        outside, inner = blocks.take(is_open).cut(first[is_open], last[is_open], at_jumps)
         leaves.append(outside)
         blocks = _bounded(slacks, *inner)
         totals += np.bincount(blocks.motion, minlength=count)
     narrow, more = _narrowed(slacks, joined(leaves), _usual(start.slacks.high, count), resolution, at_jumps, groups)
-    return _proofs(narrow.taken(np.lexsort((narrow.start, narrow.motion))), totals + more, level)
+    return _proofs(narrow.take(np.lexsort((narrow.start, narrow.motion))), totals + more, level)
 
 
 def _bounded(slacks, motion: np.ndarray, start: np.ndarray, end: np.ndarray, whole: BlockSlacks | None) -> TimeBlocks:
@@ -146,9 +146,9 @@ def _narrowed(
         matters = (blocks.slacks.low < level) & np.isfinite(level)
         is_open = matters.any(1) & (blocks.end - blocks.start > SHORTEST * resolution)
         is_open &= (more < NARROWING)[blocks.motion]
-        leaves.append(blocks.taken(~is_open))
+        leaves.append(blocks.take(~is_open))
         first, last = blocks.rest(level, matters, has_upper=False)
-        outside, inner = blocks.taken(is_open).cut(first[is_open], last[is_open], jumps)
+        outside, inner = blocks.take(is_open).cut(first[is_open], last[is_open], jumps)
         leaves.append(outside)
         blocks = _bounded(slacks, *inner)
         more += np.bincount(blocks.motion, minlength=count)
@@ -173,7 +173,7 @@ def _proofs(blocks: TimeBlocks, totals: np.ndarray, level: np.ndarray | float) -
     proofs, firsts = [], np.searchsorted(blocks.motion, np.arange(count + 1))
     for i, (first, last) in enumerate(itertools.pairwise(firsts)):
         when = 0.5 * (blocks.start + blocks.end)[first + blocks.slacks.high[first:last].argmin(0)]
-        near = blocks.taken(first + np.flatnonzero((blocks.slacks.low[first:last] <= high[i]).any(1)))
+        near = blocks.take(first + np.flatnonzero((blocks.slacks.low[first:last] <= high[i]).any(1)))
         near = near._replace(motion=np.zeros_like(near.motion))  # the one motion of its proof
         sides = [parts[i] for parts in failing], [parts[i] for parts in is_open]
         proofs.append(TimeProof(low[i], high[i], when, *sides, int(totals[i]), near))

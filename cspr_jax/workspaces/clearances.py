@@ -80,5 +80,5 @@ def flags(distances: Clearances) -> Int[np.ndarray, "n"]:
 
 def nearest_bodies(around: Scene, distances: Clearances) -> Int[np.ndarray, "n"]:
     """Kind of the nearest bodies at each pose."""
-    numbers = np.array([*(KINDS[meeting.kind] for meeting in around.meetings), 0], np.int16)
+    numbers = np.array([*(KINDS[meeting.kind] for meeting in around.contact_pairs), 0], np.int16)
     return numbers[distances.nearest]

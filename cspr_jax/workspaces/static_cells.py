@@ -50,7 +50,7 @@ class RestCells:
         with double_precision():
             self._proofs = [self._mass_proofs(one) for each in searches.values() for one in each]
         self._names = ["closure" if name == CLOSURE else "tensions" for name, each in searches.items() for _ in each]
-        self._has_contacts = poses.around is not None and bool(poses.around.meetings)
+        self._has_contacts = poses.around is not None and bool(poses.around.contact_pairs)
         self._names += ["clearances"] * self._has_contacts
         self._names += [LIMITS[name] for name, *_ in poses.limited(np.zeros((1, 3)), self._turns(1))]
 

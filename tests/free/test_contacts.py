@@ -15,7 +15,7 @@ from cspr_jax.families.free.search.tasks import Unknowns
 from cspr_jax.motion.amplitudes import named
 from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.elementary import double_precision
-from cspr_jax.robots.contacts.clearance import Meeting, scene
+from cspr_jax.robots.contacts.clearance import ContactPair, scene
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.model.shapes import box, cylinder, hull, sphere
 from cspr_jax.robots.statics.kernel_axes import centred
@@ -52,13 +52,13 @@ def moved(name, rng, surroundings):
 
 
 SOLIDS = {
-    "sphere": (sphere([0.5, 0.3, 1.0], 0.2), Meeting("obstacle", 1, 0)),
-    "cylinder": (cylinder([0.5, 0.3, 1.0], [1.0, 0.0, 2.0], 0.1), Meeting("obstacle", 2, 0)),
-    "box": (box([0.5, 0.3, 1.0], [0.4, 0.6, 0.2]), Meeting("obstacle", 0, 0)),
-    "platform and box": (box([0.5, 0.6, 2.0], [0.4, 0.6, 0.2]), Meeting("platform-obstacle", -1, 0)),
-    "cable and platform": (None, Meeting("platform", 3, -1)),
-    "cables": (None, Meeting("cables", 0, 4)),
-    "cables on the other side": (None, Meeting("cables", 0, 3)),
+    "sphere": (sphere([0.5, 0.3, 1.0], 0.2), ContactPair("obstacle", 1, 0)),
+    "cylinder": (cylinder([0.5, 0.3, 1.0], [1.0, 0.0, 2.0], 0.1), ContactPair("obstacle", 2, 0)),
+    "box": (box([0.5, 0.3, 1.0], [0.4, 0.6, 0.2]), ContactPair("obstacle", 0, 0)),
+    "platform and box": (box([0.5, 0.6, 2.0], [0.4, 0.6, 0.2]), ContactPair("platform-obstacle", -1, 0)),
+    "cable and platform": (None, ContactPair("platform", 3, -1)),
+    "cables": (None, ContactPair("cables", 0, 4)),
+    "cables on the other side": (None, ContactPair("cables", 0, 3)),
 }
 
 
@@ -90,7 +90,7 @@ def test_distances_of_cables_keep_the_sign_of_the_poses():
     rng = np.random.default_rng(5)
     with double_precision():
         question, tasks, _ = moved("cogiro", rng, {})
-        pairs = [meeting for meeting in question.scene.meetings if meeting.kind == "cables"]
+        pairs = [meeting for meeting in question.scene.contact_pairs if meeting.kind == "cables"]
         robot, places, seen = question.problem.robot, tasks.places, 0
         flat = rng.uniform([-3.0, -2.0, 1.0, -0.3, -0.3, -0.3], [3.0, 2.0, 4.0, 0.3, 0.3, 0.3], (400, 6))
         positions, vectors = flat[:, :3], flat[:, 3:]
@@ -106,7 +106,7 @@ def test_distances_of_cables_keep_the_sign_of_the_poses():
             assert (np.abs(values) < expected + 1e-9).all()
             seen += is_near.sum()
             linear, _ = contacts._linear(
-                tasks, places, contacts._gap(question, question.scene, Meeting("cables", k, other))
+                tasks, places, contacts._gap(question, question.scene, ContactPair("cables", k, other))
             )
             assert not (linear < 0.0).any()
         assert seen > 100
@@ -127,7 +127,7 @@ def test_spools_over_a_face_keep_their_side():
         )
         question = FreeQuestion.of(problem, around, poses, FreeSettings())
         tasks = question.tasks(4, 3)
-        gaps = [contacts._gap(question, around, Meeting("platform", k, -1)) for k in range(6)]
+        gaps = [contacts._gap(question, around, ContactPair("platform", k, -1)) for k in range(6)]
         half_turn = np.broadcast_to([0.0, 0.0, 1.7, 3.0, 0.0, 0.0], (1, 1, 4, 3, 6))
         for gap in gaps:
             always = gap._replace(of_poses=lambda p, q, whole=gap.of_poses: (whole(p, q)[0], np.ones(len(p), bool)))
@@ -267,17 +267,17 @@ def test_nothing_is_bounded_where_bodies_are_apart():
     with double_precision():
         question, tasks, unknowns = moved("cogiro", rng, {"obstacles": [sphere([0.0, 0.0, 30.0], 0.1)]})
         slacks = slacks_of(question, motions_of(tasks, unknowns, question.poses.z0))
-        assert contacts._clearances(question, slacks).shape[1] == len(question.scene.meetings)
+        assert contacts._clearances(question, slacks).shape[1] == len(question.scene.contact_pairs)
         assert contacts.apart(question, tasks, unknowns, slacks._replace(low=np.maximum(slacks.low, 0.0)), 1) is None
         met = slacks.low.copy()
         met[3, -1] = -0.01
         within, begun = contacts.apart(question, tasks, unknowns, slacks._replace(low=np.where(met < 0.0, met, 0.0)), 1)
-        far, still = contacts._parted(question, tasks, unknowns, {len(question.scene.meetings) - 1: 1e-3}, np.inf)
+        far, still = contacts._parted(question, tasks, unknowns, {len(question.scene.contact_pairs) - 1: 1e-3}, np.inf)
         _, residual = far.equations(still)
     # The motion has the values of its planes: here 24 m or more, over the size of the robot.
     assert (still.values[..., -1] > 2.0).all()
     np.testing.assert_allclose(residual[..., -1], 0.0, atol=1e-12)
     numbers = [number for number, _ in within.planes.least]
-    assert len(question.scene.meetings) - 1 in numbers
+    assert len(question.scene.contact_pairs) - 1 in numbers
     assert begun.values.shape == within.low.shape
     assert within.n_limited == tasks.low.shape[-1]

@@ -14,8 +14,8 @@ from cspr_jax.motion.problem import Problem
 from cspr_jax.robots.model.limits import Limits
 from cspr_jax.robots.statics.kernel_axes import centred
 from cspr_jax.verification.bounds.block_slacks import block_slacks
-from cspr_jax.verification.robustness.motion_tolerances import instant_states, motion_tolerances
-from cspr_jax.verification.robustness.uncertain_slacks import Share, lower_slacks
+from cspr_jax.verification.robustness.motion_tolerances import motion_tolerances, states_as_bounds
+from cspr_jax.verification.robustness.uncertain_slacks import Radii, lower_slacks
 
 # Robots, where they move and how far, m, their tilt, limits.
 CASES = {
@@ -170,8 +170,8 @@ def test_slacks_of_light_and_heavy_robots():
     """At instants, of robots whose mass alone is another one: bounds are the slacks themselves."""
     problem, spline = case("prototype", 0, tension_min=0.05)
     robot, limits, nothing = problem.robot, problem.limits, np.zeros(9)
-    instants = instant_states(spline, np.linspace(0.0, 1.0, 9))
-    found = lower_slacks(robot, limits, (instants, Share(nothing, nothing, nothing + 1.3)))
+    instants = states_as_bounds(spline, np.linspace(0.0, 1.0, 9))
+    found = lower_slacks(robot, limits, (instants, Radii(nothing, nothing, nothing + 1.3)))
     state, base = states_of(spline, 9), robot.base_points
     matrices = [balances(robot, state, base, ratio=ratio) for ratio in (1.0 / 1.3, 1.3)]
     tensions = np.array([np.linalg.solve(matrix, wrench[..., None])[..., 0] for matrix, wrench in matrices])

@@ -188,7 +188,7 @@ def test_verdicts_are_those_of_the_multiples():
     limits = Limits(uncertainty=BALLS)
     _, segments, arcs = feasible_motions("mssm", FROM_REST, 20, limits)
     robustness = Robustness(problem_of(ROBOTS["mssm"], limits), FROM_REST, batch=64, count_instants=lambda _: None)
-    whole, short = robustness.tolerated(segments, arcs), robustness.tolerated(segments, arcs, whole=False)
+    whole, short = robustness.tolerated(segments, arcs), robustness.tolerated(segments, arcs, full=False)
     assert ((short.proved >= 1.0) | (whole.proved < 1.001)).all()
     assert ((short.refuted > 1.0) | (short.proved == 0.0)).all()
     assert not ((short.refuted <= 1.0) & (whole.proved >= 1.0)).any()

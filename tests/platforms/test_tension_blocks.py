@@ -314,7 +314,7 @@ def rounding_used(count, seed, kind, robot):
     found = bounds_of(certifier_of(problem, kind), problem, segments, arcs, blocks)
     items = segments, arcs.astype(float), determinant_at_rest(problem, segments), *blocks[1:]
     values = np.asarray(_values(problem, items, kind=kind))
-    tau, used = blocks.instants(x[:, None]), []
+    tau, used = blocks.times(x[:, None]), []
     for i, (segment, p, beta) in enumerate(zip(theirs, arcs, betas, strict=True)):
         kappa, fraction = precise(robot, segment, int(p), beta, tau[:, i])
         allowed = found.rounding[i] / chebyshev.LEBESGUE
@@ -369,7 +369,7 @@ def test_slacks_at_nodes_are_no_lower_than_they_are(limits, least):
     middle, half = np.concatenate(flat), 1e-4 / arcs[row]
     problem, blocks = problem_of(robot, limits and limits_of(**limits)), Blocks(row, middle - half, middle + half)
     found = bounds_of(certifier_of(problem, USUAL), problem, segments, arcs, blocks, least=least)
-    tau, doubtful = blocks.instants(chebyshev.nodes()[:, None]), 0
+    tau, doubtful = blocks.times(chebyshev.nodes()[:, None]), 0
     for i, k in enumerate(row):
         true = sampled(robot, theirs[k], int(arcs[k]), betas[k], tau[:, i], limits)
         if (true[1] > 0.0).all():
@@ -407,7 +407,7 @@ def remainders_used(count, seed, kind, robot):
     far, used = np.linspace(-1.0, 1.0, 101), 0.0
     for i, (segment, p, beta) in enumerate(zip(theirs, arcs, betas, strict=True)):
         at_nodes, between = (
-            np.column_stack(precise(robot, segment, int(p), beta, blocks.instants(places[:, None])[:, i])).astype(float)
+            np.column_stack(precise(robot, segment, int(p), beta, blocks.times(places[:, None])[:, i])).astype(float)
             for places in (x, far)
         )
         fit = np.polynomial.chebyshev.chebfit(x, at_nodes, chebyshev.DEGREE)

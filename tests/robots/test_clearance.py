@@ -245,8 +245,10 @@ def test_scenes():
     found = clearance.clearances(known, place, turns)
     wanted = expected(robot, body, place, turns, diameters, 0.05)
     # Two boxes are the last.
-    assert [x.kind for x in known.meetings[-3:]] == ["platform-obstacle"] * 3 and len(known.meetings) == len(wanted) + 1
-    names = np.array([x.kind for x in known.meetings[:-1]])
+    assert [x.kind for x in known.contact_pairs[-3:]] == ["platform-obstacle"] * 3 and len(known.contact_pairs) == len(
+        wanted
+    ) + 1
+    names = np.array([x.kind for x in known.contact_pairs[:-1]])
     for values, kinds in ((found.cables, ["cables"]), (found.platform, ["platform"])):
         least = wanted[np.isin(names, kinds)].min(0)
         clear = least > -0.004  # the oracle knows no depth
@@ -258,7 +260,7 @@ def test_scenes():
     np.testing.assert_allclose(found.clearance[clear], wanted.min(0)[clear], rtol=0, atol=EXACT)
     index = np.flatnonzero(clear)
     np.testing.assert_allclose(wanted[found.nearest[index], index], found.clearance[index], rtol=0, atol=EXACT)
-    assert {known.meetings[i].kind for i in np.unique(found.nearest)} >= {"obstacle", "platform"}
+    assert {known.contact_pairs[i].kind for i in np.unique(found.nearest)} >= {"obstacle", "platform"}
     assert not found.is_open.any()
 
 
@@ -458,12 +460,12 @@ def test_platform_shapes_that_are_refused(keys, words):
 
 
 FAULTS = [
-    ("segments", "s * uv - dot(apart, v)", "s * uv + dot(apart, v)"),
-    ("segments", "dot(cross(apart, v), normal)", "dot(cross(v, apart), normal)"),
-    ("segments", "dot(apart, u) + t * uv", "dot(apart, u) - t * uv"),
-    ("_outside_box", "start - rise *", "start + rise *"),
+    ("segments", "s * uv - dot(offset, v)", "s * uv + dot(offset, v)"),
+    ("segments", "dot(cross(offset, v), normal)", "dot(cross(v, offset), normal)"),
+    ("segments", "dot(offset, u) + t * uv", "dot(offset, u) - t * uv"),
+    ("_outside_box", "start - at_start *", "start + at_start *"),
     ("_parting", "c[i] * w[j] - c[j] * w[i]", "c[i] * w[j] + c[j] * w[i]"),
-    ("_parting", "half[i] * size[j] + half[j] * size[i]", "half[i] * size[j] - half[j] * size[i]"),
+    ("_parting", "half[i] * extent[j] + half[j] * extent[i]", "half[i] * extent[j] - half[j] * extent[i]"),
 ]
 
 

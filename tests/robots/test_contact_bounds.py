@@ -18,7 +18,7 @@ from cspr_jax.robots.bounds.contact_bounds import contact_bounds, corner_depths,
 from cspr_jax.robots.bounds.state_bounds import StateBounds, cable_bounds
 from cspr_jax.robots.contacts import clearance, convex_gaps
 from cspr_jax.robots.contacts.clearance import clearances, scene
-from cspr_jax.robots.contacts.contact_bodies import bodies_of, meetings
+from cspr_jax.robots.contacts.contact_bodies import bodies_of, contact_pairs
 from cspr_jax.robots.model import shapes
 from cspr_jax.robots.statics.kernel_axes import prepared
 
@@ -155,7 +155,7 @@ def test_clearances_of_motions(name, monkeypatch):
     monkeypatch.setattr(clearance, "BATCH", 1024)
     middle, size, body = CASES[name]
     robot, around = surrounded(name, body, 0.01)
-    rows = meetings(robot, around)
+    rows = contact_pairs(robot, around)
     is_brick = np.array([row.kind == "platform-obstacle" and row.other in (0, 3) for row in rows])
     closeness, decided = {40: [], 160: []}, 0
     for count, seed in itertools.product(closeness, range(2)):
@@ -196,7 +196,7 @@ def test_cables_that_pass_through_each_other(offset, does):
     around = scene(robot)
     bodies, state = bodies_of(robot, around), lifted(0.01)
     (low, high), through = jax.tree.map(np.asarray, PASSINGS(robot, bodies, state))
-    place = meetings(robot, around).index(("cables", 0, 1))
+    place = contact_pairs(robot, around).index(("cables", 0, 1))
     assert bool(through[place]) == does and through.sum() == int(does)
     assert (float(low[place]) > 0.0) != does and float(high[place]) > 0.0
 

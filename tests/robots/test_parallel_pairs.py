@@ -88,7 +88,7 @@ def test_tensions_of_six_are_shares_of_those_of_three(seed):
     for k, (pair, place) in enumerate(zip(robot["pairs"], robot["places"], strict=True)):
         row = int(np.flatnonzero((pairs.cables == pair[0]).any(1))[0])
         np.testing.assert_allclose(pairs.exit_points[row], robot["exits"][k], atol=1e-12)
-        np.testing.assert_allclose(pairs.shares[row][pairs.cables[row] == pair[0]], 1.0 - place, atol=1e-12)
+        np.testing.assert_allclose(pairs.fractions[row][pairs.cables[row] == pair[0]], 1.0 - place, atol=1e-12)
     checked(robot, seed)
 
 
@@ -284,7 +284,7 @@ def test_limits_of_six_cables_bound_the_pairs():
     limits = cspr_jax.Limits(tension_min=low, tension_max=high, cable_length_max=long, floor=np.asarray(4.0))
     found = cspr_jax.three_cable_equivalent(made(robot, limits=limits)).limits
     for k, pair in enumerate(pairs.cables):
-        fraction = pairs.shares[k]
+        fraction = pairs.fractions[k]
         assert found.tension_min[k] == max(low[pair] / fraction) and found.tension_max[k] == min(high[pair] / fraction)
         assert found.cable_length_max[k] == min(long[pair])
     assert float(found.floor) == 4.0 and found.cable_speed_max is None
@@ -296,7 +296,7 @@ def test_limits_of_six_cables_bound_the_pairs():
     of_file = build_limits(robot_file, LimitTable(cable_length_max=long.tolist(), floor=4.0), "plan")
     np.testing.assert_allclose(of_file.tension_max, found.tension_max, rtol=1e-12)
     np.testing.assert_allclose(of_file.cable_length_max, found.cable_length_max, rtol=1e-12)
-    np.testing.assert_allclose(of_file.tension_min, 0.2 / pairs.shares.min(1), rtol=1e-12)
+    np.testing.assert_allclose(of_file.tension_min, 0.2 / pairs.fractions.min(1), rtol=1e-12)
     np.testing.assert_allclose(of_file.floor, 4.0 - robot["exits"].mean(0)[2], rtol=1e-12)
     with pytest.raises(ConfigError, match=r"tension_max = \[1.0, 2.0, 3.0\]: must be .* or 6: one a cable"):
         build_limits(robot_file, LimitTable(tension_max=[1.0, 2.0, 3.0]), "plan")

@@ -35,7 +35,7 @@ from cspr_jax.families.platforms.six_cable_proof.screen import CHUNK, smallest_t
 from cspr_jax.motion.amplitudes import named
 from cspr_jax.motion.platform_kind import USUAL, PlatformMotionKind
 from cspr_jax.numerics.linear import rotations
-from cspr_jax.robots.model.platform import pairs_apart, platform_robot
+from cspr_jax.robots.model.platform import platform_robot, separate_pairs
 from cspr_jax.robots.model.state import State
 from cspr_jax.robots.statics.reference_pose import reference_pose
 
@@ -245,7 +245,7 @@ def test_the_catalogue_hangs_still(name):
         np.testing.assert_allclose(found.tensions, 1.0, atol=2e-3)
         np.testing.assert_allclose(found.rotation, np.eye(3), atol=2e-3)
         assert np.sign(found.determinant) == (1.0 if name == "nist-robocrane" else -1.0)
-    assert len(pairs_apart(robot)) == (9 if name in ("laval-mssm", "nist-robocrane") else 12)
+    assert len(separate_pairs(robot)) == (9 if name in ("laval-mssm", "nist-robocrane") else 12)
     assert "placeholder" in robot_file.source
 
 

@@ -159,7 +159,7 @@ def test_what_is_singular():
     """One rule: what is beyond a singularity, or no number, is not regular either; the reference pose is."""
     found = wrench_balance.is_regular(np.array([1.0, 2e-6, 1e-7, -1e-7, -1.0, np.nan]))
     assert found.tolist() == [True, True, False, False, False, False]
-    fraction = jax.jit(wrench_balance.determinant_share)(ROBOTS["six"], np.array([0.0, 0.0, 1.2]), np.eye(3))
+    fraction = jax.jit(wrench_balance.determinant_ratio)(ROBOTS["six"], np.array([0.0, 0.0, 1.2]), np.eye(3))
     assert float(fraction) == pytest.approx(1.0)
 
 

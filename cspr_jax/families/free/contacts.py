@@ -19,8 +19,8 @@ from cspr_jax.families.free.search.instants import coordinates
 from cspr_jax.families.free.search.interior_point import BARRIERS, Ending, OutOfTime, again, optima, started
 from cspr_jax.families.free.search.starts import BENT, bulge, ways
 from cspr_jax.families.free.search.tasks import OUTER, ClearancePlanes, Tasks, Unknowns
-from cspr_jax.robots.contacts.clearance import Meeting, Scene, clearances
-from cspr_jax.robots.contacts.contact_bodies import bodies_of, default_scene, meetings
+from cspr_jax.robots.contacts.clearance import ContactPair, Scene, clearances
+from cspr_jax.robots.contacts.contact_bodies import bodies_of, contact_pairs, default_scene
 from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.point_mass import spool_radius
 from cspr_jax.verification.criteria import has_extent
@@ -112,11 +112,11 @@ def _clearances(question: FreeQuestion, slacks: PieceSlacks) -> np.ndarray:
     return slacks.low[:, last - len(pairs) : last]
 
 
-def _bodies(question: FreeQuestion) -> tuple[Scene, tuple[Meeting, ...]]:
+def _bodies(question: FreeQuestion) -> tuple[Scene, tuple[ContactPair, ...]]:
     # The robot among what it can meet, and which of these can meet.
     robot = question.problem.robot
     scene = question.scene or default_scene(robot)
-    return scene, meetings(robot, scene)
+    return scene, contact_pairs(robot, scene)
 
 
 def _bent(tasks: Tasks, unknowns: Unknowns, segments: np.ndarray) -> Iterator[Unknowns]:
@@ -169,7 +169,7 @@ def _linear(tasks: Tasks, places: np.ndarray, gap: _Gap) -> tuple[np.ndarray, np
     return np.where(is_near, side * middle - gap.need, np.nan), side[..., None] * np.stack(slopes, axis=-1)
 
 
-def _gap(question: FreeQuestion, scene: Scene, meeting: Meeting) -> _Gap:
+def _gap(question: FreeQuestion, scene: Scene, meeting: ContactPair) -> _Gap:
     kind, k, other = meeting
     if kind == "cables":
         return _Gap(_between_lines(scene, k, other), True, 0.5 * float(scene.diameters[[k, other]].sum()))

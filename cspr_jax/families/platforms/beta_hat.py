@@ -13,7 +13,7 @@ from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.linear import rotations
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import plane_normal
-from cspr_jax.robots.statics.wrench_balance import determinant_share, is_regular
+from cspr_jax.robots.statics.wrench_balance import determinant_ratio, is_regular
 
 if TYPE_CHECKING:
     from jaxtyping import Bool, Float
@@ -54,7 +54,7 @@ def _ends(robot: PlatformRobot, poses) -> tuple[jax.Array, ...]:
     # and the depth.
     def one(position, quaternion, z0):
         end, depth = endpoint(robot, position, quaternion, z0), plane_normal(robot) @ position
-        fraction = determinant_share(robot, position, rotations.matrix(quaternion))
+        fraction = determinant_ratio(robot, position, rotations.matrix(quaternion))
         return end.preferred, end.lowest, end.highest, fraction, depth
 
     return jax.vmap(one)(*poses)

@@ -32,7 +32,7 @@ from cspr_jax.robots.contacts.interference import contacts, gaps
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import plane_normal
 from cspr_jax.robots.statics.reference_pose import reference_pose
-from cspr_jax.robots.statics.wrench_balance import determinant_share, is_regular
+from cspr_jax.robots.statics.wrench_balance import determinant_ratio, is_regular
 from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.schema.families import WITHOUT_BETA_HAT
 from cspr_jax.verification.fewest_limits import Refused
@@ -251,7 +251,7 @@ def _standing(robot: PlatformRobot, position: Array, quaternion: Array, pairs: A
     where = (position, rotations.matrix(quaternion))
     depth = plane_normal(robot) @ position
     apart = jnp.linalg.norm(gaps(robot, pairs, *where), axis=1)
-    return depth, determinant_share(robot, *where), apart
+    return depth, determinant_ratio(robot, *where), apart
 
 
 def _check_pose(

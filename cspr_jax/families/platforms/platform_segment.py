@@ -237,7 +237,7 @@ def _bounds(segment: PlatformSegment, arcs: Array, blocks: TimeBounds, *, kind: 
 
 
 @persistent_jit(static_argnames="kind")
-def several_bounds(cases: tuple[PlatformSegment, Array, TimeBounds], *, kind: PlatformMotionKind) -> StateBounds:
+def batch_bounds(cases: tuple[PlatformSegment, Array, TimeBounds], *, kind: PlatformMotionKind) -> StateBounds:
     """Bounds of the states of several motions, over one block of each."""
     return jax.vmap(partial(_block_bounds, kind))(*cases)
 

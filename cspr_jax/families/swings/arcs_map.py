@@ -8,7 +8,7 @@ from cspr_jax.config.robot import RobotFile
 from cspr_jax.config.sweep import SweepFile
 from cspr_jax.errors import ConfigError
 from cspr_jax.families.swings.arcs import arcs_and_segments, minimum_arcs
-from cspr_jax.families.swings.hypocycloid import Hypocycloid, several_bounds
+from cspr_jax.families.swings.hypocycloid import Hypocycloid, batch_bounds
 from cspr_jax.maps.grid_map import PointMassMap
 from cspr_jax.motion.answers import Answers
 from cspr_jax.numerics.elementary import as_float64
@@ -39,12 +39,12 @@ class MinimumArcsMap(PointMassMap):
         from cspr_jax.maps.clear_motions import (
             clear_motions,
         )  # with the proofs of any motion, as in `families.swings.arcs`
-        from cspr_jax.verification.bounds.batch import SeveralMotions
+        from cspr_jax.verification.bounds.batch import MotionBatch
 
-        def join(rows: np.ndarray, arcs: np.ndarray) -> tuple[Answers, SeveralMotions]:
+        def join(rows: np.ndarray, arcs: np.ndarray) -> tuple[Answers, MotionBatch]:
             answers, segments = arcs_and_segments(self._problem, *(x[rows] for x in points), arcs=arcs, **settings)
             motions = Hypocycloid(segments, self._problem.amplitude, as_float64(answers.tried_arcs))
-            return answers, SeveralMotions(motions, answers.duration, several_bounds)
+            return answers, MotionBatch(motions, answers.duration, batch_bounds)
 
         return clear_motions(self._problem, self._scene, join, len(cells["z0"]), max_arcs=max_arcs)
 

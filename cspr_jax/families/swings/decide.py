@@ -163,7 +163,7 @@ def _search(problem: Problem, parities: dict[int, Segment], upper: np.ndarray, k
         if problem.limits.uncertainty is not None:
             indices = np.flatnonzero(is_feasible)
             multiples = tolerated_by_point_masses(
-                problem, pick(parities, rows[indices], arcs[indices]), arcs[indices], whole=False
+                problem, pick(parities, rows[indices], arcs[indices]), arcs[indices], full=False
             )
             is_feasible[indices], is_refuted[indices] = multiples.proved >= 1.0, multiples.refuted <= 1.0
         smallest[rows[is_feasible]] = arcs[is_feasible]

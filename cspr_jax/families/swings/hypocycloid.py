@@ -251,7 +251,7 @@ def _bounds(segment: Segment, arcs: Array, blocks: TimeBounds) -> StateBounds:
 
 
 @jax.jit
-def several_bounds(cases: tuple[Segment, Array, TimeBounds]) -> StateBounds:
+def batch_bounds(cases: tuple[Segment, Array, TimeBounds]) -> StateBounds:
     """Bounds of the states of several motions, over one block of each."""
     return jax.vmap(_block_bounds)(*cases)
 

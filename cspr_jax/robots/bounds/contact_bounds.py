@@ -1,16 +1,16 @@
 """Bounds of clearances over a block of time: cables from each other, from obstacles and from their platform.
 
-Meetings are those of `robots.contacts.clearance.Scene`. Where no shape of a rigid platform is known and its points lie
+Contacts are those of `robots.contacts.clearance.Scene`. Where no shape of a rigid platform is known and its points lie
 in a plane, the criterion of the thesis (section 3.10.2) takes its place: cables may not pass over the platform's face,
-from whose corner they must be apart. Its clearance is the distance of the spool, as the platform sees it, from the
-sector of the corner, which it may reach at an instant only.
+from whose corner they must be separated. Its clearance is the distance of the spool, as the platform sees it, from the
+sector of the corner, which it may touch at isolated times only.
 
 Clearances are signed: where solid bodies meet they are minus the least translation that parts them, and at least
-minus `Bodies.deepest`. Cables without thickness, and cables and sectors, meet at isolated instants only, at which the
+minus `Bodies.deepest`. Cables without thickness, and cables and sectors, meet at isolated times only, at which the
 clearance is 0. That they pass through each other is proved where the volume that they span (the height of the cable
 over the face) has opposite signs at both ends of a block, while their lines are nearest to each other inside of both
 cables (the cable is over the sector) all the time: `passings`. Cables of a planar platform lie in one plane, so that
-they may cross for a while; they count as `Bodies.deepest` deep then.
+they may cross for some time; they count as `Bodies.deepest` deep then.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ from cspr_jax.robots.model.patterns import PATTERNS
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Rounding of the corners of shapes, over the size of a scene; cosines up to which directions point away from a sector.
-CORNER_ERROR, POLAR = 1e-14, 1e-12
+CORNER_ERROR = 1e-14  # rounding of the corners of shapes, over the extent of a scene
+POLAR = 1e-12  # cosines up to which directions point away from a sector
 
 Range = tuple[Array, Array]
 
@@ -62,15 +62,15 @@ def contact_bounds(robot: AnyRobot, bodies: Bodies, state: StateBounds, cables: 
             parts.append(_platform_from_obstacles(bodies, bodies.body, state))
     if bodies.sectors is not None:
         sides, normal = bodies.sectors
-        parts.append(jax.vmap(lambda side, way: _from_sector(side, normal, way))(sides, _seen(state, ends)))
+        parts.append(jax.vmap(lambda side, cable: _from_sector(side, normal, cable))(sides, _seen(state, ends)))
     if not parts:
         return jnp.zeros(0), jnp.zeros(0)
     low, high = (jnp.concatenate([side.ravel() for side in sides]) for sides in zip(*parts, strict=True))
-    allowance = CORNER_ERROR * bodies.size
+    allowance = CORNER_ERROR * bodies.extent
     return low - allowance, high + allowance
 
 
-def passings(robot: AnyRobot, bodies: Bodies, state: StateBounds, cables: CableBounds) -> Float[Array, "n_meetings"]:
+def passings(robot: AnyRobot, bodies: Bodies, state: StateBounds, cables: CableBounds) -> Float[Array, "n_contacts"]:
     """Cables that are proved to pass through each other, or over the platform, within one block."""
     ends, first = _ends(state, cables), bodies.pairs[:, 0]
     through = jax.vmap(_pass)(*(ends.each(lambda x, k=k: x[bodies.pairs[:, k]]) for k in range(2)))
@@ -80,7 +80,7 @@ def passings(robot: AnyRobot, bodies: Bodies, state: StateBounds, cables: CableB
     parts = [through, jnp.zeros(n_others, bool)] if len(first) else [jnp.zeros(n_others, bool)]
     if bodies.sectors is not None:
         sides, normal = bodies.sectors
-        parts.append(jax.vmap(lambda side, way: _passes_over(side, normal, way))(sides, _seen(state, ends)))
+        parts.append(jax.vmap(lambda side, cable: _passes_over(side, normal, cable))(sides, _seen(state, ends)))
     return jnp.concatenate(parts)
 
 
@@ -117,8 +117,8 @@ def _cross_in_plane(first: AffineBounds, second: AffineBounds) -> Array:
     # Tell whether segments (2, 3) in the plane y = 0 cross throughout: the ends of each are on two sides of the other.
     def parted(line: AffineBounds, points: AffineBounds) -> Array:
         start = line.each(lambda x: x[:1])
-        ray, apart = line.each(lambda x: x[1:]) - start, points - start
-        side = cross(ray, apart).each(lambda x: x[:, 1])
+        ray, rays = line.each(lambda x: x[1:]) - start, points - start
+        side = cross(ray, rays).each(lambda x: x[:, 1])
         low, high = side.low(), side.high()
         return ((low[0] > 0.0) & (high[1] < 0.0)) | ((high[0] < 0.0) & (low[1] > 0.0))
 
@@ -170,7 +170,7 @@ def _inward(state: StateBounds, points: AffineBounds) -> AffineBounds:
 
 def _platform_from_obstacles(bodies: Bodies, body: Shape, state: StateBounds) -> Range:
     shape, parts = Solid(constant(body.corners), body.edges, body.faces), []
-    place = rotated(state.rotation.each(lambda x: x[None]), body.corners) + state.position.each(lambda x: x[None])
+    corners = rotated(state.rotation.each(lambda x: x[None]), body.corners) + state.position.each(lambda x: x[None])
 
     def from_rod(rod: Array) -> Range:
         axis = Solid(_inward(state, constant(rod)), *SEGMENT)
@@ -178,7 +178,7 @@ def _platform_from_obstacles(bodies: Bodies, body: Shape, state: StateBounds) ->
 
     def from_box(box: Shape) -> Range:
         brick = Solid(_inward(state, constant(box.corners)), *BOX)
-        depth = depth_bound(Solid(place, body.edges, body.faces), box.planes)
+        depth = depth_bound(Solid(corners, body.edges, body.faces), box.planes)
         return _signed(bodies, brick, shape, jnp.minimum(depth, depth_bound(brick, body.planes)))
 
     if len(bodies.rods):
@@ -190,7 +190,7 @@ def _platform_from_obstacles(bodies: Bodies, body: Shape, state: StateBounds) ->
     return low, high
 
 
-def _from_sector(sides: Array, normal: Array, way: AffineBounds) -> Range:
+def _from_sector(sides: Array, normal: Array, cable: AffineBounds) -> Range:
     # Bound the distance of the end of a cable (3,), seen from its corner, from the sector of the corner. A direction
     # that points away from the sector has no positive component along its sides, and along the direction between them.
     def off(seen: Array) -> Array:
@@ -202,14 +202,14 @@ def _from_sector(sides: Array, normal: Array, way: AffineBounds) -> Range:
 
     one, two = unit(sides)
     rays = jnp.stack([one, unit(jnp.cross(normal, two) + jnp.cross(one, normal)), two])
-    line = turning(lambda seen: unit(off(seen)), way)
-    reach = jnp.maximum(rays @ (line.middle - line.linear), rays @ (line.middle + line.linear))
-    line = line._replace(linear=jnp.where((reach <= POLAR).all(), line.linear, 0.0))
-    low = along(line, way.each(lambda x: x[None]))
-    size = jnp.sqrt(norm_squared(way).high())
+    line = turning(lambda seen: unit(off(seen)), cable)
+    heights = jnp.maximum(rays @ (line.middle - line.linear), rays @ (line.middle + line.linear))
+    line = line._replace(linear=jnp.where((heights <= POLAR).all(), line.linear, 0.0))
+    low = along(line, cable.each(lambda x: x[None]))
+    length = jnp.sqrt(norm_squared(cable).high())
     is_polar = (rays @ line.middle <= POLAR).all()
-    low = jnp.where(is_polar, jnp.maximum(low - 4.0 * POLAR * size, 0.0), 0.0)
-    return low, distance_bound(constant(way.middle - off(way.middle)), way)
+    low = jnp.where(is_polar, jnp.maximum(low - 4.0 * POLAR * length, 0.0), 0.0)
+    return low, distance_bound(constant(cable.middle - off(cable.middle)), cable)
 
 
 def _pass(first: AffineBounds, second: AffineBounds) -> Array:
@@ -219,13 +219,13 @@ def _pass(first: AffineBounds, second: AffineBounds) -> Array:
     square = norm_squared(normal)
     is_inside = square.low() > 0.0
     for ray in (v, u):
-        # Share of a cable at which the lines are nearest, times the square of the normal.
+        # Fraction of a cable at which the lines are nearest, times the square of the normal.
         fraction = dot(cross(between, ray), normal)
         is_inside &= (fraction.low() > 0.0) & ((square - fraction).low() > 0.0)
     return is_inside & changes_sign(dot(between, normal))
 
 
-def _passes_over(sides: Array, normal: Array, way: AffineBounds) -> Array:
-    over = [dot(way, jnp.cross(normal, sides[1])), -dot(way, jnp.cross(normal, sides[0]))]
+def _passes_over(sides: Array, normal: Array, cable: AffineBounds) -> Array:
+    over = [dot(cable, jnp.cross(normal, sides[1])), -dot(cable, jnp.cross(normal, sides[0]))]
     is_inside = (over[0].low() > 0.0) & (over[1].low() > 0.0)
-    return changes_sign(dot(way, normal)) & (is_inside | (sides == 0.0).all())
+    return changes_sign(dot(cable, normal)) & (is_inside | (sides == 0.0).all())

@@ -79,36 +79,43 @@ def attachments(
     robot: AnyRobot, state: StateBounds
 ) -> tuple[AffineBounds | None, AffineBounds, AffineBounds, AffineBounds]:
     """Bounds of the attachment points."""
-    target, velocity, pull = (_rows(bounds) for bounds in state[:3])
+    target, velocity, acceleration = (_expanded(bounds) for bounds in state[:3])
     if not isinstance(robot, PlatformRobot):
-        return None, target, velocity, pull
+        return None, target, velocity, acceleration
     arm = rotated(state.rotation.each(lambda x: x[None]), robot.platform_points)
-    swing = cross(_rows(state.angular_velocity), arm)
-    pull = pull + cross(_rows(state.angular_acceleration), arm) + cross(_rows(state.angular_velocity), swing)
-    return arm, target + arm, velocity + swing, pull
+    swing = cross(_expanded(state.angular_velocity), arm)
+    acceleration = (
+        acceleration
+        + cross(_expanded(state.angular_acceleration), arm)
+        + cross(_expanded(state.angular_velocity), swing)
+    )
+    return arm, target + arm, velocity + swing, acceleration
 
 
 def cable_bounds(robot: AnyRobot, state: StateBounds) -> CableBounds:
     """Bounds of the cables, also behind pulleys."""
-    arm, target, velocity, pull = attachments(robot, state)
+    arm, target, velocity, point_acceleration = attachments(robot, state)
     ray = target + -robot.base_points
     square = norm_squared(ray)
     inverse = reciprocal_root(square)
     rate = dot(ray, velocity) * inverse
-    acceleration = (norm_squared(velocity) + dot(ray, pull) - squared(rate)) * inverse
+    acceleration = (norm_squared(velocity) + dot(ray, point_acceleration) - squared(rate)) * inverse
     direction, base = -(ray * inverse.each(lambda x: x[:, None])), constant(jnp.asarray(robot.base_points))
     straight = CableBounds(direction, arm, square * inverse, rate, acceleration, base)
     if robot.pulleys is None:
         return straight
-    way = pulley_bounds(robot.pulleys, ray, velocity)
-    rate = dot(way.direction, velocity)
-    slower = squared(rate) + way.swivel
-    acceleration = dot(way.direction, pull) + (norm_squared(velocity) - slower) * way.inverse
+    wrapped = pulley_bounds(robot.pulleys, ray, velocity)
+    rate = dot(wrapped.direction, velocity)
+    slower = squared(rate) + wrapped.swivel
+    acceleration = dot(wrapped.direction, point_acceleration) + (norm_squared(velocity) - slower) * wrapped.inverse
     wheel = jnp.asarray(robot.pulleys.radius) > 0.0
-    values = (way.length, rate, acceleration)
+    values = (wrapped.length, rate, acceleration)
     length, rate, acceleration = (selected(wheel, f, g) for f, g in zip(values, straight[2:5], strict=True))
     wheel = wheel[:, None]
-    direction, leaving = selected(wheel, -way.direction, direction), selected(wheel, way.exit + base.middle, base)
+    direction, leaving = (
+        selected(wheel, -wrapped.direction, direction),
+        selected(wheel, wrapped.exit + base.middle, base),
+    )
     return CableBounds(direction, arm, length, rate, acceleration, leaving)
 
 
@@ -129,12 +136,12 @@ def balance_bounds(robot: AnyRobot, state: StateBounds, cables: CableBounds) -> 
     return matrix, wrench.each(lambda x: x[:, 0])
 
 
-def _rows(bounds: AffineBounds) -> AffineBounds:
+def _expanded(bounds: AffineBounds) -> AffineBounds:
     return bounds.each(lambda x: x[None])
 
 
 def _spin_moment(robot: PlatformRobot, state: StateBounds) -> AffineBounds:
-    # Rate of the angular momentum, in platform axes, where the inertia is constant, and turned back.
+    # Rate of the angular momentum, in platform axes, where the inertia is constant, and rotated back.
     inertia = robot.inertia
     if PATTERNS[robot.pattern].is_jointed and robot.centre_of_mass is not None:
         arm = jnp.asarray(robot.centre_of_mass)

@@ -34,17 +34,18 @@ from cspr_jax.robots.model.platform import PlatformRobot
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Surplus of a solution, and least change of tensions, as parts of the largest of them.
+# Surplus of a solution, and smallest change of tensions, as parts of the largest of them.
 SURPLUS = 1e-9
 # Rounds in which functionals are corrected, and the relative surplus of each correction.
-ROUNDS, SPARE = 8, 0.01
+ROUNDS = 8
+SPARE = 0.01
 
 
 class UncertainTensions(NamedTuple):
     """Tensions of all robots within an uncertainty, over one block.
 
     Fields:
-        low: (n_cables,) bounds below tensions that balance each robot, N; -inf where nothing is known.
+        low: (n_cables,) bounds below tensions that balance each robot, N; -inf without bounds.
         high: (n_cables,) bounds above the same tensions, N; inf likewise.
     """
 
@@ -64,18 +65,18 @@ def uncertain_tensions(
     state: StateBounds,
     cables: CableBounds,
     limits: tuple[Float[Array, "n_cables"], Float[Array, "n_cables"]],
-    sizes: tuple[Float[Array, ""], Float[Array, ""]],
+    radii: tuple[Float[Array, ""], Float[Array, ""]],
 ) -> UncertainTensions:
-    """Tensions of all robots that differ from one by places of spools and of the mass centre."""
+    """Tensions of all robots that differ from one by positions of spools and of the mass centre."""
     unit = 1.0 / wrench_units(robot)
     matrix, wrench = balance_bounds(robot, state, cables)
     matrix, wrench = matrix * unit[:, None], wrench * unit
     witness = witness_tensions(matrix, wrench, *limits)
     tensions, inverse = witness.tension, witness.inverse
-    sine = sizes[0] / cables.length.low()
+    sine = radii[0] / cables.length.low()
     tilt = jnp.where((sine >= 0.0) & (sine < 1.0), sine, jnp.nan) / jnp.sqrt(1.0 - sine**2)
     block = _UnitBlock(inverse, matrix, _across(robot, state, cables, unit), tilt, tensions)
-    centre = _centre_change(robot, state, inverse * unit[None], sizes[1]) + SURPLUS * jnp.max(tensions.magnitude())
+    centre = _centre_change(robot, state, inverse * unit[None], radii[1]) + SURPLUS * jnp.max(tensions.magnitude())
     within, displaced = block.changes(inverse)
     maximum = _solution(within + displaced, displaced @ tensions.magnitude() + centre)
     down, up = maximum, maximum
@@ -85,9 +86,9 @@ def uncertain_tensions(
     low, high = tensions.low() - down, tensions.high() + up
     is_known = jnp.isfinite(low).all() & jnp.isfinite(high).all()
     # A tension at a tilted unit vector is that of its cable over the length of the vector, at least 1.
-    stretch = jnp.sqrt(1.0 + tilt**2)
-    low = jnp.where(low < 0.0, low * stretch, low)
-    return UncertainTensions(jnp.where(is_known, low, -jnp.inf), jnp.where(is_known, high * stretch, jnp.inf))
+    norms = jnp.sqrt(1.0 + tilt**2)
+    low = jnp.where(low < 0.0, low * norms, low)
+    return UncertainTensions(jnp.where(is_known, low, -jnp.inf), jnp.where(is_known, high * norms, jnp.inf))
 
 
 class _UnitBlock(NamedTuple):
@@ -106,16 +107,16 @@ class _UnitBlock(NamedTuple):
         rounding = jnp.where(jnp.sum(left, axis=1).max() < 0.5 * SURPLUS, SURPLUS, jnp.nan)
         radius = self.matrix.radius + rounding * jnp.sum(jnp.abs(self.matrix.middle), axis=0, keepdims=True)
         within = jnp.abs(rows @ self.matrix.linear) + jnp.abs(rows) @ radius
-        ways = rotated(self.across.each(lambda x: x.reshape(dof, -1).T[None]), rows)
-        return within, norm(ways.each(lambda x: x.reshape(len(rows), count, 3))).high() * self.tilt[None]
+        directions = rotated(self.across.each(lambda x: x.reshape(dof, -1).T[None]), rows)
+        return within, norm(directions.each(lambda x: x.reshape(len(rows), count, 3))).high() * self.tilt[None]
 
 
-def _closer(block: _UnitBlock, displaced: Array, rest: Array, least: Array, centre: Array) -> tuple[Array, Array]:
+def _closer(block: _UnitBlock, displaced: Array, rest: Array, minimum: Array, centre: Array) -> tuple[Array, Array]:
     # Bound how much each tension falls and rises, (n_cables,); NaN where one might fall below the smallest tension.
     diagonal = jnp.diagonal(displaced)
     less, up = _largest_sum(block, jnp.stack([displaced - jnp.diag(diagonal), displaced]), centre)
-    down, up = less + diagonal * least + rest, up + rest
-    is_valid = (block.tensions.low() - down > least).all() & (least >= 0.0).all()
+    down, up = less + diagonal * minimum + rest, up + rest
+    is_valid = (block.tensions.low() - down > minimum).all() & (minimum >= 0.0).all()
     return jnp.where(is_valid, down, jnp.nan), jnp.where(is_valid, up, jnp.nan)
 
 
@@ -138,7 +139,7 @@ def centre_wrench(robot: AnyRobot, state: StateBounds, centre: Float[Array, "3"]
     if not isinstance(robot, PlatformRobot):
         return constant(jnp.zeros(robot.dof))
     linear = rotated(_centre_influence(robot, state), centre)
-    force = rotated(_whirl(state), centre) * robot.mass
+    force = rotated(_acceleration_matrix(state), centre) * robot.mass
     return linear + _wrench_of(robot, state, None, cross(constant(centre), force))
 
 
@@ -151,10 +152,10 @@ def _across(robot: AnyRobot, state: StateBounds, cables: CableBounds, unit: Arra
         forces = balanced_part(robot, state.rotation, forces, cross(arms, constant(units)).each(jnp.transpose))
     else:
         forces = forces.each(lambda x: x[jnp.array(PATTERNS[robot.pattern].forces)])
-    ways = (forces * unit[:, None]).each(lambda x: x.reshape(robot.dof, robot.n_cables, 3))
+    changes = (forces * unit[:, None]).each(lambda x: x.reshape(robot.dof, robot.n_cables, 3))
     units_of_cables = cables.direction.each(lambda x: x[None])
-    along = dot(ways, units_of_cables)
-    return ways - units_of_cables * along.each(lambda x: x[..., None])
+    along = dot(changes, units_of_cables)
+    return changes - units_of_cables * along.each(lambda x: x[..., None])
 
 
 def _wrench_of(
@@ -166,7 +167,7 @@ def _wrench_of(
     return balanced_part(robot, state.rotation, *parts).each(lambda x: x[:, 0])
 
 
-def _whirl(state: StateBounds) -> AffineBounds:
+def _acceleration_matrix(state: StateBounds) -> AffineBounds:
     # Maps points of the platform to their relative accelerations, (3, 3).
     axes = constant(jnp.eye(3))
     rate, acceleration = (
@@ -176,8 +177,8 @@ def _whirl(state: StateBounds) -> AffineBounds:
 
 
 def _centre_influence(robot: PlatformRobot, state: StateBounds) -> AffineBounds:
-    # Share of a displaced mass centre in the wrench, to first order, (dof, 3) per length.
-    acceleration_matrix, axes = _whirl(state) * robot.mass, constant(jnp.eye(3))
+    # Effect of a displaced mass centre on the wrench, to first order, (dof, 3) per length.
+    acceleration_matrix, axes = _acceleration_matrix(state) * robot.mass, constant(jnp.eye(3))
     force = (state.acceleration + jnp.asarray([0.0, 0.0, -1.0]) * robot.gravity) * robot.mass
     moment: AffineBounds | None = None
     if PATTERNS[robot.pattern].is_jointed and robot.centre_of_mass is not None:
@@ -189,15 +190,15 @@ def _centre_influence(robot: PlatformRobot, state: StateBounds) -> AffineBounds:
     return balanced_part(robot, state.rotation, acceleration_matrix, moment.each(jnp.transpose))
 
 
-def _centre_change(robot: AnyRobot, state: StateBounds, inverse: Array, size: Array) -> Array:
+def _centre_change(robot: AnyRobot, state: StateBounds, inverse: Array, radius: Array) -> Array:
     # Bound what a displaced mass centre changes of tensions, (n_cables,) N.
     if not isinstance(robot, PlatformRobot):
         return jnp.zeros(robot.n_cables)
     influence = _centre_influence(robot, state).each(lambda x: x.T[None])
     moments = balanced_part(robot, state.rotation, constant(jnp.zeros((3, 3))), constant(jnp.eye(3)))
     turning = rotated(moments.each(lambda x: x.T[None]), inverse)
-    acceleration_matrix = jnp.linalg.norm(_whirl(state).magnitude()) * robot.mass
-    return size * (norm(rotated(influence, inverse)).high() + size * acceleration_matrix * norm(turning).high())
+    acceleration_matrix = jnp.linalg.norm(_acceleration_matrix(state).magnitude()) * robot.mass
+    return radius * (norm(rotated(influence, inverse)).high() + radius * acceleration_matrix * norm(turning).high())
 
 
 def _solution(matrix: Array, right: Array) -> Array:

@@ -1,9 +1,9 @@
 """Witness tensions: tensions that balance a motion throughout a block of time, and bounds of how central they can be.
 
-A line f + s f' of tensions, whose middle and slope are corrected by the balance and its derivative, leaves a residual
+A line f + s f' of tensions, whose coefficients are corrected by the balance and its derivative, leaves a residual
 r(s) of second order; a parabola, beside bounds of the balance around parabolas, leaves one of third order. For any B
 with A(s) B = 1 + E(s), the correction B (1 + E)^-1 r balances exactly, and where the rows of |E| sum to less than 1 it
-is bounded. Where the bounds keep the limits, there are tensions within them at every instant: a proof. On as many
+is bounded. Where the bounds keep the limits, there are tensions within them at all times: a proof. On as many
 cables as components these are the only ones, and A is nowhere singular.
 
 For more cables, the line joins the most central tensions at both ends of the block: between them tensions are at least
@@ -34,7 +34,7 @@ class WitnessTensions(NamedTuple):
     """Tensions of one block.
 
     Fields:
-        tension: (n_cables,) bounds of tensions that balance throughout, N; radii are NaN where nothing is known.
+        tension: (n_cables,) bounds of tensions that balance throughout, N; radii are NaN without bounds.
         below: (2,) at start and end of the block, a line below the largest distance of tensions from their limits, N;
             -inf where nothing is known.
         above: (2,) likewise a line above it; inf where nothing is known.
@@ -50,7 +50,7 @@ class WitnessTensions(NamedTuple):
 
     @property
     def margin_low(self) -> Array:
-        """Lower bound of the largest distance of tensions from their limits, at every instant, N."""
+        """Lower bound of the largest distance of tensions from their limits, at all times, N."""
         return self.below.min(-1)
 
     @property
@@ -76,7 +76,7 @@ def witness_tensions(
         faces = jax.vmap(nearest_face, (0, 0, None, None))(matrices, wrenches, low, high)
         before, after = faces.tensions
         nearer = jnp.argmin(jnp.min(jnp.minimum(faces.tensions - low[None], high[None] - faces.tensions), axis=1))
-        face = jax.tree.map(lambda leaf: leaf[nearer], faces)
+        face = jax.tree.map(lambda array: array[nearer], faces)
         back = inverse if matrix.square is None else _central_inverse(matrix.middle, face, inverse)
         tension, is_regular = _solution(matrix, back, wrench, 0.5 * (before + after), 0.5 * (after - before))
         above = _face_margin(matrix, inverse, wrench, (low, high), face)
@@ -95,11 +95,11 @@ def _central_inverse(matrix: Array, face: NearestFace, other: Array) -> Array:
     # Right inverse with which tensions stay the most central ones near one face: all cables that do not span it move
     # away from their limits by the same. Another one where the cables of the face depend on each other.
     dof, count = matrix.shape
-    ways = jnp.sign(face.along)
-    system = jnp.concatenate([matrix[:, face.columns], (matrix @ ways)[:, None]], axis=1)
+    signs = jnp.sign(face.along)
+    system = jnp.concatenate([matrix[:, face.columns], (matrix @ signs)[:, None]], axis=1)
     rows = solved(system, jnp.eye(dof))[0]
     is_spanning = (jnp.arange(count)[:, None] == face.columns[None]).astype(matrix.dtype)
-    central = is_spanning @ rows[:-1] + ways[:, None] * rows[-1][None]
+    central = is_spanning @ rows[:-1] + signs[:, None] * rows[-1][None]
     return jnp.where(jnp.isfinite(central).all(), central, other)
 
 
@@ -117,18 +117,18 @@ def _solution(
     # (n,); say whether M, with this right inverse in the middle, is proved to have rank m throughout.
     m, n = matrix.middle.shape
     middle = start + inverse @ (right.middle - matrix.middle @ start)
-    slope = rise + inverse @ (right.linear - matrix.linear @ middle - matrix.middle @ rise)
-    line = AffineBounds(middle, slope, jnp.zeros(n))
+    linear = rise + inverse @ (right.linear - matrix.linear @ middle - matrix.middle @ rise)
+    line = AffineBounds(middle, linear, jnp.zeros(n))
     # Sums of rows of |M B - 1|; that of the middle is rounding.
-    rows = jnp.abs(matrix.middle @ inverse - jnp.eye(m)) + jnp.abs(matrix.linear @ inverse)
+    sums = jnp.abs(matrix.middle @ inverse - jnp.eye(m)) + jnp.abs(matrix.linear @ inverse)
     if matrix.square is not None:
-        line = line._replace(square=inverse @ (squares(right) - matrix.square @ middle - matrix.linear @ slope))
-        rows += jnp.abs(matrix.square @ inverse)
+        line = line._replace(square=inverse @ (squares(right) - matrix.square @ middle - matrix.linear @ linear))
+        sums += jnp.abs(matrix.square @ inverse)
     residual = (right - rotated(matrix, line)).magnitude()
-    rows = jnp.sum(rows + matrix.radius @ jnp.abs(inverse), axis=1)
-    fraction = jnp.max(rows, initial=0.0)
-    radius = jnp.abs(inverse) @ (residual + rows * jnp.max(residual, initial=0.0) / (1.0 - fraction))
-    is_known = (fraction < 1.0) & jnp.isfinite(middle).all() & jnp.isfinite(slope).all() & jnp.isfinite(radius).all()
+    sums = jnp.sum(sums + matrix.radius @ jnp.abs(inverse), axis=1)
+    fraction = jnp.max(sums, initial=0.0)
+    radius = jnp.abs(inverse) @ (residual + sums * jnp.max(residual, initial=0.0) / (1.0 - fraction))
+    is_known = (fraction < 1.0) & jnp.isfinite(middle).all() & jnp.isfinite(linear).all() & jnp.isfinite(radius).all()
     return line._replace(radius=jnp.where(is_known, radius, jnp.nan)), is_known
 
 
@@ -154,7 +154,7 @@ def _face_margin(
     ends = jnp.stack([top - slack.linear, top + slack.linear])
     # The quotient is a convex function of the slack: it is below the line between its values at both ends.
     smallest = jnp.maximum(along.magnitude() - 2.0 * along.half_range(), 0.0)
-    size = jnp.where(ends < 0.0, jnp.sum(along.magnitude()), jnp.sum(smallest))
-    is_known = is_normal & is_bounded.all() & (size > 0.0).all() & jnp.isfinite(ends).all()
-    above, half = jnp.where(is_known, ends / jnp.where(is_known, size, 1.0), jnp.inf), 0.5 * jnp.min(high - low)
+    norm = jnp.where(ends < 0.0, jnp.sum(along.magnitude()), jnp.sum(smallest))
+    is_bound = is_normal & is_bounded.all() & (norm > 0.0).all() & jnp.isfinite(ends).all()
+    above, half = jnp.where(is_bound, ends / jnp.where(is_bound, norm, 1.0), jnp.inf), 0.5 * jnp.min(high - low)
     return jnp.where(jnp.max(above) < half, above, half)

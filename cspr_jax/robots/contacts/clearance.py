@@ -1,7 +1,7 @@
 """Clearance of many poses: how far cables are from each other, from obstacles and from their own platform, signed.
 
 Coordinates are those of the given robot, and shapes have the same axes; the shape of the platform has platform axes,
-from the mass centre. Every kind of meeting in a scene has a kernel of `clearance_kernels`, compiled once a robot.
+from the mass centre. Every kind of contact in a scene has a kernel of `clearance_kernels`, compiled once a robot.
 """
 
 import dataclasses
@@ -16,7 +16,7 @@ from cspr_jax.errors import InputError
 from cspr_jax.numerics.batches import device_batch_size, in_batches, in_parts, in_threads
 from cspr_jax.numerics.elementary import as_float64
 from cspr_jax.robots.contacts import clearance_kernels as kernels
-from cspr_jax.robots.model.platform import PlatformRobot, pairs_apart
+from cspr_jax.robots.model.platform import PlatformRobot, separate_pairs
 from cspr_jax.robots.model.point_mass import PointMassRobot
 from cspr_jax.robots.model.shapes import Body, Box, Cylinder, Hull, Obstacle, Sphere, hull, is_flat
 
@@ -25,8 +25,9 @@ BATCH = 65_536
 # Few poses are computed in a batch of this length: a search asks for some at a time.
 FEW = 4096
 # The part of a cable next to its attachment point for which contacts with the platform do not count is so many
-# diameters long, or this part of the size of the platform's shape.
-LEAVE_DIAMETERS, LEAVE_SIZE = 10.0, 0.01
+# diameters long, or this part of the extent of the platform's shape.
+LEAVE_DIAMETERS = 10.0
+LEAVE_FRACTION = 0.01
 # Rounding of a clearance, over machine epsilon and the largest coordinate of pose, robot and obstacles; the largest
 # value that was met is 2.2.
 EPSILONS = 16.0
@@ -34,7 +35,7 @@ EPSILONS = 16.0
 Kind = Literal["cables", "obstacle", "platform", "platform-obstacle"]
 
 
-class Meeting(NamedTuple):
+class ContactPair(NamedTuple):
     """Two bodies that can meet.
 
     Fields:
@@ -72,14 +73,14 @@ class Scene:
     leave: float
 
     @property
-    def meetings(self) -> tuple[Meeting, ...]:
+    def contact_pairs(self) -> tuple[ContactPair, ...]:
         """Pairs of bodies that `Clearances.nearest` counts."""
         cables = range(len(self.base_points))
-        pairs_of_bodies = [Meeting("cables", i, j) for i, j in self.pairs]
-        pairs_of_bodies += [Meeting("obstacle", i, j) for j in range(len(self.obstacles)) for i in cables]
+        pairs_of_bodies = [ContactPair("cables", i, j) for i, j in self.pairs]
+        pairs_of_bodies += [ContactPair("obstacle", i, j) for j in range(len(self.obstacles)) for i in cables]
         if self.body is not None:
-            pairs_of_bodies += [Meeting("platform", i, -1) for i in cables]
-            pairs_of_bodies += [Meeting("platform-obstacle", -1, j) for j in range(len(self.obstacles))]
+            pairs_of_bodies += [ContactPair("platform", i, -1) for i in cables]
+            pairs_of_bodies += [ContactPair("platform-obstacle", -1, j) for j in range(len(self.obstacles))]
         return tuple(pairs_of_bodies)
 
 
@@ -87,12 +88,12 @@ class Clearances(NamedTuple):
     """Clearances of poses.
 
     Fields:
-        clearance: (n,) the least of all clearances, m; negative where two bodies meet; inf where nothing can meet.
-        nearest: (n,) index in `Scene.meetings` of the nearest two bodies; -1 where nothing can meet.
-        cables: (n,) the least clearance of two cables, m; inf where none can meet.
-        obstacles: (n,) the least clearance of obstacles from cables and platform, m.
-        platform: (n,) the least clearance of cables from their own platform, m; of whole cables at most `Scene.leave`.
-        is_open: (n,) whether the least clearance is within rounding of the threshold.
+        clearance: (n,) the smallest of all clearances, m; negative where two bodies meet; inf where nothing can meet.
+        nearest: (n,) index in `Scene.contact_pairs` of the nearest two bodies; -1 where nothing can meet.
+        cables: (n,) the smallest clearance of two cables, m; inf where none can meet.
+        obstacles: (n,) the smallest clearance of obstacles from cables and platform, m.
+        platform: (n,) smallest clearance of cables from their own platform, m; at most `Scene.leave` for full cables.
+        is_open: (n,) whether the smallest clearance is within rounding of the threshold.
     """
 
     clearance: np.ndarray
@@ -119,12 +120,12 @@ def scene(
     if body is not None and not isinstance(robot, PlatformRobot):
         raise InputError("body", None, "must be None", fault="a point mass has no shape")
     if leave is None:
-        size = 0.0 if body is None else float(np.ptp(_corners(body), axis=0).max())
-        leave = max(LEAVE_DIAMETERS * float(diameters.max()), LEAVE_SIZE * size)
+        extent = 0.0 if body is None else float(np.ptp(_corners(body), axis=0).max())
+        leave = max(LEAVE_DIAMETERS * float(diameters.max()), LEAVE_FRACTION * extent)
     if not 0.0 <= leave < np.inf:
         raise InputError("leave", leave, "a length, not negative")
     platform = np.asarray(robot.platform_points, float) if isinstance(robot, PlatformRobot) else np.zeros_like(base)
-    pairs = pairs_apart(robot) if isinstance(robot, PlatformRobot) else ()
+    pairs = separate_pairs(robot) if isinstance(robot, PlatformRobot) else ()
     return Scene(base, platform, np.broadcast_to(diameters, (len(base),)), pairs, tuple(obstacles), body, float(leave))
 
 
@@ -145,7 +146,7 @@ def clearances(
 ) -> Clearances:
     """Clearances of poses."""
     poses = _checked(scene, positions, quaternions, ends)
-    if not len(poses.place):
+    if not len(poses.position):
         return _nothing(0)
     answers = _all(scene, poses, threshold, np.dtype(dtype))
     again = np.flatnonzero(answers.is_open)
@@ -156,13 +157,13 @@ def clearances(
 
 
 class _CheckedPoses(NamedTuple):
-    place: np.ndarray  # (n, 3)
+    position: np.ndarray  # (n, 3)
     quaternion: np.ndarray | None  # (n, 4)
     spools: np.ndarray | None  # (n, n_cables, 3)
 
     def rows(self, index) -> "_CheckedPoses":
         quaternion, spools = (None if x is None else x[index] for x in self[1:])
-        return _CheckedPoses(self.place[index], quaternion, spools)
+        return _CheckedPoses(self.position[index], quaternion, spools)
 
     def lanes(self, origin: np.ndarray, dtype: np.dtype) -> kernels.PoseLanes:
         def columns(array):
@@ -170,13 +171,13 @@ class _CheckedPoses(NamedTuple):
 
         quaternion = None if self.quaternion is None else columns(self.quaternion)
         ends = None if self.spools is None else [columns(x) for x in np.swapaxes(self.spools - origin, 0, 1)]
-        return kernels.PoseLanes(columns(self.place - origin), quaternion, ends)
+        return kernels.PoseLanes(columns(self.position - origin), quaternion, ends)
 
 
 def _checked(scene: Scene, positions, quaternions, ends) -> _CheckedPoses:
-    place = np.asarray(positions, float)
-    if place.ndim != 2 or place.shape[1] != 3:
-        raise InputError("positions", None, "must be (n, 3)", fault=f"an array of shape {place.shape}")
+    points = np.asarray(positions, float)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise InputError("positions", None, "must be (n, 3)", fault=f"an array of shape {points.shape}")
 
     def checked(name: str, values, shape: tuple[int, ...]) -> np.ndarray | None:
         array = None if values is None else np.asarray(values, float)
@@ -184,8 +185,8 @@ def _checked(scene: Scene, positions, quaternions, ends) -> _CheckedPoses:
             raise InputError(name, None, f"must be {shape}", fault=f"an array of shape {array.shape}")
         return array
 
-    quaternion = checked("quaternions", quaternions, (len(place), 4))
-    return _CheckedPoses(place, quaternion, checked("ends", ends, (len(place), len(scene.base_points), 3)))
+    quaternion = checked("quaternions", quaternions, (len(points), 4))
+    return _CheckedPoses(points, quaternion, checked("ends", ends, (len(points), len(scene.base_points), 3)))
 
 
 def _all(scene: Scene, all_poses: _CheckedPoses, threshold: float, dtype: np.dtype) -> Clearances:
@@ -193,16 +194,16 @@ def _all(scene: Scene, all_poses: _CheckedPoses, threshold: float, dtype: np.dty
     origin = scene.base_points.mean(0)
     terms = list(_terms(scene, origin, dtype))
     extent = max(float(np.abs(x).max()) for x in (scene.base_points - origin, scene.platform_points))
-    reach = max([extent] + [_reach(shape, origin) for shape in scene.obstacles])
-    bound, count = EPSILONS * float(np.finfo(dtype).eps), len(all_poses.place)
-    size = FEW if count <= FEW else BATCH
+    largest = max([extent] + [_largest_coordinate(shape, origin) for shape in scene.obstacles])
+    bound, count = EPSILONS * float(np.finfo(dtype).eps), len(all_poses.position)
+    length = FEW if count <= FEW else BATCH
 
     def one(part: slice) -> Clearances:
         poses = all_poses.rows(part).lanes(origin, dtype)
-        answers = in_batches(lambda batch: tuple(term(batch) for _, _, term in terms), poses, batch_size=size)
-        answer = _least([(kind, first, x) for (kind, first, _), x in zip(terms, answers, strict=True)])
+        answers = in_batches(lambda batch: tuple(term(batch) for _, _, term in terms), poses, batch_size=length)
+        answer = _smallest([(kind, first, x) for (kind, first, _), x in zip(terms, answers, strict=True)])
         far = [np.abs(x) for x in poses.position]
-        extents = np.maximum(np.maximum(np.maximum(far[0], far[1]), far[2]), reach)
+        extents = np.maximum(np.maximum(np.maximum(far[0], far[1]), far[2]), largest)
         # NaN compares as false: such poses stay open.
         return answer._replace(is_open=~(np.abs(answer.clearance - threshold) > bound * extents))
 
@@ -217,8 +218,8 @@ def _nothing(count: int) -> Clearances:
     return Clearances(far, np.full(count, -1, np.int32), far, far, far, np.zeros(count, bool))
 
 
-def _least(terms: Sequence[tuple[Kind, int, np.ndarray]]) -> Clearances:
-    # Take the least of the distances from all kernels, in their dtype.
+def _smallest(terms: Sequence[tuple[Kind, int, np.ndarray]]) -> Clearances:
+    # Take the smallest of the distances from all kernels, in their dtype.
     _, first, distances = terms[0]
     clearance, nearest = distances.real.copy(), distances.imag.astype(np.int32) + np.int32(first)
     for _, first, distances in terms[1:]:
@@ -227,16 +228,16 @@ def _least(terms: Sequence[tuple[Kind, int, np.ndarray]]) -> Clearances:
         np.copyto(clearance, distances.real, where=is_less)
         np.copyto(nearest, distances.imag.astype(np.int32) + np.int32(first), where=is_less)
 
-    def least(*kinds: Kind) -> np.ndarray:
+    def smallest(*kinds: Kind) -> np.ndarray:
         values = [distances.real for kind, _, distances in terms if kind in kinds]
         return functools.reduce(np.minimum, values, np.full(len(clearance), np.inf, clearance.dtype)).astype(float)
 
-    kinds = least("cables"), least("obstacle", "platform-obstacle"), least("platform")
+    kinds = smallest("cables"), smallest("obstacle", "platform-obstacle"), smallest("platform")
     return Clearances(clearance.astype(float), nearest, *kinds, np.zeros(len(clearance), bool))
 
 
 def _terms(scene: Scene, origin: np.ndarray, dtype: np.dtype):
-    """Compiled functions of poses, each with its kind and the number of its first meeting."""
+    """Compiled functions of poses, each with its kind and the number of its first pair."""
     count, first = len(scene.base_points), 0
     points = _cast(
         kernels.Points(*map(as_float64, (scene.base_points - origin, scene.platform_points, scene.diameters))), dtype
@@ -284,7 +285,7 @@ def _corners(shape: Body) -> np.ndarray:
     return shape.centre + (signs * shape.half) @ shape.rotation.T
 
 
-def _reach(shape: Obstacle, origin: np.ndarray) -> float:
+def _largest_coordinate(shape: Obstacle, origin: np.ndarray) -> float:
     # Return the largest coordinate.
     if isinstance(shape, Box):
         return float(np.abs(_corners(shape) - origin).max())

@@ -1,7 +1,7 @@
-"""Compiled functions of `clearance`: the nearest bodies of each kind of meeting, one lane a pose.
+"""Compiled functions of `clearance`: the nearest bodies of each kind of contact, one lane a pose.
 
 Each gives one complex number a pose, as `clearance_lanes.nearest` does: the clearance, m, and the number of the
-meeting.
+pair.
 """
 
 from __future__ import annotations
@@ -169,12 +169,12 @@ def _nearest_pair(points: Points, starts: list[Array] | None, rays: list[Array],
         return ends if starts is None else [x[k] for x in starts], [x[k] for x in rays]
 
     def step(best, pair):
-        (i, j), place = pair
+        (i, j), index = pair
         thick = 0.5 * (points.diameters[i] + points.diameters[j])
         distance = segments(*line(i), *line(j)) - thick
         # Keep the first of equal distances, and NaN, as `clearance_lanes.nearest` does.
         is_kept = jnp.isnan(jnp.real(best)) | (distance >= jnp.real(best))
-        return jnp.where(is_kept, best, lax.complex(distance, jnp.full_like(distance, place))), None
+        return jnp.where(is_kept, best, lax.complex(distance, jnp.full_like(distance, index))), None
 
     far = jnp.full_like(template, jnp.inf)
     start = lax.complex(far, jnp.zeros_like(far))
@@ -188,12 +188,12 @@ def of_obstacle(points: Points, poses: PoseLanes, solid: Solid) -> Complex[Array
     gaps = []
     for k, (end, ray) in enumerate(zip(ends, rays, strict=True)):
         if isinstance(solid, Ball):
-            apart = point_segment(_three(solid.centre), end, ray) - solid.radius
+            distance = point_segment(_three(solid.centre), end, ray) - solid.radius
         elif isinstance(solid, Rod):
-            apart = segments(_three(solid.start), _three(solid.ray), end, ray) - solid.radius
+            distance = segments(_three(solid.start), _three(solid.ray), end, ray) - solid.radius
         else:
-            apart = segment_box(*_in_brick(solid, end, ray), _three(solid.half))
-        gaps.append(apart - 0.5 * points.diameters[k])
+            distance = segment_box(*_in_brick(solid, end, ray), _three(solid.half))
+        gaps.append(distance - 0.5 * points.diameters[k])
     return nearest(gaps)
 
 

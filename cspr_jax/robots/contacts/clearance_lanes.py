@@ -50,27 +50,27 @@ def segments(a: Vector, u: Vector, b: Vector, v: Vector) -> Float[Array, "..."]:
     """Distance of two segments."""
     # Find the nearest points of the lines, then clip each to its segment: the last two steps are exact where one point
     # is an end, and for parallel lines wherever the first step starts.
-    apart, normal = _less(b, a), cross(u, v)
-    uu, vv, uv, tiny = dot(u, u), dot(v, v), dot(u, v), _tiny(apart[0] * u[0])
-    s = _fraction(dot(cross(apart, v), normal) / _greater(dot(normal, normal), tiny))
-    t = _fraction((s * uv - dot(apart, v)) / _greater(vv, tiny))
-    s = _fraction((dot(apart, u) + t * uv) / _greater(uu, tiny))
-    between = tuple(apart[k] + t * v[k] - s * u[k] for k in range(3))
+    offset, normal = _less(b, a), cross(u, v)
+    uu, vv, uv, tiny = dot(u, u), dot(v, v), dot(u, v), _tiny(offset[0] * u[0])
+    s = _fraction(dot(cross(offset, v), normal) / _greater(dot(normal, normal), tiny))
+    t = _fraction((s * uv - dot(offset, v)) / _greater(vv, tiny))
+    s = _fraction((dot(offset, u) + t * uv) / _greater(uu, tiny))
+    between = tuple(offset[k] + t * v[k] - s * u[k] for k in range(3))
     return jnp.sqrt(dot(between, between))
 
 
 def point_segment(point: Vector, a: Vector, u: Vector) -> Float[Array, "..."]:
     """Distance of a point from a segment."""
-    apart = _less(point, a)
-    s = _fraction(dot(apart, u) / _greater(dot(u, u), _tiny(apart[0] * u[0])))
-    between = tuple(apart[k] - s * u[k] for k in range(3))
+    offset = _less(point, a)
+    s = _fraction(dot(offset, u) / _greater(dot(u, u), _tiny(offset[0] * u[0])))
+    between = tuple(offset[k] - s * u[k] for k in range(3))
     return jnp.sqrt(dot(between, between))
 
 
 def segment_box(a: Vector, u: Vector, half: Numbers) -> Float[Array, "..."]:
     """Signed distance of a segment from a box around the origin, in its axes."""
-    apart = _parting(a, u, half)
-    return jnp.where(apart > 0.0, _outside_box(a, u, half), apart)
+    gap = _parting(a, u, half)
+    return jnp.where(gap > 0.0, _outside_box(a, u, half), gap)
 
 
 def _outside_box(a: Vector, u: Vector, half: Numbers) -> Array:
@@ -81,27 +81,27 @@ def _outside_box(a: Vector, u: Vector, half: Numbers) -> Array:
     negative.
     """
 
-    def slope(part):
+    def derivative(part):
         beyond = _beyond(_along(a, u, part), half)
         return dot(beyond, u)
 
     zero, one = jnp.zeros_like(a[0] + u[0]), jnp.ones_like(a[0] + u[0])
-    start, stop, rise, fall = zero, one, slope(zero), slope(one)
-    is_first, is_last = rise >= 0.0, fall <= 0.0
+    start, stop, at_start, at_stop = zero, one, derivative(zero), derivative(one)
+    is_first, is_last = at_start >= 0.0, at_stop <= 0.0
     for k in range(3):
-        # For a segment that lies in a plane of a face any place will do.
+        # For a segment that lies in a plane of a face any point will do.
         inverse = 1.0 / jnp.where(u[k] == 0.0, jnp.ones_like(u[k]), u[k])
         for side in (-half[k], half[k]):
             part = _fraction((side - a[k]) * inverse)
-            value = slope(part)
+            value = derivative(part)
             later, sooner = (value <= 0.0) & (part >= start), (value >= 0.0) & (part <= stop)
-            start, rise = jnp.where(later, part, start), jnp.where(later, value, rise)
-            stop, fall = jnp.where(sooner, part, stop), jnp.where(sooner, value, fall)
-    steep = fall - rise
-    part = start - rise * (stop - start) / jnp.where(steep > 0.0, steep, one)
+            start, at_start = jnp.where(later, part, start), jnp.where(later, value, at_start)
+            stop, at_stop = jnp.where(sooner, part, stop), jnp.where(sooner, value, at_stop)
+    steep = at_stop - at_start
+    part = start - at_start * (stop - start) / jnp.where(steep > 0.0, steep, one)
     part = jnp.where(is_first, zero, jnp.where(is_last, one, _fraction(part)))
-    # If the slope in a plane is small beside its own rounding, that plane is the better place.
-    first, *others = (_beyond(_along(a, u, place), half) for place in (part, start, stop))
+    # If the derivative in a plane is small beside its own rounding, that plane is the better point.
+    first, *others = (_beyond(_along(a, u, fraction), half) for fraction in (part, start, stop))
     minimum = dot(first, first)
     for beyond in others:
         minimum = nan_ignoring_min(dot(beyond, beyond), minimum)
@@ -121,13 +121,13 @@ def _parting(a: Vector, u: Vector, half: Numbers) -> Array:
     """
     w = tuple(0.5 * x for x in u)
     c = tuple(x + y for x, y in zip(a, w, strict=True))
-    size = tuple(jnp.abs(x) for x in w)
-    gap = jnp.abs(c[0]) - (half[0] + size[0])
+    extent = tuple(jnp.abs(x) for x in w)
+    gap = jnp.abs(c[0]) - (half[0] + extent[0])
     for k in (1, 2):
-        gap = _greater(jnp.abs(c[k]) - (half[k] + size[k]), gap)
+        gap = _greater(jnp.abs(c[k]) - (half[k] + extent[k]), gap)
     for i, j in ((1, 2), (2, 0), (0, 1)):
         square = w[i] * w[i] + w[j] * w[j]
-        shadow = jnp.abs(c[i] * w[j] - c[j] * w[i]) - (half[i] * size[j] + half[j] * size[i])
+        shadow = jnp.abs(c[i] * w[j] - c[j] * w[i]) - (half[i] * extent[j] + half[j] * extent[i])
         across = shadow / jnp.sqrt(_greater(square, _tiny(square)))
         # A segment along the third axis has no such line.
         gap = jnp.where((square > _tiny(square)) & (across > gap), across, gap)
@@ -136,11 +136,11 @@ def _parting(a: Vector, u: Vector, half: Numbers) -> Array:
 
 def nearest(values: Sequence[Array]) -> Complex[Array, "..."]:
     """The smallest of several arrays and its index, as one complex number, since XLA computes two outputs twice."""
-    minimum, place = values[0], jnp.zeros_like(values[0])
+    minimum, index = values[0], jnp.zeros_like(values[0])
     for k, value in enumerate(values[1:], 1):
         is_less = value < minimum
-        minimum, place = jnp.where(is_less, value, minimum), jnp.where(is_less, np.asarray(k, value.dtype), place)
-    return lax.complex(minimum, place)
+        minimum, index = jnp.where(is_less, value, minimum), jnp.where(is_less, np.asarray(k, value.dtype), index)
+    return lax.complex(minimum, index)
 
 
 class Polyhedron(NamedTuple):
@@ -169,7 +169,7 @@ def segment_hull(a: Vector, u: Vector, hull: Polyhedron) -> Float[Array, "..."]:
     def clip(face, ends):
         high, rate = _of_face(hull, face, a, u)
         meet = -high / jnp.where(rate == 0.0, jnp.ones_like(rate), rate)
-        # A segment parallel to a face lies outside of its plane, or inside, as a whole.
+        # A segment parallel to a face lies entirely outside of its plane, or inside.
         first = jnp.where(rate < 0.0, _greater(meet, ends[0]), ends[0])
         last = jnp.where(rate > 0.0, nan_ignoring_min(meet, ends[1]), ends[1])
         return first, jnp.where((rate == 0.0) & (high > 0.0), -jnp.ones_like(last), last)
@@ -186,7 +186,7 @@ def segment_hull(a: Vector, u: Vector, hull: Polyhedron) -> Float[Array, "..."]:
 
 
 def _of_face(hull: Polyhedron, face: Array, a: Vector, u: Vector) -> tuple[Array, Array]:
-    # Return the height of a start above the plane of a face, and its growth along the segment.
+    # Return the height of a start above the plane of a face, and its rate along the segment.
     normal, corner = hull.normals[face], hull.triangles[face, 0]
     three = [normal[k] for k in range(3)]
     return dot(three, [a[k] - corner[k] for k in range(3)]), dot(three, u)
@@ -195,13 +195,13 @@ def _of_face(hull: Polyhedron, face: Array, a: Vector, u: Vector) -> tuple[Array
 def _outside_hull(a: Vector, u: Vector, hull: Polyhedron) -> Array:
     """Distance of a segment from a polyhedron that it does not enter: from an edge, or of an end from a face."""
 
-    def to_edge(edge, least):
+    def to_edge(edge, smallest):
         start, end = hull.edges[edge, 0], hull.edges[edge, 1]
         return nan_ignoring_min(
-            segments(a, u, [start[k] for k in range(3)], [end[k] - start[k] for k in range(3)]), least
+            segments(a, u, [start[k] for k in range(3)], [end[k] - start[k] for k in range(3)]), smallest
         )
 
-    def to_face(face, least):
+    def to_face(face, smallest):
         normal, triangle = hull.normals[face], hull.triangles[face]
         for point in (a, tuple(x + y for x, y in zip(a, u, strict=True))):
             high = dot([normal[k] for k in range(3)], [point[k] - triangle[0, k] for k in range(3)])
@@ -213,31 +213,31 @@ def _outside_hull(a: Vector, u: Vector, hull: Polyhedron) -> Array:
             inside = ((areas[0] >= 0.0) & (areas[1] >= 0.0) & (areas[2] >= 0.0)) | (
                 (areas[0] <= 0.0) & (areas[1] <= 0.0) & (areas[2] <= 0.0)
             )
-            least = jnp.where(is_above & inside & (high < least), high, least)
-        return least
+            smallest = jnp.where(is_above & inside & (high < smallest), high, smallest)
+        return smallest
 
     far = jnp.full_like(a[0] + u[0], jnp.inf)
-    least = lax.fori_loop(0, len(hull.edges), to_edge, far)
-    return lax.fori_loop(0, len(hull.offsets), to_face, least)
+    smallest = lax.fori_loop(0, len(hull.edges), to_edge, far)
+    return lax.fori_loop(0, len(hull.offsets), to_face, smallest)
 
 
 def boxes(first: Numbers, centre: Vector, axes: Sequence[Vector], half: Numbers) -> Float[Array, "..."]:
     """Largest gap between projections of two boxes on a line, in axes of the first, which is around the origin."""
     gap = jnp.full_like(centre[0] + axes[0][0], -jnp.inf)
     for k in range(3):
-        reach = first[k] + sum(half[j] * jnp.abs(axes[j][k]) for j in range(3))
-        gap = _greater(jnp.abs(centre[k]) - reach, gap)
-        reach = half[k] + sum(first[j] * jnp.abs(axes[k][j]) for j in range(3))
-        gap = _greater(jnp.abs(dot(centre, axes[k])) - reach, gap)
+        radius = first[k] + sum(half[j] * jnp.abs(axes[j][k]) for j in range(3))
+        gap = _greater(jnp.abs(centre[k]) - radius, gap)
+        radius = half[k] + sum(first[j] * jnp.abs(axes[k][j]) for j in range(3))
+        gap = _greater(jnp.abs(dot(centre, axes[k])) - radius, gap)
     for axis in axes:
         for i, j in ((1, 2), (2, 0), (0, 1)):
             # The line is normal to an edge of each box, so that its component along this axis of the first is zero.
             x, y = -axis[j], axis[i]
             square = x * x + y * y
-            reach = first[i] * jnp.abs(x) + first[j] * jnp.abs(y)
-            reach = reach + sum(h * jnp.abs(e[i] * x + e[j] * y) for h, e in zip(half, axes, strict=True))
+            radius = first[i] * jnp.abs(x) + first[j] * jnp.abs(y)
+            radius = radius + sum(h * jnp.abs(e[i] * x + e[j] * y) for h, e in zip(half, axes, strict=True))
             tiny = _tiny(square)
-            across = (jnp.abs(centre[i] * x + centre[j] * y) - reach) / jnp.sqrt(_greater(square, tiny))
+            across = (jnp.abs(centre[i] * x + centre[j] * y) - radius) / jnp.sqrt(_greater(square, tiny))
             # Parallel edges have no such line.
             gap = jnp.where((square > tiny) & (across > gap), across, gap)
     return gap

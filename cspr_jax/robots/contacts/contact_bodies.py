@@ -10,7 +10,7 @@ import numpy as np
 
 from cspr_jax.robots.cables import AnyRobot
 from cspr_jax.robots.contacts import clearance
-from cspr_jax.robots.contacts.clearance import Meeting, Scene
+from cspr_jax.robots.contacts.clearance import ContactPair, Scene
 from cspr_jax.robots.contacts.convex_gaps import BOX, BOX_SIGNS, FacePlanes
 from cspr_jax.robots.contacts.interference import contacts
 from cspr_jax.robots.model.platform import RIGID, PlatformRobot
@@ -19,8 +19,9 @@ from cspr_jax.robots.model.shapes import Box, Cylinder, Hull, is_flat
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Over the size of a scene: depth below which penetrations are not told apart, and thickness of flat boxes.
-DEEPEST, THINNEST = 1e-4, 1e-9
+# Over the extent of a scene:
+DEEPEST = 1e-4  # depth below which penetrations are not distinguished
+THINNEST = 1e-9  # thickness of flat boxes
 
 
 class Shape(NamedTuple):
@@ -49,11 +50,11 @@ class Bodies(NamedTuple):
         rods: (n_rods, 2, 3) ends of the axes of spheres and cylinders, m.
         rod_radii: (n_rods,) m.
         boxes: leaves (n_boxes, ...).
-        order: (n_obstacles,) place of each obstacle among rods, and boxes behind them.
+        order: (n_obstacles,) index of each obstacle among rods, and boxes behind them.
         body: shape of the platform in its axes; None: not known.
         leave: () length of each cable next to its attachment point that may meet the platform, m.
         sectors: (n_cables, 2, 3) sides and (3,) normal of `interference.Contacts`; None: not judged.
-        size: () largest coordinate, m.
+        extent: () largest coordinate, m.
         deepest: () m.
     """
 
@@ -67,7 +68,7 @@ class Bodies(NamedTuple):
     body: Shape | None
     leave: Any
     sectors: Any
-    size: Any
+    extent: Any
     deepest: Any
 
 
@@ -76,14 +77,14 @@ def has_sectors(robot: AnyRobot, scene: Scene) -> bool:
     return scene.body is None and robot.pattern == RIGID and is_flat(np.asarray(scene.platform_points))
 
 
-def meetings(robot: AnyRobot, scene: Scene) -> tuple[Meeting, ...]:
+def contact_pairs(robot: AnyRobot, scene: Scene) -> tuple[ContactPair, ...]:
     """Pairs of bodies in the order of their bounds."""
     over = range(robot.n_cables) if has_sectors(robot, scene) else ()
-    return scene.meetings + tuple(Meeting("platform", k, -1) for k in over)
+    return scene.contact_pairs + tuple(ContactPair("platform", k, -1) for k in over)
 
 
 def default_scene(robot: AnyRobot) -> Scene:
-    """A robot without surroundings, whose cables meet each other."""
+    """A robot without obstacles, whose cables meet each other."""
     return clearance.scene(robot, diameter=0.0 if robot.cable_diameter is None else np.asarray(robot.cable_diameter))
 
 
@@ -93,11 +94,11 @@ def bodies_of(robot: AnyRobot, scene: Scene) -> Bodies:
     boxes = [k for k, shape in enumerate(scene.obstacles) if isinstance(shape, Box)]
     axes = [_axis(scene.obstacles[k]) for k in rods]
     radii = np.array([scene.obstacles[k].radius for k in rods])  # type: ignore[union-attr]
-    size = max(float(np.abs(x).max()) for x in (scene.base_points, scene.platform_points))
+    extent = max(float(np.abs(x).max()) for x in (scene.base_points, scene.platform_points))
     corners = [np.abs(scene.obstacles[k].centre).max() + scene.obstacles[k].half.sum() for k in boxes]  # type: ignore
-    reach = [float(np.abs(axis).max() + radius) for axis, radius in zip(axes, radii, strict=True)]
-    size = max([size, *reach, *corners])
-    thinnest = THINNEST * size
+    largest = [float(np.abs(axis).max() + radius) for axis, radius in zip(axes, radii, strict=True)]
+    extent = max([extent, *largest, *corners])
+    thinnest = THINNEST * extent
     shapes = [_shape(scene.obstacles[k], thinnest) for k in boxes]  # type: ignore[arg-type]
     near = contacts(robot) if has_sectors(robot, scene) and isinstance(robot, PlatformRobot) else None
     return Bodies(
@@ -113,8 +114,8 @@ def bodies_of(robot: AnyRobot, scene: Scene) -> Bodies:
         sectors=None
         if near is None
         else (near.sides - (near.sides @ near.normal)[..., None] * near.normal, near.normal),
-        size=np.asarray(size),
-        deepest=np.asarray(DEEPEST * size),
+        extent=np.asarray(extent),
+        deepest=np.asarray(DEEPEST * extent),
     )
 
 
@@ -144,8 +145,8 @@ def _shape(shape: Box | Hull, thinnest: float) -> Shape:
         offsets = np.einsum("fi,fi->f", normals, corners[faces[:, 0]])
         return Shape(corners, edges, faces, FacePlanes(normals, offsets))
     points = np.concatenate([shape.triangles.reshape(-1, 3), shape.edges.reshape(-1, 3)])
-    corners, places = np.unique(points, axis=0, return_inverse=True)
-    faces, edges = np.split(places.ravel(), [3 * len(shape.triangles)])
+    corners, indices = np.unique(points, axis=0, return_inverse=True)
+    faces, edges = np.split(indices.ravel(), [3 * len(shape.triangles)])
     faces, edges = faces.reshape(-1, 3), edges.reshape(-1, 2)
     a, b, c = np.moveaxis(shape.triangles, 1, 0)
     flipped = np.einsum("fi,fi->f", np.cross(b - a, c - a), shape.normals) < 0.0

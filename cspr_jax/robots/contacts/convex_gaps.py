@@ -1,7 +1,7 @@
 """Gaps between moving convex bodies over a block of time: bounds, from affine bounds of their corners.
 
-For a direction n and all corners a and b of two bodies, the least n . (b - a) / |n| is no larger than their signed
-distance (the distance of bodies that are apart, minus the least translation that parts bodies that are not). The
+For a direction n and all corners a and b of two bodies, the smallest n . (b - a) / |n| is no larger than their signed
+distance (the distance of bodies that are separated, minus the smallest translation that parts bodies that are not). The
 direction is that of the nearest points in the middle of the block, and turns with the block as they do then: a line
 n(s) = e + s e', so that bounds close with the square of the length of the block. Any direction gives a proof, so it
 need not be known with bounds. From above the distance is bounded by that of two fixed points of the bodies, the nearest
@@ -101,26 +101,26 @@ def clearance_bounds(first: Solid, second: Solid) -> tuple[Float[Array, ""], Flo
     line = turning(partial(parting_direction, features), first.corners, second.corners)
     between = second.corners.each(lambda x: x[None]) - first.corners.each(lambda x: x[:, None])
     low = along(line, between.each(lambda x: x.reshape(-1, 3)))
-    place, other = (
+    point, other = (
         dot(body.corners.each(jnp.transpose), weights[None])
         for body, weights in zip((first, second), nearest_weights(features, *corners), strict=True)
     )
-    return low, distance_bound(place, other)
+    return low, distance_bound(point, other)
 
 
 def turning(direction: Callable[..., Array], *points: AffineBounds) -> AffineBounds:
     """A direction that turns at a constant rate, which follows that of a function of points in the middle."""
-    middles, slopes = (tuple(getattr(x, name) for x in points) for name in ("middle", "linear"))
-    middle, turn = jax.jvp(direction, middles, slopes)
+    middles, derivatives = (tuple(getattr(x, name) for x in points) for name in ("middle", "linear"))
+    middle, turn = jax.jvp(direction, middles, derivatives)
     return AffineBounds(middle, jnp.where(jnp.sum(turn**2) <= 1.0, turn, 0.0), jnp.zeros_like(middle))
 
 
 def along(line: AffineBounds, vectors: AffineBounds) -> Float[Array, ""]:
-    """Least component of vectors along a direction that turns."""
+    """Smallest component of vectors along a direction that turns."""
     middle, turn = line.middle, line.linear
     low = jnp.min(dot(line.each(lambda x: x[None]), vectors).low())
-    size = jnp.sqrt(jnp.dot(middle, middle) + jnp.dot(turn, turn) + 2.0 * jnp.abs(jnp.dot(middle, turn)))
-    return jnp.where(low > 0.0, low * (1.0 - DISTANCE_ERROR) / size, -jnp.inf)
+    length = jnp.sqrt(jnp.dot(middle, middle) + jnp.dot(turn, turn) + 2.0 * jnp.abs(jnp.dot(middle, turn)))
+    return jnp.where(low > 0.0, low * (1.0 - DISTANCE_ERROR) / length, -jnp.inf)
 
 
 def distance_bound(first: AffineBounds, second: AffineBounds) -> Float[Array, ""]:
@@ -188,11 +188,11 @@ def nearest_features(p: Float[Array, "m 3"], q: Float[Array, "k 3"], first: Soli
         parts.append(_over(p, q, second.faces) ** 2)
     if len(first.faces):
         parts.append(_over(q, p, first.faces).T ** 2)
-    places = [jnp.argmin(part) for part in parts]
-    minimum = jnp.stack([part.reshape(-1)[place] for part, place in zip(parts, places, strict=True)])
+    indices = [jnp.argmin(part) for part in parts]
+    minimum = jnp.stack([part.reshape(-1)[index] for part, index in zip(parts, indices, strict=True)])
     best = jnp.argmin(minimum)
     numbers = [
-        jnp.stack([place // part.shape[1], place % part.shape[1]]) for part, place in zip(parts, places, strict=True)
+        jnp.stack([index // part.shape[1], index % part.shape[1]]) for part, index in zip(parts, indices, strict=True)
     ]
     kinds = jnp.asarray([0] + [1] * bool(len(second.faces)) + [2] * bool(len(first.faces)))
     return Features((first, second), kinds[best], *jnp.stack(numbers)[best])
@@ -207,15 +207,17 @@ def parting_direction(features: Features, p: Float[Array, "m 3"], q: Float[Array
     inside &= jnp.dot(normal, normal) > PARALLEL_SQUARE * jnp.dot(u, u) * jnp.dot(v, v)
     # The common normal of edges is known however near they are, if both points are inside of them.
     gap = jnp.where(inside, jnp.where(jnp.dot(normal, gap) < 0.0, -normal, normal), gap)
-    way = _unit(gap)
+    direction = _unit(gap)
     for kind, corners, body, face, sign in (
         (1, q, second, features.second, -1.0),
         (2, p, first, features.first, 1.0),
     ):
         if len(body.faces):
             corner = jnp.asarray(body.faces)[jnp.minimum(face, len(body.faces) - 1)]
-            way = jnp.where(features.kind == kind, sign * _normal(*(corners[corner[k]] for k in range(3))), way)
-    return way
+            direction = jnp.where(
+                features.kind == kind, sign * _normal(*(corners[corner[k]] for k in range(3))), direction
+            )
+    return direction
 
 
 def nearest_weights(

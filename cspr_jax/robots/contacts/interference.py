@@ -1,4 +1,4 @@
-"""Cables that meet each other or the platform, thesis section 3.10.2: vectors at one instant, tests between two."""
+"""Cables that meet each other or the platform, thesis section 3.10.2: vectors in one state, tests between two."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from cspr_jax.robots.model.platform import PlatformRobot, pairs_apart, rays
+from cspr_jax.robots.model.platform import PlatformRobot, rays, separate_pairs
 
 if TYPE_CHECKING:
     from jaxtyping import Bool, Float, Int
 
-# Points nearer than this part of the platform's size are one corner.
+# Points nearer than this part of the platform's extent are one corner.
 SAME = 1e-9
 PARALLEL = 1e-14
 # Squares of lengths from here on; a segment may be a point.
@@ -47,7 +47,7 @@ def contacts(robot: PlatformRobot) -> Contacts:
     first, second, _ = np.linalg.svd(centred)[2]
     flat = np.stack([centred @ first, centred @ second], axis=1)
     sides = np.array([_sector(points, flat, i) for i in range(len(points))])
-    return Contacts(np.array(pairs_apart(robot), int).reshape(-1, 2), sides, np.cross(first, second))
+    return Contacts(np.array(separate_pairs(robot), int).reshape(-1, 2), sides, np.cross(first, second))
 
 
 def _sector(points: np.ndarray, flat: np.ndarray, corner: int) -> np.ndarray:
@@ -88,9 +88,9 @@ def nearest(
 ) -> tuple[Float[Array, "..."], Float[Array, "..."]]:
     """Find where segments a + s u and b + t v are nearest to each other."""
     # Find the nearest points of the lines, then clip them to the segments.
-    apart = b - a
+    offset = b - a
     uu, uv, vv = (jnp.sum(x * y, axis=-1) for x, y in ((u, u), (u, v), (v, v)))
-    au, av = jnp.sum(apart * u, axis=-1), jnp.sum(apart * v, axis=-1)
+    au, av = jnp.sum(offset * u, axis=-1), jnp.sum(offset * v, axis=-1)
     denominator = uu * vv - uv**2
     is_parallel = denominator <= PARALLEL * uu * vv
     s = jnp.clip(jnp.where(is_parallel, 0.0, (au * vv - av * uv) / jnp.where(is_parallel, 1.0, denominator)), 0.0, 1.0)
@@ -109,7 +109,7 @@ def cable_directions(
 def cables_cross(
     before: Float[np.ndarray, "... n_pairs 3"], after: Float[np.ndarray, "... n_pairs 3"]
 ) -> Bool[np.ndarray, "... n_pairs"]:
-    """Pairs of cables that passed through each other between two instants, (3.94)."""
+    """Pairs of cables that passed through each other between two times, (3.94)."""
     return np.einsum("...k,...k->...", before, after) <= 0.0
 
 
@@ -119,7 +119,7 @@ def platform_hit(
     before: Float[np.ndarray, "... n_cables 3"],
     after: Float[np.ndarray, "... n_cables 3"],
 ) -> Bool[np.ndarray, "... n_cables"]:
-    """Cables that passed over the platform between two instants, as in the thesis, in platform axes."""
+    """Cables that passed over the platform between two times, as in the thesis, in platform axes."""
     high, low = before @ normal, after @ normal
     through = high * low <= 0.0
     # Find the direction within the platform's plane, a combination of both directions with positive weights.

@@ -22,22 +22,22 @@ def gaps(base_points: Float[Array, "n_cables 3"], pairs: Sequence[tuple[int, int
     """The shortest vectors between cables."""
     vectors = []
     for i, j in pairs:
-        apart = [base_points[j, k] - base_points[i, k] for k in range(3)]
-        vectors.append(gap(apart, cables.rays[i], cables.rays[j]))
+        offset = [base_points[j, k] - base_points[i, k] for k in range(3)]
+        vectors.append(gap(offset, cables.rays[i], cables.rays[j]))
     return vectors
 
 
-def gap(apart: Vector, u: Vector, v: Vector) -> Vector:
+def gap(offset: Vector, u: Vector, v: Vector) -> Vector:
     """The shortest vector between two segments; `interference.between` in lanes."""
     uu, uv, vv = dot(u, u), dot(u, v), dot(v, v)
-    au, av = dot(apart, u), dot(apart, v)
+    au, av = dot(offset, u), dot(offset, v)
     denominator = uu * vv - uv * uv
     is_parallel = denominator <= PARALLEL * uu * vv
     s = (au * vv - av * uv) / jnp.where(is_parallel, 1.0, denominator)
     s = jnp.clip(jnp.where(is_parallel, 0.0, s), 0.0, 1.0)
     t = jnp.clip((s * uv - av) / vv, 0.0, 1.0)
     s = jnp.clip((au + t * uv) / uu, 0.0, 1.0)
-    return tuple(apart[k] + t * v[k] - s * u[k] for k in range(3))
+    return tuple(offset[k] + t * v[k] - s * u[k] for k in range(3))
 
 
 def residual(sides: tuple[Vector, Vector], normal: Vector, seen: Vector) -> Vector:

@@ -15,8 +15,8 @@ class Uncertainty:
     """Uncertainty of a robot: a motion must be feasible for every robot within it.
 
     Fields:
-        spool_positions: () largest distance of each spool from its place, m.
-        mass_centre: () largest distance of the mass centre from its place, platform axes, m; 0 for a point mass.
+        spool_positions: () largest distance of each spool from its position, m.
+        mass_centre: () largest distance of the mass centre from its position, platform axes, m; 0 for a point mass.
         mass_factor: () at least 1; mass and inertia lie between 1 / factor and factor times their values.
     """
 

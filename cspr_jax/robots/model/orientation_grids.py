@@ -67,9 +67,9 @@ def equal_volume_grid(divisions: int) -> OrientationGrid:
     count, step = 2 * divisions, math.pi / divisions
     cells = [1]  # numbers of cells: one around the vertical, then band by band
     cap = math.acos(1.0 - 2.0 / (4.0 * math.pi / step**2))
-    bands = max(1, round((math.pi - 2.0 * cap) / step))
-    height = (math.pi - 2.0 * cap) / bands
-    for i in range(bands):
+    rings = max(1, round((math.pi - 2.0 * cap) / step))
+    height = (math.pi - 2.0 * cap) / rings
+    for i in range(rings):
         area = math.cos(cap + i * height) - math.cos(cap + (i + 1) * height)
         cells.append(max(1, round(2.0 * math.pi * area / step**2)))
     cells.append(1)

@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from jaxtyping import Float
 
 COUNT = 6
-# Tolerance, as part of the size (the largest distance of a spool from the centroid of all): for cables of a pair to be
-# parallel, and for the mass centre to lie on the line between them; as part of this line, the distance that the mass
-# centre must keep from its ends.
+# Tolerance, as part of the largest distance of a spool from the centroid of all: for cables of a pair to be parallel,
+# and for the mass centre to lie on the line between them; as part of this line, the distance that the mass centre must
+# keep from its ends.
 SAME_LINE = 1e-6
 # Below this determinant of unit moments cables let the platform turn; and how far around the spools this is tested.
 SMALLEST_MOMENTS = 1e-6
-_PLACES = np.array([[0.3, 0.2, 1.0], [-0.5, 0.4, 0.7], [0.1, -0.7, -1.1]])
+_POSITIONS = np.array([[0.3, 0.2, 1.0], [-0.5, 0.4, 0.7], [0.1, -0.7, -1.1]])
 ALLOWED = "must be six cables in three parallel pairs, with the mass centre between the points of each pair"
 
 
@@ -39,26 +39,26 @@ class ParallelPairs:
 
     Fields:
         cables: (3, 2) numbers of the cables from 0 on; pairs are in the order of their first cables.
-        shares: (3, 2) share of each cable in the tension of its pair, which is the tension of the equivalent's cable; 1
+        fractions: (3, 2) of each cable in the tension of its pair, which is the tension of the equivalent's cable; 1
             in sum.
         exit_points: (3, 3) spools of the equivalent, in the axes of the spools, m.
     """
 
     cables: np.ndarray
-    shares: np.ndarray
+    fractions: np.ndarray
     exit_points: np.ndarray
 
     def tensions(self, of_pairs) -> Float[np.ndarray, "... 6"]:
         """Tensions of all cables."""
-        pulls = np.asarray(of_pairs, float)
-        each = np.empty((*pulls.shape[:-1], COUNT))
-        each[..., self.cables] = pulls[..., None] * self.shares
+        tensions = np.asarray(of_pairs, float)
+        each = np.empty((*tensions.shape[:-1], COUNT))
+        each[..., self.cables] = tensions[..., None] * self.fractions
         return each
 
     def bound(self, of_cables, *, is_tension: bool, is_least: bool) -> Float[np.ndarray, "3"]:
         """Limits of the pairs with which all cables keep their limits."""
         limits = np.broadcast_to(np.asarray(of_cables, float), (COUNT,))[self.cables]
-        limits = limits / self.shares if is_tension else limits
+        limits = limits / self.fractions if is_tension else limits
         return limits.max(1) if is_least else limits.min(1)
 
 
@@ -66,74 +66,75 @@ def parallel_pairs(base_points, platform_points) -> ParallelPairs:
     """The three pairs of a robot."""
     base, platform = np.asarray(base_points, float), np.asarray(platform_points, float)
     if len(base) != COUNT:
-        raise _fault(f"{len(base)} cables")
-    room = SAME_LINE * float(np.linalg.norm(base - base.mean(0), axis=1).max())
-    cables = _matched(base - platform, room)
-    shares = np.array([_shares(platform, first, second, room) for first, second in cables.tolist()])
-    exits = (shares[:, :, None] * base[cables]).sum(1)
+        raise _error(f"{len(base)} cables")
+    tolerance = SAME_LINE * float(np.linalg.norm(base - base.mean(0), axis=1).max())
+    cables = _matched(base - platform, tolerance)
+    fractions = np.array([_tension_fractions(platform, first, second, tolerance) for first, second in cables.tolist()])
+    exits = (fractions[:, :, None] * base[cables]).sum(1)
     if is_on_line(exits):
-        raise _fault("the three cables of the equivalent leave from points on one line, or from the same one")
+        raise _error("the three cables of the equivalent leave from points on one line, or from the same one")
     if is_vertical(exits):
-        raise _fault("the three cables of the equivalent leave from a vertical plane")
+        raise _error("the three cables of the equivalent leave from a vertical plane")
     _refuse_turning(exits, platform[cables[:, 1]] - platform[cables[:, 0]])
-    return ParallelPairs(cables, shares, exits)
+    return ParallelPairs(cables, fractions, exits)
 
 
-def _fault(words: str) -> InputError:
+def _error(words: str) -> InputError:
     return InputError("platform_points", None, ALLOWED, fault=words)
 
 
-def _matched(offsets: np.ndarray, room: float) -> np.ndarray:
-    # Cables of a pair have the same offset A - B. Of the fifteen ways to match six cables, take the one that fits best.
-    apart = np.linalg.norm(offsets[:, None] - offsets, axis=2)
-    misses = {way: max(apart[pair] for pair in way) for way in _ways(tuple(range(COUNT)))}
-    way = min(misses, key=lambda known: misses[known])
-    if not misses[way] <= room:
-        first, second = max(way, key=lambda pair: apart[pair])
-        raise _fault(
+def _matched(offsets: np.ndarray, tolerance: float) -> np.ndarray:
+    # Cables of a pair have the same offset A - B. Of the fifteen matchings of six cables, take the one that fits best.
+    distances = np.linalg.norm(offsets[:, None] - offsets, axis=2)
+    misses = {matching: max(distances[pair] for pair in matching) for matching in _matchings(tuple(range(COUNT)))}
+    best = min(misses, key=lambda matching: misses[matching])
+    if not misses[best] <= tolerance:
+        first, second = max(best, key=lambda pair: distances[pair])
+        raise _error(
             f"cables {first + 1} and {second + 1} are not parallel: base_points[{first}] - base_points[{second}] and "
-            f"platform_points[{first}] - platform_points[{second}] differ by {misses[way]:.3g} m (at most {room:.2g} m)"
+            f"platform_points[{first}] - platform_points[{second}] differ by {misses[best]:.3g} m "
+            f"(at most {tolerance:.2g} m)"
         )
-    return np.array(way)
+    return np.array(best)
 
 
-def _ways(left: tuple[int, ...]) -> list[tuple[tuple[int, int], ...]]:
+def _matchings(left: tuple[int, ...]) -> list[tuple[tuple[int, int], ...]]:
     if not left:
         return [()]
     first, *others = left
     return [
         ((first, other), *rest)
         for other in others
-        for rest in _ways(tuple(cable for cable in others if cable != other))
+        for rest in _matchings(tuple(cable for cable in others if cable != other))
     ]
 
 
-def _shares(platform: np.ndarray, first: int, second: int, room: float) -> tuple[float, float]:
-    # Return the shares with which the moments of both cables about the mass centre are in balance.
+def _tension_fractions(platform: np.ndarray, first: int, second: int, tolerance: float) -> tuple[float, float]:
+    # Return the fractions with which the moments of both cables about the mass centre are in balance.
     along = platform[second] - platform[first]
     square = float(along @ along)
-    if not np.sqrt(square) > room:
-        raise _fault(f"cables {first + 1} and {second + 1} are attached at the same point")
-    place = float(-platform[first] @ along) / square
-    beside = float(np.linalg.norm(platform[first] + place * along))
+    if not np.sqrt(square) > tolerance:
+        raise _error(f"cables {first + 1} and {second + 1} are attached at the same point")
+    fraction = float(-platform[first] @ along) / square
+    beside = float(np.linalg.norm(platform[first] + fraction * along))
     names = f"platform_points[{first}] and platform_points[{second}]"
-    if not beside <= room:
-        raise _fault(f"the mass centre lies {beside:.3g} m beside the line of {names} (at most {room:.2g} m)")
-    if not SAME_LINE < place < 1.0 - SAME_LINE:
-        raise _fault(
-            f"the mass centre does not lie between {names}: it is {place:.3g} of the way from one to the other"
+    if not beside <= tolerance:
+        raise _error(f"the mass centre lies {beside:.3g} m beside the line of {names} (at most {tolerance:.2g} m)")
+    if not SAME_LINE < fraction < 1.0 - SAME_LINE:
+        raise _error(
+            f"the mass centre does not lie between {names}: it is {fraction:.3g} of the way from one to the other"
         )
-    return 1.0 - place, place
+    return 1.0 - fraction, fraction
 
 
 def _refuse_turning(exits: np.ndarray, along: np.ndarray) -> None:
     # The moment of a pair is `along` x cable. If the lines of the spools meet in one point O, all moments are normal to
     # the line from O to the platform, wherever it is, so that it can turn about this line; otherwise, as a rule, they
     # are not.
-    size = np.linalg.norm(exits - exits.mean(0), axis=1).max()
-    for place in exits.mean(0) + size * _PLACES:
-        cables = place - exits
-        units = [rows / np.linalg.norm(rows, axis=1, keepdims=True) for rows in (along, cables)]
+    radius = np.linalg.norm(exits - exits.mean(0), axis=1).max()
+    for position in exits.mean(0) + radius * _POSITIONS:
+        cables = position - exits
+        units = [vectors / np.linalg.norm(vectors, axis=1, keepdims=True) for vectors in (along, cables)]
         if abs(np.linalg.det(np.cross(*units))) > SMALLEST_MOMENTS:
             return
-    raise _fault("the pairs let the platform turn, as where the lines between their spools are parallel or meet")
+    raise _error("the pairs let the platform turn, as where the lines between their spools are parallel or meet")

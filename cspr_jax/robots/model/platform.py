@@ -24,11 +24,11 @@ from cspr_jax.robots.model.patterns import PATTERNS
 from cspr_jax.robots.model.point_mass import (
     STANDARD_GRAVITY,
     Axis,
+    cable_units,
     check_axis,
     check_numbers,
     checked_coordinates,
     checked_points,
-    pulls,
 )
 from cspr_jax.robots.model.pulleys import Pulleys
 from cspr_jax.robots.model.state import State
@@ -89,7 +89,7 @@ class PlatformRobot:
     def wrench_matrix(self, state: State) -> Array:
         """Wrenches of unit tensions; see `Robot.wrench_matrix`."""
         arms = self.platform_points @ state.rotation.T
-        forces = pulls(self, state.position[None] + arms)
+        forces = cable_units(self, state.position[None] + arms)
         return self._balanced(state.rotation, forces.T, jnp.cross(arms, forces).T)
 
     def inertial_wrench(self, state: State) -> Array:
@@ -158,7 +158,7 @@ def platform_robot(  # noqa: PLR0913
     """
     row = PATTERNS.get(pattern)
     if row is None or not row.is_body:
-        bodies = " or ".join(f'"{name}"' for name, known in PATTERNS.items() if known.is_body)
+        bodies = " or ".join(f'"{name}"' for name, row in PATTERNS.items() if row.is_body)
         raise InputError("pattern", pattern, bodies)
     base = (checked_coordinates if row.is_planar else checked_points)("base_points", base_points, row.dof)
     platform = checked_platform(platform_points, len(base), row)
@@ -215,7 +215,7 @@ def wrench_per_mass(robot: PlatformRobot, state: State) -> Float[Array, "6"]:
     return jnp.concatenate([state.acceleration.at[2].add(-robot.gravity), moment])
 
 
-def pairs_apart(robot: PlatformRobot) -> tuple[tuple[int, int], ...]:
+def separate_pairs(robot: PlatformRobot) -> tuple[tuple[int, int], ...]:
     """Pairs of cables that can meet: those that share neither spool nor platform point."""
     base, platform = np.asarray(robot.base_points), np.asarray(robot.platform_points)
     return tuple(

@@ -33,7 +33,7 @@ STANDARD_GRAVITY = 9.81
 # Degrees of freedom of a point mass in space, in the plane y = 0, and on a vertical guide.
 SPATIAL, PLANAR, GUIDED = 3, 2, 1
 LARGEST_LENGTH = 1e6  # m; beyond, products of lengths lose their meaning
-# Spools nearer to a plane than this, over the size of the robot, lie in it.
+# Spools nearer to a plane than this, over their spread, lie in it.
 IN_PLANE = 1e-9
 # Two spools count as level if their heights differ by less than this part of their distance.
 LEVEL = 1e-9
@@ -80,7 +80,7 @@ class PointMassRobot:
 
     def wrench_matrix(self, state: State) -> Array:
         """Wrenches of unit tensions; see `Robot.wrench_matrix`."""
-        return pulls(self, state.position[None]).T[self._directions]
+        return cable_units(self, state.position[None]).T[self._directions]
 
     def inertial_wrench(self, state: State) -> Array:
         """Wrench that the cables must supply; see `Robot.inertial_wrench`."""
@@ -159,32 +159,32 @@ def _check_planar(points: np.ndarray) -> None:
         raise InputError("base_points", points.tolist(), "two spools on a level line")
 
 
-def checked_points(key: str, points, least: int) -> Float[np.ndarray, "n 3"]:
+def checked_points(key: str, points, count: int) -> Float[np.ndarray, "n 3"]:
     """Points of a robot's geometry."""
-    points = checked_coordinates(key, points, least)
-    if least > PLANAR and is_on_line(points):
+    points = checked_coordinates(key, points, count)
+    if count > PLANAR and is_on_line(points):
         raise InputError(key, points.tolist(), "points that are not on one line, or coincident")
     return points
 
 
-def checked_coordinates(key: str, coordinates, least: int) -> Float[np.ndarray, "n 3"]:
+def checked_coordinates(key: str, coordinates, count: int) -> Float[np.ndarray, "n 3"]:
     """Points, wherever they lie."""
     if isinstance(coordinates, jax.core.Tracer):
         raise InputError(key, "a traced array", "numbers; to differentiate, dataclasses.replace(robot, ...) takes both")
     points = np.asarray(coordinates, float)
     if points.ndim != 2 or points.shape[1] != 3 or not (np.abs(points) <= LARGEST_LENGTH).all():
-        raise InputError(key, coordinates, f"{least} points or more of three coordinates, at most 1e6 m")
-    if len(points) < least:
-        raise InputError(key, coordinates, f"must be {least} or more, one a cable", fault=f"{len(points)} points")
+        raise InputError(key, coordinates, f"{count} points or more of three coordinates, at most 1e6 m")
+    if len(points) < count:
+        raise InputError(key, coordinates, f"must be {count} or more, one a cable", fault=f"{len(points)} points")
     return points
 
 
-def pulls(robot: Robot, targets: Array) -> Float[Array, "n_cables 3"]:
+def cable_units(robot: Robot, targets: Array) -> Float[Array, "n_cables 3"]:
     """Unit vectors of the cables, from the effector on; with pulleys those of the free cables."""
     if robot.pulleys is not None:
         targets = jnp.broadcast_to(targets, robot.base_points.shape)
-        way = exits(robot.base_points, robot.pulleys.axes, robot.pulleys.radius, targets)
-        return -jnp.asarray(way.direction)
+        leaving = exits(robot.base_points, robot.pulleys.axes, robot.pulleys.radius, targets)
+        return -jnp.asarray(leaving.direction)
     rays = robot.base_points - targets
     return rays / jnp.linalg.norm(rays, axis=1, keepdims=True)
 
@@ -221,7 +221,7 @@ def rest_point(z0):
 
 @jax.jit
 def spool_radius(robot: Robot) -> Float[Array, ""]:
-    """Largest distance of a spool from the centroid of all: the size of a robot."""
+    """Largest distance of a spool from the centroid of all."""
     return jnp.max(jnp.linalg.norm(robot.base_points, axis=1))
 
 
@@ -230,8 +230,8 @@ def in_one_plane(robot: PointMassRobot) -> bool:
     if robot.n_cables <= robot.dof:
         return True
     points = np.asarray(robot.base_points)
-    sizes = spread(points[:, [0, 2]] if robot.dof == PLANAR else points)
-    return bool(sizes[robot.dof - 1] <= IN_PLANE * sizes[0])
+    spreads = spread(points[:, [0, 2]] if robot.dof == PLANAR else points)
+    return bool(spreads[robot.dof - 1] <= IN_PLANE * spreads[0])
 
 
 @jax.jit
@@ -250,7 +250,7 @@ def plane_normal(robot: Robot) -> Float[Array, "3"]:
     if robot.n_cables > SPATIAL:
         x, y, z = a.T
         xx, xy, yy, xz, yz = jnp.dot(x, x), jnp.dot(x, y), jnp.dot(y, y), jnp.dot(x, z), jnp.dot(y, z)
-        slope = jnp.stack([xz * yy - yz * xy, yz * xx - xz * xy]) / (xx * yy - xy**2)
-        return jnp.stack([-slope[0], -slope[1], jnp.ones_like(xx)])
+        gradient = jnp.stack([xz * yy - yz * xy, yz * xx - xz * xy]) / (xx * yy - xy**2)
+        return jnp.stack([-gradient[0], -gradient[1], jnp.ones_like(xx)])
     area = jnp.cross(a[0], a[1]) + jnp.cross(a[1], a[2]) + jnp.cross(a[2], a[0])
     return area / area[2]

@@ -59,8 +59,8 @@ class Exit(NamedTuple):
 
 def pulleys_of(radius, axes, n_cables: int, z_axis: str) -> Pulleys:
     """Pulleys of a robot, checked."""
-    sizes = np.asarray(radius, float)
-    if sizes.shape not in ((), (n_cables,)) or not ((sizes >= 0.0) & (sizes <= LARGEST_RADIUS)).all():
+    radii = np.asarray(radius, float)
+    if radii.shape not in ((), (n_cables,)) or not ((radii >= 0.0) & (radii <= LARGEST_RADIUS)).all():
         raise InputError("pulley_radius", radius, f"a number >= 0, in m, or {n_cables}: one a cable")
     up = [0.0, 0.0, 1.0 if z_axis == "up" else -1.0]
     directions = np.asarray(up if axes is None else axes, float)
@@ -71,7 +71,7 @@ def pulleys_of(radius, axes, n_cables: int, z_axis: str) -> Pulleys:
         raise InputError("pulley_axes", directions.tolist(), "vectors that are not zero")
     directions = directions / largest
     units = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
-    return Pulleys(as_float64(np.broadcast_to(sizes, (n_cables,))), as_float64(np.broadcast_to(units, (n_cables, 3))))
+    return Pulleys(as_float64(np.broadcast_to(radii, (n_cables,))), as_float64(np.broadcast_to(units, (n_cables, 3))))
 
 
 def exits(

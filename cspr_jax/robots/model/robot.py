@@ -80,8 +80,8 @@ MOVED = ("2T", "3T", "3R3T")  # patterns of trajectories and searches; workspace
 def check_moved(robot: Robot, *, pulleys: bool = False) -> None:
     """Refuse a robot that no trajectory and no search moves."""
     if robot.pattern not in MOVED:
-        known = " or ".join(f'"{name}"' for name in MOVED)
-        raise InputError("pattern", robot.pattern, f"{known} (what is asked for does not exist yet for others)")
+        allowed = " or ".join(f'"{name}"' for name in MOVED)
+        raise InputError("pattern", robot.pattern, f"{allowed} (what is asked for does not exist yet for others)")
     if robot.pulleys is not None and not pulleys:
         raise InputError(
             "pulley_radius", None, "must be absent (what is asked for does not exist yet for them)", fault="pulleys"

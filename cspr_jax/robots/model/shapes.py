@@ -107,11 +107,11 @@ def cylinder(start, end, radius: float, *, name: str = "cylinder") -> Cylinder:
     return Cylinder(_point("start", start), _point("end", end), _radius(radius), name)
 
 
-def box(centre, size, quaternion=IDENTITY, *, name: str = "box") -> Box:
+def box(centre, edges, quaternion=IDENTITY, *, name: str = "box") -> Box:
     """A box, its numbers checked."""
-    lengths, components = _point("size", size), np.asarray(quaternion, float)
+    lengths, components = _point("size", edges), np.asarray(quaternion, float)
     if not (lengths >= 0.0).all():
-        raise InputError("size", size, "three lengths, none negative")
+        raise InputError("size", edges, "three lengths, none negative")
     if components.shape != (4,) or not abs(np.linalg.norm(components) - 1.0) <= UNIT_NORM:
         raise InputError("quaternion", quaternion, "four numbers of a unit quaternion, scalar first")
     rotation = rotation_matrix(components / np.linalg.norm(components))

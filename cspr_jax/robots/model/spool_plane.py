@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 # Below this ratio points count as lying on a line, or their plane as vertical.
 SMALLEST_AREA_RATIO = 1e-6
 SMALLEST_LEVEL_RATIO = 1e-3
-# Points nearer to P0 than this part of the size of a robot count as being at P0; points as near to a line through P0,
-# as being on it.
+# Points nearer to P0 than this part of the radius of the spools count as being at P0; points as near to a line through
+# P0, as being on it.
 AT_P0 = 1e-9
 
 
@@ -23,9 +23,9 @@ def spread(points: Float[np.ndarray, "n m"]) -> np.ndarray:
 
 
 def is_on_line(points: Float[np.ndarray, "n m"]) -> bool:
-    """Tell whether points lie on one line, or at one place."""
-    sizes = spread(points)
-    return not sizes[1] > SMALLEST_AREA_RATIO * sizes[0]
+    """Tell whether points lie on one line, or coincide."""
+    spreads = spread(points)
+    return not spreads[1] > SMALLEST_AREA_RATIO * spreads[0]
 
 
 def is_vertical(points: Float[np.ndarray, "n 3"]) -> bool:
@@ -35,8 +35,8 @@ def is_vertical(points: Float[np.ndarray, "n 3"]) -> bool:
     return not level[0] * level[1] > SMALLEST_LEVEL_RATIO * spreads[0] * spreads[1]
 
 
-def size(base_points: Float[np.ndarray, "n 3"]) -> float:
-    """Size of a robot."""
+def largest_radius(base_points: Float[np.ndarray, "n 3"]) -> float:
+    """Largest distance of a spool from the centroid of all."""
     return float(np.linalg.norm(base_points - base_points.mean(0), axis=1).max())
 
 
@@ -47,6 +47,6 @@ def in_plane(
     spools = np.concatenate([base_points, base_points + np.array([0.0, 1.0, 0.0])]) if planar else base_points
     if len(spools) < 3 or is_on_line(spools) or is_vertical(spools):
         return np.zeros(len(points), bool)
-    _, sizes, axes = np.linalg.svd(spools - spools.mean(0))
-    near = AT_P0 * size(base_points)
-    return (np.abs((points - spools.mean(0)) @ axes[2]) <= near) & bool(sizes[2] <= near)
+    _, spreads, axes = np.linalg.svd(spools - spools.mean(0))
+    near = AT_P0 * largest_radius(base_points)
+    return (np.abs((points - spools.mean(0)) @ axes[2]) <= near) & bool(spreads[2] <= near)

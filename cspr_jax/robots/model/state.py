@@ -1,4 +1,4 @@
-"""State of an effector at one instant: position, orientation and their derivatives."""
+"""State of an effector at one time: position, orientation and their derivatives."""
 
 from typing import NamedTuple
 
@@ -6,7 +6,7 @@ from jax import Array
 
 
 class State(NamedTuple):
-    """Position, orientation and their derivatives in time at one instant; a point mass has no orientation.
+    """Position, orientation and their time derivatives; a point mass has no orientation.
 
     Fields:
         position: (3,) of the mass centre, m.

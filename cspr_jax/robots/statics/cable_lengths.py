@@ -33,8 +33,8 @@ def moved_lengths(
         lengths = jnp.linalg.norm(rays, axis=1)
         rates = jnp.sum(rays * velocities, axis=1) / lengths
         return lengths, rates, (squares + jnp.sum(rays * accelerations, axis=1) - rates**2) / lengths
-    way = exits(robot.base_points, pulleys.axes, pulleys.radius, rays + robot.base_points)
-    along = jnp.asarray(way.direction)
+    leaving = exits(robot.base_points, pulleys.axes, pulleys.radius, rays + robot.base_points)
+    along = jnp.asarray(leaving.direction)
     rates = jnp.sum(along * velocities, axis=1)
     across = jnp.cross(pulleys.axes, rays)
     wide = jnp.sum(across**2, axis=1)
@@ -42,7 +42,7 @@ def moved_lengths(
     swivel = jnp.sum(across * velocities, axis=1) ** 2 / wide**1.5
     slower = pulleys.radius * (1.0 - jnp.sum(along * pulleys.axes, axis=1)) * swivel
     return (
-        way.wrapped + way.free,
+        leaving.wrapped + leaving.free,
         rates,
-        jnp.sum(along * accelerations, axis=1) + (squares - rates**2 - slower) / way.free,
+        jnp.sum(along * accelerations, axis=1) + (squares - rates**2 - slower) / leaving.free,
     )

@@ -1,4 +1,4 @@
-"""The force balance of a point mass on three cables, or on two in a plane, at one instant."""
+"""The force balance of a point mass on three cables, or on two in a plane, in one state."""
 
 from __future__ import annotations
 

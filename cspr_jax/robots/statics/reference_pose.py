@@ -1,4 +1,4 @@
-"""The reference orientation of a platform, and whether it hangs still there, thesis sections 3.4.3 and 3.9.
+"""The reference orientation of a platform, and whether it is at rest there, thesis sections 3.4.3 and 3.9.
 
 The plane of the attachment points is level, and the platform is turned about the vertical so that the sum of the
 squares of the level components of the cables is the smallest. The thesis adds up the level components of unit vectors
@@ -63,7 +63,7 @@ class Reference(NamedTuple):
 def aligned(robot: PlatformRobot) -> tuple[PlatformRobot, Float[np.ndarray, "3 3"]]:
     """A robot whose platform axes are parallel to the fixed ones in the reference orientation.
 
-    On more cables than degrees of freedom a platform hangs still in many orientations. Its reference orientation is
+    On more cables than degrees of freedom a platform is at rest in many orientations. Its reference orientation is
     then the one in which its axes are parallel to those of the robot file, and so is that of a platform that does not
     turn about all axes.
     """
@@ -88,18 +88,18 @@ def reference_pose(robot: PlatformRobot, z0: float) -> Reference:
     rotated, rotation = aligned(robot)
     center = rest_point(np.asarray(z0, float))
     with double_precision():
-        size, still = (np.asarray(x) for x in _standing(rotated, center))
-    place = f"the reference pose (platform level and at rest, z0 = {z0:g} m)"
-    if not wrench_balance.is_regular(abs(size)):
-        error = f"{place} is singular (determinant {size:.1g}, at least {wrench_balance.SINGULAR:g} counts): "
+        determinant, tensions = (np.asarray(x) for x in _standing(rotated, center))
+    pose = f"the reference pose (platform level and at rest, z0 = {z0:g} m)"
+    if not wrench_balance.is_regular(abs(determinant)):
+        error = f"{pose} is singular (determinant {determinant:.1g}, at least {wrench_balance.SINGULAR:g} counts): "
         raise InputError("platform_points", None, _CHANGE_LINES, fault=error + _free(rotated, center))
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):  # all tensions may be zero, or not finite
-        fraction = still / np.abs(still).mean()
+        fraction = tensions / np.abs(tensions).mean()
     if not (np.isfinite(fraction) & (fraction > SMALLEST_TENSION)).all():
         slack = int(np.argmin(np.where(np.isfinite(fraction), fraction, -np.inf)))
-        error = f"in {place} cable {slack + 1} is slack: it would need {fraction[slack]:.3g} of the mean tension"
+        error = f"in {pose} cable {slack + 1} is slack: it would need {fraction[slack]:.3g} of the mean tension"
         raise InputError("platform_points", None, _CHANGE_LOAD, fault=error)
-    return Reference(rotated, rotation, float(size), fraction)
+    return Reference(rotated, rotation, float(determinant), fraction)
 
 
 def _free(robot: PlatformRobot, center: np.ndarray) -> str:
@@ -107,13 +107,13 @@ def _free(robot: PlatformRobot, center: np.ndarray) -> str:
     points = np.asarray(robot.platform_points)
     cables = np.asarray(robot.base_points) - center - points
     along = cables / np.linalg.norm(cables, axis=1, keepdims=True)
-    size = np.linalg.norm(points, axis=1).max()
-    still = np.linalg.svd(np.hstack([along, np.cross(points, along) / size]))[2][-1]
+    radius = np.linalg.norm(points, axis=1).max()
+    motion = np.linalg.svd(np.hstack([along, np.cross(points, along) / radius]))[2][-1]
     parts = {
-        "be pushed sideways": np.linalg.norm(still[:2]),
-        "be lifted": abs(still[2]),
-        "turn about a level axis": np.linalg.norm(still[3:5]),
-        "turn about the vertical": abs(still[5]),
+        "be pushed sideways": np.linalg.norm(motion[:2]),
+        "be lifted": abs(motion[2]),
+        "turn about a level axis": np.linalg.norm(motion[3:5]),
+        "turn about the vertical": abs(motion[5]),
     }
     return f"the platform can {max(parts, key=lambda name: parts[name])} while no cable changes its length"
 

@@ -1,4 +1,4 @@
-"""Sensitivity of an effector to errors of its cable lengths, Machines 11 (2), 2023, 224, (7), at one place.
+"""Sensitivity of an effector to errors of its cable lengths, Machines 11 (2), 2023, 224, (7), at one position.
 
 Let K be the matrix from velocity and angular velocity to the rates of the cable lengths, one row (e, b x e) a cable; a
 small error d rho of the lengths then moves the effector by K^-1 d rho. The largest displacement for errors up to one
@@ -57,14 +57,14 @@ def sensitivities(
 
 
 def pair_sensitivities(
-    exit_points: Float[Array, "3 3"], along: Float[Array, "3 3"], size: Float[Array, ""], position: Float[Array, "3"]
+    exit_points: Float[Array, "3 3"], along: Float[Array, "3 3"], radius: Float[Array, ""], position: Float[Array, "3"]
 ) -> Sensitivities:
     """Sensitivities of a platform on three parallel pairs of cables in closed form, as (A1) and (A2)."""
     cables = position[None] - exit_points
     units = cables / jnp.linalg.norm(cables, axis=1, keepdims=True)
     translation, first = solved(units, jnp.eye(_TRANSLATIONS))
     rotation, second = solved(jnp.cross(along, units), jnp.eye(_TRANSLATIONS))
-    return _of_inverse(translation, 2.0 * rotation, first * second / size**3)
+    return _of_inverse(translation, 2.0 * rotation, first * second / radius**3)
 
 
 def _of_inverse(translations: Array, rotations: Array, determinant: Array) -> Sensitivities:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from jaxtyping import Float, Int
 
 LARGEST_FOLD = 6
-# Points nearer to each other than this part of the robot's size are the same.
+# Points nearer to each other than this part of the robot's largest coordinate are the same.
 SAME = 1e-9
 ANGLE_ERROR = 1e-9
 KEY_DIGITS = 9
@@ -58,18 +58,20 @@ def folded(symmetry: Symmetries, azimuths: Float[np.ndarray, "n"]) -> Float[np.n
 
 
 def alike(
-    symmetry: Symmetries, places: Float[np.ndarray, "n m"], angles: Float[np.ndarray, "n 3"]
+    symmetry: Symmetries, positions: Float[np.ndarray, "n m"], angles: Float[np.ndarray, "n 3"]
 ) -> Int[np.ndarray, "n"]:
-    """Orientations that represent others: at a place on a mirror plane, the plane joins orientations in pairs."""
-    azimuths, stands = np.arctan2(places[:, 1], places[:, 0]), np.arange(len(places))
+    """Orientations that represent others: at a position on a mirror plane, the plane joins orientations in pairs."""
+    azimuths, stands = np.arctan2(positions[:, 1], positions[:, 0]), np.arange(len(positions))
     mirrored = np.flatnonzero((np.abs(np.sin(azimuths[:, None] - np.asarray(symmetry.mirrors))) < ANGLE_ERROR).any(1))
     if not len(mirrored):
         return stands
     # The axis of the tilt is no vector: phi becomes pi - phi, and sigma -sigma.
     both = np.concatenate([angles[mirrored], np.array([math.pi, 0.0, 0.0]) + angles[mirrored] * [-1.0, 1.0, -1.0]])
     units = [f(both[:, i]) for i in (0, 2) for f in (np.cos, np.sin)]
-    keys = np.round(np.stack([*units, both[:, 1], *np.tile(places[mirrored], (2, 1)).T], axis=1), KEY_DIGITS) + 0.0
-    same = np.unique(keys, axis=0, return_inverse=True)[1].reshape(2, -1).min(0)
+    rounded = (
+        np.round(np.stack([*units, both[:, 1], *np.tile(positions[mirrored], (2, 1)).T], axis=1), KEY_DIGITS) + 0.0
+    )
+    same = np.unique(rounded, axis=0, return_inverse=True)[1].reshape(2, -1).min(0)
     _, first, group = np.unique(same, return_index=True, return_inverse=True)
     stands[mirrored] = mirrored[first[group]]
     return stands
@@ -84,8 +86,8 @@ def _maps(robot: PlatformRobot, change: np.ndarray) -> bool:
     base, points = np.asarray(robot.base_points), np.asarray(robot.platform_points)
     cables = np.concatenate([base, points], axis=1)
     other = np.concatenate([base @ change.T, points @ change.T], axis=1)
-    size = np.abs(cables).max()
-    apart = np.linalg.norm(cables[:, None] - other[None, :], axis=2)
+    largest = np.abs(cables).max()
+    distances = np.linalg.norm(cables[:, None] - other[None, :], axis=2)
     inertia = np.asarray(robot.inertia)
     moved = change @ inertia @ change.T - inertia
-    return bool((apart.min(0) <= SAME * size).all() and np.abs(moved).max() <= SAME * np.abs(inertia).max())
+    return bool((distances.min(0) <= SAME * largest).all() and np.abs(moved).max() <= SAME * np.abs(inertia).max())

@@ -1,4 +1,4 @@
-"""The wrench balance of a rigid platform on cables, thesis (3.1) to (3.11), at one instant: the readable form."""
+"""The wrench balance of a rigid platform on cables, thesis (3.1) to (3.11), in one state: the readable form."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from jax import Array
 
 from cspr_jax.numerics.elementary import solved
 from cspr_jax.robots.model.platform import PlatformRobot, rays, wrench_per_mass
-from cspr_jax.robots.model.point_mass import plane_normal, pulls, rest_point
+from cspr_jax.robots.model.point_mass import cable_units, plane_normal, rest_point
 from cspr_jax.robots.model.robot import check_determined
 from cspr_jax.robots.model.state import State
 from cspr_jax.robots.statics.cable_lengths import moved_lengths
@@ -22,9 +22,9 @@ SINGULAR = 1e-6
 
 
 def at_rest(position: Float[Array, "3"], rotation: Float[Array, "3 3"]) -> State:
-    """State of a platform that stands still."""
-    still = jnp.zeros_like(position)
-    return State(position, still, still, rotation, still, still)
+    """State of a platform at rest."""
+    zero = jnp.zeros_like(position)
+    return State(position, zero, zero, rotation, zero, zero)
 
 
 def jacobian(
@@ -38,15 +38,15 @@ def jacobian(
 def normalised_determinant(
     robot: PlatformRobot, position: Float[Array, "3"], rotation: Float[Array, "3 3"]
 ) -> Float[Array, ""]:
-    """Determinant of J with cables of length 1 and the platform's size as the unit of length.
+    """Determinant of J with cables of length 1 and the platform's radius as the unit of length.
 
     It is zero where the cables cannot carry every wrench, (3.5); its sign is that of det J.
     """
     check_determined(robot, pulleys=True)
     arms = robot.platform_points @ rotation.T
-    units = -pulls(robot, position[None] + arms)
-    size = jnp.sqrt(jnp.mean(jnp.sum(robot.platform_points**2, axis=1)))
-    return solved(jnp.concatenate([units, jnp.cross(arms / size, units)], axis=1), jnp.zeros((robot.n_cables, 0)))[1]
+    units = -cable_units(robot, position[None] + arms)
+    radius = jnp.sqrt(jnp.mean(jnp.sum(robot.platform_points**2, axis=1)))
+    return solved(jnp.concatenate([units, jnp.cross(arms / radius, units)], axis=1), jnp.zeros((robot.n_cables, 0)))[1]
 
 
 def is_regular(determinant):
@@ -54,7 +54,7 @@ def is_regular(determinant):
     return determinant > SINGULAR
 
 
-def determinant_share(
+def determinant_ratio(
     robot: PlatformRobot, position: Float[Array, "3"], rotation: Float[Array, "3 3"]
 ) -> Float[Array, ""]:
     """Normalised determinant over its value in the reference orientation at the same depth in the middle."""
@@ -82,5 +82,5 @@ def cable_motion(
     arms = robot.platform_points @ state.rotation.T
     swing = jnp.cross(state.angular_velocity, arms)
     inward = jnp.cross(state.angular_velocity, swing)
-    pull = state.acceleration[None] + jnp.cross(state.angular_acceleration, arms) + inward
-    return moved_lengths(robot, state.position[None] + arms, state.velocity[None] + swing, pull)
+    acceleration = state.acceleration[None] + jnp.cross(state.angular_acceleration, arms) + inward
+    return moved_lengths(robot, state.position[None] + arms, state.velocity[None] + swing, acceleration)

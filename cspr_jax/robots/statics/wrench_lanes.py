@@ -75,10 +75,10 @@ def inertial_wrench(
 
 def balance(cables: CableLanes, force: Vector, moment: Vector) -> Balance:
     """The tensions that give a wrench, (3.11)."""
-    pulls = [tuple(-x for x in ray) for ray in cables.rays]
-    moments = [cross(arm, pull) for arm, pull in zip(cables.arms, pulls, strict=True)]
+    forces = [tuple(-x for x in ray) for ray in cables.rays]
+    moments = [cross(arm, unit) for arm, unit in zip(cables.arms, forces, strict=True)]
     first, second = range(0, CABLES, 2), range(1, CABLES, 2)
-    a, b = [pulls[k] for k in first], [pulls[k] for k in second]
+    a, b = [forces[k] for k in first], [forces[k] for k in second]
     adjugate = (cross(a[1], a[2]), cross(a[2], a[0]), cross(a[0], a[1]))
     d = dot(a[0], adjugate[0])
     g = [[dot(row, column) for column in b] for row in adjugate]  # adj(A) B
@@ -113,23 +113,25 @@ def determinant(cables: CableLanes) -> Float[Array, "..."]:
 
 
 def normalised_determinant(robot: PlatformRobot, cables: CableLanes) -> Float[Array, "..."]:
-    """Determinant of J with unit cables, the platform's size as unit; see `wrench_balance.normalised_determinant`."""
+    """Determinant of J with unit cables, the platform's radius as unit; see `wrench_balance.normalised_determinant`."""
     lengths = [jnp.sqrt(dot(ray, ray)) for ray in cables.rays]
-    size = jnp.sqrt(jnp.mean(jnp.sum(robot.platform_points**2, axis=1)))
-    return determinant(cables) / (size**3 * math.prod(lengths[1:], start=lengths[0]))
+    radius = jnp.sqrt(jnp.mean(jnp.sum(robot.platform_points**2, axis=1)))
+    return determinant(cables) / (radius**3 * math.prod(lengths[1:], start=lengths[0]))
 
 
 def cable_rates(
     cables: CableLanes, velocity: Vector, acceleration: Vector, omega: Vector, angular_acceleration: Vector
 ) -> list[list[Array]]:
     """Lengths of the cables and their first two derivatives, (3.2) and (3.3)."""
-    rows = []
+    entries = []
     for arm, ray in zip(cables.arms, cables.rays, strict=True):
         swing = cross(omega, arm)
-        pace = combined([(jnp.ones(()), velocity), (jnp.ones(()), swing)])
+        point_velocity = combined([(jnp.ones(()), velocity), (jnp.ones(()), swing)])
         across, inward = cross(angular_acceleration, arm), cross(omega, swing)
-        pull = tuple(acceleration[i] + across[i] + inward[i] for i in range(3))
+        point_acceleration = tuple(acceleration[i] + across[i] + inward[i] for i in range(3))
         length = jnp.sqrt(dot(ray, ray))
-        rate = dot(ray, pace) / length
-        rows.append((length, rate, (dot(pace, pace) + dot(ray, pull) - rate * rate) / length))
-    return [list(column) for column in zip(*rows, strict=True)]
+        rate = dot(ray, point_velocity) / length
+        entries.append(
+            (length, rate, (dot(point_velocity, point_velocity) + dot(ray, point_acceleration) - rate * rate) / length)
+        )
+    return [list(column) for column in zip(*entries, strict=True)]

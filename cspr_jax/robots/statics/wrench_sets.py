@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 # Columns are unit vectors: d - 1 columns with a volume below this span no face; a column nearer to a plane lies in it.
 FLAT = 1e-12
-# Rounding of a slack, over the size of the numbers of which it is the difference; to be divided by the volume of the
-# face's columns.
+# Rounding of a slack, over the magnitude of the numbers of which it is the difference; to be divided by the volume of
+# the face's columns.
 SLACK_ERROR = 1e-14
 
 
@@ -72,9 +72,9 @@ class Faces:
 
     def rounding(self, values: Float[Array, "... n_components"]) -> Float[Array, "..."]:
         """Bound of the rounding error of the smallest slack."""
-        size = jnp.linalg.norm(values, axis=-1)[..., None]
+        magnitude = jnp.linalg.norm(values, axis=-1)[..., None]
         offsets = jnp.abs(jnp.where(jnp.isfinite(self.offsets), self.offsets, 0.0))
-        each = SLACK_ERROR * (size + offsets + jnp.linalg.norm(self.apex, axis=-1)[..., None])
+        each = SLACK_ERROR * (magnitude + offsets + jnp.linalg.norm(self.apex, axis=-1)[..., None])
         finite = jnp.isfinite(self.offsets) & (self.volumes > FLAT)
         smallest = jnp.min(jnp.where(finite, self.slacks(values), jnp.inf), axis=-1, keepdims=True)
         # A face counts if it may be the nearest one.
@@ -84,22 +84,22 @@ class Faces:
 
 
 @functools.cache
-def _subsets(count: int, size: int) -> np.ndarray:
-    return np.array(list(itertools.combinations(range(count), size)), int).reshape(math.comb(count, size), size)
+def _subsets(count: int, n: int) -> np.ndarray:
+    return np.array(list(itertools.combinations(range(count), n)), int).reshape(math.comb(count, n), n)
 
 
 @functools.cache
-def _level(rows: int, columns: int, size: int) -> tuple[np.ndarray, ...]:
-    # Return how products of `size` columns follow from products of one column less: the parent and the last column of
+def _level(rows: int, columns: int, n: int) -> tuple[np.ndarray, ...]:
+    # Return how products of `n` columns follow from products of one column less: the parent and the last column of
     # each choice of columns; for each choice of rows the row of the last column, the other rows, and the sign,
-    # (n_choices, size) each.
-    smaller = {tuple(s): i for i, s in enumerate(_subsets(columns, size - 1).tolist())}
-    chosen = _subsets(columns, size)
+    # (n_choices, n) each.
+    smaller = {tuple(s): i for i, s in enumerate(_subsets(columns, n - 1).tolist())}
+    chosen = _subsets(columns, n)
     parent = np.array([smaller[tuple(s[:-1])] for s in chosen.tolist()])
-    others = {tuple(s): i for i, s in enumerate(_subsets(rows, size - 1).tolist())}
-    row = _subsets(rows, size)
-    rest = np.array([[others[tuple(s[:k] + s[k + 1 :])] for k in range(size)] for s in row.tolist()])
-    sign = np.array([(-1.0) ** (size - 1 - k) for k in range(size)])
+    others = {tuple(s): i for i, s in enumerate(_subsets(rows, n - 1).tolist())}
+    row = _subsets(rows, n)
+    rest = np.array([[others[tuple(s[:k] + s[k + 1 :])] for k in range(n)] for s in row.tolist()])
+    sign = np.array([(-1.0) ** (n - 1 - k) for k in range(n)])
     return parent, chosen[:, -1], row, rest, sign
 
 
@@ -112,8 +112,8 @@ def normals_to(matrix: Float[Array, "dof n_cables"]) -> Float[Array, "n_choices 
     """Normals to all choices of d - 1 columns: their generalised cross products."""
     dof, count = matrix.shape
     products = matrix.T  # products of one column, by row
-    for size in range(2, dof):
-        parent, last, row, rest, sign = _level(dof, count, size)
+    for n in range(2, dof):
+        parent, last, row, rest, sign = _level(dof, count, n)
         terms = products[parent][:, rest] * matrix.T[last][:, row]
         products = terms @ sign
     # In the order of `_subsets`, the row that a product leaves out is the last one first.
@@ -139,9 +139,9 @@ def one_sided_faces(
     chosen = beside_faces(count, dof)
     if count - dof > 2:
         normals = normals_to(matrix)
-        size = jnp.linalg.norm(normals, axis=1)[:, None]
-        along = jnp.take_along_axis(normals / jnp.where(size > FLAT, size, 1.0) @ matrix, jnp.asarray(chosen), axis=1)
-        return jnp.where((size > FLAT) & (jnp.abs(along) > FLAT), along, 0.0)
+        norm = jnp.linalg.norm(normals, axis=1)[:, None]
+        along = jnp.take_along_axis(normals / jnp.where(norm > FLAT, norm, 1.0) @ matrix, jnp.asarray(chosen), axis=1)
+        return jnp.where((norm > FLAT) & (jnp.abs(along) > FLAT), along, 0.0)
     # One row of the null space more than it has columns: the relation among them.
     rows = kernel.T[chosen]
     if chosen.shape[1] == 1:
@@ -151,8 +151,8 @@ def one_sided_faces(
     else:
         after, last = rows[:, np.array([1, 2, 0])], rows[:, np.array([2, 0, 1])]
         along = after[..., 0] * last[..., 1] - after[..., 1] * last[..., 0]
-    size = jnp.max(jnp.abs(along), axis=1, keepdims=True)
-    along = jnp.where(size > FLAT, along / jnp.where(size > FLAT, size, 1.0), 0.0)
+    norm = jnp.max(jnp.abs(along), axis=1, keepdims=True)
+    along = jnp.where(norm > FLAT, along / jnp.where(norm > FLAT, norm, 1.0), 0.0)
     return jnp.where(jnp.abs(along) > FLAT, along, 0.0)
 
 
@@ -160,8 +160,8 @@ def face_distances(
     along: Float[Array, "n m"], slacks: Float[Array, "n"], weights: Float[Array, "n m"]
 ) -> Float[Array, "n"]:
     """Distances of tensions from their limits at which a face is reached."""
-    sizes = jnp.sum(jnp.abs(along) * weights, axis=1)
-    return jnp.where(sizes > 0.0, slacks / jnp.where(sizes > 0.0, sizes, 1.0), jnp.inf)
+    norms = jnp.sum(jnp.abs(along) * weights, axis=1)
+    return jnp.where(norms > 0.0, slacks / jnp.where(norms > 0.0, norms, 1.0), jnp.inf)
 
 
 @jax.jit
@@ -210,15 +210,15 @@ def acceleration_faces(
     tension_min: Float[Array, "n_cables"],
     tension_max: Float[Array, "n_cables"],
 ) -> Faces:
-    """Faces of the set of accelerations that the cables of a point mass can give at one place."""
-    still = jnp.zeros_like(position)
-    matrix = robot.wrench_matrix(State(position, still, still))
+    """Faces of the set of accelerations that the cables of a point mass can give at one position."""
+    zero = jnp.zeros_like(position)
+    matrix = robot.wrench_matrix(State(position, zero, zero))
     faces = wrench_faces(matrix, tension_min / robot.mass, tension_max / robot.mass)
     if robot.dof == PLANAR:
         normals, apex = (jnp.stack([x[..., 0], 0.0 * x[..., 0], x[..., 1]], -1) for x in (faces.normals, faces.apex))
     else:
         normals, apex = faces.normals, faces.apex
-    falling = -relative_acceleration(robot, still)
+    falling = -relative_acceleration(robot, zero)
     # A face that bounds nothing keeps its -inf.
     return dataclasses.replace(faces, normals=normals, apex=apex + falling, offsets=faces.offsets + normals @ falling)
 

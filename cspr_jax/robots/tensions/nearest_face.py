@@ -47,27 +47,27 @@ def nearest_face(
     """Find the nearest face."""
     dof, count = matrix.shape
     solutions = all_tensions(matrix, wrench)
-    cap = CAP * (jnp.max(jnp.abs(solutions.least)) + jnp.max(low))
+    cap = CAP * (jnp.max(jnp.abs(solutions.min_norm)) + jnp.max(low))
     low, high = jnp.asarray(low), jnp.minimum(high, jnp.maximum(cap, low))
     chosen = beside_faces(count, dof)
     along = one_sided_faces(matrix, solutions.kernel)
     # Faces of both signs, each cable at the limit that gives the least.
     along, others = jnp.concatenate([along, -along]), np.concatenate([chosen, chosen])
     limits = jnp.where(along > 0.0, low[others], high[others])
-    slacks = jnp.sum(along * (solutions.least[others] - limits), axis=1)
+    slacks = jnp.sum(along * (solutions.min_norm[others] - limits), axis=1)
     span = high - low
     # If the range of one cable is the limit, each cable is as far from limits as its own range allows.
     weights = jnp.where(
         jnp.min(face_distances(along, slacks, jnp.ones(along.shape))) > 0.5 * jnp.min(span), span / jnp.max(span), 1.0
     )
-    place = jnp.argmin(face_distances(along, slacks, weights[others]))
-    at, product = jnp.asarray(others)[place], along[place]
-    limit = jnp.where(product == 0.0, 0.5 * (low[at] + high[at]), limits[place])
+    index = jnp.argmin(face_distances(along, slacks, weights[others]))
+    at, product = jnp.asarray(others)[index], along[index]
+    limit = jnp.where(product == 0.0, 0.5 * (low[at] + high[at]), limits[index])
     system = jnp.concatenate([solutions.kernel.T[at], -(jnp.sign(product) * weights[at])[:, None]], axis=1)
-    along_kernel = solved(system, (solutions.least[at] - limit)[:, None])[0][:-1, 0]
+    along_kernel = solved(system, (solutions.min_norm[at] - limit)[:, None])[0][:-1, 0]
     is_other = (at[:, None] == jnp.arange(count)[None]).astype(product.dtype)
     return NearestFace(
         along=product @ is_other,
-        columns=jnp.asarray(spanning(count, dof))[place % len(chosen)],
-        tensions=solutions.least - solutions.kernel.T @ along_kernel,
+        columns=jnp.asarray(spanning(count, dof))[index % len(chosen)],
+        tensions=solutions.min_norm - solutions.kernel.T @ along_kernel,
     )

@@ -20,13 +20,13 @@ def is_rectangle(base_points: Float[np.ndarray, "n_cables 3"]) -> bool:
     if points.shape != (4, SPATIAL):
         return False
     sides = np.roll(points, -1, axis=0) - points
-    sizes = np.abs(sides[:2])
-    along = 0 if sizes[0, 0] > sizes[0, 1] else 1
+    lengths = np.abs(sides[:2])
+    along = 0 if lengths[0, 0] > lengths[0, 1] else 1
     expected = np.zeros((2, SPATIAL))
     expected[0, along], expected[1, 1 - along] = sides[0, along], sides[1, 1 - along]
-    small = LEVEL * np.linalg.norm(sizes)
+    small = LEVEL * np.linalg.norm(lengths)
     is_right = (np.abs(sides - np.concatenate([expected, -expected])) <= small).all()
-    return bool(is_right and sizes[0, along] > small and sizes[1, 1 - along] > small)
+    return bool(is_right and lengths[0, along] > small and lengths[1, 1 - along] > small)
 
 
 def tension_couples(
@@ -34,7 +34,7 @@ def tension_couples(
 ) -> Float[Array, "n_cables"]:
     """Tension couples T12, T23, T34, T41 of a point mass on four cables, Boralugoda (2019), (30) to (33).
 
-    A couple is the pull of two cables whose spools are the ends of a side, as seen along that side, where both lie in
+    A couple is the force of two cables whose spools are the ends of a side, as seen along that side, where both lie in
     one line. Unlike the tensions, couples follow from the motion alone: each two opposite couples share the force.
     """
     spools = robot.base_points
@@ -43,6 +43,6 @@ def tension_couples(
     across = jnp.roll(spools, -2, axis=0) - jnp.roll(spools, -1, axis=0)
     width = jnp.linalg.norm(across, axis=1)
     rays = position[None] - spools
-    place, depth = jnp.sum(rays * across, axis=1) / width, rays[:, 2]
+    along, depth = jnp.sum(rays * across, axis=1) / width, rays[:, 2]
     lift = -force[2] / depth
-    return ((width - place) * lift - across @ force / width) / width * jnp.hypot(place, depth)
+    return ((width - along) * lift - across @ force / width) / width * jnp.hypot(along, depth)

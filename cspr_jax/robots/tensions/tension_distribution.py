@@ -1,4 +1,4 @@
-"""Tensions of a robot with more cables than it needs, at one instant: the least ones, or the farthest from limits.
+"""Tensions of a robot with more cables than it needs, in one state: the least ones, or the farthest from limits.
 
 All tensions that give a wrench are t = t0 + N^T x: t0 is the least of all, N an orthonormal basis of tensions without a
 wrench, so that the least tensions within limits belong to the shortest feasible x. With one or two components of x
@@ -40,7 +40,7 @@ LONGEST = 10
 
 
 class Distribution(NamedTuple):
-    """Tensions of all cables at one instant.
+    """Tensions of all cables in one state.
 
     Fields:
         tensions: (n_cables,) N. Where none are feasible, or a rule finds none that are, the tensions of least norm,
@@ -55,21 +55,21 @@ class Distribution(NamedTuple):
 
 
 class AllTensions(NamedTuple):
-    """All tensions that give a wrench: least + x @ kernel.
+    """All tensions that give a wrench: min_norm + x @ kernel.
 
     Fields:
-        least: (n_cables,) tensions of least norm, N.
+        min_norm: (n_cables,) tensions of least norm, N.
         kernel: (n_free, n_cables) orthonormal rows of tensions without a wrench, one for each cable more than needed.
         is_regular: () whether the cables span all components of a wrench.
     """
 
-    least: Array
+    min_norm: Array
     kernel: Array
     is_regular: Array
 
     def tensions(self, point: Float[Array, "m"]) -> Float[Array, "n_cables"]:
         """Tensions of one x."""
-        return self.least + point @ self.kernel
+        return self.min_norm + point @ self.kernel
 
 
 @jax.jit
@@ -110,7 +110,7 @@ def checked(
     tensions: Float[Array, "n_cables"],
 ) -> Distribution:
     """Tensions with their residual and verdict."""
-    tensions = jnp.where(keeps(tensions, low, high), tensions, solutions.least)
+    tensions = jnp.where(keeps(tensions, low, high), tensions, solutions.min_norm)
     residual = jnp.linalg.norm(matrix @ tensions - wrench) / (1.0 + jnp.linalg.norm(wrench))
     return Distribution(tensions, residual, solutions.is_regular & keeps(tensions, low, high))
 
@@ -147,16 +147,16 @@ def _frame(matrix: Array, wrench: Array) -> tuple[Array, Array, Array]:
     def take(carry, k):
         rest, products, frame, along = carry
         square = jnp.where(is_row == (k < dof), jnp.sum(rest**2, axis=1), -1.0)
-        place = jnp.argmax(square)
+        index = jnp.argmax(square)
         # Subtract the components along the other rows that rounding has left.
-        again = frame @ rest[place]
-        vector = rest[place] - again @ frame
+        again = frame @ rest[index]
+        vector = rest[index] - again @ frame
         length = jnp.linalg.norm(vector)
-        unit, product = vector / length, (products[place] - jnp.dot(again, along)) / length
+        unit, product = vector / length, (products[index] - jnp.dot(again, along)) / length
         parts, is_next = rest @ unit, jnp.arange(count) == k
         rest, products = rest - parts[:, None] * unit[None], products - parts * product
         frame, along = jnp.where(is_next[:, None], unit[None], frame), jnp.where(is_next, product, along)
-        return (rest, products, frame, along), square[place]
+        return (rest, products, frame, along), square[index]
 
     none = jnp.zeros(count)
     start = jnp.concatenate([matrix, jnp.eye(count)]), jnp.concatenate([wrench, none]), jnp.zeros((count, count)), none
@@ -172,7 +172,7 @@ def _shortest(solutions: AllTensions, low: Array, high: Array) -> Array:
     if freedom > 2:
         return _at_limits(solutions, low, high, _limits_reached(solutions, low, high))
     points, is_point = _candidates(solutions, low, high)
-    tensions = solutions.least[None] + points @ solutions.kernel
+    tensions = solutions.min_norm[None] + points @ solutions.kernel
     excess = jnp.max(jnp.abs(beyond(tensions, low[None], high[None])), axis=1)
     is_within = is_point & (excess <= TENSION_ERROR * jnp.max(jnp.abs(tensions), axis=1))
     # If the limits leave only one point, rounding can leave none.
@@ -186,7 +186,7 @@ def _candidates(solutions: AllTensions, low: Array, high: Array) -> tuple[Array,
     rows = jnp.concatenate([solutions.kernel.T, solutions.kernel.T])
     limits = jnp.concatenate([low, high])
     is_limit = jnp.isfinite(limits)
-    offsets = jnp.where(is_limit, limits, 0.0) - jnp.concatenate([solutions.least, solutions.least])
+    offsets = jnp.where(is_limit, limits, 0.0) - jnp.concatenate([solutions.min_norm, solutions.min_norm])
     square = jnp.sum(rows**2, axis=1)
     is_line = is_limit & (square > FLAT**2)
     feet = rows * (offsets / jnp.where(is_line, square, 1.0))[:, None]
@@ -210,10 +210,10 @@ def _pairs(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 class _ActiveSet(NamedTuple):
-    # State of the search for the limits that the shortest x reaches. At each step x = pulls @ kernel.T is the shortest
-    # for some limits.
+    # State of the search for the limits that the shortest x reaches. At each step x = multipliers @ kernel.T is the
+    # shortest for some limits.
     point: Array  # (r,)
-    pulls: Array  # (n,) with the signs of `sides`, and of the limit sought
+    multipliers: Array  # (n,) with the signs of `sides`, and of the limit sought
     sides: Array  # (n,) 1 held at its smallest tension, -1 at its largest, 0 free
     sought: Array  # () the cable whose limit is next
     is_seeking: Array  # ()
@@ -234,7 +234,7 @@ def _limits_reached(solutions: AllTensions, low: Array, high: Array) -> Array:
 
     none, no = jnp.zeros(count), jnp.asarray(False)
     # Tensions that are not finite are never within limits.
-    is_lost = ~(jnp.isfinite(solutions.least).all() & jnp.isfinite(solutions.kernel).all())
+    is_lost = ~(jnp.isfinite(solutions.min_norm).all() & jnp.isfinite(solutions.kernel).all())
     start = _ActiveSet(jnp.zeros(freedom), none, none, jnp.asarray(0), no, is_lost, jnp.asarray(0))
     return lax.while_loop(is_open, lambda search: _step(solutions, low, high, search), start).sides
 
@@ -246,22 +246,22 @@ def _step(solutions: AllTensions, low: Array, high: Array, search: _ActiveSet) -
     is_sought = jnp.arange(excess.size) == sought
     side, distance = jnp.sign(excess[sought]), jnp.abs(excess[sought])
     is_held = search.sides != 0.0
-    way, loss = projected(solutions.kernel, is_held, side * solutions.kernel[:, sought], jnp.zeros_like(excess))
-    square = jnp.dot(way, way)
-    is_blocked = (is_held.sum() >= way.size) | (square <= DEPENDENT**2)
+    direction, loss = projected(solutions.kernel, is_held, side * solutions.kernel[:, sought], jnp.zeros_like(excess))
+    square = jnp.dot(direction, direction)
+    is_blocked = (is_held.sum() >= direction.size) | (square <= DEPENDENT**2)
     full = jnp.where(is_blocked, jnp.inf, distance / jnp.where(is_blocked, 1.0, square))
     losing = is_held & (search.sides * loss > 0.0)
-    until = jnp.where(losing, search.pulls / jnp.where(losing, loss, 1.0), jnp.inf)
+    until = jnp.where(losing, search.multipliers / jnp.where(losing, loss, 1.0), jnp.inf)
     first = jnp.argmin(until)
     length = jnp.minimum(full, until[first])
     is_stuck, is_reached = jnp.isinf(length), full <= until[first]
     length = jnp.where(is_stuck, 0.0, length)
     let_go = (jnp.arange(excess.size) == first) & ~is_reached
-    pulls = search.pulls + length * (jnp.where(is_sought, side, 0.0) - loss)
+    multipliers = search.multipliers + length * (jnp.where(is_sought, side, 0.0) - loss)
     sides = jnp.where(is_sought & is_reached & ~is_stuck, side, search.sides)
     return _ActiveSet(
-        point=search.point + jnp.where(is_blocked, 0.0, length) * way,
-        pulls=jnp.where(let_go, 0.0, pulls),
+        point=search.point + jnp.where(is_blocked, 0.0, length) * direction,
+        multipliers=jnp.where(let_go, 0.0, multipliers),
         sides=jnp.where(let_go, 0.0, sides),
         sought=sought,
         is_seeking=~is_reached,
@@ -273,7 +273,7 @@ def _step(solutions: AllTensions, low: Array, high: Array, search: _ActiveSet) -
 def _at_limits(solutions: AllTensions, low: Array, high: Array, sides: Array) -> Array:
     # Return the shortest x at which the tensions with a side are at their limits.
     limits = jnp.where(sides > 0.0, low, jnp.where(sides < 0.0, high, 0.0))
-    offsets = jnp.where(sides == 0.0, 0.0, limits - solutions.least)
+    offsets = jnp.where(sides == 0.0, 0.0, limits - solutions.min_norm)
     return projected(solutions.kernel, sides != 0.0, jnp.zeros(solutions.kernel.shape[0]), offsets)[0]
 
 
@@ -294,16 +294,16 @@ def projected(
 
 
 def _largest_distance(matrix: Array, low: Array, high: Array, solutions: AllTensions) -> Array:
-    """Largest r, () N: half of a cable's range, or a face's slack over its way inwards for each newton of r."""
+    """Largest r, () N: half of a cable's range, or a face's slack over its rate for each newton of r."""
     dof, count = matrix.shape
     if count == dof:
-        return jnp.min(jnp.minimum(solutions.least - low, high - solutions.least))
+        return jnp.min(jnp.minimum(solutions.min_norm - low, high - solutions.min_norm))
     others, products = beside_faces(count, dof), one_sided_faces(matrix, solutions.kernel)
 
     def slack(along, cables):
         # A cable without a largest tension pulls beyond the face: its slack is infinite.
         reached = jnp.where(along < 0.0, high[cables], low[cables])
-        return jnp.sum(along * (solutions.least[cables] - reached), axis=-1)
+        return jnp.sum(along * (solutions.min_norm[cables] - reached), axis=-1)
 
     both, cables = jnp.concatenate([products, -products]), np.concatenate([others, others])
     each = lax.stop_gradient(face_distances(both, slack(both, cables), jnp.ones(both.shape)))
@@ -311,6 +311,6 @@ def _largest_distance(matrix: Array, low: Array, high: Array, solutions: AllTens
     nearest = jnp.argmin(each)
     is_face = jnp.isfinite(each[nearest])
     along = jnp.where(is_face, both[nearest], 0.0)
-    size = jnp.where(is_face, jnp.sum(jnp.abs(along)), 1.0)
-    distance = jnp.where(is_face, slack(along, jnp.asarray(cables)[nearest]) / size, jnp.inf)
+    norm = jnp.where(is_face, jnp.sum(jnp.abs(along)), 1.0)
+    distance = jnp.where(is_face, slack(along, jnp.asarray(cables)[nearest]) / norm, jnp.inf)
     return jnp.minimum(distance, 0.5 * jnp.min(high - low))

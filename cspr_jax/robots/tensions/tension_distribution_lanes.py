@@ -42,7 +42,7 @@ def _dot(a: Lanes, b: Lanes) -> Array:
     return total
 
 
-def _apart(vector: Lanes, units: Sequence[Lanes], one: Array) -> tuple[Lanes, Lanes]:
+def _normal_part(vector: Lanes, units: Sequence[Lanes], one: Array) -> tuple[Lanes, Lanes]:
     """Component of a vector normal to unit vectors, and its products with them; computed twice, against rounding."""
     total: Lanes = [jnp.zeros_like(vector[0])] * len(units)
     for _ in range(2):
@@ -62,29 +62,29 @@ def _all_tensions(matrix: Array, wrench: Array, one: Array) -> tuple[list[Array]
     along: list[Array] = []
     lengths: list[Array] = []
     for i in range(dof):
-        left, products = _apart([matrix[i, k] for k in range(count)], units, one)
+        left, products = _normal_part([matrix[i, k] for k in range(count)], units, one)
         length = jnp.sqrt(_dot(left, left))
         inverse = 1.0 / length
         along.append(materialized((wrench[i] - (_dot(products, along) if units else 0.0)) * inverse, one))
         units.append([x * inverse for x in left])
         lengths.append(length)
-    minimum = [_dot(along, [unit[k] for unit in units]) for k in range(count)]
+    min_norm = [_dot(along, [unit[k] for unit in units]) for k in range(count)]
     kernel: list[list[Array]] = []
     for _ in range(count - dof):
         # Take the cable whose unit vector has the longest component normal to the rows so far.
         rest = [1.0 - _dot(column, column) for column in ([unit[k] for unit in units] for k in range(count))]
-        place, maximum = jnp.zeros_like(rest[0]), rest[0]
+        index, maximum = jnp.zeros_like(rest[0]), rest[0]
         for k, value in enumerate(rest[1:], 1):
-            place, maximum = jnp.where(value > maximum, float(k), place), jnp.where(value > maximum, value, maximum)
-        place = materialized(place, one)
-        left, _ = _apart([jnp.where(place == k, 1.0, 0.0) for k in range(count)], units, one)
+            index, maximum = jnp.where(value > maximum, float(k), index), jnp.where(value > maximum, value, maximum)
+        index = materialized(index, one)
+        left, _ = _normal_part([jnp.where(index == k, 1.0, 0.0) for k in range(count)], units, one)
         inverse = 1.0 / jnp.sqrt(_dot(left, left))
         kernel.append([materialized(x * inverse, one) for x in left])
         units.append(kernel[-1])
     shortest, longest = lengths[0], lengths[0]
     for length in lengths[1:]:
         shortest, longest = nan_ignoring_min(length, shortest), jnp.where(length > longest, length, longest)
-    return minimum, kernel, shortest / longest
+    return min_norm, kernel, shortest / longest
 
 
 def _interval(values: Lanes, rates: Lanes, low: Lanes, high: Lanes, rounding: Array) -> tuple[Array, Array]:
@@ -109,7 +109,7 @@ def _nearest(first: Array, last: Array) -> Array:
 
 
 @jax.jit
-def _on_line(least: Lanes, kernel: Sequence[Lanes], low: Lanes, high: Lanes, size: Array) -> Array:
+def _on_line(min_norm: Lanes, kernel: Sequence[Lanes], low: Lanes, high: Lanes, magnitude: Array) -> Array:
     # Return the shortest x with the first cable at a limit, as a complex number; not finite where there is none.
     (a, *others), (b, *more) = kernel
     square = a * a + b * b
@@ -117,37 +117,37 @@ def _on_line(least: Lanes, kernel: Sequence[Lanes], low: Lanes, high: Lanes, siz
     rates = [a * y - b * x for x, y in zip(others, more, strict=True)]
     best, shortest = lax.complex(jnp.full_like(a, jnp.inf), jnp.zeros_like(a)), jnp.full_like(a, jnp.inf)
     for limit in (low[0], high[0]):
-        reach = (limit - least[0]) * inverse
-        values = [t + reach * (a * x + b * y) for t, x, y in zip(least[1:], others, more, strict=True)]
-        first, last = _interval(values, rates, low[1:], high[1:], TENSION_ERROR * size)
+        offset = (limit - min_norm[0]) * inverse
+        values = [t + offset * (a * x + b * y) for t, x, y in zip(min_norm[1:], others, more, strict=True)]
+        first, last = _interval(values, rates, low[1:], high[1:], TENSION_ERROR * magnitude)
         along = _nearest(first, last)
-        length = (reach * reach + along * along) * square
+        length = (offset * offset + along * along) * square
         is_point = (first <= last) & jnp.isfinite(limit) & (square > FLAT**2) & (length < shortest)
-        x, y = reach * a - along * b, reach * b + along * a
+        x, y = offset * a - along * b, offset * b + along * a
         best, shortest = jnp.where(is_point, lax.complex(x, y), best), jnp.where(is_point, length, shortest)
     return best
 
 
 @jax.jit
-def _in_interval(least: Lanes, kernel: Sequence[Lanes], low: Lanes, high: Lanes, size: Array) -> Array:
+def _in_interval(min_norm: Lanes, kernel: Sequence[Lanes], low: Lanes, high: Lanes, magnitude: Array) -> Array:
     # Return the shortest x of one component.
-    first, last = _interval(least, kernel[0], low, high, TENSION_ERROR * size)
+    first, last = _interval(min_norm, kernel[0], low, high, TENSION_ERROR * magnitude)
     along = jnp.where(first <= last, _nearest(first, last), jnp.inf)
     return lax.complex(along, jnp.zeros_like(along))
 
 
 @jax.jit
-def _size(least: Lanes, low: Lanes) -> Array:
-    size = jnp.abs(least[0]) + low[0]
-    for tension, limit in zip(least[1:], low[1:], strict=True):
-        size = size + jnp.abs(tension) + limit
-    return size
+def _magnitude(min_norm: Lanes, low: Lanes) -> Array:
+    total = jnp.abs(min_norm[0]) + low[0]
+    for tension, limit in zip(min_norm[1:], low[1:], strict=True):
+        total = total + jnp.abs(tension) + limit
+    return total
 
 
 @jax.jit
-def _shortest(least: Lanes, low: Lanes, high: Lanes, size: Array, points: Sequence[Array]) -> Array:
-    within, rounding = jnp.full_like(least[0], True, bool), TENSION_ERROR * size
-    for tension, lowest, highest in zip(least, low, high, strict=True):
+def _shortest(min_norm: Lanes, low: Lanes, high: Lanes, magnitude: Array, points: Sequence[Array]) -> Array:
+    within, rounding = jnp.full_like(min_norm[0], True, bool), TENSION_ERROR * magnitude
+    for tension, lowest, highest in zip(min_norm, low, high, strict=True):
         within = within & (tension >= lowest - rounding) & (tension <= highest + rounding)
     best = points[0]
     shortest = best.real * best.real + best.imag * best.imag
@@ -159,11 +159,11 @@ def _shortest(least: Lanes, low: Lanes, high: Lanes, size: Array, points: Sequen
 
 
 @jax.jit
-def _tensions(least: Lanes, kernel: Sequence[Lanes], point: Array) -> list[Array]:
+def _tensions(min_norm: Lanes, kernel: Sequence[Lanes], point: Array) -> list[Array]:
     parts = (point.real, point.imag)[: len(kernel)]
     is_point = jnp.isfinite(point.real)
     safe = [jnp.where(is_point, part, 0.0) for part in parts]
-    return [t + _dot(safe, [row[k] for row in kernel]) for k, t in enumerate(least)]
+    return [t + _dot(safe, [row[k] for row in kernel]) for k, t in enumerate(min_norm)]
 
 
 @jax.jit
@@ -179,28 +179,28 @@ def _verdict(tensions: Lanes, low: Lanes, high: Lanes, point: Array) -> Array:
 @jax.jit
 def _residual(matrix: Array, wrench: Array, tensions: Lanes) -> Array:
     dof, count = matrix.shape[:2]
-    off, size = jnp.zeros_like(wrench[0]), jnp.zeros_like(wrench[0])
+    off, square = jnp.zeros_like(wrench[0]), jnp.zeros_like(wrench[0])
     for i in range(dof):
         gap = _dot([matrix[i, k] for k in range(count)], tensions) - wrench[i]
-        off, size = off + gap * gap, size + wrench[i] * wrench[i]
-    return jnp.sqrt(off) / (1.0 + jnp.sqrt(size))
+        off, square = off + gap * gap, square + wrench[i] * wrench[i]
+    return jnp.sqrt(off) / (1.0 + jnp.sqrt(square))
 
 
 def _of_batch(batch: tuple[np.ndarray, ...]) -> tuple[tuple[Array, ...], Array, Array, Array]:
     matrix, wrench, low, high = (np.ascontiguousarray(np.moveaxis(x, 0, -1)) for x in batch)
     lows, highs = list(low), list(high)
-    minimum, kernel, fraction = _all_tensions(matrix, wrench, np.ones(()))
-    size = _size(minimum, lows)
+    min_norm, kernel, fraction = _all_tensions(matrix, wrench, np.ones(()))
+    magnitude = _magnitude(min_norm, lows)
     if len(kernel) == 1:
-        points = [_in_interval(minimum, kernel, lows, highs, size)]
+        points = [_in_interval(min_norm, kernel, lows, highs, magnitude)]
     else:
         # Take each cable in turn as the first, so that one compiled function serves all.
         points = []
         for k in range(len(lows)):
-            rolled = [[x[k], *x[:k], *x[k + 1 :]] for x in (minimum, *kernel, lows, highs)]
-            points.append(_on_line(rolled[0], rolled[1:3], *rolled[3:], size))
-    point = _shortest(minimum, lows, highs, size, points)
-    tensions = _tensions(minimum, kernel, point)
+            rolled = [[x[k], *x[:k], *x[k + 1 :]] for x in (min_norm, *kernel, lows, highs)]
+            points.append(_on_line(rolled[0], rolled[1:3], *rolled[3:], magnitude))
+    point = _shortest(min_norm, lows, highs, magnitude, points)
+    tensions = _tensions(min_norm, kernel, point)
     return tuple(tensions), _residual(matrix, wrench, tensions), _verdict(tensions, lows, highs, point), fraction
 
 

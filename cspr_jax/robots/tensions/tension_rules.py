@@ -38,16 +38,22 @@ if TYPE_CHECKING:
     from jaxtyping import Float
 
 BATCH = 4096
-# The p-norm takes so many steps of Newton's method, while the weight of the limits falls from first to last; compares
-# so many lengths of each step; and goes no farther than this part of the way to the nearest limit.
-STEPS, LENGTHS, KEPT = 60, 24, 0.99
-FIRST_WEIGHT, LAST_WEIGHT, LAST_STEPS = 1e-1, 1e-14, 12
+# The p-norm takes so many steps of Newton's method, while the weight of the limits decreases from first to last, which
+# serves the last steps.
+STEPS = 60
+LAST_STEPS = 12
+FIRST_WEIGHT = 1e-1
+LAST_WEIGHT = 1e-14
+LENGTHS = 24  # of each step, which are compared
+LONGEST_STEP = 0.99  # over the distance to the nearest limit
 # Tensions nearer to the reference than this part of the largest distance count as being at this distance: nearer, a
 # second derivative would be infinite.
 NEAR = 1e-9
 # For cables without a largest tension the search may begin at this multiple of the largest tension in sight.
 FAR = 10.0
-EXPONENT, LEAST_EXPONENT, LARGEST_EXPONENT = 4.0, 1.01, 100.0
+EXPONENT = 4.0
+MIN_EXPONENT = 1.01
+MAX_EXPONENT = 100.0
 
 
 @jax.jit
@@ -64,7 +70,7 @@ def closed_form(
     middle = 0.5 * (tension_min + tension_max)
     rest = all_tensions(matrix, wrench - matrix @ middle)
     solutions = all_tensions(matrix, wrench)
-    tensions = middle + rest.least
+    tensions = middle + rest.min_norm
     answer = checked(matrix, wrench, tension_min, tension_max, solutions, tensions)
     return _as_found(answer, tensions, tension_min, tension_max)
 
@@ -82,7 +88,7 @@ def improved_closed_form(
     """
     solutions = all_tensions(matrix, wrench)
     middle = 0.5 * (tension_min + tension_max)
-    aim = solutions.kernel @ (middle - solutions.least)
+    aim = solutions.kernel @ (middle - solutions.min_norm)
     freedom, count = solutions.kernel.shape
 
     def hold(_, state):
@@ -93,7 +99,7 @@ def improved_closed_form(
         is_worst = (jnp.arange(count) == worst) & (free[worst] > TENSION_ERROR * jnp.max(tension_max))
         sides = jnp.where(is_worst, jnp.sign(excess), sides)
         limits = jnp.where(sides > 0.0, tension_min, tension_max)
-        offsets = jnp.where(sides == 0.0, 0.0, limits - solutions.least)
+        offsets = jnp.where(sides == 0.0, 0.0, limits - solutions.min_norm)
         nearest = projected(solutions.kernel, sides != 0.0, aim, offsets)[0]
         return jnp.where(is_worst.any(), nearest, point), sides
 
@@ -123,11 +129,11 @@ def p_norm(
     active limits are then reached to 1e-10, weakly active ones to the root of the weight.
     """
     solutions = all_tensions(matrix, wrench)
-    size = jnp.max(jnp.abs(solutions.least)) + jnp.max(jnp.abs(tension_min)) + jnp.max(jnp.abs(reference))
-    largest = jnp.where(jnp.isfinite(tension_max), tension_max, FAR * size)
-    start, room = centred(matrix, wrench, tension_min, largest)
+    magnitude = jnp.max(jnp.abs(solutions.min_norm)) + jnp.max(jnp.abs(tension_min)) + jnp.max(jnp.abs(reference))
+    largest = jnp.where(jnp.isfinite(tension_max), tension_max, FAR * magnitude)
+    start, slack = centred(matrix, wrench, tension_min, largest)
     # If the limits leave only one point, that point is the answer.
-    is_open = room > TENSION_ERROR * size
+    is_open = slack > TENSION_ERROR * magnitude
     tensions = jnp.where(
         is_open,
         _along_barriers(solutions, start.tensions, tension_min, tension_max, reference, exponent),
@@ -144,12 +150,12 @@ def _along_barriers(solutions: AllTensions, start: Array, low: Array, high: Arra
     scale = jnp.where(scale > 0.0, scale, 1.0)
     has_largest = jnp.isfinite(high)
 
-    def rooms(tensions):
+    def slacks(tensions):
         above, below = tensions - low, jnp.where(has_largest, high - tensions, scale)
         return above / scale, jnp.where(has_largest, below / scale, 1.0)
 
     def value(tensions, weight):
-        above, below = rooms(tensions)
+        above, below = slacks(tensions)
         inside = (above > 0.0) & (below > 0.0)
         logs = jnp.log(jnp.where(inside, above, 1.0)) + jnp.log(jnp.where(inside, below, 1.0))
         distance = jnp.abs(tensions - reference) / scale
@@ -162,20 +168,22 @@ def _along_barriers(solutions: AllTensions, start: Array, low: Array, high: Arra
         away = (tensions - reference) / scale
         distance = jnp.maximum(jnp.abs(away), NEAR)
         second_derivative = jnp.exp((p - 2.0) * jnp.log(distance))
-        above, below = rooms(tensions)
-        slope = second_derivative * away + weight * (jnp.where(has_largest, 1.0 / below, 0.0) - 1.0 / above)
-        bends = (p - 1.0) * second_derivative + weight * (jnp.where(has_largest, 1.0 / below**2, 0.0) + 1.0 / above**2)
-        hessian = (solutions.kernel * bends[None]) @ solutions.kernel.T
+        above, below = slacks(tensions)
+        gradient = second_derivative * away + weight * (jnp.where(has_largest, 1.0 / below, 0.0) - 1.0 / above)
+        diagonal = (p - 1.0) * second_derivative + weight * (
+            jnp.where(has_largest, 1.0 / below**2, 0.0) + 1.0 / above**2
+        )
+        hessian = (solutions.kernel * diagonal[None]) @ solutions.kernel.T
         hessian = hessian + jnp.eye(freedom) * (1e-15 * jnp.trace(hessian) + 1e-300)
-        way = -solved(hessian, (solutions.kernel @ slope)[:, None])[0][:, 0] @ solutions.kernel
+        direction = -solved(hessian, (solutions.kernel @ gradient)[:, None])[0][:, 0] @ solutions.kernel
         # Go no farther than to a limit.
         up, down = (
-            jnp.where(has_largest, below / jnp.where(way > 0.0, way, 1.0), jnp.inf),
-            above / jnp.where(way < 0.0, -way, 1.0),
+            jnp.where(has_largest, below / jnp.where(direction > 0.0, direction, 1.0), jnp.inf),
+            above / jnp.where(direction < 0.0, -direction, 1.0),
         )
-        free = jnp.min(jnp.where(way > 0.0, up, jnp.where(way < 0.0, down, jnp.inf)))
-        lengths = jnp.minimum(1.0, KEPT * free) * 0.5 ** np.arange(LENGTHS)
-        tried = tensions[None] + (scale * lengths)[:, None] * way[None]
+        free = jnp.min(jnp.where(direction > 0.0, up, jnp.where(direction < 0.0, down, jnp.inf)))
+        lengths = jnp.minimum(1.0, LONGEST_STEP * free) * 0.5 ** np.arange(LENGTHS)
+        tried = tensions[None] + (scale * lengths)[:, None] * direction[None]
         values = jax.vmap(value, (0, None))(tried, weight)
         best = jnp.argmin(values)
         return jnp.where(values[best] < value(tensions, weight), tried[best], tensions)
@@ -216,7 +224,7 @@ def by_rule(
     tension_min: Float[Array, "n_cables"],
     tension_max: Float[Array, "n_cables"],
 ) -> Distribution:
-    """Tensions at one instant by a rule, the p-norm with the exponent 4 about `middles`."""
+    """Tensions in one state by a rule, the p-norm with the exponent 4 about `middles`."""
     more = (middles(tension_min, tension_max), jnp.asarray(EXPONENT)) if rule == "p-norm" else ()
     return RULES[rule].function(matrix, wrench, tension_min, tension_max, *more)
 
@@ -253,8 +261,8 @@ def distributions(
             "tension_max", None, f"must be finite with rule {rule}", fault="a cable without a largest tension"
         )
     if rule == "p-norm":
-        if not LEAST_EXPONENT <= exponent <= LARGEST_EXPONENT:
-            raise InputError("exponent", exponent, f"from {LEAST_EXPONENT} to {LARGEST_EXPONENT}")
+        if not MIN_EXPONENT <= exponent <= MAX_EXPONENT:
+            raise InputError("exponent", exponent, f"from {MIN_EXPONENT} to {MAX_EXPONENT}")
         with double_precision():
             middle = np.asarray(middles(jnp.asarray(low), jnp.asarray(high)))
         about = middle if reference is None else _each("reference", reference, (count, cables))

@@ -41,13 +41,13 @@ def time_bounds(
     tau = normalised(duration, start, end)
     knots = np.concatenate([[0.0], np.asarray(amplitude.knots, float), [1.0]])
     pieces, errors = _pieces(amplitude, knots, orders)
-    # A band holds for the block that is as much longer as the normalised time is uncertain.
+    # Bounds hold for the block that is as much longer as the normalised time is uncertain.
     first, last = tau.middle - tau.linear, tau.middle + tau.linear
-    bands = piecewise_bounds(pieces, overlaps(knots, first, last), orders)
+    bounds = piecewise_bounds(pieces, overlaps(knots, first, last), orders)
     slack = [error + np.asarray(amplitude.largest)[order + 1] * ROUNDING for order, error in enumerate(errors)]
     values = tuple(
-        AffineBounds(band.middle[:, 0], band.linear[:, 0], band.radius[:, 0] + more)
-        for band, more in zip(bands, slack, strict=True)
+        AffineBounds(each.middle[:, 0], each.linear[:, 0], each.radius[:, 0] + more)
+        for each, more in zip(bounds, slack, strict=True)
     )
     return TimeBounds(tau, values)
 
@@ -56,7 +56,7 @@ def _pieces(amplitude: Amplitude, knots: np.ndarray, orders: int) -> tuple[np.nd
     # Return Bernstein coefficients (n_pieces, degree + 1, 1), and what rounding may be of each order, in all pieces.
     powers, origins = np.asarray(amplitude.coefficients, float), np.asarray(amplitude.origins, float)
     degree = int(np.flatnonzero(powers.any(0)).max(initial=0))
-    powers, reach = powers[:, : degree + 1], np.abs(np.stack([knots[:-1], knots[1:]]) - origins).max(0)
+    powers, radii = powers[:, : degree + 1], np.abs(np.stack([knots[:-1], knots[1:]]) - origins).max(0)
     shift = (knots[:-1] - origins)[:, None]
     moved = np.stack(
         [
@@ -68,7 +68,7 @@ def _pieces(amplitude: Amplitude, knots: np.ndarray, orders: int) -> tuple[np.nd
     errors = [
         float(
             max(
-                (math.perm(i, order) * np.abs(powers[:, i]) * reach ** (i - order) for i in range(order, degree + 1)),
+                (math.perm(i, order) * np.abs(powers[:, i]) * radii ** (i - order) for i in range(order, degree + 1)),
                 key=np.max,
                 default=np.zeros(1),
             ).max()

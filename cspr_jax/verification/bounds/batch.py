@@ -1,4 +1,4 @@
-"""Several motions of one family on one amplitude function, so that bounds of blocks of all are computed together."""
+"""Motions of one family on one amplitude function, so that bounds of blocks of all are computed together."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 BATCH = 64
 
 
-class SeveralMotions:
+class MotionBatch:
     """Motions between points or poses, with numbers of arcs."""
 
     def __init__(
@@ -30,21 +30,21 @@ class SeveralMotions:
         self._motions, self.durations, self._kernel, self._orders = motions, np.asarray(durations), kernel, orders
 
     def __getitem__(self, i: int) -> Any:
-        segment, arcs = self._rows(i)
+        segment, arcs = self._select(i)
         return dataclasses.replace(self._motions, segment=segment, arcs=as_float64(arcs))
 
-    def taken(self, chosen: np.ndarray) -> "SeveralMotions":
+    def take(self, chosen: np.ndarray) -> "MotionBatch":
         """Some of the motions."""
-        segment, arcs = self._rows(chosen)
+        segment, arcs = self._select(chosen)
         motions = dataclasses.replace(self._motions, segment=segment, arcs=arcs)
-        return SeveralMotions(motions, self.durations[chosen], self._kernel, orders=self._orders)
+        return MotionBatch(motions, self.durations[chosen], self._kernel, orders=self._orders)
 
     def bounds(
         self, motion: Int[np.ndarray, "k"], start: Float[np.ndarray, "k"], end: Float[np.ndarray, "k"]
     ) -> StateBounds:
         """Bounds of the states over blocks; see `motion.motion.BoundedMotion.bounds`."""
         blocks = time_bounds(self._motions.amplitude, self.durations[motion], start, end, orders=self._orders)
-        return in_batches(self._kernel, (*self._rows(motion), blocks), batch_size=BATCH)
+        return in_batches(self._kernel, (*self._select(motion), blocks), batch_size=BATCH)
 
-    def _rows(self, chosen: Any) -> Any:
+    def _select(self, chosen: Any) -> Any:
         return jax.tree.map(lambda leaves: np.asarray(leaves)[chosen], (self._motions.segment, self._motions.arcs))

@@ -1,7 +1,7 @@
-"""Blocks of several motions with bounds of their slacks, and the parts into which they are cut.
+"""Blocks of some motions with bounds of their slacks, and the parts into which they are cut.
 
 Over a block a slack lies between two lines. Each leaves what it decides: the part in which the lower line is above a
-level, or the upper one below it, needs no second look. Where the rest is a small part of the block, the block is cut
+level, or the upper one below it, is decided. Where the rest is a small part of the block, the block is cut
 there; the rest shrinks with the square of its length at a simple root, while halves would take a step for each digit.
 """
 
@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from jaxtyping import Bool, Complex, Float
 
 # A block is halved unless the rest is a smaller part of it than this; the rest is widened by this part of the block.
-SMALL, WIDER = 0.5, 1e-3
+SMALL = 0.5
+WIDER = 1e-3
 
 
 class TimeBlocks(NamedTuple):
@@ -36,7 +37,7 @@ class TimeBlocks(NamedTuple):
     end: np.ndarray
     slacks: BlockSlacks
 
-    def taken(self, chosen: np.ndarray) -> "TimeBlocks":
+    def take(self, chosen: np.ndarray) -> "TimeBlocks":
         """Some of the blocks."""
         slacks = BlockSlacks(*(bounds[chosen] for bounds in self.slacks))
         return TimeBlocks(self.motion[chosen], self.start[chosen], self.end[chosen], slacks)
@@ -73,45 +74,45 @@ class TimeBlocks(NamedTuple):
         middle = np.where(has_jump, middle, 0.5 * (start + end))
         is_split = has_jump | ~is_cut
         inner = self._replace(start=start, end=end)
-        halves = [inner._replace(end=middle).taken(is_split), inner._replace(start=middle).taken(is_split)]
-        return joined(outside), joined([inner.taken(~is_split), *halves])
+        halves = [inner._replace(end=middle).take(is_split), inner._replace(start=middle).take(is_split)]
+        return joined(outside), joined([inner.take(~is_split), *halves])
 
     def _part(self, chosen, first, last, **edges) -> "TimeBlocks":
-        # Bounds by the lines between two shares of the block, beyond the edges by more than these are rounded.
+        # Bounds by the lines between two fractions of the block, beyond the edges by more than these are rounded.
         low, high, low_rise, high_rise = self.slacks
         ends = [np.broadcast_to(fraction, len(low))[:, None] for fraction in (first, last)]
-        fall = np.minimum(*(low_rise * fraction for fraction in ends)) + np.maximum(-low_rise, 0.0)
-        rise = np.maximum(*(high_rise * fraction for fraction in ends)) - np.maximum(high_rise, 0.0)
-        low = low + fall - ROUNDING * (np.abs(low) + np.abs(low_rise))
-        high = high + rise + ROUNDING * (np.abs(high) + np.abs(high_rise))
+        lower = np.minimum(*(low_rise * fraction for fraction in ends)) + np.maximum(-low_rise, 0.0)
+        upper = np.maximum(*(high_rise * fraction for fraction in ends)) - np.maximum(high_rise, 0.0)
+        low = low + lower - ROUNDING * (np.abs(low) + np.abs(low_rise))
+        high = high + upper + ROUNDING * (np.abs(high) + np.abs(high_rise))
         level = np.zeros_like(low)
-        return self._replace(slacks=BlockSlacks(low, high, level, level), **edges).taken(chosen)
+        return self._replace(slacks=BlockSlacks(low, high, level, level), **edges).take(chosen)
 
-    def no_looser_than(self, whole: BlockSlacks) -> "TimeBlocks":
+    def no_looser_than(self, other: BlockSlacks) -> "TimeBlocks":
         """The blocks with the better of two bounds."""
         low, high, low_rise, high_rise = self.slacks
-        is_low, is_high = low < whole.low, high > whole.high
+        is_low, is_high = low < other.low, high > other.high
         return self._replace(
             slacks=BlockSlacks(
-                np.where(is_low, whole.low, low),
-                np.where(is_high, whole.high, high),
+                np.where(is_low, other.low, low),
+                np.where(is_high, other.high, high),
                 np.where(is_low, 0.0, low_rise),
                 np.where(is_high, 0.0, high_rise),
             )
         )
 
 
-def joined(several: "list[TimeBlocks]") -> TimeBlocks:
-    """All blocks of several lists."""
-    bounds = (np.concatenate(parts) for parts in zip(*(blocks.slacks for blocks in several), strict=True))
-    motion, start, end = (np.concatenate(parts) for parts in zip(*(blocks[:3] for blocks in several), strict=True))
+def joined(batches: "list[TimeBlocks]") -> TimeBlocks:
+    """All blocks of some lists."""
+    bounds = (np.concatenate(parts) for parts in zip(*(blocks.slacks for blocks in batches), strict=True))
+    motion, start, end = (np.concatenate(parts) for parts in zip(*(blocks[:3] for blocks in batches), strict=True))
     return TimeBlocks(motion, start, end, BlockSlacks(*bounds))
 
 
 def _jump_within(
     jumps: np.ndarray, motion: np.ndarray, start: np.ndarray, end: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    # Instants of jumps strictly within blocks, near their middles, (k,), and whether there are any.
+    # Times of jumps strictly within blocks, near their middles, (k,), and whether there are any.
     if not len(jumps):
         return start, np.zeros(len(start), bool)
     # NumPy orders complex numbers by their real parts first.
@@ -124,7 +125,7 @@ def _jump_within(
 
 
 def _below(value: np.ndarray, rise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    # Shares between which a line with this value at the start is not above zero.
+    # Fractions between which a line with this value at the start is not above zero.
     with np.errstate(divide="ignore", invalid="ignore"):
         root = np.clip(-value / rise, 0.0, 1.0)
     return np.where(rise < 0.0, root, 0.0), np.where(rise > 0.0, root, 1.0)

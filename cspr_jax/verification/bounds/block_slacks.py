@@ -1,7 +1,7 @@
 """Slacks of any motion over blocks of time: bounds, from bounds of its states, of how far each criterion is met.
 
-A motion passes a singularity, and cables without thickness pass through each other, at an instant only. Where that is
-proved to happen within a block that is short enough, the slack counts as negative there.
+A motion passes a singularity, and cables without thickness pass through each other, at isolated times only. Where that
+is proved to happen within a block that is short enough, the slack counts as negative there.
 """
 
 from __future__ import annotations
@@ -38,10 +38,11 @@ if TYPE_CHECKING:
     from jaxtyping import Float
 
 # Blocks that are bounded together, with contacts and without.
-BATCH, RATES_BATCH = 64, 128
-# Length of a block and the one before it, together, at which what happens at an instant counts for the block, s.
-INSTANT = 1e-6
-# Upper bound of a slack that vanishes at an instant.
+BATCH = 64
+RATES_BATCH = 128
+# Length of a block and the one before it, together, at which what happens at one time counts for the block, s.
+SHORTEST = 1e-6
+# Upper bound of a slack that vanishes at one time.
 SMALLEST = 1e-12
 Pair = tuple[Array, Array] | Array
 # Bounds of slacks, without lines or with them, in the order of the fields of `BlockSlacks`.
@@ -52,8 +53,8 @@ class BlockSlacks(NamedTuple):
     """Bounds of slacks over k blocks: by numbers, and by lines over the block that rise from or to these numbers.
 
     Fields:
-        low: (k, n_criteria) lower bounds, -inf where nothing is known.
-        high: (k, n_criteria) upper bounds, inf where nothing is known.
+        low: (k, n_criteria) lower bounds, -inf without bounds.
+        high: (k, n_criteria) upper bounds, inf without bounds.
         low_rise: (k, n_criteria) rise of the line below the slack, from start to end, whose lower end is at `low`;
             None: no line is known.
         high_rise: (k, n_criteria) likewise of the line above, whose higher end is at `high`.
@@ -65,7 +66,7 @@ class BlockSlacks(NamedTuple):
     high_rise: np.ndarray = None  # type: ignore[assignment]
 
     def complete(self) -> "BlockSlacks":
-        """The bounds with lines, level ones where none are known."""
+        """The bounds with lines, level ones where there are none."""
         rises = (np.zeros_like(self.low) if rise is None else rise for rise in (self.low_rise, self.high_rise))
         return BlockSlacks(self.low, self.high, *rises)
 
@@ -95,7 +96,7 @@ def _kernel(
     passes: bool = False,
     contacts_alone: bool = False,
 ) -> tuple[Array, ...] | Array:
-    # Bound the slacks, or tell which of them are proved to vanish at an instant.
+    # Bound the slacks, or tell which of them are proved to vanish at one time.
     def one(state: StateBounds) -> tuple[Array, ...] | Array:
         cables, matrix, wrench = _balance(robot, state)
         if passes:
@@ -169,7 +170,7 @@ def _of_pose(robot: AnyRobot, matrix: AffineBounds, state: StateBounds) -> list[
 
 
 def _passes(robot: AnyRobot, bodies: Bodies, matrix: AffineBounds, state: StateBounds, cables: CableBounds) -> Array:
-    # Tell which of the determinant and the contacts are proved to vanish within a block, (1 + n_meetings,).
+    # Tell which of the determinant and the contacts are proved to vanish within a block, (1 + n_contacts,).
     is_regular, _ = judged_poses(robot)
     through = changes_sign(determinant(matrix)) if is_regular else jnp.zeros((), bool)
     return jnp.concatenate([through[None], passings(robot, bodies, state, cables)])
@@ -223,11 +224,11 @@ def block_slacks(
     is_open = ~((low > 0.0) | (high < 0.0))[:, at_instants]
     # An event at the border of two blocks is within the second one and the end of the first.
     before = np.maximum(2.0 * start - end, 0.0)
-    short = np.flatnonzero(is_open.any(1) & (end - before <= INSTANT))
+    short = np.flatnonzero(is_open.any(1) & (end - before <= SHORTEST))
     if len(short):
         kernel = partial(_kernel, robot, limits, bodies, passes=True)
         # Bounds are of all blocks together, which may be those of several motions.
-        states = jax.tree.map(lambda leaf: np.asarray(leaf)[short], bounds(before, end))
+        states = jax.tree.map(lambda array: np.asarray(array)[short], bounds(before, end))
         passes = in_batches(kernel, states, batch_size=BATCH)
         passes = passes if rows[np.argmax(at_instants)].flag == Verdict.SINGULAR else passes[:, 1:]
         vanishing = np.zeros((len(short), len(rows)), bool)

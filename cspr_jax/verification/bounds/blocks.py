@@ -13,9 +13,9 @@ from cspr_jax.motion.amplitudes import Amplitude
 if TYPE_CHECKING:
     from jaxtyping import Float, Num
 
-# A remainder of up to this share of a block does not add a block to a piece between knots.
+# A remainder of up to this part of a block does not add a block to a piece between knots.
 SLIVER = 0.3
-INSTANTS = 1025  # at which the number of parts of an arc is tabulated
+SAMPLES = 1025  # at which the number of parts of an arc is tabulated
 
 
 class Blocks(NamedTuple):
@@ -35,9 +35,9 @@ class Blocks(NamedTuple):
         """Blocks chosen by indices, or by a mask (k,)."""
         return Blocks(*(x[rows] for x in self))
 
-    def instants(self, places: np.ndarray) -> Float[np.ndarray, "m k"]:
-        """Instants at the same places of each block."""
-        return 0.5 * (self.start + self.stop) + places * (0.5 * (self.stop - self.start))
+    def times(self, positions: np.ndarray) -> Float[np.ndarray, "m k"]:
+        """Times at the same positions, -1 to 1, of each block."""
+        return 0.5 * (self.start + self.stop) + positions * (0.5 * (self.stop - self.start))
 
     def halves(self) -> "Blocks":
         """Both halves of each block, (2 k,)."""
@@ -50,11 +50,11 @@ class Blocks(NamedTuple):
 
 
 class Parts(NamedTuple):
-    """Number of parts that an arc is cut into, at equidistant instants tau from 0 to 1.
+    """Number of parts that an arc is cut into, at equidistant tau from 0 to 1.
 
     Fields:
-        at_cusps: (m,) the number if there is a cusp at the instant.
-        at_middles: (m,) the number if the instant is halfway between two cusps. In between it follows the squared sine
+        at_cusps: (m,) the number if there is a cusp there.
+        at_middles: (m,) the number if tau is halfway between two cusps. In between it follows the squared sine
             of the phase.
     """
 
@@ -69,7 +69,7 @@ class Parts(NamedTuple):
 
 def growing(amplitude: Amplitude, at_cusps: tuple[float, float], at_middles: tuple[float, float]) -> Parts:
     """Number of parts of an arc along a motion from rest: more where it swings farther."""
-    tau = np.linspace(0.0, 1.0, INSTANTS)
+    tau = np.linspace(0.0, 1.0, SAMPLES)
     piece = np.searchsorted(np.asarray(amplitude.knots), tau)
     coefficients, origins = np.asarray(amplitude.coefficients)[piece], np.asarray(amplitude.origins)[piece]
     values = np.polynomial.polynomial.polyval(tau - origins, coefficients.T, tensor=False)
@@ -93,7 +93,7 @@ def _edges(arcs: int, knots: list[float], parts: float | Parts) -> np.ndarray:
     # Return the edges of the blocks of a motion; its two ends are among the knots.
     each = parts.of(arcs) if isinstance(parts, Parts) else np.full(2, float(parts))
     tau = np.linspace(0.0, 1.0, len(each))
-    # Count the parts that lie before each instant.
+    # Count the parts that lie before each tau.
     before = arcs * np.append(0.0, np.cumsum(0.5 * (each[1:] + each[:-1]) * np.diff(tau)))
     inside = []
     for start, stop in itertools.pairwise(knots):

@@ -21,32 +21,32 @@ class Distances(NamedTuple):
         bound: (k, m) lower bounds in the middle of each block, along some unit vectors.
         change: (k, m) by how much the distances can shrink within the block.
         tilt: (k, m) gain of the bounds, per displacement of the spools, along vectors tilted against it.
-        slope: (k, m) sine of the angle of that tilt per displacement, 1/m; the bounds shrink by its cosine.
+        sine: (k, m) sine of the angle of that tilt per displacement, 1/m; the bounds shrink by its cosine.
         swing: (k, m) what the tilted bounds can lose besides within the block, per displacement.
         spools: (m,) largest loss of each distance, per largest displacement of a spool.
-        here: (k, l) distances in the middle.
-        here_spools: (k, l) loss of the distances in the middle for the worst displacements, per displacement.
+        current: (k, l) distances in the middle.
+        current_spools: (k, l) loss of the distances in the middle for the worst displacements, per displacement.
     """
 
     bound: np.ndarray
     change: np.ndarray
     tilt: np.ndarray
-    slope: np.ndarray
+    sine: np.ndarray
     swing: np.ndarray
     spools: np.ndarray
-    here: np.ndarray
-    here_spools: np.ndarray
+    current: np.ndarray
+    current_spools: np.ndarray
 
     def hold(self, spools: Float[np.ndarray, "k"]) -> Float[np.ndarray, "k"]:
         """Tell whether all distances stay positive within blocks, however spools move: proved."""
         far = spools[:, None]
-        cosine = np.sqrt(np.maximum(1.0 - (far * self.slope) ** 2, 0.0))
+        cosine = np.sqrt(np.maximum(1.0 - (far * self.sine) ** 2, 0.0))
         low = cosine * self.bound - self.change + far * (self.tilt - self.swing)
-        return ((low > self.spools * far) & (far * self.slope < 1.0)).all(1)
+        return ((low > self.spools * far) & (far * self.sine < 1.0)).all(1)
 
     def fail(self, spools: Float[np.ndarray, "k"]) -> Float[np.ndarray, "k"]:
         """Tell whether the worst displacements of the spools use up a distance in the middle of each block."""
-        return (self.here < self.here_spools * spools[:, None]).any(1)
+        return (self.current < self.current_spools * spools[:, None]).any(1)
 
 
 class Rates(NamedTuple):
@@ -66,7 +66,7 @@ class Rates(NamedTuple):
 
 
 class Enclosure(NamedTuple):
-    """Middle states and bounds of k blocks of motions; "in the middle" means at the middle instant.
+    """Middle states and bounds of k blocks of motions; "in the middle" means at the middle time.
 
     Fields:
         rays: (k, n_cables, 3) from spool to attachment point in the middle, m.
@@ -75,7 +75,7 @@ class Enclosure(NamedTuple):
         moment: (k, 3) moment of the cables about the mass centre, per mass, in the middle, m^2/s^2.
         acceleration_matrix: (k, 3, 3) maps a point of the platform, from the mass centre, to its relative
             acceleration, 1/s^2.
-        way: (k, n_cables, 3) how far the tangents of the rays lead from the middle to the stop, m.
+        tangent: (k, n_cables, 3) how far the tangents of the rays lead from the middle to the stop, m.
         deviation: (k, n_cables) largest distance of the rays from their tangents within the block, m.
         force_change: (k,) largest change of the force from the middle, within the block, m/s^2.
         acceleration_matrix_change: (k,) largest such change of `acceleration_matrix`, 1/s^2.
@@ -90,7 +90,7 @@ class Enclosure(NamedTuple):
     force: np.ndarray
     moment: np.ndarray
     acceleration_matrix: np.ndarray
-    way: np.ndarray
+    tangent: np.ndarray
     deviation: np.ndarray
     force_change: np.ndarray
     acceleration_matrix_change: np.ndarray
@@ -102,7 +102,7 @@ class Enclosure(NamedTuple):
     @property
     def moved(self) -> np.ndarray:
         """Largest change of the rays from the middle, within the block, (k, n_cables) m."""
-        return largest_moves(self.way, self.deviation)
+        return largest_moves(self.tangent, self.deviation)
 
     def part(self, rows: np.ndarray) -> "Enclosure":
         """Blocks chosen by indices, or by a mask (k,)."""
@@ -116,18 +116,18 @@ class Enclosure(NamedTuple):
         return self._replace(**fields, distances=distances, rates=rates)
 
     def middle(self, mu: Float[np.ndarray, "k n_cables"]) -> "Enclosure":
-        """Enclosure of the middle instants alone, as if blocks had no length."""
-        names = "way", "deviation", "force_change", "acceleration_matrix_change"
+        """Enclosure of the middle times alone, as if blocks had no length."""
+        names = "tangent", "deviation", "force_change", "acceleration_matrix_change"
         changes = {name: np.zeros_like(getattr(self, name)) for name in names}
-        still = {name: np.zeros_like(getattr(self.rates, name)) for name in ("velocity_change", "acceleration_change")}
+        static = {name: np.zeros_like(getattr(self.rates, name)) for name in ("velocity_change", "acceleration_change")}
         nothing = np.zeros_like(self.distances.change)
         distances = self.distances._replace(change=nothing, swing=nothing)
-        return self._replace(**changes, low=mu, high=mu, distances=distances, rates=self.rates._replace(**still))
+        return self._replace(**changes, low=mu, high=mu, distances=distances, rates=self.rates._replace(**static))
 
 
-def largest_moves(way: Float[np.ndarray, "... 3"], deviation: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
+def largest_moves(tangent: Float[np.ndarray, "... 3"], deviation: Float[np.ndarray, "..."]) -> Float[np.ndarray, "..."]:
     """Largest changes of rays from the middles of blocks."""
-    return np.linalg.norm(way, axis=-1) + deviation
+    return np.linalg.norm(tangent, axis=-1) + deviation
 
 
 def structure(
@@ -169,18 +169,22 @@ class Influence(NamedTuple):
         return Influence(*(x[rows] for x in self))
 
 
-def influence(known: Enclosure) -> Influence:
+def influence(enclosure: Enclosure) -> Influence:
     """Influence in the middle of blocks."""
-    is_platform = bool(known.arms.any())
-    inverse = inverted(structure(known.rays, known.arms, is_platform=is_platform))
+    is_platform = bool(enclosure.arms.any())
+    inverse = inverted(structure(enclosure.rays, enclosure.arms, is_platform=is_platform))
     forces = inverse[..., :3]
     moments = inverse[..., 3:] if is_platform else np.zeros_like(forces)
-    spools = forces[:, :, None] + np.cross(moments[:, :, None], known.arms)
-    lengths = np.linalg.norm(known.rays, axis=2)
-    units = known.rays / lengths[..., None]
+    spools = forces[:, :, None] + np.cross(moments[:, :, None], enclosure.arms)
+    lengths = np.linalg.norm(enclosure.rays, axis=2)
+    units = enclosure.rays / lengths[..., None]
     across = spools - np.sum(spools * units[:, None], axis=3, keepdims=True) * units[:, None]
-    centre = forces @ known.acceleration_matrix + np.cross(known.force[:, None], moments)
-    wrench = np.concatenate([known.force, known.moment], axis=1)[..., None] if is_platform else known.force[..., None]
+    centre = forces @ enclosure.acceleration_matrix + np.cross(enclosure.force[:, None], moments)
+    wrench = (
+        np.concatenate([enclosure.force, enclosure.moment], axis=1)[..., None]
+        if is_platform
+        else enclosure.force[..., None]
+    )
     return Influence(spools, across, centre, forces, moments, lengths, (inverse @ wrench)[..., 0])
 
 

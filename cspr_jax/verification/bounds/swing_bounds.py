@@ -32,14 +32,14 @@ def swing_bounds(
     lateral, axial = sincospi(tau * (segment.sense * segment.precession))
     if variable:
         r3 = block.values[3] * span
-        place = (r * cosine - r1 * sine * (1.0 / omega), r * sine * nu)
+        local_position = (r * cosine - r1 * sine * (1.0 / omega), r * sine * nu)
         w = ((r * steady + r2) * (-1.0 / omega), r1 * (2.0 * nu))
         w1 = (r1 * (2.0 * nu**2 * omega - steady / omega) - r3 * (1.0 / omega), (r * steady + r2 * 3.0) * nu)
-        pace = (sine * w[0], sine * w[1])
-        second_derivative = tuple(cosine * rate * omega + sine * slope for rate, slope in zip(w, w1, strict=True))
+        local_velocity = (sine * w[0], sine * w[1])
+        second_derivative = tuple(cosine * rate * omega + sine * change for rate, change in zip(w, w1, strict=True))
     else:
-        place = (r * cosine, r * sine * nu)
-        pace = (r1 * cosine - r * sine * (steady / omega), r1 * sine * nu)
+        local_position = (r * cosine, r * sine * nu)
+        local_velocity = (r1 * cosine - r * sine * (steady / omega), r1 * sine * nu)
         second_derivative = (
             (r2 - r * steady) * cosine - r1 * sine * (2.0 * steady / omega),
             (r2 + r * steady) * sine * nu,
@@ -47,6 +47,6 @@ def swing_bounds(
     # Into the axes of the robot.
     current, velocity, acceleration = (
         rotated(segment.plane, stacked([axial * x + lateral * y, axial * y - lateral * x]))
-        for x, y in (place, pace, second_derivative)
+        for x, y in (local_position, local_velocity, second_derivative)
     )
     return current + segment.center, velocity * (1.0 / duration), acceleration * (1.0 / duration**2)

@@ -15,23 +15,23 @@ if TYPE_CHECKING:
 
 
 def rates_hold(
-    known: Enclosure, influence: Influence, limits: Limits, spools: Float[np.ndarray, "k"]
+    enclosure: Enclosure, influence: Influence, limits: Limits, spools: Float[np.ndarray, "k"]
 ) -> Bool[np.ndarray, "k"]:
     """Prove that every cable of every robot keeps its limits of speed and acceleration within blocks."""
     is_met, largest = np.ones(len(spools), bool), _limits_of_rates(limits)
     if largest is None:
         return is_met
     # Within the block every ray of every robot lies in a ball around the planned ray in the middle.
-    ball = np.minimum((known.moved + spools[:, None]) / influence.lengths, 1.0)
-    units, rates = known.rays / influence.lengths[..., None], known.rates
+    ball = np.minimum((enclosure.moved + spools[:, None]) / influence.lengths, 1.0)
+    units, rates = enclosure.rays / influence.lengths[..., None], enclosure.rates
     slowest, fastest = _along(units, rates.velocity, ball)
     minimum, maximum = _along(units, rates.acceleration, ball)
-    pace = np.linalg.norm(rates.velocity, axis=2)
+    norm = np.linalg.norm(rates.velocity, axis=2)
     short, long = influence.lengths * (1.0 - ball), influence.lengths * (1.0 + ball)
     speed = np.maximum(np.abs(slowest), np.abs(fastest)) + rates.velocity_change
     low = np.where(slowest * fastest > 0.0, np.minimum(np.abs(slowest), np.abs(fastest)), 0.0) - rates.velocity_change
-    across = (pace + rates.velocity_change) ** 2 - np.maximum(low, 0.0) ** 2
-    inward = np.maximum(np.maximum(pace - rates.velocity_change, 0.0) ** 2 - speed**2, 0.0)
+    across = (norm + rates.velocity_change) ** 2 - np.maximum(low, 0.0) ** 2
+    inward = np.maximum(np.maximum(norm - rates.velocity_change, 0.0) ** 2 - speed**2, 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         up = across / short + maximum + rates.acceleration_change
         down = inward / long + minimum - rates.acceleration_change
@@ -49,14 +49,14 @@ def _limits_of_rates(limits: Limits) -> tuple[np.ndarray, np.ndarray] | None:
 
 def _along(units: np.ndarray, vectors: np.ndarray, ball: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     # Bound the component of vectors along all rays that lie within a part `ball` of their length of the given rays.
-    component, size = np.sum(units * vectors, axis=2), np.linalg.norm(vectors, axis=2)
-    across = np.sqrt(np.maximum(size**2 - component**2, 0.0))
+    component, norm = np.sum(units * vectors, axis=2), np.linalg.norm(vectors, axis=2)
+    across = np.sqrt(np.maximum(norm**2 - component**2, 0.0))
     angle, inclination = np.arcsin(ball), np.arctan2(across, component)
-    return size * np.cos(np.minimum(inclination + angle, np.pi)), size * np.cos(np.maximum(inclination - angle, 0.0))
+    return norm * np.cos(np.minimum(inclination + angle, np.pi)), norm * np.cos(np.maximum(inclination - angle, 0.0))
 
 
 def rates_fail(
-    known: Enclosure, influence: Influence, limits: Limits, spools: Float[np.ndarray, "k"]
+    enclosure: Enclosure, influence: Influence, limits: Limits, spools: Float[np.ndarray, "k"]
 ) -> Float[np.ndarray, "k"]:
     """Tell whether a cable of some robot breaks a limit of speed or acceleration in the middle of each block.
 
@@ -65,13 +65,13 @@ def rates_fail(
     broken, largest = np.zeros(len(spools), bool), _limits_of_rates(limits)
     if largest is None:
         return broken
-    units, (velocity, acceleration, _, _) = known.rays / influence.lengths[..., None], known.rates
-    ways = [units]
+    units, (velocity, acceleration, _, _) = enclosure.rays / influence.lengths[..., None], enclosure.rates
+    directions = [units]
     for vectors in (velocity, acceleration):
-        ways.append(unit_vectors(vectors - np.sum(vectors * units, axis=2, keepdims=True) * units))
-    for way in ways:
+        directions.append(unit_vectors(vectors - np.sum(vectors * units, axis=2, keepdims=True) * units))
+    for direction in directions:
         for sign in (1.0, -1.0):
-            rays = known.rays - sign * spools[:, None, None] * way
+            rays = enclosure.rays - sign * spools[:, None, None] * direction
             lengths = np.linalg.norm(rays, axis=2)
             rate = np.sum(rays * velocity, axis=2) / lengths
             second_derivative = (np.sum(velocity**2 + rays * acceleration, axis=2) - rate**2) / lengths

@@ -24,13 +24,13 @@ from cspr_jax.runtime.persistent_jit import persistent_jit
 from cspr_jax.verification.bounds.block_slacks import BATCH
 from cspr_jax.verification.bounds.blocks import Blocks
 from cspr_jax.verification.robustness.tolerances import Tolerated, tolerated_by
-from cspr_jax.verification.robustness.uncertain_slacks import blocks_hold, instants_fail, share_of, worst_ways
+from cspr_jax.verification.robustness.uncertain_slacks import blocks_hold, radii_of, states_fail, worst_directions
 from cspr_jax.verification.time_proof import FIRST
 
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-INSTANTS = 256  # in one batch
+STATES = 256  # in one batch
 
 
 @dataclasses.dataclass
@@ -42,58 +42,62 @@ class _StatePool:
     contacts_alone: bool
     blocks: Blocks
     states: StateBounds
-    instants: StateBounds
-    ways: np.ndarray
+    middle_states: StateBounds
+    directions: np.ndarray
 
-    def part(self, rows: np.ndarray) -> "_StatePool":
-        states, instants = (jax.tree.map(lambda x: x[rows], each) for each in (self.states, self.instants))
+    def part(self, index: np.ndarray) -> "_StatePool":
+        states, middle_states = (jax.tree.map(lambda x: x[index], each) for each in (self.states, self.middle_states))
         return dataclasses.replace(
-            self, blocks=self.blocks.part(rows), states=states, instants=instants, ways=self.ways[rows]
+            self,
+            blocks=self.blocks.part(index),
+            states=states,
+            middle_states=middle_states,
+            directions=self.directions[index],
         )
 
-    def halves(self, rows: np.ndarray) -> "_StatePool":
-        blocks = self.blocks.part(rows).halves()
+    def halves(self, index: np.ndarray) -> "_StatePool":
+        blocks = self.blocks.part(index).halves()
         return _pool(self.problem, self.bodies, self.motion, blocks, contacts_alone=self.contacts_alone)
 
     def middles(self) -> "_StatePool":
-        return dataclasses.replace(self, states=self.instants)
+        return dataclasses.replace(self, states=self.middle_states)
 
     def hold(self, multiple: np.ndarray) -> np.ndarray:
         if not len(self.blocks.row):
             return np.zeros(0, bool)
         of_robot = self.problem.robot, self.problem.limits, self.bodies
         kernel = partial(blocks_hold, *of_robot, contacts_alone=self.contacts_alone)
-        return in_batches(kernel, (self.states, share_of(self.problem.limits, multiple)), batch_size=BATCH)
+        return in_batches(kernel, (self.states, radii_of(self.problem.limits, multiple)), batch_size=BATCH)
 
     def fail(self, multiple: np.ndarray) -> np.ndarray:
         if not len(self.blocks.row):
             return np.zeros(0, bool)
         of_robot = self.problem.robot, self.problem.limits, self.bodies
-        fraction = share_of(self.problem.limits, multiple)
-        return instants_fail(*of_robot, self.instants, fraction, self.ways, contacts_alone=self.contacts_alone)
+        radii = radii_of(self.problem.limits, multiple)
+        return states_fail(*of_robot, self.middle_states, radii, self.directions, contacts_alone=self.contacts_alone)
 
 
 def _pool(
     problem: Problem, bodies: Bodies, motion: BoundedMotion, blocks: Blocks, *, contacts_alone: bool
 ) -> _StatePool:
     middle = 0.5 * (blocks.start + blocks.stop)
-    each = motion.bounds(blocks.start, blocks.stop), instant_states(motion, middle / float(motion.duration()))
-    states, instants = (jax.tree.map(np.asarray, bounds) for bounds in each)
-    fraction, of_robot = share_of(problem.limits, np.ones(len(middle))), (problem.robot, problem.limits, bodies)
-    ways = worst_ways(*of_robot, instants, fraction, contacts_alone=contacts_alone)
-    return _StatePool(problem, bodies, motion, contacts_alone, blocks, states, instants, ways)
+    each = motion.bounds(blocks.start, blocks.stop), states_as_bounds(motion, middle / float(motion.duration()))
+    states, middle_states = (jax.tree.map(np.asarray, bounds) for bounds in each)
+    radii, of_robot = radii_of(problem.limits, np.ones(len(middle))), (problem.robot, problem.limits, bodies)
+    directions = worst_directions(*of_robot, middle_states, radii, contacts_alone=contacts_alone)
+    return _StatePool(problem, bodies, motion, contacts_alone, blocks, states, middle_states, directions)
 
 
 @persistent_jit
-def _instants(motion: Motion, tau) -> StateBounds:
+def _constant_states(motion: Motion, tau) -> StateBounds:
     states = jax.vmap(motion.state)(tau)
     names = [name for name in StateBounds._fields if getattr(states, name) is not None]
     return StateBounds(**{name: constant(getattr(states, name)) for name in names})
 
 
-def instant_states(motion: Motion, tau: Float[np.ndarray, "k"]) -> StateBounds:
+def states_as_bounds(motion: Motion, tau: Float[np.ndarray, "k"]) -> StateBounds:
     """States of a motion, as bounds of blocks without a length."""
-    return in_batches(partial(_instants, common_shape(motion)), tau, batch_size=INSTANTS)
+    return in_batches(partial(_constant_states, common_shape(motion)), tau, batch_size=STATES)
 
 
 def motion_tolerances(

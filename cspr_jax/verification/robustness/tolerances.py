@@ -21,18 +21,20 @@ from cspr_jax.verification.robustness.uncertainty import Requirements, WorstDisp
 if TYPE_CHECKING:
     from jaxtyping import Num
 
-# `ROW` is tried first, in its order. A multiple that fails is then divided by `RATIO` while it fails, down to `FIRST`.
-RATIO, FIRST = 8.0, 1e-6
-ROW = (1.0, 8.0, 64.0, 512.0, LARGEST_MULTIPLE)
-# Ratio that the proved and the refuted multiple are to reach, and bisections that find each.
-NEAR, STEPS = 0.99, 12
-# Most halvings of a block, and most open blocks of an arc.
-HALVINGS, OPEN = 14, 256
+# These are tried first, in their order. A multiple that fails is then divided by `RATIO` while it fails, down to
+# `SMALLEST`.
+FIRST_MULTIPLES = (1.0, 8.0, 64.0, 512.0, LARGEST_MULTIPLE)
+RATIO = 8.0
+SMALLEST = 1e-6
+NEAR = 0.99  # ratio that the proved and the refuted multiple are to reach
+STEPS = 12  # bisections that find each
+HALVINGS = 14  # of a block, at most
+OPEN = 256  # blocks of an arc, at most
 # Times as many blocks as usual may be open where it is decided whether a motion is feasible: at the multiple 1.
 DECIDED = 4.0
-# Factor by which a target is lowered where more blocks are open, and how often it is applied in a row.
-LESS, LESSER = 0.95, 8
-# Levels of halving at which a robot that fails is still looked for once the bounds cannot hold.
+LOWERED = 0.95  # factor of a target where more blocks are open
+LOWERINGS = 8  # how often it is applied in a row
+# Levels of halving at which a robot that fails is looked for although the bounds cannot hold.
 MORE = 3
 
 
@@ -49,7 +51,7 @@ class Tolerated(NamedTuple):
 
 
 class Pool(Protocol):
-    """Blocks that are not settled, and what is known of them; multiples are (k,), one for each block."""
+    """Open blocks, and their bounds; multiples are (k,), one for each block."""
 
     blocks: Blocks
 
@@ -91,9 +93,9 @@ class Pool(Protocol):
 @dataclasses.dataclass
 class _Open:
     # Blocks of swings, and of platforms on six cables.
-    look: Callable[[Blocks], "_Open"]
+    enclosed: Callable[[Blocks], "_Open"]
     blocks: Blocks
-    known: Enclosure
+    enclosure: Enclosure
     influence: Influence
     worst: WorstDisplacements
     requirements: Requirements
@@ -101,20 +103,20 @@ class _Open:
     def part(self, rows: np.ndarray) -> "_Open":
         worst = WorstDisplacements(*(x[:, rows] for x in self.worst))
         requirements = dataclasses.replace(self.requirements, slack=self.requirements.slack[rows])
-        known, influence = self.known.part(rows), self.influence.part(rows)
-        return _Open(self.look, self.blocks.part(rows), known, influence, worst, requirements)
+        enclosure, influence = self.enclosure.part(rows), self.influence.part(rows)
+        return _Open(self.enclosed, self.blocks.part(rows), enclosure, influence, worst, requirements)
 
     def halves(self, rows: np.ndarray) -> "_Open":
-        return self.look(self.blocks.part(rows).halves())
+        return self.enclosed(self.blocks.part(rows).halves())
 
     def middles(self) -> "_Open":
-        return dataclasses.replace(self, known=self.known.middle(self.influence.mu))
+        return dataclasses.replace(self, enclosure=self.enclosure.middle(self.influence.mu))
 
     def fail(self, multiple: np.ndarray) -> np.ndarray:
-        return fails(self.known, self.influence, self.worst, self.requirements, multiple)
+        return fails(self.enclosure, self.influence, self.worst, self.requirements, multiple)
 
     def hold(self, multiple: np.ndarray) -> np.ndarray:
-        return holds(self.known, self.influence, self.requirements, multiple)
+        return holds(self.enclosure, self.influence, self.requirements, multiple)
 
 
 def tolerated(
@@ -123,21 +125,21 @@ def tolerated(
     requirements: Requirements,
     enclose: Callable[[Blocks], Enclosure],
     *,
-    whole: bool = True,
+    full: bool = True,
 ) -> Tolerated:
     """Multiples of an uncertainty that motions are proved to tolerate, and that are refuted."""
     if not len(arcs):
         return Tolerated(np.zeros(0), np.zeros(0))
-    return tolerated_by(_looked_at(requirements, enclose, blocks), arcs, whole=whole)
+    return tolerated_by(_enclosed(requirements, enclose, blocks), arcs, full=full)
 
 
-def tolerated_by(pool: Pool, arcs: Num[np.ndarray, "n"], *, whole: bool = True) -> Tolerated:
-    """Multiples of an uncertainty, as `tolerated` gives them, by any way to prove and to refute blocks."""
-    search = _MultipleSearch(arcs, whole=whole)
+def tolerated_by(pool: Pool, arcs: Num[np.ndarray, "n"], *, full: bool = True) -> Tolerated:
+    """Multiples of an uncertainty, as `tolerated` gives them, by any pool of blocks."""
+    search = _MultipleSearch(arcs, full=full)
     search.refuted = (
-        _refuted_first(pool, len(arcs)) if whole else _refuted_below(pool, search.refuted, np.ones(len(arcs)))
+        _refuted_first(pool, len(arcs)) if full else _refuted_below(pool, search.refuted, np.ones(len(arcs)))
     )
-    search.targets = _targets(search.refuted, whole=whole)
+    search.targets = _targets(search.refuted, full=full)
     for level in range(HALVINGS + 1):
         pool = search.left(pool)
         is_open = search.open_blocks(pool, level)
@@ -149,10 +151,10 @@ def tolerated_by(pool: Pool, arcs: Num[np.ndarray, "n"], *, whole: bool = True) 
 
 
 class _MultipleSearch:
-    # State of the search for n motions: refuted multiples, targets and, of motions that are settled, proved multiples.
+    # State of the search for n motions: refuted multiples, targets and, of motions that are done, proved multiples.
 
-    def __init__(self, arcs: np.ndarray, *, whole: bool) -> None:
-        self._arcs, self._whole, self._count = arcs, whole, len(arcs)
+    def __init__(self, arcs: np.ndarray, *, full: bool) -> None:
+        self._arcs, self._full, self._count = arcs, full, len(arcs)
         self.refuted, self.targets = np.full(len(arcs), np.inf), np.ones(len(arcs))
         self.proved, self._is_hopeless = np.full(len(arcs), np.nan), np.zeros(len(arcs), bool)
 
@@ -162,23 +164,23 @@ class _MultipleSearch:
         return OPEN * self._arcs * np.where(self.targets == 1.0, DECIDED, 1.0)
 
     def left(self, pool: Pool) -> Pool:
-        # Return the blocks of motions that are not settled.
-        if self._whole:
+        # Return the blocks of open motions.
+        if self._full:
             self.targets = _reachable(pool, self.targets)
         self.proved = np.where(np.isnan(self.proved) & (self.targets == 0.0), 0.0, self.proved)
         return pool.part(np.isnan(self.proved)[pool.blocks.row])
 
     def open_blocks(self, pool: Pool, level: int) -> np.ndarray:
-        # Return the blocks to be halved; settle motions without any, and motions with too many.
+        # Return the blocks to be halved; finish motions without any, and motions with too many.
         row = pool.blocks.row
         is_open = ~pool.hold(self.targets[row])
-        is_open = self._lessened(pool, is_open) if self._whole else self._hopeful(pool, is_open)
+        is_open = self._lessened(pool, is_open) if self._full else self._hopeful(pool, is_open)
         many = np.bincount(row[is_open], minlength=self._count)
         ends = (many > self._most_open) | ((many > 0) & (level == HALVINGS))
         ends |= self._is_hopeless & (many > 0) & (level >= MORE)
         left = is_open & ends[row]
         if left.any():
-            self.proved[ends] = _held(pool.part(left), self.targets)[ends] if self._whole else 0.0
+            self.proved[ends] = _held(pool.part(left), self.targets)[ends] if self._full else 0.0
         done = np.isnan(self.proved) & (many == 0)
         self.proved[done] = np.where(self._is_hopeless, 0.0, self.targets)[done]
         return is_open & ~ends[row]
@@ -186,11 +188,11 @@ class _MultipleSearch:
     def _lessened(self, pool: Pool, is_open: np.ndarray) -> np.ndarray:
         # Lower the targets of motions of which too many blocks are open.
         row = pool.blocks.row
-        for _ in range(LESSER):
+        for _ in range(LOWERINGS):
             much = np.bincount(row[is_open], minlength=self._count) > self._most_open
             if not much.any():
                 break
-            self.targets = np.where(much, _not_across_one(LESS * self.targets, self.targets), self.targets)
+            self.targets = np.where(much, _not_across_one(LOWERED * self.targets, self.targets), self.targets)
             indices = np.flatnonzero(is_open & much[row])
             is_open[indices] = ~pool.part(indices).hold(self.targets[row[indices]])
         return is_open
@@ -205,8 +207,8 @@ class _MultipleSearch:
 
     def refute(self, pool: Pool) -> None:
         # Take in the multiples that the middles of new blocks refute.
-        self.refuted = _refuted_below(pool, self.refuted, NEAR * self.refuted if self._whole else self.targets)
-        self.targets = np.minimum(self.targets, _targets(self.refuted, whole=self._whole))
+        self.refuted = _refuted_below(pool, self.refuted, NEAR * self.refuted if self._full else self.targets)
+        self.targets = np.minimum(self.targets, _targets(self.refuted, full=self._full))
 
 
 def _reachable(pool: Pool, multiples: np.ndarray) -> np.ndarray:
@@ -220,17 +222,17 @@ def _reachable(pool: Pool, multiples: np.ndarray) -> np.ndarray:
     return np.where(minimum < multiples, _near(minimum), multiples)
 
 
-def _looked_at(requirements: Requirements, enclose: Callable[[Blocks], Enclosure], blocks: Blocks) -> _Open:
-    known = enclose(blocks)
-    influences = influence(known)
+def _enclosed(requirements: Requirements, enclose: Callable[[Blocks], Enclosure], blocks: Blocks) -> _Open:
+    enclosure = enclose(blocks)
+    influences = influence(enclosure)
     each = dataclasses.replace(requirements, slack=requirements.slack[blocks.row])
-    look = partial(_looked_at, requirements, enclose)
-    return _Open(look, blocks, known, influences, worst(known, influences, each), each)
+    enclosed = partial(_enclosed, requirements, enclose)
+    return _Open(enclosed, blocks, enclosure, influences, worst(enclosure, influences, each), each)
 
 
-def _targets(refuted: np.ndarray, *, whole: bool) -> np.ndarray:
+def _targets(refuted: np.ndarray, *, full: bool) -> np.ndarray:
     # Return the multiples that are to be proved; 0 where there is nothing to be proved any more.
-    if not whole:
+    if not full:
         return np.where(refuted > 1.0, 1.0, 0.0)
     return np.minimum(_near(refuted), LARGEST_MULTIPLE)
 
@@ -250,9 +252,9 @@ def _any(row: np.ndarray, is_so: np.ndarray, count: int) -> np.ndarray:
 
 
 def _refuted_first(pool: Pool, count: int) -> np.ndarray:
-    # Find the least multiple of a coarse row that the middles refute, then narrow it down.
+    # Find the smallest of the first multiples that the middles refute, then narrow it down.
     high, row = np.full(count, np.inf), pool.blocks.row
-    for multiple in ROW:
+    for multiple in FIRST_MULTIPLES:
         left = pool.part(np.isinf(high)[row])
         broken = left.fail(np.full(len(left.blocks.row), multiple))
         high[_any(left.blocks.row, broken, count)] = multiple
@@ -260,14 +262,14 @@ def _refuted_first(pool: Pool, count: int) -> np.ndarray:
     bad = bad.part(bad.fail(high[bad.blocks.row]))
     while len(bad.blocks.row):
         broken = bad.fail(high[bad.blocks.row] / RATIO)
-        lower = _any(bad.blocks.row, broken, count) & (high > FIRST)
+        lower = _any(bad.blocks.row, broken, count) & (high > SMALLEST)
         high = np.where(lower, high / RATIO, high)
         bad = bad.part(broken & lower[bad.blocks.row])
     return _narrowed(pool, high / RATIO, high)
 
 
 def _refuted_below(pool: Pool, refuted: np.ndarray, multiples: np.ndarray) -> np.ndarray:
-    # Try the multiples on the blocks, narrow down those that they refute, and return the least refuted multiples.
+    # Try the multiples on the blocks, narrow down those that they refute, and return the smallest refuted multiples.
     multiples = np.minimum(multiples, LARGEST_MULTIPLE)
     is_new = _any(pool.blocks.row, pool.fail(multiples[pool.blocks.row]), len(refuted)) & (multiples > 0.0)
     high = np.where(is_new, multiples, np.inf)
@@ -275,7 +277,7 @@ def _refuted_below(pool: Pool, refuted: np.ndarray, multiples: np.ndarray) -> np
 
 
 def _narrowed(pool: Pool, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    # Narrow `high`, which some middle refutes where it is finite, down towards `low`: some middle refutes it still.
+    # Narrow `high`, which some middle refutes where it is finite, down towards `low`: some middle still refutes it.
     pool = pool.part(np.isfinite(high)[pool.blocks.row])
     pool = pool.part(pool.fail(high[pool.blocks.row]))
     low, high = low.copy(), high.copy()

@@ -1,11 +1,11 @@
 """Slacks of all robots within an uncertainty, over blocks of time: proved positive, or broken by one of these robots.
 
-Spools and the mass centre lie in balls around their places. What is proved rests on the tensions of
+Spools and the mass centre lie in balls around their positions. What is proved rests on the tensions of
 `robots.bounds.uncertain_tensions`, for the smallest and the largest mass: sums of the tensions of both, in proportion,
 serve all masses between. Lengths change by no more than spools do; unit vectors of cables stay in cones, which bounds
 rates, accelerations and clearances. Determinant and depth are judged for the planned robot alone.
 
-What is refuted rests on the slacks of single robots at instants, displaced along differences of these slacks.
+What is refuted rests on the slacks of single robots in single states, displaced along differences of these slacks.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ from cspr_jax.verification.bounds.block_slacks import limit_slacks, tension_slac
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Displacement by which differences are taken, over the length of a cable; criteria of which the worst one is sought.
-STEP, NEAREST = 1e-6, 2
-BATCH = 256  # robots at instants
+STEP = 1e-6  # displacement by which differences are taken, over the length of a cable
+NEAREST = 2  # criteria of which the worst displacements are sought
+BATCH = 256  # robots in single states
 
 
-class Share(NamedTuple):
+class Radii(NamedTuple):
     """A multiple of an uncertainty, one for each block, or of one.
 
     Fields:
@@ -56,45 +56,45 @@ class Share(NamedTuple):
     factor: Array
 
 
-def share_of(limits: Limits, multiple: Float[np.ndarray, "k"]) -> Share:
+def radii_of(limits: Limits, multiple: Float[np.ndarray, "k"]) -> Radii:
     """Multiples of an uncertainty."""
     uncertainty: Any = limits.uncertainty
     with np.errstate(over="ignore"):
         factor = as_float64(float(uncertainty.mass_factor) ** multiple)
     spools, centre = (
-        as_float64(multiple * float(size)) for size in (uncertainty.spool_positions, uncertainty.mass_centre)
+        as_float64(multiple * float(radius)) for radius in (uncertainty.spool_positions, uncertainty.mass_centre)
     )
-    return Share(spools, centre, factor)
+    return Radii(spools, centre, factor)
 
 
 @persistent_jit(static_argnames="contacts_alone", compiler_options=compile_options.least())
 def blocks_hold(
-    robot: AnyRobot, limits: Limits, bodies: Bodies, cases: tuple[StateBounds, Share], *, contacts_alone: bool = False
+    robot: AnyRobot, limits: Limits, bodies: Bodies, cases: tuple[StateBounds, Radii], *, contacts_alone: bool = False
 ) -> Float[Array, "k"]:
     """Prove that all robots keep taut cables, limits and distances throughout blocks."""
 
-    def one(state: StateBounds, fraction: Share) -> Array:
+    def one(state: StateBounds, radii: Radii) -> Array:
         cables = cable_bounds(robot, state)
-        parts = [] if contacts_alone else _cable_slacks(robot, limits, state, cables, fraction)
-        turn = jnp.arcsin(fraction.spools / cables.length.low())
+        parts = [] if contacts_alone else _cable_slacks(robot, limits, state, cables, radii)
+        turn = jnp.arcsin(radii.spools / cables.length.low())
         wide = cables._replace(
-            exit=_wider(cables.exit, fraction.spools),
+            exit=_wider(cables.exit, radii.spools),
             direction=_wider(cables.direction, turn[:, None]),
-            length=_wider(cables.length, fraction.spools),
+            length=_wider(cables.length, radii.spools),
         )
-        apart = contact_bounds(robot, bodies, state, wide)[0]
+        distances = contact_bounds(robot, bodies, state, wide)[0]
         is_met = (jnp.concatenate(parts) > 0.0).all() if parts else jnp.ones((), bool)
-        return is_met & ((apart > 0.0).all() | (fraction.spools == 0.0))
+        return is_met & ((distances > 0.0).all() | (radii.spools == 0.0))
 
     return jax.vmap(one)(*cases)
 
 
 @persistent_jit(compiler_options=compile_options.least())
-def lower_slacks(robot: AnyRobot, limits: Limits, cases: tuple[StateBounds, Share]) -> Float[Array, "k n_slacks"]:
+def lower_slacks(robot: AnyRobot, limits: Limits, cases: tuple[StateBounds, Radii]) -> Float[Array, "k n_slacks"]:
     """Lower bounds of the slacks of tensions and limits of all robots over blocks."""
 
-    def one(state: StateBounds, fraction: Share) -> Array:
-        slacks = jnp.concatenate(_cable_slacks(robot, limits, state, cable_bounds(robot, state), fraction))
+    def one(state: StateBounds, radii: Radii) -> Array:
+        slacks = jnp.concatenate(_cable_slacks(robot, limits, state, cable_bounds(robot, state), radii))
         return jnp.where(jnp.isnan(slacks), -jnp.inf, slacks)
 
     return jax.vmap(one)(*cases)
@@ -105,7 +105,7 @@ def _wider(bounds: AffineBounds, radius: Array) -> AffineBounds:
 
 
 def _cable_slacks(
-    robot: AnyRobot, limits: Limits, state: StateBounds, cables: CableBounds, fraction: Share
+    robot: AnyRobot, limits: Limits, state: StateBounds, cables: CableBounds, radii: Radii
 ) -> list[Array]:
     # Bound the slacks of tensions, and of the limits of lengths, speeds and accelerations, from below, with the unit
     # vectors u' of cables at most `turn` from u.
@@ -113,13 +113,13 @@ def _cable_slacks(
 
     def at_mass(ratio: Array) -> UncertainTensions:
         other = with_mass(robot, ratio)
-        return uncertain_tensions(other, state, cables, (low, high), (fraction.spools, fraction.centre))
+        return uncertain_tensions(other, state, cables, (low, high), (radii.spools, radii.centre))
 
-    tensions = jax.vmap(at_mass)(jnp.stack([1.0 / fraction.factor, fraction.factor]))
+    tensions = jax.vmap(at_mass)(jnp.stack([1.0 / radii.factor, radii.factor]))
     parts = [jnp.min(tensions.low - low[None], axis=0)]
     parts += [] if limits.tension_max is None else [jnp.min(high[None] - tensions.high, axis=0)]
     parts = [jnp.min(jnp.concatenate(parts), keepdims=True)] if robot.n_cables > robot.dof else parts
-    maximum = _largest(robot, limits, state, cables, fraction.spools)
+    maximum = _largest(robot, limits, state, cables, radii.spools)
     for row in limits_set(limits):
         if row.quantity != "tension":
             limit = jnp.broadcast_to(getattr(limits, row.name), robot.n_cables if row.per_cable else 1)
@@ -134,16 +134,16 @@ def _largest(
     lengths = {"length": cables.length.high() + spools}
     if limits.cable_speed_max is None and limits.cable_acceleration_max is None:
         return lengths
-    _, _, velocity, pull = attachments(robot, state)
+    _, _, velocity, acceleration = attachments(robot, state)
     near, speed = cables.length.low(), cables.rate.magnitude()
     sine = spools / near
     slowest = jnp.maximum(0.0, jnp.maximum(cables.rate.low(), -cables.rate.high()))
     square = jnp.maximum(norm(velocity).high() ** 2 - slowest**2, 0.0)
     faster = sine * jnp.sqrt(square) + (1.0 - jnp.sqrt(1.0 - sine**2)) * speed
-    # With q = v^2 - rate^2, of length q / l + u pull: q' / l' - q / l, and (u' - u) pull.
+    # With q = v^2 - rate^2, of length q / l + u p'': q' / l' - q / l, and (u' - u) p''.
     short = jnp.where(near > spools, near - spools, jnp.nan)
     more = faster * (2.0 * speed + faster) / short + square * spools / (near * short)
-    more += jnp.arcsin(sine) * norm(pull).high()
+    more += jnp.arcsin(sine) * norm(acceleration).high()
     return lengths | {"speed": speed + faster, "acceleration": cables.acceleration.magnitude() + more}
 
 
@@ -156,7 +156,7 @@ def _upper_slacks(
     *,
     contacts_alone: bool,
 ) -> Array:
-    # Upper bounds of slacks, (k, n_slacks), at instants, of robots whose spools and mass centre are moved, (k, n_cables
+    # Upper bounds of slacks, (k, n_slacks), in states, of robots whose spools and mass centre are moved, (k, n_cables
     # + 1, 3) m, and whose masses are multiples of the planned one, (k,).
     def one(state: StateBounds, moved: Array, ratio: Array) -> Array:
         other = with_mass(dataclasses.replace(robot, base_points=robot.base_points + moved[:-1]), ratio)
@@ -183,7 +183,7 @@ def _of_robots(
     *,
     contacts_alone: bool,
 ) -> np.ndarray:
-    # Upper bounds of slacks, (k, m, n_slacks), of m robots at each of k instants.
+    # Upper bounds of slacks, (k, m, n_slacks), of m robots in each of k states.
     shape = moved.shape[:2]
     repeated = jax.tree.map(lambda x: np.repeat(x, shape[1], axis=0), states)
     cases = repeated, moved.reshape(-1, *moved.shape[2:]), ratio.reshape(-1)
@@ -191,12 +191,12 @@ def _of_robots(
     return in_batches(kernel, cases, batch_size=BATCH).reshape(*shape, -1)
 
 
-def worst_ways(
+def worst_directions(
     robot: AnyRobot,
     limits: Limits,
     bodies: Bodies,
     states: StateBounds,
-    fraction: Share,
+    radii: Radii,
     *,
     contacts_alone: bool = False,
 ) -> Float[np.ndarray, "k 2 n_cables+1 3"]:
@@ -209,31 +209,31 @@ def worst_ways(
     ratio = np.ones((len(step), 3 * count + 1))
     high = _of_robots(robot, limits, bodies, states, step * moves, ratio, contacts_alone=contacts_alone)
     with np.errstate(invalid="ignore", divide="ignore"):
-        slopes = np.swapaxes(high[:, 1:] - high[:, :1], 1, 2).reshape(len(step), -1, count, 3) / step
-        slopes = np.where(np.isfinite(slopes), slopes, 0.0)
-        sizes = np.linalg.norm(slopes, axis=3)
-        room = high[:, 0] / (
-            sizes[..., :-1].sum(2) * fraction.spools[:, None] + sizes[..., -1] * fraction.centre[:, None]
+        derivatives = np.swapaxes(high[:, 1:] - high[:, :1], 1, 2).reshape(len(step), -1, count, 3) / step
+        derivatives = np.where(np.isfinite(derivatives), derivatives, 0.0)
+        norms = np.linalg.norm(derivatives, axis=3)
+        tolerated = high[:, 0] / (
+            norms[..., :-1].sum(2) * radii.spools[:, None] + norms[..., -1] * radii.centre[:, None]
         )
-        first = np.argsort(np.where(np.isfinite(room), room, np.inf), axis=1)[
-            :, np.minimum(np.arange(NEAREST), room.shape[1] - 1)
+        first = np.argsort(np.where(np.isfinite(tolerated), tolerated, np.inf), axis=1)[
+            :, np.minimum(np.arange(NEAREST), tolerated.shape[1] - 1)
         ]
-        ways = -slopes / np.where(sizes > 0.0, sizes, 1.0)[..., None]
-    return np.take_along_axis(ways, first[..., None, None], axis=1)
+        directions = -derivatives / np.where(norms > 0.0, norms, 1.0)[..., None]
+    return np.take_along_axis(directions, first[..., None, None], axis=1)
 
 
-def instants_fail(
+def states_fail(
     robot: AnyRobot,
     limits: Limits,
     bodies: Bodies,
     states: StateBounds,
-    fraction: Share,
-    ways: np.ndarray,
+    radii: Radii,
+    directions: np.ndarray,
     *,
     contacts_alone: bool = False,
 ) -> Float[np.ndarray, "k"]:
-    """Tell at which instants a robot that is displaced, light or heavy, breaks a criterion."""
-    radii = np.repeat(np.stack([fraction.spools, fraction.centre], axis=1), [robot.n_cables, 1], axis=1)
-    moved = np.repeat(radii[:, None, :, None] * ways, 2, axis=1)
-    ratio = np.tile(np.stack([1.0 / fraction.factor, fraction.factor], axis=1), (1, ways.shape[1]))
+    """Tell in which states a robot that is displaced, light or heavy, breaks a criterion."""
+    distances = np.repeat(np.stack([radii.spools, radii.centre], axis=1), [robot.n_cables, 1], axis=1)
+    moved = np.repeat(distances[:, None, :, None] * directions, 2, axis=1)
+    ratio = np.tile(np.stack([1.0 / radii.factor, radii.factor], axis=1), (1, directions.shape[1]))
     return _of_robots(robot, limits, bodies, states, moved, ratio, contacts_alone=contacts_alone).min((1, 2)) < 0.0

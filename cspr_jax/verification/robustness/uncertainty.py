@@ -2,12 +2,12 @@
 
 The motion is the planned one; spools, mass centre and mass differ from the plan's. With W the structure matrix and w
 the wrench per mass in the middle of a block, W mu = w, and E what rays within the block and displaced spools add to W,
-the tensions mu' of another robot differ from the planned ones mu at the same instant by d = mu' - mu,
+the tensions mu' of another robot differ from the planned ones mu at the same time by d = mu' - mu,
 
     |d| <= A |d| + B mu + b,    so |d| <= (1 - A)^-1 (B mu + b)  where the spectral radius of A = G + B is below 1,
 
-component by component. G_kj is |g_kj . the way of ray j| plus |g_kj| times the distance of the ray from its tangent,
-B_kj is |g_kj across ray j| times the largest displacement of spool j, and b is the effect of the mass centre:
+component by component. G_kj is |g_kj . the tangent of ray j| plus |g_kj| times the distance of the ray from its
+tangent, B_kj is |g_kj across ray j| times the largest displacement of spool j, and b is the effect of the mass centre:
 docs/theory.md. Then no such robot is singular either.
 """
 
@@ -29,12 +29,13 @@ from cspr_jax.verification.robustness.cable_rates import rates_fail, rates_hold
 if TYPE_CHECKING:
     from jaxtyping import Float
 
-# Blocks of which nothing is known have infinite bounds and no inverse: NaN proves nothing, and refutes nothing.
+# Blocks without an enclosure have infinite bounds and no inverse: NaN proves nothing, and refutes nothing.
 UNKNOWN = np.errstate(invalid="ignore", divide="ignore", over="ignore")
 # Largest relative error of solving for a deviation, and of the tensions.
 SOLVING_ERROR = 1e-9
 # Rounds in which functionals are corrected, and the relative surplus of each correction.
-ROUNDS, SPARE = 8, 0.01
+ROUNDS = 8
+SPARE = 0.01
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,39 +56,39 @@ class Requirements:
 
 
 def requirements_of(problem: Problem, slack: Float[np.ndarray, "n"]) -> Requirements:
-    """Return the requirements on all robots within the uncertainty of a problem."""
+    """Requirements on all robots within the uncertainty of a problem."""
     limits = jax.tree.map(np.asarray, touchable(problem).limits)
     if limits.uncertainty is None:
         raise ValueError("limits of robots within an uncertainty have none")
     return Requirements(float(problem.robot.mass), slack, limits, limits.uncertainty)
 
 
-class _Share(NamedTuple):
+class _Radii(NamedTuple):
     # A multiple of an uncertainty, one for each block: radii (k,) m, and the factor of the mass.
     spools: np.ndarray
     centre: np.ndarray
     factor: np.ndarray
 
 
-def _share(requirements: Requirements, multiple: np.ndarray) -> _Share:
+def _radii(requirements: Requirements, multiple: np.ndarray) -> _Radii:
     uncertainty = requirements.uncertainty
-    return _Share(
+    return _Radii(
         multiple * float(uncertainty.spool_positions),
         multiple * float(uncertainty.mass_centre),
         float(uncertainty.mass_factor) ** multiple,
     )
 
 
-class _Reaches(NamedTuple):
-    # Reach of k blocks and a multiple of the uncertainty, (k, n_cables) each: displacement of spools across rays, at
+class _Effects(NamedTuple):
+    # Effects in k blocks of a multiple of the uncertainty, (k, n_cables) each: displacement of spools across rays, at
     # planned lengths; motion of rays from the middle, over their lengths; effect of the mass centre on tensions.
     off: np.ndarray
     tilt: np.ndarray
     centre: np.ndarray
 
 
-def _reaches(known: Enclosure, influence: Influence, spools: np.ndarray, centre: np.ndarray) -> _Reaches:
-    near = influence.lengths - known.moved
+def _effects(enclosure: Enclosure, influence: Influence, spools: np.ndarray, centre: np.ndarray) -> _Effects:
+    near = influence.lengths - enclosure.moved
     fraction = spools[:, None] / np.where(near > 0.0, near, np.nan)
     # A displaced spool counts as one that is displaced across its ray alone, at the planned length.
     off = np.where(fraction < 1.0, spools[:, None] / np.sqrt(1.0 - fraction**2), np.nan)
@@ -95,41 +96,41 @@ def _reaches(known: Enclosure, influence: Influence, spools: np.ndarray, centre:
         np.linalg.norm(x, axis=2) for x in (influence.centre, influence.moments, influence.forces)
     )
     acceleration_matrix, radius = (
-        np.linalg.norm(known.acceleration_matrix, axis=(1, 2)) + known.acceleration_matrix_change,
+        np.linalg.norm(enclosure.acceleration_matrix, axis=(1, 2)) + enclosure.acceleration_matrix_change,
         centre[:, None],
     )
     rest = (
         direct_effect
-        + force * known.acceleration_matrix_change[:, None]
-        + moment * (known.force_change + centre * acceleration_matrix)[:, None]
+        + force * enclosure.acceleration_matrix_change[:, None]
+        + moment * (enclosure.force_change + centre * acceleration_matrix)[:, None]
     )
-    return _Reaches(off, np.minimum(known.moved / influence.lengths, 1.0), radius * rest)
+    return _Effects(off, np.minimum(enclosure.moved / influence.lengths, 1.0), radius * rest)
 
 
 def _changes(
-    known: Enclosure, influence: Influence, vectors: np.ndarray, far: _Reaches
+    enclosure: Enclosure, influence: Influence, vectors: np.ndarray, far: _Effects
 ) -> tuple[np.ndarray, np.ndarray]:
     # Bound the changes of rays within blocks, and by displaced spools, along vectors (k, ..., n_cables, 3).
-    shape = (len(vectors), *(1,) * (vectors.ndim - 3), *known.deviation.shape[1:])
+    shape = (len(vectors), *(1,) * (vectors.ndim - 3), *enclosure.deviation.shape[1:])
     full = np.linalg.norm(vectors, axis=-1)
-    units = (known.rays / influence.lengths[..., None]).reshape(*shape, 3)
-    way, deviation, off, tilt = (
-        known.way.reshape(*shape, 3),
-        *(x.reshape(shape) for x in (known.deviation, far.off, far.tilt)),
+    units = (enclosure.rays / influence.lengths[..., None]).reshape(*shape, 3)
+    tangent, deviation, off, tilt = (
+        enclosure.tangent.reshape(*shape, 3),
+        *(x.reshape(shape) for x in (enclosure.deviation, far.off, far.tilt)),
     )
     along = np.sum(vectors * units, axis=-1)
     across = np.sqrt(np.maximum(full**2 - along**2, 0.0))
-    return np.abs(np.sum(vectors * way, axis=-1)) + full * deviation, off * np.minimum(full, across + full * tilt)
+    return np.abs(np.sum(vectors * tangent, axis=-1)) + full * deviation, off * np.minimum(full, across + full * tilt)
 
 
 @UNKNOWN
 def deviations(
-    known: Enclosure, influence: Influence, spools: Float[np.ndarray, "k"], centre: Float[np.ndarray, "k"]
+    enclosure: Enclosure, influence: Influence, spools: Float[np.ndarray, "k"], centre: Float[np.ndarray, "k"]
 ) -> Float[np.ndarray, "k n_cables"]:
-    """Largest differences between tensions of robots and the planned ones, at the same instant of a block."""
-    far = _reaches(known, influence, spools, centre)
-    within, displaced = _changes(known, influence, influence.spools, far)
-    rest = (displaced @ known.high[..., None])[..., 0] + SOLVING_ERROR * known.high + far.centre
+    """Largest differences between tensions of robots and the planned ones, at the same time of a block."""
+    far = _effects(enclosure, influence, spools, centre)
+    within, displaced = _changes(enclosure, influence, influence.spools, far)
+    rest = (displaced @ enclosure.high[..., None])[..., 0] + SOLVING_ERROR * enclosure.high + far.centre
     return _solved(within + displaced, rest)
 
 
@@ -137,7 +138,7 @@ class Changes(NamedTuple):
     """Largest changes of tensions, per mass and length.
 
     Fields:
-        down: (k, n_cables) 1/s^2; infinite where nothing is known.
+        down: (k, n_cables) 1/s^2; infinite where nothing is enclosure.
         up: (k, n_cables) likewise.
     """
 
@@ -147,43 +148,43 @@ class Changes(NamedTuple):
 
 @UNKNOWN
 def closer_changes(
-    known: Enclosure,
+    enclosure: Enclosure,
     influence: Influence,
     spools: Float[np.ndarray, "k"],
     centre: Float[np.ndarray, "k"],
     off: Float[np.ndarray, "k n_cables"],
-    least: Float[np.ndarray, "k n_cables"],
+    minimum: Float[np.ndarray, "k n_cables"],
     *,
     upwards: bool,
 ) -> Changes:
     """Closer bounds of the changes of tensions, which hold as long as no tension falls below its smallest value.
 
-    Change the planned robot into another one little by little, until a first tension mu'_k reaches its smallest value.
+    Change the planned robot into another one continuously, until a first tension mu'_k reaches its smallest value.
     All others are then above theirs, and at least 0. With c_j the terms of row k of B, mu'_k has changed by at most
     the largest sum of c_j mu'_j over such tensions, in which mu'_k itself is known. That sum is at most y . w for every
     functional y of wrenches whose products with the columns of the other robot's W are at least c_j.
     """
-    far = _reaches(known, influence, spools, centre)
-    within, displaced = _changes(known, influence, influence.spools, far)
+    far = _effects(enclosure, influence, spools, centre)
+    within, displaced = _changes(enclosure, influence, influence.spools, far)
     diagonal = np.eye(displaced.shape[1])[None] * displaced
-    rest = np.sum(within * off[:, None], axis=2) + far.centre + SOLVING_ERROR * known.high
-    down = _largest_sum(known, influence, displaced - diagonal, far) + rest + np.sum(diagonal, axis=2) * least
-    is_valid = (known.low - down > least).all(1)
-    up = _largest_sum(known, influence, displaced, far) + rest if upwards else np.full_like(down, np.inf)
+    rest = np.sum(within * off[:, None], axis=2) + far.centre + SOLVING_ERROR * enclosure.high
+    down = _largest_sum(enclosure, influence, displaced - diagonal, far) + rest + np.sum(diagonal, axis=2) * minimum
+    is_valid = (enclosure.low - down > minimum).all(1)
+    up = _largest_sum(enclosure, influence, displaced, far) + rest if upwards else np.full_like(down, np.inf)
     return Changes(*(np.where(is_valid[:, None], x, np.inf) for x in (down, up)))
 
 
-def _largest_sum(known: Enclosure, influence: Influence, weights: np.ndarray, far: _Reaches) -> np.ndarray:
+def _largest_sum(enclosure: Enclosure, influence: Influence, weights: np.ndarray, far: _Effects) -> np.ndarray:
     # Bound the sum of tensions of any robot, none below 0, times each of the rows of weights (k, n_cables, n_cables).
     more = np.zeros_like(weights)
     for _ in range(ROUNDS):
         functional = np.einsum("kij,kjlx->kilx", weights + more, influence.spools)
-        moved, shifted = _changes(known, influence, functional, far)
+        moved, shifted = _changes(enclosure, influence, functional, far)
         more, last = (moved + shifted) * (1.0 + SPARE) + SOLVING_ERROR * np.max(weights, axis=2, keepdims=True), more
     # The last correction is enough for the functional of the round before; it must be enough for its own.
     functional = np.einsum("kij,kjlx->kilx", weights + last, influence.spools)
-    moved, shifted = _changes(known, influence, functional, far)
-    total = np.sum((weights + last) * (known.high + far.centre)[:, None] + moved * known.high[:, None], axis=2)
+    moved, shifted = _changes(enclosure, influence, functional, far)
+    total = np.sum((weights + last) * (enclosure.high + far.centre)[:, None] + moved * enclosure.high[:, None], axis=2)
     is_valid = (moved + shifted <= last).all(2)
     return np.where(is_valid, total, np.inf)
 
@@ -202,49 +203,56 @@ def _solved(matrix: np.ndarray, rest: np.ndarray) -> np.ndarray:
 
 @UNKNOWN
 def holds(
-    known: Enclosure, influence: Influence, requirements: Requirements, multiple: Float[np.ndarray, "k"]
+    enclosure: Enclosure, influence: Influence, requirements: Requirements, multiple: Float[np.ndarray, "k"]
 ) -> Float[np.ndarray, "k"]:
     """Prove that every robot within a multiple of the uncertainty meets all criteria within blocks."""
-    fraction = _share(requirements, multiple)
+    radii = _radii(requirements, multiple)
     is_met = np.ones(len(multiple), bool)
     if float(requirements.uncertainty.spool_positions) > 0.0:
-        is_met &= known.distances.hold(fraction.spools)
-        is_met &= rates_hold(known, influence, requirements.limits, fraction.spools)
-    off = deviations(known, influence, fraction.spools, fraction.centre)
-    is_taut = _tensions_hold(known, influence, requirements, fraction, Changes(off, off))
+        is_met &= enclosure.distances.hold(radii.spools)
+        is_met &= rates_hold(enclosure, influence, requirements.limits, radii.spools)
+    off = deviations(enclosure, influence, radii.spools, radii.centre)
+    is_taut = _tensions_hold(enclosure, influence, requirements, radii, Changes(off, off))
     again = np.flatnonzero(is_met & ~is_taut & np.isfinite(off).all(1))
     if len(again):
-        part = known.part(again), influence.part(again)
-        part_share = _Share(*(x[again] for x in fraction))
+        part = enclosure.part(again), influence.part(again)
+        part_share = _Radii(*(x[again] for x in radii))
         less = dataclasses.replace(requirements, slack=requirements.slack[again])
         upwards = requirements.limits.tension_max is not None
         closer = closer_changes(
-            *part, part_share.spools, part_share.centre, off[again], _least(*part, less, part_share), upwards=upwards
+            *part,
+            part_share.spools,
+            part_share.centre,
+            off[again],
+            _minimum_tensions(*part, less, part_share),
+            upwards=upwards,
         )
         is_taut[again] = _tensions_hold(*part, less, part_share, closer)
     return is_met & is_taut
 
 
-def _least(known: Enclosure, influence: Influence, requirements: Requirements, fraction: _Share) -> np.ndarray:
+def _minimum_tensions(
+    enclosure: Enclosure, influence: Influence, requirements: Requirements, radii: _Radii
+) -> np.ndarray:
     # Return the smallest tensions per mass and length that are allowed within blocks.
     minimum = np.repeat(SIX_CABLES_UNDECIDED * requirements.slack[:, None], influence.lengths.shape[1], axis=1)
     limit = requirements.limits.tension_min
     if limit is None:
         return minimum
-    near = influence.lengths - known.moved
-    return np.maximum(minimum, limit / (near * (requirements.mass / fraction.factor)[:, None]))
+    near = influence.lengths - enclosure.moved
+    return np.maximum(minimum, limit / (near * (requirements.mass / radii.factor)[:, None]))
 
 
 def _tensions_hold(
-    known: Enclosure, influence: Influence, requirements: Requirements, fraction: _Share, changes: Changes
+    enclosure: Enclosure, influence: Influence, requirements: Requirements, radii: _Radii, changes: Changes
 ) -> np.ndarray:
-    is_met = (known.low - changes.down > _least(known, influence, requirements, fraction)).all(1)
+    is_met = (enclosure.low - changes.down > _minimum_tensions(enclosure, influence, requirements, radii)).all(1)
     limit = requirements.limits.tension_max
     if limit is None:
         return is_met
-    near, far = influence.lengths - known.moved, influence.lengths + known.moved
-    longest = far / np.sqrt(1.0 - np.minimum(fraction.spools[:, None] / near, 1.0) ** 2)
-    maximum = (known.high + changes.up) * longest * (requirements.mass * fraction.factor)[:, None]
+    near, far = influence.lengths - enclosure.moved, influence.lengths + enclosure.moved
+    longest = far / np.sqrt(1.0 - np.minimum(radii.spools[:, None] / near, 1.0) ** 2)
+    maximum = (enclosure.high + changes.up) * longest * (requirements.mass * radii.factor)[:, None]
     return is_met & (maximum <= limit).all(1)
 
 
@@ -262,57 +270,57 @@ class WorstDisplacements(NamedTuple):
 
 
 @UNKNOWN
-def worst(known: Enclosure, influence: Influence, requirements: Requirements) -> WorstDisplacements:
+def worst(enclosure: Enclosure, influence: Influence, requirements: Requirements) -> WorstDisplacements:
     """Displacements that are worst to first order."""
-    uncertainty, rows = requirements.uncertainty, np.arange(len(influence.mu))
-    size = np.sum(np.linalg.norm(influence.across, axis=3) * np.abs(influence.mu)[:, None], axis=2)
-    change = float(uncertainty.spool_positions) * size
+    uncertainty, index = requirements.uncertainty, np.arange(len(influence.mu))
+    norm = np.sum(np.linalg.norm(influence.across, axis=3) * np.abs(influence.mu)[:, None], axis=2)
+    change = float(uncertainty.spool_positions) * norm
     change += float(uncertainty.mass_centre) * np.linalg.norm(influence.centre, axis=2)
-    limits, pull = requirements.limits, requirements.mass * influence.lengths
-    low = 0.0 if limits.tension_min is None else limits.tension_min / pull
-    rooms = [(influence.mu - low, 1.0)]
+    limits, weighted = requirements.limits, requirements.mass * influence.lengths
+    low = 0.0 if limits.tension_min is None else limits.tension_min / weighted
+    slacks = [(influence.mu - low, 1.0)]
     if limits.tension_max is not None:
-        rooms.append((np.asarray(limits.tension_max) / pull - influence.mu, -1.0))
+        slacks.append((np.asarray(limits.tension_max) / weighted - influence.mu, -1.0))
     spools, centre = [], []
-    for room, sign in rooms:
-        cable = np.argmin(np.nan_to_num(room / change, nan=np.inf), axis=1)
-        spools.append(sign * unit_vectors(influence.across[rows, cable] * np.sign(influence.mu)[..., None]))
-        centre.append(-sign * unit_vectors(influence.centre[rows, cable]))
+    for slack, sign in slacks:
+        cable = np.argmin(np.nan_to_num(slack / change, nan=np.inf), axis=1)
+        spools.append(sign * unit_vectors(influence.across[index, cable] * np.sign(influence.mu)[..., None]))
+        centre.append(-sign * unit_vectors(influence.centre[index, cable]))
     return WorstDisplacements(np.stack(spools), np.stack(centre))
 
 
 @UNKNOWN
 def fails(
-    known: Enclosure,
+    enclosure: Enclosure,
     influence: Influence,
     worst: WorstDisplacements,
     requirements: Requirements,
     multiple: Float[np.ndarray, "k"],
 ) -> Float[np.ndarray, "k"]:
     """Tell where a worst robot within a multiple of the uncertainty breaks a criterion in the middle of a block."""
-    fraction, limits = _share(requirements, multiple), requirements.limits
+    radii, limits = _radii(requirements, multiple), requirements.limits
     broken = np.zeros(len(multiple), bool)
     for spools, centre in zip(*worst, strict=True):
-        mu, lengths = tensions(known, fraction.spools[:, None, None] * spools, fraction.centre[:, None] * centre)
+        mu, lengths = tensions(enclosure, radii.spools[:, None, None] * spools, radii.centre[:, None] * centre)
         broken |= (mu < -SIX_CABLES_UNDECIDED * requirements.slack[:, None]).any(1)
-        pull = requirements.mass * mu * lengths
+        weighted = requirements.mass * mu * lengths
         if limits.tension_min is not None:
-            broken |= (pull / fraction.factor[:, None] < limits.tension_min).any(1)
+            broken |= (weighted / radii.factor[:, None] < limits.tension_min).any(1)
         if limits.tension_max is not None:
-            broken |= (pull * fraction.factor[:, None] > limits.tension_max).any(1)
+            broken |= (weighted * radii.factor[:, None] > limits.tension_max).any(1)
     if float(requirements.uncertainty.spool_positions) > 0.0:
-        broken |= known.distances.fail(fraction.spools)
-        broken |= rates_fail(known, influence, limits, fraction.spools)
+        broken |= enclosure.distances.fail(radii.spools)
+        broken |= rates_fail(enclosure, influence, limits, radii.spools)
     return broken
 
 
 def tensions(
-    known: Enclosure, spools: Float[np.ndarray, "k n_cables 3"], centre: Float[np.ndarray, "k 3"]
+    enclosure: Enclosure, spools: Float[np.ndarray, "k n_cables 3"], centre: Float[np.ndarray, "k 3"]
 ) -> tuple[Float[np.ndarray, "k n_cables"], Float[np.ndarray, "k n_cables"]]:
     """Tensions of other robots in the middles of blocks."""
-    rays, is_platform = known.rays - spools, bool(known.arms.any())
-    extra = np.einsum("kij,kj->ki", known.acceleration_matrix, centre)
-    force = known.force + extra
-    wrench = np.concatenate([force, known.moment + np.cross(centre, force)], axis=1) if is_platform else force
-    inverse = inverted(structure(rays, known.arms, is_platform=is_platform))
+    rays, is_platform = enclosure.rays - spools, bool(enclosure.arms.any())
+    extra = np.einsum("kij,kj->ki", enclosure.acceleration_matrix, centre)
+    force = enclosure.force + extra
+    wrench = np.concatenate([force, enclosure.moment + np.cross(centre, force)], axis=1) if is_platform else force
+    inverse = inverted(structure(rays, enclosure.arms, is_platform=is_platform))
     return (inverse @ wrench[..., None])[..., 0], np.linalg.norm(rays, axis=2)

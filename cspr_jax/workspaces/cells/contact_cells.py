@@ -132,7 +132,7 @@ def _of_cell(bodies: Bodies, cell: _CellLanes) -> Range:
         solids = jax.tree.map(lambda array: array[None], placed)
         parts.append(_from_obstacles(bodies, solids, lambda points: Solid(points, shape.edges, shape.faces), planes))
     low, high = (jnp.min(jnp.concatenate([side.ravel() for side in sides])) for sides in zip(*parts, strict=True))
-    allowance = DISTANCE_ERROR * (bodies.size + jnp.max(jnp.abs(cell.position)))
+    allowance = DISTANCE_ERROR * (bodies.extent + jnp.max(jnp.abs(cell.position)))
     return low - allowance, high + allowance
 
 

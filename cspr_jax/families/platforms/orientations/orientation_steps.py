@@ -26,7 +26,7 @@ from cspr_jax.robots.contacts.interference import Contacts, cables_cross, contac
 from cspr_jax.robots.model.platform import PlatformRobot
 from cspr_jax.robots.model.point_mass import plane_normal
 from cspr_jax.robots.statics import wrench_lanes
-from cspr_jax.robots.statics.wrench_balance import at_rest, determinant_share, is_regular, normalised_determinant
+from cspr_jax.robots.statics.wrench_balance import at_rest, determinant_ratio, is_regular, normalised_determinant
 from cspr_jax.robots.statics.wrench_lanes import cable_lanes
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ def reference_share(robot: PlatformRobot, place: Float[np.ndarray, "3"]) -> floa
 @jax.jit
 def _upright(robot: PlatformRobot, place: Array) -> tuple[Array, Array, Array]:
     upright = jnp.eye(3)
-    fraction = determinant_share(robot, place, upright)
+    fraction = determinant_ratio(robot, place, upright)
     return normalised_determinant(robot, place, upright), plane_normal(robot) @ place, fraction
 
 

@@ -15,7 +15,7 @@ from cspr_jax.families.platforms.arcs import Candidates, segments_with
 from cspr_jax.families.platforms.checkers import pose_checker
 from cspr_jax.families.platforms.end_acceleration import AT_REST
 from cspr_jax.families.platforms.motion_checker import MANY
-from cspr_jax.families.platforms.platform_segment import PlatformMotion, several_bounds
+from cspr_jax.families.platforms.platform_segment import PlatformMotion, batch_bounds
 from cspr_jax.families.platforms.pose_targets import Poses, pose_arcs, rest_poses, start_beta_hat
 from cspr_jax.maps.grid_map import PlatformMap
 from cspr_jax.numerics.elementary import as_float64
@@ -60,17 +60,17 @@ class PosesMap(PlatformMap):
     def _clear(self, motions: Candidates) -> dict[str, np.ndarray]:
         # Return the columns among obstacles, by which a motion is proved as its plan is.
         from cspr_jax.maps.clear_motions import clear_motions  # with the proofs of any motion, which others need not
-        from cspr_jax.verification.bounds.batch import SeveralMotions
+        from cspr_jax.verification.bounds.batch import MotionBatch
 
         kind = self._checker.kind._replace(from_rest=False)
 
-        def join(rows: np.ndarray, arcs: np.ndarray) -> tuple[PlatformMotionAnswers, SeveralMotions]:
+        def join(rows: np.ndarray, arcs: np.ndarray) -> tuple[PlatformMotionAnswers, MotionBatch]:
             cases = motions.motions(rows)
             answers = self._answers(cases, arcs)
             chosen = cases._replace(beta_hats=(answers.beta_hat[:, 0], answers.beta_hat[:, 1]))
             segments = segments_with(self._problem.robot, chosen, answers.tried_arcs)
             each = PlatformMotion(segments, self._problem.amplitude, as_float64(answers.tried_arcs), kind)
-            return answers, SeveralMotions(each, answers.duration, partial(several_bounds, kind=kind), orders=4)
+            return answers, MotionBatch(each, answers.duration, partial(batch_bounds, kind=kind), orders=4)
 
         maximum = self._keys.trajectory.max_arcs
         return clear_motions(self._problem, self._scene, join, len(motions.z0), max_arcs=maximum)

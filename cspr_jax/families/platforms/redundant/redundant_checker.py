@@ -30,7 +30,7 @@ from cspr_jax.motion.problem import Problem
 from cspr_jax.numerics.batches import in_batches
 from cspr_jax.numerics.search.minima import narrowed_times
 from cspr_jax.numerics.tolerances import SAMPLES_UNDECIDED
-from cspr_jax.robots.model.platform import pairs_apart
+from cspr_jax.robots.model.platform import separate_pairs
 from cspr_jax.schema.verdicts import Verdict, conjunction
 from cspr_jax.verification.proved import proved
 from cspr_jax.workspaces.poses import exact
@@ -94,7 +94,7 @@ class RedundantChecker(MotionChecker):
         self._requirement = requirement(robot, FEASIBLE, limits)
         self._workspace = WorkspaceSearch(robot, self._requirement)
         self._weight = float(robot.mass * robot.gravity) / robot.n_cables
-        self._pairs = np.array(pairs_apart(robot), int).reshape(-1, 2)
+        self._pairs = np.array(separate_pairs(robot), int).reshape(-1, 2)
         size = float(np.linalg.norm(np.asarray(robot.platform_points), axis=1).max())
         self._diameter = 0.0 if robot.cable_diameter is None else float(robot.cable_diameter)
         self._touch = TOUCH * size

@@ -215,7 +215,7 @@ class PlatformChecker(MotionChecker):
         feasible = np.flatnonzero(verdict == Verdict.FEASIBLE)
         if self._robustness is None or not len(feasible):
             return
-        tolerances = self._robustness.tolerated(*motions.rows(feasible), whole=False)
+        tolerances = self._robustness.tolerated(*motions.rows(feasible), full=False)
         checks.tolerated[rows[feasible]], checks.not_tolerated[rows[feasible]] = tolerances
         open_ones = np.where(tolerances.refuted <= 1.0, Verdict.UNCERTAINTY.value, Verdict.UNDECIDED.value)
         verdict[feasible] = np.where(tolerances.proved >= 1.0, Verdict.FEASIBLE.value, open_ones)

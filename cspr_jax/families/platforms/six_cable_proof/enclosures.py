@@ -1,4 +1,4 @@
-"""Enclosures of a platform on its way, for bounds over robots that differ a little; vectors are in platform axes."""
+"""Enclosures of a platform on its path, for bounds over robots that differ a little; vectors are in platform axes."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ class _Within(NamedTuple):
     # Changes of the rays along their tangents up to the stops of k blocks (k, 6, 3), and bounds of changes within these
     # blocks: of velocities and accelerations of the attachment points, of rays from their tangents, of rays (k, 6), of
     # force and whirl (k,).
-    way: np.ndarray
+    tangent: np.ndarray
     velocity: np.ndarray
     acceleration: np.ndarray
     deviation: np.ndarray
@@ -159,13 +159,13 @@ def _within(robot: PlatformRobot, middle: _Middle, moving: _Moving, half: np.nda
     pull = near.second_derivative + arms * turning
     steep = jerk + arms * wide.radial_rate * (wide.angular_acceleration + wide.omega**2) / radius
     deviation = 0.5 * half**2 * (near.second_derivative + 2.0 * near.omega * near.speed + turning * away)
-    way = middle.pace * (half * time)[..., None]
+    tangent = middle.pace * (half * time)[..., None]
     return _Within(
-        way,
+        tangent,
         half * (pull + near.omega * pace) / time,
         half * (steep + near.omega * pull) / squared,
         deviation,
-        largest_moves(way, deviation),
+        largest_moves(tangent, deviation),
         *(half * x for x in (force, acceleration_matrix)),
     )
 
@@ -194,7 +194,7 @@ def _distances(problem: Problem, pairs: tuple, middle: _Middle, within: _Within,
         _add_gap(columns, gaps[:, n], places[:, n], middle, within, tips, pair)
     for k in range(CABLES):
         e, height = unit_vectors(left[:, k]), np.linalg.norm(left[:, k], axis=1)
-        change = np.abs(np.sum(e * within.way[:, k], axis=1)) + within.deviation[:, k]
+        change = np.abs(np.sum(e * within.tangent[:, k], axis=1)) + within.deviation[:, k]
         columns.add(-np.sum(e * middle.rays[:, k], axis=1), change, 1.0, height, 1.0)
     longest = touchable(problem).limits.cable_length_max
     for k, length in enumerate([] if longest is None else np.asarray(longest).tolist()):
@@ -209,7 +209,7 @@ def _add_gap(columns: _Columns, gaps, places, middle: _Middle, within: _Within, 
     e, gap = unit_vectors(gaps), np.linalg.norm(gaps, axis=1)
     tilt = _tilted(middle.rays[:, i], middle.rays[:, j], places)
     slope = np.linalg.norm(tilt, axis=1)
-    along = [np.sum(e * within.way[:, k], axis=1) for k in pair]
+    along = [np.sum(e * within.tangent[:, k], axis=1) for k in pair]
     for first, last in itertools.product((1.0, 0.0), repeat=2):
         apart = (tips[j] - last * middle.rays[:, j]) - (tips[i] - first * middle.rays[:, i])
         change = (
@@ -253,11 +253,11 @@ class Robustness:
         self._certifier = Certifier(problem, kind, batch=batch, count_instants=count_instants)
         self._knots = np.asarray(problem.amplitude.knots)
 
-    def tolerated(self, segments: PlatformSegment, arcs: Float[np.ndarray, "n"], *, whole: bool = True) -> Tolerated:
+    def tolerated(self, segments: PlatformSegment, arcs: Float[np.ndarray, "n"], *, full: bool = True) -> Tolerated:
         """Multiples that motions stand."""
         blocks = parts_of_arcs(arcs, self._knots, PARTS)
         requirements = requirements_of(self._problem, np.asarray(segments.rate) / CABLES)
-        return tolerated(blocks, arcs, requirements, partial(self.enclosure, segments, arcs), whole=whole)
+        return tolerated(blocks, arcs, requirements, partial(self.enclosure, segments, arcs), full=full)
 
     def enclosure(self, segments: PlatformSegment, arcs: Float[np.ndarray, "n"], blocks: Blocks) -> Enclosure:
         """Enclosure of blocks of motions."""
@@ -279,7 +279,7 @@ class Robustness:
             force=middle.force,
             moment=middle.moment,
             acceleration_matrix=middle.acceleration_matrix,
-            way=within.way,
+            tangent=within.tangent,
             deviation=within.deviation,
             force_change=within.force[:, 0],
             acceleration_matrix_change=within.acceleration_matrix[:, 0],

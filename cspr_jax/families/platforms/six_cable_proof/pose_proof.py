@@ -130,7 +130,7 @@ class PlaceCertifier:
             if level >= NEAR_CONTACT and len(doubtful):
                 doubtful_blocks = part.part(doubtful)
                 cables = self._cables(doubtful_blocks, np.asarray(bounds.bends)[:, doubtful], (segments, arcs))
-                base, between = np.asarray(self._problem.robot.base_points), doubtful_blocks.instants(MIDDLES[:, None])
+                base, between = np.asarray(self._problem.robot.base_points), doubtful_blocks.times(MIDDLES[:, None])
                 for flag, step in (
                     (met, cables_meet(base, self._near.pairs, cables)),
                     (hit, cables_hit(self._near.sides, self._near.normal, cables)),
@@ -139,7 +139,7 @@ class PlaceCertifier:
                     flag[doubtful_blocks.row[meeting]] = True
                     work.refute(doubtful_blocks.row[meeting], between[step[meeting], meeting])
             nodes, bound = np.asarray(bounds.nodes), np.asarray(bounds.slacks)
-            tau = part.instants(PLACES[:, None] if margins else np.asarray(bounds.place)[None])
+            tau = part.times(PLACES[:, None] if margins else np.asarray(bounds.place)[None])
             return BlockBounds(nodes, bound, tau, lambda _: is_clear)
 
         first = work.work_off(blocks, look)
@@ -166,7 +166,7 @@ class PlaceCertifier:
         segments, arcs = motions
         block = np.tile(np.arange(len(blocks.row)), len(PLACES))
         row, middle = blocks.row[block], 0.5 * (blocks.start + blocks.stop)[block]
-        items = rows(segments, row), arcs[row].astype(float), middle, blocks.instants(PLACES[:, None]).ravel() - middle
+        items = rows(segments, row), arcs[row].astype(float), middle, blocks.times(PLACES[:, None]).ravel() - middle
         vectors = in_batches(partial(cables_beside, self._problem, kind=self._kind), items, batch_size=self._batch)
         rays, seen = (x.reshape(len(PLACES), len(blocks.row), *x.shape[1:]) for x in vectors)
         centre, arm, platform = bends

@@ -118,7 +118,7 @@ class Certifier:
 
         def look(part: Blocks, _: int) -> BlockBounds:
             bounds = self._looked_at(part, motions, margins=margins)
-            tau = part.instants(chebyshev.nodes()[:, None] if margins else np.asarray(bounds.place)[None])
+            tau = part.times(chebyshev.nodes()[:, None] if margins else np.asarray(bounds.place)[None])
             nodes, bound = np.asarray(bounds.nodes), np.asarray(bounds.bound)
             return BlockBounds(nodes, bound, tau, lambda least: bound[0] >= near * np.maximum(least[part.row, 0], 0.0))
 

@@ -101,7 +101,7 @@ def enclosure(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"], b
         force=known.acceleration - np.array([0.0, 0.0, float(problem.robot.gravity)]),
         moment=np.zeros((count, 3)),
         acceleration_matrix=np.zeros((count, 3, 3)),
-        way=np.broadcast_to(way[:, None], each),
+        tangent=np.broadcast_to(way[:, None], each),
         deviation=np.repeat(known.deviation[:, None], n_cables, axis=1),
         force_change=known.acceleration_change,
         acceleration_matrix_change=nothing,
@@ -113,10 +113,10 @@ def enclosure(problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"], b
 
 
 def tolerated_by_point_masses(
-    problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"], *, whole: bool = True
+    problem: Problem, segments: Segment, arcs: Num[np.ndarray, "n"], *, full: bool = True
 ) -> Tolerated:
     """Multiples of the uncertainty that motions of a point mass tolerate."""
     blocks = parts_of_arcs(arcs, np.asarray(problem.amplitude.knots), PARTS)
     rates: Any = np.asarray(segments.rate)
     requirements = requirements_of(problem, rates / problem.robot.base_points.shape[0])
-    return tolerated(blocks, arcs, requirements, partial(enclosure, problem, segments, arcs), whole=whole)
+    return tolerated(blocks, arcs, requirements, partial(enclosure, problem, segments, arcs), full=full)
